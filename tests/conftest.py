@@ -1,0 +1,48 @@
+"""What all tests share: the kernel cache, and the logs and reference figures that lie beside the project."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from fusetune.digest import source_digest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# Numba reads the variable when it is imported, so it is set before any test module is.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".cache" / "numba" / source_digest("ekf2", "px4")))
+
+SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
+
+
+def _shared_part(name: str) -> Path:
+    folder = SHARED / name
+    if not folder.is_dir():
+        pytest.skip(f"needs {name} of real flights in {folder} (or below FUSETUNE_SHARED), which is not there")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def project_root() -> Path:
+    """Folder that holds the Snakefile."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared_logs() -> Path:
+    """Folder of real flight logs; the test is skipped where it does not exist."""
+    return _shared_part("logs")
+
+
+@pytest.fixture(scope="session")
+def shared_reference() -> Path:
+    """Folder of PX4's own replays of the real logs; the test is skipped where it does not exist."""
+    return _shared_part("reference")
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of fact tables; the test is skipped where it does not exist."""
+    return _shared_part("data")
