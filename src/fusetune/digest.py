@@ -1,61 +1,44 @@
-"""Digest of the package's sources: the name of a kernel cache and the reason to run a job again.
-
-Numba's cache looks only at the file a kernel stands in, not at the files of the functions it calls; Snakemake does not
-look at the sources of a library at all. One digest over the files that a step uses closes both holes. Importing this
-module is cheap (standard library only), because the workflow computes digests whenever it is parsed.
-"""
+"""One figure for the sources of a part of the package, so that changed code re-runs what depends on it."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
 from pathlib import Path
 
-PACKAGE_ROOT = Path(__file__).resolve().parent
-SOURCE_SUFFIXES = frozenset({".py", ".csv", ".npz", ".yaml", ".json"})
+_PACKAGE_FOLDER = Path(__file__).resolve().parent
+_NOT_SOURCES = {".pyc", ".pyo", ".nbi", ".nbc"}
 
 
-def source_files(parts: Iterable[str]) -> list[Path]:
-    """List the source files of some parts of the package, in a fixed order.
+def source_digest(*parts: str) -> str:
+    """SHA-256 over the names and bytes of the source files of some parts of the package.
 
     Parameters
     ----------
     parts
-        Names below the package root: a sub-package (``"ekf2"``) or a module (``"digest.py"``).
+        Folders or files relative to the package (``"px4"``, ``"ekf2"``, ``"save/verdict.py"``); their order does not
+        matter. Data files that ship with a part (CSV, schemas, styles) count as sources; compiled caches do not.
 
     Raises
     ------
     FileNotFoundError
-        A part does not exist: a digest of nothing would hide changes.
-    """
-    files: set[Path] = set()
-    for part in parts:
-        path = PACKAGE_ROOT / part
-        if path.is_dir():
-            files.update(file for file in path.rglob("*") if file.suffix in SOURCE_SUFFIXES)
-        elif path.is_file():
-            files.add(path)
-        else:
-            raise FileNotFoundError(f"the package has no part {part!r} at {path}")
-    return sorted(files)
-
-
-def source_digest(*parts: str) -> str:
-    """Digest the sources of some parts of the package.
-
-    Parameters
-    ----------
-    parts
-        Names below the package root, as in `source_files`; none means the whole package.
-
-    Returns
-    -------
-    str
-        16 hexadecimal digits of SHA-256 over the relative names and the contents.
+        A part does not exist.
     """
     digest = hashlib.sha256()
-    for file in source_files(parts or (".",)):
-        digest.update(file.relative_to(PACKAGE_ROOT).as_posix().encode())
-        digest.update(b"\0")
-        digest.update(hashlib.sha256(file.read_bytes()).digest())
-    return digest.hexdigest()[:16]
+    for file in sorted({file for part in parts for file in _source_files(part)}):
+        name, content = file.relative_to(_PACKAGE_FOLDER).as_posix(), file.read_bytes()
+        digest.update(f"{name}\0{len(content)}\0".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _source_files(part: str) -> list[Path]:
+    path = _PACKAGE_FOLDER / part
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise FileNotFoundError(f"the package has no part {part!r}")
+    return [
+        file
+        for file in path.rglob("*")
+        if file.is_file() and "__pycache__" not in file.parts and file.suffix not in _NOT_SOURCES
+    ]

@@ -1,0 +1,1 @@
+"""Third room: every log becomes a folder of tables with a verdict."""
