@@ -1,0 +1,37 @@
+"""Fusion of NED velocity observations, axis by axis."""
+
+from numba import njit
+
+from fusetune.ekf2.measurement_update import fuse_direct_state
+from fusetune.ekf2.state import VELOCITY
+
+
+@njit(cache=True, error_model="numpy")
+def fuse_horizontal_velocity(ekf, params, aid):
+    """Fuse north and east velocity of an aid source that has been judged; return whether it was fused."""
+    aid.fused = _fuse_velocity_axes(ekf, params, aid, 2)
+    if aid.fused:
+        ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+    return aid.fused
+
+
+@njit(cache=True, error_model="numpy")
+def fuse_velocity(ekf, params, aid):
+    """Fuse all three velocity axes of an aid source that has been judged; return whether they were fused."""
+    aid.fused = _fuse_velocity_axes(ekf, params, aid, 3)
+    if aid.fused:
+        ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+        ekf.time_last_ver_vel_fuse = ekf.time_delayed_us
+    return aid.fused
+
+
+@njit(cache=True, error_model="numpy")
+def _fuse_velocity_axes(ekf, params, aid, n_axes):
+    if aid.innovation_rejected:
+        return False
+    for i in range(n_axes):
+        fuse_direct_state(
+            ekf, params, aid.innovation[i], aid.innovation_variance[i], aid.observation_variance[i], VELOCITY + i
+        )
+    aid.time_last_fuse = ekf.time_delayed_us
+    return True
