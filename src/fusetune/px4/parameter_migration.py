@@ -1,0 +1,82 @@
+"""EKF2 parameters of older and newer releases in the names and the meaning of v1.16.
+
+What each replacement means is what PX4 itself does when a vehicle with stored parameters is updated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+_GPS, _OPTICAL_FLOW, _INHIBIT_ACCEL_BIAS, _VISION_POSITION, _VISION_YAW, _DRAG = (1 << bit for bit in range(6))
+_GPS_YAW, _VISION_VELOCITY = 1 << 7, 1 << 8
+"""Bits of EKF2_AID_MASK (releases before v1.14)."""
+
+_GPS_CTRL_AIDING, _GPS_CTRL_ALTITUDE, _GPS_CTRL_YAW = 0b0111, 0b0010, 0b1000
+_EV_CTRL_POSITION, _EV_CTRL_HEIGHT, _EV_CTRL_VELOCITY, _EV_CTRL_YAW = 0b0011, 0b0010, 0b0100, 0b1000
+_IMU_CTRL_DEFAULT, _IMU_CTRL_ACCEL_BIAS = 0b111, 0b010
+
+_HEIGHT_GPS, _HEIGHT_RANGE, _HEIGHT_VISION = 1, 2, 3
+"""Values of EKF2_HGT_MODE and EKF2_HGT_REF."""
+
+_RENAMED = {
+    "EKF2_REQ_GDOP": ("EKF2_REQ_PDOP",),
+    "EKF2_EV_GATE": ("EKF2_EVP_GATE",),
+    "EKF2_PCOEF_Y": ("EKF2_PCOEF_YN", "EKF2_PCOEF_YP"),
+    "EKF2_RNG_AID": ("EKF2_RNG_CTRL",),
+    "EKF2_HGT_MODE": ("EKF2_HGT_REF",),
+    "EKF2_AGP0_CTRL": ("EKF2_AGP_CTRL",),
+    "EKF2_AGP0_DELAY": ("EKF2_AGP_DELAY",),
+    "EKF2_AGP0_GATE": ("EKF2_AGP_GATE",),
+    "EKF2_AGP0_NOISE": ("EKF2_AGP_NOISE",),
+    "SENS_GPS0_DELAY": ("EKF2_GPS_DELAY",),
+    "SENS_GPS0_OFFX": ("EKF2_GPS_POS_X",),
+    "SENS_GPS0_OFFY": ("EKF2_GPS_POS_Y",),
+    "SENS_GPS0_OFFZ": ("EKF2_GPS_POS_Z",),
+}
+"""One parameter that went on under another name (or two) with the same meaning and unit."""
+
+_MAG_TYPE_AUTOMATIC, _MAG_TYPES_REMOVED = 0, (2, 3, 4)
+
+
+def migrate_names(logged: Mapping[str, float | int]) -> dict[str, float | int]:
+    """The logged parameters with those of v1.16 added where the log has only their predecessors.
+
+    A parameter that the log holds under its v1.16 name is never overridden by a predecessor.
+    """
+    derived: dict[str, float | int] = {}
+    for old, new_names in _RENAMED.items():
+        if old in logged:
+            derived.update(dict.fromkeys(new_names, logged[old]))
+    if "EKF2_WIND_NOISE" in logged:
+        # a standard deviation per step at 100 Hz became a noise density: smaller by the square root of the rate
+        derived["EKF2_WIND_NSD"] = float(logged["EKF2_WIND_NOISE"]) / 10.0
+    if "EKF2_HGT_MODE" in logged and int(logged["EKF2_HGT_MODE"]) == _HEIGHT_RANGE:
+        derived["EKF2_RNG_CTRL"] = 2
+    if "EKF2_AID_MASK" in logged:
+        derived.update(_controls_of_aid_mask(int(logged["EKF2_AID_MASK"]), int(logged.get("EKF2_HGT_MODE", 0))))
+    migrated = derived | dict(logged)
+    if migrated.get("EKF2_MAG_TYPE") in _MAG_TYPES_REMOVED:
+        migrated["EKF2_MAG_TYPE"] = _MAG_TYPE_AUTOMATIC
+    return migrated
+
+
+def _controls_of_aid_mask(mask: int, height_mode: int) -> dict[str, int]:
+    """The control parameter of each aid source that EKF2_AID_MASK and EKF2_HGT_MODE amount to."""
+    gps = _GPS_CTRL_AIDING if mask & _GPS else _GPS_CTRL_ALTITUDE if height_mode == _HEIGHT_GPS else 0
+    if mask & _GPS_YAW:
+        gps |= _GPS_CTRL_YAW
+    vision = _EV_CTRL_POSITION if mask & _VISION_POSITION else 0
+    if height_mode == _HEIGHT_VISION:
+        vision |= _EV_CTRL_HEIGHT
+    if mask & _VISION_VELOCITY:
+        vision |= _EV_CTRL_VELOCITY
+    if mask & _VISION_YAW:
+        vision |= _EV_CTRL_YAW
+    imu = _IMU_CTRL_DEFAULT & ~_IMU_CTRL_ACCEL_BIAS if mask & _INHIBIT_ACCEL_BIAS else _IMU_CTRL_DEFAULT
+    return {
+        "EKF2_GPS_CTRL": gps,
+        "EKF2_OF_CTRL": int(bool(mask & _OPTICAL_FLOW)),
+        "EKF2_EV_CTRL": vision,
+        "EKF2_DRAG_CTRL": int(bool(mask & _DRAG)),
+        "EKF2_IMU_CTRL": imu,
+    }
