@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from fusetune.digest import source_digest
+from fusetune.kernel_cache import use_kernel_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 
 # Numba reads the variable when it is imported, so it is set before any test module is.
-os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".cache" / "numba" / source_digest("ekf2", "px4")))
+use_kernel_cache()
 
 SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
 

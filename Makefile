@@ -1,0 +1,40 @@
+# make       sets up .venv where that is needed, then runs the pipeline
+# make test  sets up .venv where that is needed, then runs the tests
+CORES ?= 2
+PYTHON ?= $(shell command -v python3.11 || command -v python3 || command -v python)
+BIN := .venv/bin
+READY := .venv/.ready
+
+# Every job is a process of its own: without byte code each of them would compile its imports again.
+export PYTHONDONTWRITEBYTECODE :=
+export UV_COMPILE_BYTECODE := 1
+
+.PHONY: all setup test clean
+
+all: $(READY)
+	$(BIN)/snakemake --cores $(CORES)
+
+setup: $(READY)
+
+test: $(READY)
+	$(BIN)/pytest
+
+# The stamp goes first and comes last: a set-up that was interrupted is done again from nothing.
+$(READY): requirements.lock pyproject.toml
+	@if [ ! -e $@ ]; then rm -rf .venv; fi; rm -f $@
+	@if command -v uv >/dev/null 2>&1; then \
+		echo "Setting up .venv with uv ..." && \
+		{ [ -d .venv ] || uv venv --quiet --python '>=3.11' .venv; } && \
+		uv pip install --quiet --python $(BIN)/python -c requirements.lock -e '.[dev]'; \
+	elif [ -n "$(PYTHON)" ] && "$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then \
+		echo "Setting up .venv with pip ..." && \
+		{ [ -d .venv ] || "$(PYTHON)" -m venv .venv; } && \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[dev]'; \
+	else \
+		echo "fusetune needs Python 3.11 or newer, or uv: install one of them and run make again." >&2; exit 1; \
+	fi
+	@touch $@
+
+# Removes what the pipeline has made; logs in flights/ and the environment stay.
+clean:
+	rm -rf results .snakemake .cache

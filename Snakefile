@@ -1,0 +1,37 @@
+# From flight logs to EKF2 parameters: design -> execute -> save -> analyze -> apply, and a report of it all.
+from snakemake.utils import min_version
+
+min_version("9.27")
+
+
+configfile: "config/config.yaml"
+
+
+report: "workflow/report/workflow.rst"
+
+
+include: "workflow/rules/environment.smk"
+include: "workflow/rules/configuration.smk"
+include: "workflow/rules/common.smk"
+include: "workflow/rules/design.smk"
+include: "workflow/rules/execute.smk"
+include: "workflow/rules/save.smk"
+include: "workflow/rules/analyze.smk"
+include: "workflow/rules/apply.smk"
+include: "workflow/rules/report.smk"
+
+
+wildcard_constraints:
+    flight=r"[^/]+",
+
+
+rule all:
+    default_target: True
+    input:
+        rules.design.output,
+        rules.decide.output,
+        rules.build_report.output,
+
+
+onsuccess:
+    print(closing_words())

@@ -1,0 +1,65 @@
+"""What was made from what: lets a job that makes several files make only those that are missing or out of date.
+
+A job that handles many parameter sets spares the start of a process for each. The ledger in the folder of its outputs
+says, per set, from which inputs its files were made (a key) and which files these were, by size and time of change. A
+set whose key is the same and whose files are untouched needs no second computation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from fusetune.files import atomic_path
+
+
+def key_of(inputs: Any) -> str:
+    """Digest anything that JSON can hold, independent of the order of mappings."""
+    text = json.dumps(inputs, sort_keys=True, ensure_ascii=False, allow_nan=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _fingerprint(file: Path) -> list[int]:
+    status = file.stat()
+    return [status.st_size, status.st_mtime_ns]
+
+
+class Ledger:
+    """The record of one folder.
+
+    Parameters
+    ----------
+    path
+        File of the record; a missing or unreadable one counts as empty, for it only ever saves work.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self.entries: dict[str, dict[str, Any]] = {}
+        try:
+            entries = json.loads(self.path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return
+        if isinstance(entries, dict):
+            self.entries = {name: entry for name, entry in entries.items() if isinstance(entry, dict)}
+
+    def is_current(self, name: str, key: str, files: Iterable[str | os.PathLike[str]]) -> bool:
+        """Whether the files of an entry stand as they were made, from the inputs that the key digests."""
+        entry = self.entries.get(name)
+        if entry is None or entry.get("key") != key:
+            return False
+        try:
+            found = {Path(file).name: _fingerprint(Path(file)) for file in files}
+        except OSError:
+            return False
+        return found == entry.get("files")
+
+    def record(self, name: str, key: str, files: Iterable[str | os.PathLike[str]]) -> None:
+        """Enter files that have just been made, and save the record."""
+        self.entries[name] = {"key": key, "files": {Path(file).name: _fingerprint(Path(file)) for file in files}}
+        with atomic_path(self.path) as temporary:
+            temporary.write_text(json.dumps(self.entries, indent=1, sort_keys=True), encoding="utf-8")

@@ -1,0 +1,54 @@
+for number, first in enumerate(range(0, len(SETS), SETTINGS["sets_per_job"]), 1):
+    chunk = SETS[first : first + SETTINGS["sets_per_job"]]
+
+    # One job replays several sets; each set keeps its own files. They are updated, not made anew, so that a job that is
+    # started for a new set leaves the others' files as they are.
+    rule:
+        name:
+            f"replay_{number}"
+        input:
+            flight="results/save/{flight}",
+            kernels=ancient(KERNELS_READY),
+        output:
+            update(
+                expand(
+                    "results/analyze/{{flight}}/{pset}.{part}",
+                    pset=chunk,
+                    part=REPLAY_PARTS,
+                )
+            ),
+        log:
+            f"results/logs/replay/{{flight}}.{number}.log",
+        benchmark:
+            f"results/benchmarks/replay/{{flight}}.{number}.tsv"
+        conda:
+            "../envs/fusetune.yaml"
+        params:
+            sets=overrides_of(chunk),
+            ledger=f"results/analyze/{{flight}}/.replay_{number}.json",
+            code=DIGEST["replay"],
+        message:
+            f"Analyze: replay {{wildcards.flight}} with {', '.join(chunk)}"
+        script:
+            "../scripts/replay_flight.py"
+
+
+rule score_flight:
+    input:
+        flight="results/save/{flight}",
+        replays=expand("results/analyze/{{flight}}/{pset}.{part}", pset=SETS, part=REPLAY_PARTS),
+    output:
+        expand("results/analyze/{{flight}}/{part}", part=SCORE_PARTS),
+    log:
+        "results/logs/score/{flight}.log",
+    conda:
+        "../envs/fusetune.yaml"
+    params:
+        sets=SETS,
+        present=PRESENT,
+        scoring=SETTINGS["scoring"],
+        code=DIGEST["score"],
+    message:
+        "Analyze: score {wildcards.flight}"
+    script:
+        "../scripts/score_flight.py"

@@ -1,0 +1,43 @@
+rule decide:
+    input:
+        flights="results/save/flights.parquet",
+        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        configuration=CONFIGURATION_FILES,
+    output:
+        "results/apply/ranking.parquet",
+        "results/apply/per_flight.parquet",
+        report(
+            "results/apply/ranking.csv",
+            caption="../report/ranking.rst",
+            category="Decision",
+            labels={"table": "ranking"},
+        ),
+        report(
+            "results/apply/decision.json",
+            caption="../report/decision.rst",
+            category="Decision",
+            labels={"table": "decision and provenance"},
+        ),
+        report(
+            "results/apply/best_params.params",
+            caption="../report/best_params.rst",
+            category="Decision",
+            labels={"table": "parameters to load"},
+        ),
+        "results/apply/rollback.params",
+    log:
+        "results/logs/decide.log",
+    conda:
+        "../envs/fusetune.yaml"
+    params:
+        sets=SETS,
+        present=PRESENT,
+        newest_flight=lambda wildcards: present_flight(),
+        descriptions={pset.name: pset.description for pset in STUDY.sets},
+        decision=SETTINGS["decision"],
+        seed=SETTINGS["seed"],
+        code=DIGEST["apply"],
+    message:
+        "Apply: decide over {params.sets}"
+    script:
+        "../scripts/decide.py"

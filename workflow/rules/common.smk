@@ -1,0 +1,74 @@
+# Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
+import csv
+import json
+
+REPLAY_PARTS = (
+    "innovations.parquet",
+    "states.parquet",
+    "local_position.parquet",
+    "status_flags.parquet",
+    "json",
+)
+SCORE_PARTS = (
+    "metrics.parquet",
+    "scores.parquet",
+    "samples.parquet",
+    "scoring.json",
+    "onboard.innovations.parquet",
+)
+
+
+def read_csv(path):
+    with open(path, encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def replayable_rows():
+    return [row for row in read_csv(checkpoints.list_flights.get().output.csv) if row["status"] == "replayable"]
+
+
+def replayable_flights():
+    return [row["flight"] for row in replayable_rows()]
+
+
+def of_replayable_flights(pattern):
+    """Input function: one file of every flight that can be replayed."""
+    return lambda wildcards: expand(pattern, flight=replayable_flights())
+
+
+def present_flight():
+    """The flight whose parameters count as the vehicle's present ones; None where no flight can be replayed."""
+    rows = replayable_rows()
+    wanted = SETTINGS["present_flight"]
+    if wanted is None:
+        return max(rows, key=lambda row: (row["recorded"], row["flight"]), default={}).get("flight")
+    if wanted not in [row["flight"] for row in rows]:
+        raise WorkflowError(
+            f"{CONFIG_FILE}: present_flight is {wanted!r}, which is no flight that can be replayed. "
+            "See results/save/flights.csv."
+        )
+    return wanted
+
+
+def present_overrides():
+    """What the set `present` gives to the parameters that the study varies: the vehicle's present values."""
+    with open(f"results/save/{present_flight()}/metadata.json", encoding="utf-8") as file:
+        parameters = json.load(file)["parameters"]
+    values = parameters["initial"] | {change["name"]: change["value"] for change in parameters["changed"]}
+    varied = {name for overrides in OVERRIDES.values() for name in overrides}
+    return {name: values[name] for name in sorted(varied & values.keys())}
+
+
+def overrides_of(names):
+    """Params function: the values of some sets, so that only sets whose values change are replayed again."""
+    return lambda wildcards: {name: present_overrides() if name == PRESENT else OVERRIDES[name] for name in names}
+
+
+def closing_words():
+    statuses = [row["status"] for row in read_csv("results/save/flights.csv")]
+    kind = "flights" if FLOWN_LOGS else "simulated flights"
+    refused = len(statuses) - statuses.count("replayable")
+    return (
+        f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv). "
+        "The decision and its evidence: results/report.html"
+    )

@@ -1,0 +1,92 @@
+# What the user asked for: settings, parameter sets, mission and logs, checked before anything runs.
+from fusetune.design.config_file import read_yaml, validate
+from fusetune.design.mission import load_mission
+from fusetune.design.study import load_study
+
+PRESENT = "present"
+CONFIG_FILE = str((workflow.configfiles or ["config/config.yaml"])[-1])
+
+
+def with_defaults(values, schema):
+    """Complete a checked configuration with the defaults of its schema."""
+    for key, part in schema.get("properties", {}).items():
+        if part.get("type") == "object":
+            values[key] = with_defaults(dict(values.get(key, {})), part)
+        elif "default" in part:
+            values.setdefault(key, part["default"])
+    return values
+
+
+def checked_settings():
+    schema = read_yaml(PROJECT / "workflow" / "schemas" / "config.schema.yaml")
+    validate(config, schema, CONFIG_FILE)
+    return with_defaults(dict(config), schema)
+
+
+def discovered_logs():
+    """Logs below the folder of flights, name of the flight -> file; a folder in between becomes part of the name."""
+    folder = SETTINGS["flights_dir"]
+    if not os.path.isdir(folder):
+        raise UserError(
+            CONFIG_FILE,
+            f"flights_dir is {folder!r}, which is no folder",
+            "Make it or name another",
+        )
+    found = glob_wildcards(os.path.join(folder, "{flight}.{suffix,[uU][lL][gG]}"))
+    logs = {}
+    for stem, suffix in sorted(zip(found.flight, found.suffix)):
+        file, flight = os.path.join(folder, f"{stem}.{suffix}"), stem.replace(os.sep, "__")
+        if os.path.basename(stem).startswith("."):
+            continue
+        if flight in logs:
+            raise UserError(
+                file,
+                f"gives the same flight name as {logs[flight]}",
+                "Rename one of the two",
+            )
+        logs[flight] = file
+    return logs
+
+
+def demonstration_flights():
+    """Simulated flights, name -> set flown: every set of the study in turn, as in the paper's experiment."""
+    turns = [pset.name for _ in range(SETTINGS["demonstration"]["flights_per_set"]) for pset in STUDY.sets]
+    digits = len(str(len(turns)))
+    return {f"flight_{number:0{digits}}_{name}": name for number, name in enumerate(turns, 1)}
+
+
+def checked_faults():
+    faults = SETTINGS["demonstration"]["faults"]
+    for flight in faults:
+        if flight not in DEMONSTRATION:
+            raise UserError(
+                CONFIG_FILE,
+                f"demonstration.faults names the flight {flight!r}; expected one of {', '.join(DEMONSTRATION)}",
+                "Mend the name",
+            )
+    return faults
+
+
+def told_in_one_line(function, *arguments):
+    try:
+        return function(*arguments)
+    except UserError as error:
+        raise WorkflowError(str(error)) from None
+
+
+SETTINGS = told_in_one_line(checked_settings)
+STUDY = told_in_one_line(load_study, SETTINGS["study"])
+MISSION = told_in_one_line(load_mission, SETTINGS["mission"])
+OVERRIDES = {pset.name: pset.overrides for pset in STUDY.sets}
+SETS = [PRESENT, *OVERRIDES]
+DEMONSTRATION = demonstration_flights()
+FAULTS = told_in_one_line(checked_faults)
+FLOWN_LOGS = told_in_one_line(discovered_logs)
+LOGS = FLOWN_LOGS or {flight: f"results/execute/{flight}.ulg" for flight in DEMONSTRATION}
+CONFIGURATION_FILES = [
+    *map(str, workflow.configfiles),
+    SETTINGS["study"],
+    SETTINGS["mission"],
+]
+if not FLOWN_LOGS:
+    CONFIGURATION_FILES.append(SETTINGS["demonstration"]["vehicle"])

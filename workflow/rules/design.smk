@@ -1,0 +1,23 @@
+rule design:
+    input:
+        study=SETTINGS["study"],
+        mission=SETTINGS["mission"],
+    output:
+        plan=f"results/design/{MISSION.name}.plan",
+        sets=report(
+            "results/design/sets.parquet",
+            caption="../report/sets.rst",
+            category="Design",
+            labels={"table": "parameter sets"},
+        ),
+        params=expand("results/design/{pset}.params", pset=list(OVERRIDES)),
+    log:
+        "results/logs/design.log",
+    conda:
+        "../envs/fusetune.yaml"
+    params:
+        code=DIGEST["design"],
+    message:
+        "Design: write the mission plan and {STUDY.name}'s parameter sets"
+    script:
+        "../scripts/design.py"

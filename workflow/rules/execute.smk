@@ -1,0 +1,37 @@
+rule compile_kernels:
+    output:
+        KERNELS_READY,
+    log:
+        "results/logs/compile_kernels.log",
+    conda:
+        "../envs/fusetune.yaml"
+    message:
+        "Compile the estimator (once for each version of its sources)"
+    script:
+        "../scripts/compile_kernels.py"
+
+
+rule simulate_flight:
+    input:
+        mission=SETTINGS["mission"],
+        vehicle=SETTINGS["demonstration"]["vehicle"],
+        kernels=ancient(KERNELS_READY),
+    output:
+        "results/execute/{flight}.ulg",
+    log:
+        "results/logs/execute/{flight}.log",
+    wildcard_constraints:
+        flight="|".join(map(re.escape, DEMONSTRATION)),
+    conda:
+        "../envs/fusetune.yaml"
+    params:
+        overrides=lambda wildcards: OVERRIDES[DEMONSTRATION[wildcards.flight]],
+        faults=lambda wildcards: FAULTS.get(wildcards.flight, []),
+        seed=lambda wildcards: 1000 * SETTINGS["demonstration"]["seed"]
+        + list(DEMONSTRATION).index(wildcards.flight)
+        + 1,
+        code=DIGEST["execute"],
+    message:
+        "Execute: simulate {wildcards.flight}"
+    script:
+        "../scripts/simulate_flight.py"

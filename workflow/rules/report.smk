@@ -1,0 +1,86 @@
+SUMMARY_FIGURES = {
+    "differences.svg": "scores against the present set",
+    "flights_by_sets.svg": "flights and sets",
+    "rms.svg": "RMS of innovations",
+    "innovations.svg": "innovations",
+    "normalised_innovations.svg": "normalised innovations",
+    "consistency.svg": "consistency",
+    "breaks.svg": "fusion breaks",
+}
+
+
+rule plot_flight:
+    input:
+        flight="results/save/{flight}",
+        scores="results/analyze/{flight}/scoring.json",
+    output:
+        report(
+            "results/report/flights/{flight}.png",
+            caption="../report/flight.rst",
+            category="Flights",
+            labels={"flight": "{flight}"},
+        ),
+    log:
+        "results/logs/plot/{flight}.log",
+    conda:
+        "../envs/fusetune.yaml"
+    params:
+        sets=SETS,
+        present=PRESENT,
+        code=DIGEST["report"],
+    message:
+        "Report: draw {wildcards.flight}"
+    script:
+        "../scripts/plot_flight.py"
+
+
+rule plot_summary:
+    input:
+        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        decision="results/apply/decision.json",
+    output:
+        [
+            report(
+                f"results/report/{figure}",
+                caption="../report/summary.rst",
+                category="Decision",
+                labels={"figure": label},
+            )
+            for figure, label in SUMMARY_FIGURES.items()
+        ],
+    log:
+        "results/logs/plot_summary.log",
+    conda:
+        "../envs/fusetune.yaml"
+    params:
+        code=DIGEST["report"],
+    message:
+        "Report: draw the comparison of the sets"
+    script:
+        "../scripts/plot_summary.py"
+
+
+rule build_report:
+    input:
+        flights="results/save/flights.parquet",
+        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        figures=of_replayable_flights("results/report/flights/{flight}.png"),
+        summary=rules.plot_summary.output,
+        decision="results/apply/decision.json",
+    output:
+        report(
+            "results/report.html",
+            caption="../report/page.rst",
+            category="Decision",
+            labels={"page": "report"},
+        ),
+    log:
+        "results/logs/build_report.log",
+    conda:
+        "../envs/fusetune.yaml"
+    params:
+        code=DIGEST["report"],
+    message:
+        "Report: build results/report.html"
+    script:
+        "../scripts/build_report.py"

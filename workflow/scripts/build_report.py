@@ -1,0 +1,20 @@
+"""Build the report page out of what the rooms wrote."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusetune.report.page import build_report
+from job import logged_job
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+with logged_job(snakemake.log[0]):
+    build_report(
+        Path(snakemake.input.flights),
+        [Path(scores).parent for scores in snakemake.input.scores],
+        [Path(figure) for figure in snakemake.input.figures],
+        Path(snakemake.input.decision).parent,
+        Path(snakemake.input.summary[0]).parent,
+        Path(snakemake.output[0]),
+    )

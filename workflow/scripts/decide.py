@@ -1,0 +1,25 @@
+"""Rank the sets over all flights, decide, and write the parameter files."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusetune.apply.decide import decide
+from job import logged_job
+
+from fusetune.apply.settings import DecisionSettings
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+with logged_job(snakemake.log[0]):
+    decide(
+        [Path(scores).parent for scores in snakemake.input.scores],
+        Path(snakemake.input.flights),
+        Path(snakemake.output[0]).parent,
+        sets=snakemake.params.sets,
+        present=snakemake.params.present,
+        newest_flight=snakemake.params.newest_flight,
+        descriptions=snakemake.params.descriptions,
+        configuration_files=[Path(file) for file in snakemake.input.configuration],
+        settings=DecisionSettings.from_mapping(snakemake.params.decision, seed=snakemake.params.seed),
+    )

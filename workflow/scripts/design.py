@@ -1,0 +1,13 @@
+"""Write the mission plan, one parameter file per set, and the table of sets."""
+
+from typing import TYPE_CHECKING, Any
+
+from job import logged_job
+
+from fusetune.design import write_design
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+with logged_job(snakemake.log[0]):
+    write_design(snakemake.input.mission, snakemake.input.study, "results/design")

@@ -1,0 +1,13 @@
+"""Put the verdicts of all flights into one table."""
+
+from typing import TYPE_CHECKING, Any
+
+from job import logged_job
+
+from fusetune.save import write_flights_table
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+with logged_job(snakemake.log[0]):
+    write_flights_table(snakemake.input.folders, snakemake.output.table, snakemake.output.csv)

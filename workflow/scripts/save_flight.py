@@ -1,0 +1,14 @@
+"""Turn a log into a folder of tables with metadata and a verdict; a bad log becomes a refusal."""
+
+from typing import TYPE_CHECKING, Any
+
+from job import logged_job
+
+from fusetune.save import save_log
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+with logged_job(snakemake.log[0]):
+    verdict = save_log(snakemake.input.log, snakemake.output[0])
+    print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")

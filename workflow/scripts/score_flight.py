@@ -1,0 +1,21 @@
+"""Measure how well each set predicts the sensors of one flight, and how well the vehicle's own estimator did."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from job import logged_job
+
+from fusetune.analyze.score_flight import score_flight
+from fusetune.analyze.settings import ScoringSettings
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+with logged_job(snakemake.log[0]):
+    score_flight(
+        Path(snakemake.input.flight),
+        Path(snakemake.output[0]).parent,
+        snakemake.params.sets,
+        present=snakemake.params.present,
+        settings=ScoringSettings.from_mapping(snakemake.params.scoring),
+    )

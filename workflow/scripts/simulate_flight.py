@@ -1,0 +1,23 @@
+"""Fly the mission with a simulated vehicle and write its log."""
+
+from typing import TYPE_CHECKING, Any
+
+from job import logged_job
+
+from fusetune.design.mission import load_mission
+from fusetune.execute import simulate
+from fusetune.execute.faults import parse_faults
+from fusetune.execute.vehicle import load_vehicle
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+with logged_job(snakemake.log[0]):
+    simulate(
+        load_mission(snakemake.input.mission),
+        load_vehicle(snakemake.input.vehicle),
+        snakemake.params.overrides,
+        snakemake.params.seed,
+        parse_faults(snakemake.params.faults, "config/config.yaml"),
+        snakemake.output[0],
+    )
