@@ -1,0 +1,76 @@
+"""Files that hold one replay: `<set>.innovations.parquet`, `.states`, `.local_position`, `.status_flags`, `.json`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fusetune.ekf2.replay import ReplayResult
+from fusetune.ekf2.replay_tables import flags_table, innovation_table, local_position_table, state_table
+from fusetune.files import atomic_path
+
+TABLES = {
+    "innovations": innovation_table,
+    "states": state_table,
+    "local_position": local_position_table,
+    "status_flags": flags_table,
+}
+
+BASELINE = "v1.16"
+
+
+@dataclass(frozen=True)
+class ReplayIdentity:
+    """What was replayed."""
+
+    set: str
+    overrides: Mapping[str, float]
+    params: Mapping[str, float]
+
+
+def replay_files(folder: Path, set_name: str) -> list[Path]:
+    """All files of one replay."""
+    return [folder / f"{set_name}.{table}.parquet" for table in TABLES] + [folder / f"{set_name}.json"]
+
+
+def write_replay(folder: Path, identity: ReplayIdentity, result: ReplayResult) -> None:
+    """Write the tables of a replay, and last the JSON that says the set is complete."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, to_table in TABLES.items():
+        write_table(to_table(result), folder / f"{identity.set}.{name}.parquet")
+    with atomic_path(folder / f"{identity.set}.json") as path:
+        path.write_text(json.dumps(_summary(identity, result), indent=1) + "\n", encoding="utf-8")
+
+
+def write_table(table: pa.Table, target: Path) -> None:
+    """Write a Parquet file that is either whole or not there."""
+    with atomic_path(target) as path:
+        pq.write_table(table, path, compression="zstd", compression_level=1)
+
+
+def _summary(identity: ReplayIdentity, result: ReplayResult) -> dict[str, object]:
+    status, reason = ("diverged", "a state or variance is no finite number") if result.diverged else ("ok", "")
+    if not result.updates:
+        status, reason = "not_started", "the filter never found the vehicle still enough to take its tilt"
+    origin = None
+    if result.origin is not None:
+        origin = dict(zip(("latitude_deg", "longitude_deg", "altitude_m"), result.origin, strict=True))
+    return {
+        "version": BASELINE,
+        "set": identity.set,
+        "overrides": dict(identity.overrides),
+        "status": status,
+        "reason": reason,
+        "n_imu": result.imu_samples,
+        "n_updates": result.updates,
+        "mode": result.mode,
+        "resets": result.resets,
+        "filter_fault_flags_max": result.filter_fault_flags_max,
+        "origin": origin,
+        "params": dict(identity.params),
+    }

@@ -1,0 +1,284 @@
+"""Everything the estimator takes from one flight, in the order in which it arrives.
+
+Built once per flight, since no parameter of the estimator enters: parameter sets share it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fusetune.ekf2 import message_samples as convert
+from fusetune.ekf2.arrival_order import RunSchedule, schedule_runs
+from fusetune.ekf2.range_selection import select_range_samples
+from fusetune.ekf2.sensor_samples import (
+    AIRSPEED_SAMPLE,
+    AUXVEL_SAMPLE,
+    BARO_SAMPLE,
+    EV_SAMPLE,
+    FLOW_SAMPLE,
+    GNSS_SAMPLE,
+    MAG_SAMPLE,
+    SYSTEM_FLAGS_SAMPLE,
+)
+from fusetune.px4.flight import Flight, ParameterChange
+
+ARMING_STATE_ARMED = 2
+VEHICLE_TYPE_FIXED_WING = 2
+LAUNCH_STATE_WAITING = 1
+STATUS_MAX_AGE_US = 3_000_000
+AIRSPEED_VALIDATED_MAX_AGE_US = 3_000_000
+
+COMMAND_SET_GPS_GLOBAL_ORIGIN = 100000
+COMMAND_EXTERNAL_POSITION_ESTIMATE = 43003
+COMMAND_EXTERNAL_WIND_ESTIMATE = 43004
+ESTIMATOR_COMMANDS = (
+    COMMAND_SET_GPS_GLOBAL_ORIGIN,
+    COMMAND_EXTERNAL_POSITION_ESTIMATE,
+    COMMAND_EXTERNAL_WIND_ESTIMATE,
+)
+
+ARRIVAL_TOPICS = ("airspeed", "auxvel", "baro", "ev", "flow", "gnss", "mag", "range", "system_flags", "command")
+
+ARRIVALS = np.dtype(
+    [(name, "i8") for name in ARRIVAL_TOPICS] + [("reset_accel_bias", "?"), ("reset_gyro_bias", "?")], align=True
+)
+"""What arrives with one IMU sample: a position in each sample array, -1 for nothing."""
+
+COMMAND = np.dtype([("timestamp", "i8"), ("command", "i8"), ("param", "f8", (7,))], align=True)
+
+
+class SampleArrays(NamedTuple):
+    """The arrays that the compiled replay reads."""
+
+    imu: np.ndarray
+    arrivals: np.ndarray
+    gnss: np.ndarray
+    mag: np.ndarray
+    baro: np.ndarray
+    air_density: np.ndarray
+    range: np.ndarray
+    range_limits: np.ndarray
+    flow: np.ndarray
+    flow_limits: np.ndarray
+    ev: np.ndarray
+    airspeed: np.ndarray
+    auxvel: np.ndarray
+    system_flags: np.ndarray
+    command: np.ndarray
+
+
+@dataclass(frozen=True)
+class EstimatorInputs:
+    """Samples of one flight and the order of their arrival."""
+
+    flight: str
+    mode: str
+    """``"timestamps"`` or ``"approx"``, see `fusetune.ekf2.arrival_order`."""
+    arrays: SampleArrays
+    parameter_changes: tuple[tuple[int, ParameterChange], ...]
+    """(run, change): changes that the log records in flight, and the run before which each takes effect."""
+
+
+def build_inputs(flight: Flight) -> EstimatorInputs:
+    """Collect the estimator's inputs from a canonical flight.
+
+    Parameters
+    ----------
+    flight : Flight
+        In the layout of `fusetune.px4.release_layouts.canonical`; needs `sensor_combined`, all else is optional.
+
+    Raises
+    ------
+    KeyError
+        The flight has no `sensor_combined`.
+    """
+    runs = schedule_runs(flight)
+    imu_table = flight.topics["sensor_combined", 0]
+    arrivals = np.full(len(runs.timestamp), -1, ARRIVALS)
+    arrivals["reset_accel_bias"], arrivals["reset_gyro_bias"] = _bias_resets(flight, runs)
+    gnss = _used(flight, runs, arrivals, "vehicle_gps_position", "gnss", convert.gnss_samples, GNSS_SAMPLE)
+    mag = _plain(flight, runs, arrivals, "vehicle_magnetometer", "mag", convert.mag_samples, MAG_SAMPLE)
+    baro, air_density = _baro(flight, runs, arrivals)
+    flow, flow_limits = _flow(flight, runs, arrivals)
+    ev = _used(flight, runs, arrivals, "vehicle_visual_odometry", "ev", convert.vision_samples, EV_SAMPLE)
+    auxvel = _used(flight, runs, arrivals, "landing_target_pose", "auxvel", convert.auxvel_samples, AUXVEL_SAMPLE)
+    airspeed = _airspeed(flight, runs, arrivals)
+    ranges = select_range_samples(flight, runs)
+    arrivals["range"] = ranges.arrival
+    system_flags = _system_flags(flight, runs, arrivals)
+    command = _commands(flight, runs, arrivals)
+    arrays = SampleArrays(
+        imu=convert.imu_samples(imu_table)[runs.imu_rows],
+        arrivals=arrivals,
+        gnss=gnss,
+        mag=mag,
+        baro=baro,
+        air_density=air_density,
+        range=ranges.samples,
+        range_limits=ranges.limits,
+        flow=flow,
+        flow_limits=flow_limits,
+        ev=ev,
+        airspeed=airspeed,
+        auxvel=auxvel,
+        system_flags=system_flags,
+        command=command,
+    )
+    changes = tuple(
+        (int(np.searchsorted(runs.timestamp, change.timestamp)), change) for change in flight.parameters.changed
+    )
+    return EstimatorInputs(flight.name, runs.mode, arrays, changes)
+
+
+def _plain(flight, runs, arrivals, topic, field, to_samples, dtype):  # type: ignore[no-untyped-def]
+    """Samples of a topic of which every message is used; notes their arrivals."""
+    table = flight.topic(topic)
+    if table is None:
+        return np.zeros(0, dtype)
+    arrivals[field] = runs.newest_message(topic, table["timestamp"])
+    return to_samples(table)
+
+
+def _used(flight, runs, arrivals, topic, field, to_samples, dtype):  # type: ignore[no-untyped-def]
+    """Samples of a topic of which messages can be unusable; those arrive as nothing."""
+    table = flight.topic(topic)
+    if table is None:
+        return np.zeros(0, dtype)
+    samples, usable = to_samples(table)
+    arrivals[field] = _only_usable(runs.newest_message(topic, table["timestamp"]), usable)
+    return samples
+
+
+def _only_usable(newest: np.ndarray, usable: np.ndarray) -> np.ndarray:
+    return np.where((newest >= 0) & usable[newest], newest, -1)
+
+
+def _baro(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    table = flight.topic("vehicle_air_data")
+    if table is None:
+        return np.zeros(0, BARO_SAMPLE), np.zeros(0)
+    arrivals["baro"] = runs.newest_message("vehicle_air_data", table["timestamp"])
+    return convert.baro_samples(table)
+
+
+def _flow(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    table = flight.topic("vehicle_optical_flow")
+    if table is None:
+        return np.zeros(0, FLOW_SAMPLE), np.zeros((0, 3))
+    samples, limits, usable = convert.flow_samples(table)
+    arrivals["flow"] = _only_usable(runs.newest_message("vehicle_optical_flow", table["timestamp"]), usable)
+    return samples, limits
+
+
+def _airspeed(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
+    """Validated airspeed where it is published, the raw sensor after 3 s without it."""
+    validated, raw = flight.topic("airspeed_validated"), flight.topic("airspeed")
+    samples = np.zeros(0, AIRSPEED_SAMPLE)
+    arrival = np.full(len(runs.timestamp), -1)
+    last_validated = np.zeros(len(runs.timestamp), dtype=np.int64)
+    if validated is not None:
+        samples, usable = convert.validated_airspeed_samples(validated)
+        newest = runs.newest_message("airspeed_validated", validated["timestamp"])
+        arrival = _only_usable(newest, usable)
+        seen = np.where(newest >= 0, validated["timestamp"].astype(np.int64)[newest], 0)
+        last_validated = np.concatenate([[0], np.maximum.accumulate(seen)[:-1]])
+        validated_is_new = newest >= 0
+    else:
+        validated_is_new = np.zeros(len(runs.timestamp), dtype=bool)
+    if raw is not None:
+        scale = float(flight.parameters.initial.get("ASPD_SCALE_1", 1.0))
+        raw_samples, usable = convert.airspeed_samples(raw, scale)
+        newest = _only_usable(runs.newest_message("airspeed", raw["timestamp"]), usable)
+        stale = runs.timestamp - last_validated > AIRSPEED_VALIDATED_MAX_AGE_US
+        arrival = np.where((newest >= 0) & stale & ~validated_is_new, newest + len(samples), arrival)
+        samples = np.concatenate([samples, raw_samples])
+    arrivals["airspeed"] = arrival
+    return samples
+
+
+def _bias_resets(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndarray]:
+    """Runs at which the accelerometer or gyro in use, or its calibration, changes."""
+    imu = flight.topics["sensor_combined", 0]
+    selection = flight.topic("sensor_selection")
+    resets = []
+    for sensor in ("accel", "gyro"):
+        count = convert.column(imu, f"{sensor}_calibration_count", 0.0)[runs.imu_rows]
+        reset = convert.changed_since_previous(count, 0.0)
+        if selection is not None:
+            newest = runs.newest_message("sensor_selection", selection["timestamp"])
+            device = selection[f"{sensor}_device_id"].astype(np.int64)
+            seen = np.flatnonzero(newest >= 0)
+            reset[seen] |= convert.changed_since_previous(device[newest[seen]], 0.0)
+        resets.append(reset)
+    return resets[0], resets[1]
+
+
+def _carried(flight: Flight, runs: RunSchedule, topic: str) -> tuple[np.ndarray, np.ndarray]:
+    """For each run: row of the newest message so far (-1 before the first), and whether it is new."""
+    table = flight.topic(topic)
+    if table is None or not len(table["timestamp"]):
+        nothing = np.full(len(runs.timestamp), -1)
+        return nothing, nothing >= 0
+    newest = runs.newest_message(topic, table["timestamp"])
+    return np.maximum.accumulate(newest), newest >= 0
+
+
+def _system_flags(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
+    """One sample whenever `vehicle_status` or `vehicle_land_detected` is new; messages over 3 s old are ignored."""
+    status_row, status_new = _carried(flight, runs, "vehicle_status")
+    land_row, land_new = _carried(flight, runs, "vehicle_land_detected")
+    launch_row, _ = _carried(flight, runs, "launch_detection_status")
+    at = np.flatnonzero(status_new | land_new)
+    arrivals["system_flags"][at] = np.arange(len(at))
+    samples = np.zeros(len(at), SYSTEM_FLAGS_SAMPLE)
+    samples["time_us"] = runs.timestamp[at]
+    status = _fresh(flight, "vehicle_status", status_row[at], runs.timestamp[at])
+    if status is not None:
+        rows, table = status
+        samples["in_air"][rows] = table["arming_state"] == ARMING_STATE_ARMED
+        samples["is_fixed_wing"][rows] = convert_vehicle_type(table) == VEHICLE_TYPE_FIXED_WING
+    land = _fresh(flight, "vehicle_land_detected", land_row[at], runs.timestamp[at])
+    if land is not None:
+        rows, table = land
+        samples["at_rest"][rows] = convert.column(table, "at_rest", 0.0) > 0
+        samples["in_air"][rows] = convert.column(table, "landed", 0.0) == 0
+        samples["gnd_effect"][rows] = convert.column(table, "in_ground_effect", 0.0) > 0
+    launch = _fresh(flight, "launch_detection_status", launch_row[at], runs.timestamp[at])
+    if launch is not None:
+        rows, table = launch
+        samples["constant_pos"][rows] = table["launch_detection_state"] == LAUNCH_STATE_WAITING
+    return samples
+
+
+def convert_vehicle_type(table):  # type: ignore[no-untyped-def]
+    """`vehicle_type` of `vehicle_status`; releases before it existed say `is_rotary_wing`."""
+    if "vehicle_type" in table:
+        return table["vehicle_type"]
+    return np.where(convert.column(table, "is_rotary_wing", 1.0) > 0, 1, VEHICLE_TYPE_FIXED_WING)
+
+
+def _fresh(flight: Flight, topic: str, rows: np.ndarray, now: np.ndarray):  # type: ignore[no-untyped-def]
+    """(which samples, the message of each) for messages at most 3 s old; None without the topic."""
+    table = flight.topic(topic)
+    if table is None or not len(table["timestamp"]):
+        return None
+    fresh = (rows >= 0) & (now < table["timestamp"].astype(np.int64)[rows] + STATUS_MAX_AGE_US)
+    return np.flatnonzero(fresh), {name: values[rows[fresh]] for name, values in table.items()}
+
+
+def _commands(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
+    """Commands that move the estimator's origin, position or wind."""
+    table = flight.topic("vehicle_command")
+    if table is None:
+        return np.zeros(0, COMMAND)
+    commands = np.zeros(len(table["timestamp"]), COMMAND)
+    commands["timestamp"] = table["timestamp"]
+    commands["command"] = table["command"]
+    for i in range(7):
+        commands["param"][:, i] = convert.column(table, f"param{i + 1}")
+    relevant = np.isin(commands["command"], ESTIMATOR_COMMANDS)
+    arrivals["command"] = _only_usable(runs.newest_message("vehicle_command", table["timestamp"]), relevant)
+    return commands

@@ -1,0 +1,48 @@
+"""The parameter record that every kernel takes: one field per EKF2 parameter of the baseline release."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fusetune.px4.ekf2_parameters import PARAMETERS, complete
+
+__all__ = ["EKF2_PARAMETERS", "PARAMETER_NAMES", "complete", "parameter_record"]
+
+PARAMETER_NAMES = tuple(sorted(PARAMETERS))
+
+EKF2_PARAMETERS = np.dtype([(name, "f8") for name in PARAMETER_NAMES])
+"""All fields are float64, whole numbers too, so that one value can be set through a flat view of the record."""
+
+OBSOLETE_MAG_TYPE_DEFAULT = 0
+VALID_MAG_TYPES = (0, 1, 5, 6)
+DELAY_PARAMETERS = (
+    "EKF2_AVEL_DELAY",
+    "EKF2_BARO_DELAY",
+    "EKF2_ASP_DELAY",
+    "EKF2_MAG_DELAY",
+    "EKF2_RNG_DELAY",
+    "EKF2_GPS_DELAY",
+    "EKF2_OF_DELAY",
+    "EKF2_EV_DELAY",
+)
+
+
+def parameter_record(values: Mapping[str, float]) -> np.ndarray:
+    """One-element array of EKF2_PARAMETERS from a complete set, with the corrections PX4 makes at start.
+
+    PX4 replaces obsolete values of EKF2_MAG_TYPE and raises EKF2_DELAY_MAX to the longest sensor delay.
+
+    Raises
+    ------
+    KeyError
+        A parameter of the baseline release is missing.
+    """
+    record = np.zeros(1, EKF2_PARAMETERS)
+    for name in PARAMETER_NAMES:
+        record[name] = values[name]
+    if int(values["EKF2_MAG_TYPE"]) not in VALID_MAG_TYPES:
+        record["EKF2_MAG_TYPE"] = OBSOLETE_MAG_TYPE_DEFAULT
+    record["EKF2_DELAY_MAX"] = max(values[name] for name in ("EKF2_DELAY_MAX", *DELAY_PARAMETERS))
+    return record

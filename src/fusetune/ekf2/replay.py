@@ -1,0 +1,224 @@
+"""Replay one flight through the estimator with one parameter set.
+
+The compiled loop does at every IMU sample what PX4's EKF2 module does in one run: take the IMU sample, the newest
+message of every aiding topic, the system flags; update the filter; publish. It works through the flight in stretches,
+so that memory for results grows only with what is recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fusetune.ekf2.aid_sources.drag.drag_accumulator import accumulate_drag
+from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.buffers import initialise_buffers, push_drag, push_imu
+from fusetune.ekf2.commands import handle_command
+from fusetune.ekf2.estimator import EKF, initialise_estimator, reset_accel_bias, reset_gyro_bias, update
+from fusetune.ekf2.imu_down_sampler import accumulate_imu, initialise_down_sampler, reset_down_sampler
+from fusetune.ekf2.inputs import EstimatorInputs
+from fusetune.ekf2.output_predictor import initialise_output_predictor, predict_output
+from fusetune.ekf2.parameters import PARAMETER_NAMES, parameter_record
+from fusetune.ekf2.recording import (
+    FLAG_COLUMNS,
+    FLAGS_ROW,
+    INNOVATION_ROW,
+    LOCAL_POSITION_ROW,
+    RECORDER_MEMORY,
+    STATE_ROW,
+    allocate_records,
+    record_update,
+    views_of,
+)
+from fusetune.ekf2.sample_arrival import (
+    receive_airspeed,
+    receive_auxvel,
+    receive_baro,
+    receive_ev,
+    receive_flow,
+    receive_gnss,
+    receive_mag,
+    receive_range,
+    receive_system_flags,
+)
+
+RUNS_PER_STRETCH = 2048
+MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """What one replay published, as structured arrays in time order (see `fusetune.ekf2.recording`)."""
+
+    mode: str
+    innovations: np.ndarray
+    states: np.ndarray
+    local_position: np.ndarray
+    flags: np.ndarray
+    imu_samples: int
+    updates: int
+    origin: tuple[float, float, float] | None
+    """Latitude and longitude (deg) and altitude (m) of the local frame, None while never set."""
+
+    @property
+    def resets(self) -> dict[str, int]:
+        """Reset counters at the end of the flight, under the names of `vehicle_local_position`."""
+        names = [name for name in LOCAL_POSITION_ROW.names or () if name.endswith("_reset_counter")]
+        return {name: int(self.local_position[name][-1]) if len(self.local_position) else 0 for name in names}
+
+    @property
+    def filter_fault_flags_max(self) -> int:
+        """Largest value of the fault flags seen as one number, like `estimator_status.filter_fault_flags`."""
+        faults = [i for i, name in enumerate(FLAG_COLUMNS) if name.startswith("fs_")]
+        bits = self.flags["flags"][:, faults].astype(np.int64) << np.arange(len(faults))
+        return int(bits.sum(axis=1).max(initial=0))
+
+    @property
+    def diverged(self) -> bool:
+        """Whether a state or variance stopped being a finite number."""
+        if not len(self.states):
+            return False
+        return not (np.isfinite(self.states["states"]).all() and np.isfinite(self.states["covariances"]).all())
+
+    def source_names(self) -> np.ndarray:
+        """Aid source of each innovation row."""
+        return np.array(AID_SOURCE_NAMES)[self.innovations["source"]]
+
+
+def replay(
+    inputs: EstimatorInputs, parameters: Mapping[str, float], *, overridden: frozenset[str] | None = None
+) -> ReplayResult:
+    """Run the estimator over one flight.
+
+    Parameters
+    ----------
+    inputs : EstimatorInputs
+        From `fusetune.ekf2.inputs.build_inputs`.
+    parameters : mapping
+        A complete set, from `fusetune.ekf2.parameters.complete`.
+    overridden : frozenset of str, optional
+        Parameters that the set varies: changes that the log records for them in flight are not applied.
+
+    Returns
+    -------
+    ReplayResult
+        The same inputs and parameters give the same bytes.
+    """
+    ekf = np.zeros(1, EKF)
+    params = parameter_record(parameters)
+    recorder = np.zeros(1, RECORDER_MEMORY)
+    views = views_of(ekf)
+    records = allocate_records(RUNS_PER_STRETCH)
+    kept: list[tuple[np.ndarray, ...]] = []
+    for start, stop in _stretches(inputs, params, overridden or frozenset()):
+        recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
+        run_estimator(ekf[0], params[0], inputs.arrays, views, recorder[0], records, start, stop)
+        done = recorder[0]
+        kept.append(
+            (
+                records.innovations[: done["innovation_rows"]].copy(),
+                records.states[: done["update_rows"]].copy(),
+                records.local_position[: done["update_rows"]].copy(),
+                records.flags[: done["flag_rows"]].copy(),
+            )
+        )
+    dtypes = (INNOVATION_ROW, STATE_ROW, LOCAL_POSITION_ROW, FLAGS_ROW)
+    joined = [
+        np.concatenate([part[i] for part in kept]) if kept else np.zeros(0, dtype) for i, dtype in enumerate(dtypes)
+    ]
+    return ReplayResult(
+        inputs.mode,
+        *joined,
+        imu_samples=len(inputs.arrays.imu),
+        updates=int(recorder["updates"][0]),
+        origin=_origin(ekf["origin"][0]),
+    )
+
+
+def _origin(origin: np.void) -> tuple[float, float, float] | None:
+    if not origin["valid"]:
+        return None
+    return float(np.rad2deg(origin["lat_rad"])), float(np.rad2deg(origin["lon_rad"])), float(origin["alt"])
+
+
+def _stretches(inputs: EstimatorInputs, params: np.ndarray, overridden: frozenset[str]):  # type: ignore[no-untyped-def]
+    """Split the runs, and change parameters between the parts where the log says so."""
+    changes = [
+        (run, change)
+        for run, change in inputs.parameter_changes
+        if change.name in PARAMETER_NAMES and change.name not in overridden
+    ]
+    total = len(inputs.arrays.imu)
+    cuts = sorted({*range(0, total, RUNS_PER_STRETCH), *(min(run, total) for run, _ in changes), total})
+    for start, stop in zip(cuts[:-1], cuts[1:], strict=True):
+        for run, change in changes:
+            if run == start:
+                params[change.name] = change.value
+        yield start, stop
+
+
+@njit(cache=True, error_model="numpy")
+def run_estimator(ekf, params, inputs, views, recorder, records, start, stop):
+    """Process the runs `start` to `stop` of a flight."""
+    for run in range(start, stop):
+        arrivals = inputs.arrivals[run]
+        if arrivals.command >= 0:
+            handle_command(ekf, params, inputs.command[arrivals.command])
+        if arrivals.reset_accel_bias:
+            reset_accel_bias(ekf, params)
+        if arrivals.reset_gyro_bias:
+            reset_gyro_bias(ekf, params)
+        receive_imu(ekf, params, inputs.imu[run])
+        receive_aiding(ekf, params, inputs, arrivals)
+        if update(ekf, params, inputs):
+            record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
+
+
+@njit(cache=True, error_model="numpy")
+def receive_imu(ekf, params, imu):
+    """Feed the output predictor and the down-sampler; move the horizon when an interval is complete."""
+    if not ekf.buffers.initialised:
+        initialise_buffers(ekf, params, imu.time_us)
+        initialise_down_sampler(ekf.down_sampler, params)
+        initialise_output_predictor(ekf)
+        initialise_estimator(ekf, params)
+    ekf.time_latest_us = imu.time_us
+    predict_output(ekf, params, imu)
+    if accumulate_imu(ekf.down_sampler, imu):
+        ekf.imu_newest = ekf.down_sampler.sample
+        reset_down_sampler(ekf.down_sampler, params)
+        period = np.float32(params.EKF2_PREDICT_US) * np.float32(1e-6)
+        low, high = MIN_DT_FACTOR * period, MAX_DT_FACTOR * period
+        ekf.imu_newest.delta_ang_dt = min(max(np.float32(ekf.imu_newest.delta_ang_dt), low), high)
+        ekf.imu_newest.delta_vel_dt = min(max(np.float32(ekf.imu_newest.delta_vel_dt), low), high)
+        push_imu(ekf, imu.time_us)
+        ekf.imu_updated = True
+    buffers = ekf.buffers
+    if accumulate_drag(ekf, params, imu, buffers.imu_length, buffers.observation_length):
+        push_drag(ekf, ekf.drag.produced)
+
+
+@njit(cache=True, error_model="numpy")
+def receive_aiding(ekf, params, inputs, arrivals):
+    """Buffer what arrived with this IMU sample, in the order of PX4's module."""
+    if arrivals.airspeed >= 0:
+        receive_airspeed(ekf, params, inputs, arrivals.airspeed)
+    if arrivals.auxvel >= 0:
+        receive_auxvel(ekf, params, inputs, arrivals.auxvel)
+    if arrivals.baro >= 0:
+        receive_baro(ekf, params, inputs, arrivals.baro)
+    if arrivals.ev >= 0:
+        receive_ev(ekf, params, inputs, arrivals.ev)
+    if arrivals.flow >= 0:
+        receive_flow(ekf, params, inputs, arrivals.flow)
+    if arrivals.gnss >= 0:
+        receive_gnss(ekf, params, inputs, arrivals.gnss)
+    if arrivals.mag >= 0:
+        receive_mag(ekf, params, inputs, arrivals.mag)
+    if arrivals.range >= 0:
+        receive_range(ekf, params, inputs, arrivals.range)
+    if arrivals.system_flags >= 0:
+        receive_system_flags(ekf, inputs, arrivals.system_flags)
