@@ -1,0 +1,81 @@
+"""Does the filter believe what it should? Mean normalised innovation squared (NIS) against its χ² bounds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import chdtri
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """A figure with its two-sided bounds; all of the same shape."""
+
+    value: Array
+    lower: Array
+    upper: Array
+
+
+def mean_nis(innovation: Array, innovation_variance: Array) -> Array:
+    """Averaged normalised innovation r = Σ νᵀ S⁻¹ ν / N in its diagonal form.
+
+    Parameters
+    ----------
+    innovation, innovation_variance : (D, ..., N) arrays, components first; the variance is R + H P Hᵀ
+
+    Returns
+    -------
+    (...) array; D is expected. A large S makes it tiny, so a small value alone is no merit.
+    """
+    return np.mean(np.sum(np.square(innovation) / innovation_variance, axis=0), axis=-1)
+
+
+def chi2_quantile(probability: float, dof: Array | float) -> Array:
+    """Quantile of χ² with any positive (also fractional) number of degrees of freedom."""
+    return np.asarray(chdtri(dof, 1.0 - probability), dtype=np.float64)
+
+
+def paper_bounds(nis: Array, samples: int, dimension: int, confidence: float) -> Bounds:
+    """Two-sided acceptance region of the mean NIS as the paper states it.
+
+    N r ~ χ²(N·dim − dim), so r lies between the α/2 and 1 − α/2 quantiles divided by N. Samples are taken as
+    independent, which filtered measurements never are: see `effective_bounds`.
+    """
+    return _bounds(nis, float(samples), float(dimension * samples - dimension), confidence)
+
+
+def effective_bounds(nis: Array, effective_samples: Array, dimension: int, confidence: float) -> Bounds:
+    """Bounds of the mean NIS for correlated samples: N is replaced by N_eff, r N_eff ~ χ²(dim N_eff)."""
+    return _bounds(nis, effective_samples, dimension * np.asarray(effective_samples), confidence)
+
+
+def _bounds(nis: Array, samples: Array | float, dof: Array | float, confidence: float) -> Bounds:
+    nis = np.asarray(nis, dtype=np.float64)
+    tail = 0.5 * (1.0 - confidence)
+    positive = np.asarray(dof) > 0.0
+    safe = np.where(positive, dof, 1.0)
+    lower = np.where(positive, chi2_quantile(tail, safe) / samples, 0.0)
+    upper = np.where(positive, chi2_quantile(1.0 - tail, safe) / samples, np.inf)
+    return Bounds(nis, np.broadcast_to(lower, nis.shape), np.broadcast_to(upper, nis.shape))
+
+
+def j_nis(nis: Array, dimension: int) -> Array:
+    """Distance of the mean NIS from its expectation, |ln(mean NIS / dim)|; 0 is consistent."""
+    with np.errstate(divide="ignore"):
+        return np.abs(np.log(np.asarray(nis) / dimension))
+
+
+def c_nis(innovation: Array, innovation_variance: Array) -> Array:
+    """J_NIS + |ln(var NIS / 2 dim)|: also the spread of the NIS must be that of χ²(dim).
+
+    Parameters
+    ----------
+    innovation, innovation_variance : (D, ..., N) arrays, components first, N ≥ 2
+    """
+    dimension = innovation.shape[0]
+    nis = np.sum(np.square(innovation) / innovation_variance, axis=0)
+    with np.errstate(divide="ignore"):
+        spread = np.abs(np.log(np.var(nis, axis=-1, ddof=1) / (2.0 * dimension)))
+    return j_nis(np.mean(nis, axis=-1), dimension) + spread

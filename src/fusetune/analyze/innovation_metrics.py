@@ -1,0 +1,61 @@
+"""Size of the innovations: root mean square per component, horizontal and vertical, and the worst window."""
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def rms_innovation(innovation: Array) -> Array:
+    """Averaged innovation of one component.
+
+    Parameters
+    ----------
+    innovation : (..., N) array, unit of the source
+
+    Returns
+    -------
+    (...) array: sqrt(Σ ν² / N)
+
+    References
+    ----------
+    García, Molina, Trincado: averaged innovation over N_T measurements.
+    """
+    return np.sqrt(np.mean(np.square(innovation), axis=-1))
+
+
+def rms_norm(innovation: Array) -> Array:
+    """Averaged innovation of several components: the root mean of the squared residual norm.
+
+    Parameters
+    ----------
+    innovation : (D, ..., N) array, the components first
+
+    Returns
+    -------
+    (...) array: sqrt(Σ |ν|² / N); with D = 2 the paper's horizontal figure, with D = 1 the vertical one
+    """
+    return np.sqrt(np.mean(np.sum(np.square(innovation), axis=0), axis=-1))
+
+
+def mean_innovation(innovation: Array) -> Array:
+    """Mean of the innovations, (..., N) → (...); an unbiased model has 0."""
+    return np.mean(innovation, axis=-1)
+
+
+def worst_window(values: Array, window: npt.NDArray[np.int64]) -> Array:
+    """Largest mean of `values` over any window.
+
+    Parameters
+    ----------
+    values : (..., N) array, e.g. squared innovations
+    window : (N,) ascending index of the window of each sample
+
+    Returns
+    -------
+    (...) array; windows with less than half the samples of the fullest one do not count
+    """
+    starts = np.flatnonzero(np.r_[True, np.diff(window) != 0])
+    counts = np.diff(np.r_[starts, window.size])
+    means = np.add.reduceat(values, starts, axis=-1) / counts
+    return np.max(means[..., counts >= 0.5 * counts.max()], axis=-1)

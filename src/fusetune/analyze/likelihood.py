@@ -1,0 +1,63 @@
+"""Proper scores of the innovations: the negative log-likelihood (NLL), two robust forms and the scale-profiled one.
+
+All are means per sample and axis in nat; lower is better. The term ln S punishes inflated noise.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+STUDENT_T_DOF = 5.0
+WINSOR_STANDARD_DEVIATIONS = 5.0
+_NORMAL_CONSISTENCY = 1.4826
+"""Median absolute value → standard deviation, for a normal distribution."""
+
+
+def gaussian_nll(innovation: Array, innovation_variance: Array) -> Array:
+    """½ (ν²/S + ln S + ln 2π) of each sample; smallest in the mean where S is the true variance."""
+    return 0.5 * (np.square(innovation) / innovation_variance + np.log(innovation_variance) + math.log(2.0 * math.pi))
+
+
+def student_t_nll(innovation: Array, innovation_variance: Array, dof: float = STUDENT_T_DOF) -> Array:
+    """NLL of each sample under Student's t with variance S: an outlier costs its logarithm, not its square.
+
+    Parameters
+    ----------
+    innovation, innovation_variance : arrays of one shape
+    dof : degrees of freedom > 2; the scale is S (dof − 2)/dof, so that the variance is S
+    """
+    scale = innovation_variance * (dof - 2.0) / dof
+    constant = math.lgamma(0.5 * dof) - math.lgamma(0.5 * (dof + 1.0)) + 0.5 * math.log(dof * math.pi)
+    return constant + 0.5 * np.log(scale) + 0.5 * (dof + 1.0) * np.log1p(np.square(innovation) / (dof * scale))
+
+
+def winsor_limit(innovation: Array) -> float:
+    """Limit beyond which innovations are winsorised: 5 robust standard deviations over all sets together.
+
+    It must not depend on S: clipping ν/√S would let a set win by making S small.
+    """
+    median = float(np.median(np.abs(innovation)))
+    return WINSOR_STANDARD_DEVIATIONS * _NORMAL_CONSISTENCY * median if median > 0.0 else math.inf
+
+
+def winsorised(innovation: Array, limit: float) -> Array:
+    """Innovations clipped to ±limit."""
+    return np.clip(innovation, -limit, limit)
+
+
+def profile_nll(mean_nis: Array, mean_log_variance: Array) -> Array:
+    """Scale-profiled NLL: the NLL with S multiplied by its best constant factor, without the constant ½ + ½ ln 2π.
+
+    min over c of mean(½ ν²/(c S) + ½ ln(c S)) is reached at c = mean(ν²/S) and is ½ ln mean(ν²/S) + ½ mean ln S.
+    It asks how well the filter predicts and how well it knows *when* it is uncertain, not how large R was set.
+
+    Parameters
+    ----------
+    mean_nis : (...) mean of ν²/S of one source and axis
+    mean_log_variance : (...) mean of ln S of the same samples
+    """
+    with np.errstate(divide="ignore"):
+        return 0.5 * np.log(mean_nis) + 0.5 * np.asarray(mean_log_variance)

@@ -1,0 +1,190 @@
+"""The long table of figures: one row per flight, set, source, axis and metric."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from fusetune.analyze import likelihood
+from fusetune.analyze.break_rate import beyond_standard_deviations, break_rate
+from fusetune.analyze.consistency import Bounds, c_nis, effective_bounds, j_nis, mean_nis, paper_bounds
+from fusetune.analyze.filter_events import FilterEvents
+from fusetune.analyze.innovation_metrics import mean_innovation, rms_innovation, rms_norm, worst_window
+from fusetune.analyze.measurement_alignment import PairedSamples
+from fusetune.analyze.settings import ScoringSettings
+from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.analyze.true_errors import ErrorFigure
+from fusetune.analyze.whiteness import autocorrelation, effective_samples, lag_limit, ljung_box
+
+Array = npt.NDArray[np.float64]
+
+METRICS_SCHEMA = pa.schema(
+    [
+        pa.field("flight", pa.string()),
+        pa.field("set", pa.string()),
+        pa.field("source", pa.string()),
+        pa.field("axis", pa.string()),
+        pa.field("metric", pa.string()),
+        pa.field("value", pa.float64()),
+        pa.field("lower", pa.float64()),
+        pa.field("upper", pa.float64()),
+        pa.field("n", pa.float64()),
+    ]
+)
+"""`n` is the number of samples behind the figure (N_eff where the figure says so), `lower`, `upper` its bounds."""
+
+FEWEST_SAMPLES = 4
+"""Fewer samples than this tell nothing about variances and correlations."""
+
+
+@dataclass
+class MetricsTable:
+    """Rows under construction."""
+
+    flight: str
+    _columns: dict[str, list] = field(default_factory=lambda: {name: [] for name in METRICS_SCHEMA.names})
+
+    def add(
+        self,
+        set_name: str,
+        source: str,
+        axis: str,
+        metric: str,
+        value: float,
+        n: float,
+        lower: float = np.nan,
+        upper: float = np.nan,
+    ) -> None:
+        """Append one figure."""
+        row = (self.flight, set_name, source, axis, metric, float(value), float(lower), float(upper), float(n))
+        for column, item in zip(self._columns.values(), row, strict=True):
+            column.append(item)
+
+    def add_each(self, sets: tuple[str, ...], source: str, axis: str, metric: str, values: Array, n: float) -> None:
+        """Append one figure per set, `values` (S,)."""
+        for name, value in zip(sets, values, strict=True):
+            self.add(name, source, axis, metric, value, n)
+
+    def add_bounds(
+        self, sets: tuple[str, ...], source: str, axis: str, metric: str, bounds: Bounds, n: float | Array
+    ) -> None:
+        """Append one figure with bounds per set."""
+        counts = np.broadcast_to(n, bounds.value.shape)
+        for i, name in enumerate(sets):
+            self.add(name, source, axis, metric, bounds.value[i], counts[i], bounds.lower[i], bounds.upper[i])
+
+    def finished(self) -> pa.Table:
+        return pa.table({name: pa.array(v) for name, v in self._columns.items()}, schema=METRICS_SCHEMA)
+
+
+def add_axis_metrics(table: MetricsTable, pairs: PairedSamples, settings: ScoringSettings) -> None:
+    """Append all figures of one source and axis for all its sets."""
+    source, axis, sets, n = pairs.source, AXES[pairs.axis], pairs.sets, pairs.time.size
+    if n < FEWEST_SAMPLES:
+        return
+    innovation, variance = pairs.innovation, pairs.innovation_variance
+    correlation = autocorrelation(innovation / np.sqrt(variance), lag_limit(n))
+    independent = effective_samples(correlation, n)
+    nis = mean_nis(innovation[None], variance[None])
+    table.add_each(sets, source, axis, "mean_innovation", mean_innovation(innovation), n)
+    table.add_each(sets, source, axis, "rms_innovation", rms_innovation(innovation), n)
+    table.add_bounds(sets, source, axis, "mean_nis", paper_bounds(nis, n, 1, settings.confidence), n)
+    effective = effective_bounds(nis, independent, 1, settings.confidence)
+    table.add_bounds(sets, source, axis, "mean_nis_effective", effective, independent)
+    table.add_each(sets, source, axis, "j_nis", j_nis(nis, 1), n)
+    table.add_each(sets, source, axis, "c_nis", c_nis(innovation[None], variance[None]), n)
+    if correlation.shape[-1]:
+        statistic, p_value = ljung_box(correlation, n)
+        table.add_each(sets, source, axis, "lag1_correlation", correlation[:, 0], n)
+        table.add_each(sets, source, axis, "ljung_box", statistic, n)
+        table.add_each(sets, source, axis, "ljung_box_p", p_value, n)
+    _add_likelihoods(table, pairs, nis)
+    for limit in (3, 5):
+        broken = beyond_standard_deviations(innovation, variance, limit)
+        table.add_bounds(sets, source, axis, f"break_rate_{limit}sd", break_rate(broken, settings.confidence), n)
+    table.add_bounds(sets, source, axis, "break_rate_gate", break_rate(beyond_gate(pairs), settings.confidence), n)
+    window = (pairs.time - pairs.time[0]) // round(settings.window_s * 1e6)
+    squared = np.square(innovation)
+    table.add_each(sets, source, axis, "worst_window_rms", np.sqrt(worst_window(squared, window)), n)
+    table.add_each(sets, source, axis, "worst_window_nis", worst_window(squared / variance, window), n)
+
+
+def beyond_gate(pairs: PairedSamples) -> npt.NDArray[np.bool_]:
+    """True where the axis is beyond its gate; where its gate is unknown, where the source was rejected."""
+    return np.where(np.isfinite(pairs.test_ratio), pairs.test_ratio > 1.0, pairs.rejected)
+
+
+def _add_likelihoods(table: MetricsTable, pairs: PairedSamples, nis: Array) -> None:
+    source, axis, sets, n = pairs.source, AXES[pairs.axis], pairs.sets, pairs.time.size
+    innovation, variance = pairs.innovation, pairs.innovation_variance
+    clipped = likelihood.winsorised(innovation, likelihood.winsor_limit(innovation))
+    log_variance = np.mean(np.log(variance), axis=-1)
+    clipped_nis = np.mean(np.square(clipped) / variance, axis=-1)
+    values = {
+        "nll": np.mean(likelihood.gaussian_nll(innovation, variance), axis=-1),
+        "nll_student_t": np.mean(likelihood.student_t_nll(innovation, variance), axis=-1),
+        "nll_winsorised": np.mean(likelihood.gaussian_nll(clipped, variance), axis=-1),
+        "nll_profile": likelihood.profile_nll(nis, log_variance),
+        "nll_profile_winsorised": likelihood.profile_nll(clipped_nis, log_variance),
+    }
+    for metric, value in values.items():
+        table.add_each(sets, source, axis, metric, value, n)
+
+
+def add_group_metrics(table: MetricsTable, pairs: dict[int, PairedSamples], settings: ScoringSettings) -> None:
+    """Append the aggregates (horizontal, vertical, all axes) of one source, whose axes share their samples.
+
+    Parameters
+    ----------
+    pairs : by axis
+    """
+    any_axis = next(iter(pairs.values()))
+    for group, axes in AID_SOURCES[any_axis.source].groups:
+        members = [pairs[axis] for axis in axes if axis in pairs]
+        same = all(np.array_equal(one.time, members[0].time) and one.sets == members[0].sets for one in members)
+        if len(members) != len(axes) or not same or members[0].time.size < FEWEST_SAMPLES:
+            continue
+        _add_group(table, group, members, settings)
+
+
+def _add_group(table: MetricsTable, group: str, members: list[PairedSamples], settings: ScoringSettings) -> None:
+    source, sets, n, dimension = members[0].source, members[0].sets, members[0].time.size, len(members)
+    innovation = np.stack([one.innovation for one in members])
+    variance = np.stack([one.innovation_variance for one in members])
+    nis = mean_nis(innovation, variance)
+    shares = effective_samples(autocorrelation(innovation / np.sqrt(variance), lag_limit(n)), n) / n
+    independent = n * np.mean(shares, axis=0)
+    table.add_each(sets, source, group, "rms_innovation", rms_norm(innovation), n)
+    table.add_bounds(sets, source, group, "mean_nis", paper_bounds(nis, n, dimension, settings.confidence), n)
+    effective = effective_bounds(nis, independent, dimension, settings.confidence)
+    table.add_bounds(sets, source, group, "mean_nis_effective", effective, independent)
+    table.add_each(sets, source, group, "j_nis", j_nis(nis, dimension), n)
+    table.add_each(sets, source, group, "c_nis", c_nis(innovation, variance), n)
+    profile = likelihood.profile_nll(
+        np.mean(np.square(innovation) / variance, axis=-1), np.mean(np.log(variance), axis=-1)
+    )
+    table.add_each(sets, source, group, "nll", likelihood.gaussian_nll(innovation, variance).mean(axis=-1).sum(0), n)
+    table.add_each(sets, source, group, "nll_profile", profile.sum(axis=0), n)
+    broken = np.logical_or.reduce([beyond_gate(one) for one in members])
+    table.add_bounds(sets, source, group, "break_rate_gate", break_rate(broken, settings.confidence), n)
+
+
+def add_events(table: MetricsTable, set_name: str, events: FilterEvents, flight_s: float) -> None:
+    """Append resets, timeouts, faults and time without aid; `flight_s` is the time over which they were counted."""
+    for kind, count in events.resets.items():
+        table.add(set_name, "filter", kind, "resets", count, flight_s)
+    table.add(set_name, "filter", "all", "resets", events.total_resets, flight_s)
+    for source, count in events.timeouts.items():
+        if count:
+            table.add(set_name, "filter", source, "timeouts", count, flight_s)
+    table.add(set_name, "filter", "all", "timeouts", events.total_timeouts, flight_s)
+    table.add(set_name, "filter", "all", "fault_flags", events.fault_flags, flight_s)
+    table.add(set_name, "filter", "horizontal", "dead_reckoning_s", events.dead_reckoning_s, flight_s)
+
+
+def add_true_errors(table: MetricsTable, set_name: str, figures: list[ErrorFigure]) -> None:
+    """Append errors against the truth, source `truth_<quantity>`."""
+    for one in figures:
+        source = f"truth_{one.quantity}"
+        table.add(set_name, source, one.axis, one.metric, one.value, one.n, one.lower, one.upper)

@@ -1,0 +1,105 @@
+"""As flown: the innovations that the vehicle's own estimator logged, brought to the layout of a replay."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fusetune.analyze.set_files import AxisSamples, SourceAxis
+from fusetune.analyze.sources import AID_SOURCES
+from fusetune.files import atomic_path
+from fusetune.px4.flight import Flight, TopicTable
+
+ONBOARD = "onboard"
+"""Name under which the vehicle's own figures stand beside the sets; it is never ranked."""
+
+_FIELDS = ("observation_variance", "innovation", "innovation_variance", "test_ratio")
+
+
+def onboard_samples(flight: Flight) -> dict[SourceAxis, AxisSamples]:
+    """Innovations that the vehicle logged, from the canonical topics `estimator_aid_src_*`.
+
+    Parameters
+    ----------
+    flight : in the layout of `px4.release_layouts.canonical`
+
+    Returns
+    -------
+    Samples by source and axis; empty where the log holds none. Of several estimator instances the primary counts.
+    """
+    instance = _primary_instance(flight)
+    samples: dict[SourceAxis, AxisSamples] = {}
+    for name, source in AID_SOURCES.items():
+        topic = f"estimator_aid_src_{name}"
+        table = flight.topic(topic, instance)
+        if table is None:
+            table = flight.topic(topic)
+        if table is None or table["timestamp"].size == 0:
+            continue
+        for axis in range(source.axes):
+            column = f"[{axis}]" if f"innovation[{axis}]" in table else ""
+            if f"innovation{column}" in table and f"innovation_variance{column}" in table:
+                samples[name, axis] = _axis_samples(table, column)
+    return samples
+
+
+def _primary_instance(flight: Flight) -> int:
+    table = flight.topic("estimator_selector_status")
+    if table is None or table["timestamp"].size == 0:
+        return 0
+    values, counts = np.unique(table["primary_instance"], return_counts=True)
+    return int(values[np.argmax(counts)])
+
+
+def _axis_samples(table: TopicTable, column: str) -> AxisSamples:
+    time = table["timestamp_sample"] if np.all(table.get("timestamp_sample", np.zeros(1)) > 0) else table["timestamp"]
+    rows = np.sort(np.unique(time, return_index=True)[1])
+    length = rows.size
+
+    def values(field: str) -> npt.NDArray[np.float64]:
+        found = table.get(f"{field}{column}")
+        return np.full(length, np.nan) if found is None else found[rows].astype(np.float64)
+
+    flags = {
+        name: table[name][rows].astype(bool) if name in table else np.full(length, default)
+        for name, default in (("innovation_rejected", False), ("fused", True))
+    }
+    return AxisSamples(
+        timestamp_sample=time[rows].astype(np.int64),
+        observation_variance=values("observation_variance"),
+        innovation=values("innovation"),
+        innovation_variance=values("innovation_variance"),
+        test_ratio=values("test_ratio"),
+        rejected=flags["innovation_rejected"],
+        fused=flags["fused"],
+    )
+
+
+def write_onboard(path: Path, samples: dict[SourceAxis, AxisSamples]) -> None:
+    """Write the vehicle's own innovations in the layout of `<set>.innovations.parquet`."""
+    columns: dict[str, list[npt.NDArray]] = {name: [] for name in ("timestamp_sample", *_FIELDS, "rejected", "fused")}
+    sources: list[str] = []
+    axes: list[int] = []
+    for (source, axis), one in sorted(samples.items()):
+        sources += [source] * one.timestamp_sample.size
+        axes += [axis] * one.timestamp_sample.size
+        for name, parts in columns.items():
+            parts.append(getattr(one, name))
+
+    def joined(name: str, dtype: type) -> pa.Array:
+        return pa.array(np.concatenate([np.zeros(0, dtype=dtype), *columns[name]]).astype(dtype))
+
+    table = pa.table(
+        {
+            "source": pa.array(sources, pa.string()).dictionary_encode(),
+            "axis": pa.array(axes, pa.int32()),
+            "timestamp_sample": joined("timestamp_sample", np.int64),
+            **{name: joined(name, np.float64) for name in _FIELDS},
+            "innovation_rejected": joined("rejected", np.bool_),
+            "fused": joined("fused", np.bool_),
+        }
+    )
+    with atomic_path(path) as temporary:
+        pq.write_table(table, temporary)

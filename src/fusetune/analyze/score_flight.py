@@ -1,0 +1,248 @@
+"""Scores all parameter sets of one flight on the same samples and writes the figures."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fusetune.analyze.activity import inactive_parameters, same_results
+from fusetune.analyze.block_scores import BLOCK_SCHEMA, block_rows
+from fusetune.analyze.filter_events import FilterEvents, filter_events
+from fusetune.analyze.flight_phases import airborne_intervals, imu_gaps
+from fusetune.analyze.measurement_alignment import PairedSamples, paired_samples
+from fusetune.analyze.metrics_table import (
+    MetricsTable,
+    add_axis_metrics,
+    add_events,
+    add_group_metrics,
+    add_true_errors,
+)
+from fusetune.analyze.onboard import ONBOARD, onboard_samples, write_onboard
+from fusetune.analyze.scoring_window import Cut, Interval, ScoringWindow, scoring_window, subtract
+from fusetune.analyze.set_files import SetRecord, read_set
+from fusetune.analyze.settings import ScoringSettings
+from fusetune.analyze.sources import AID_SOURCES
+from fusetune.analyze.true_errors import read_truth, true_errors
+from fusetune.files import atomic_path
+from fusetune.px4.flight import Flight
+from fusetune.px4.release_layouts import canonical
+from fusetune.save.flight_folder import load_flight
+
+SAMPLES_SCHEMA = pa.schema(
+    [
+        pa.field("set", pa.dictionary(pa.int32(), pa.string())),
+        pa.field("source", pa.dictionary(pa.int32(), pa.string())),
+        pa.field("axis", pa.int8()),
+        pa.field("time_us", pa.int64()),
+        pa.field("innovation", pa.float32()),
+        pa.field("innovation_variance", pa.float32()),
+        pa.field("test_ratio", pa.float32()),
+    ]
+)
+
+_NOT_IN_SAMPLES = ("gravity",)
+"""Sampled at every update: the samples would fill the disk and no plot shows them."""
+
+TOPICS = (
+    "vehicle_land_detected",
+    "sensor_combined",
+    "vehicle_imu",
+    "vehicle_gps_position",
+    "sensor_gps",
+    "vehicle_local_position_groundtruth",
+    "vehicle_attitude_groundtruth",
+    "estimator_selector_status",
+    "estimator_innovations",
+    "estimator_innovation_variances",
+    "estimator_innovation_test_ratios",
+    "ekf2_innovations",
+    "estimator_status",
+    *(f"estimator_aid_src_{name}" for name in AID_SOURCES),
+)
+"""What the metrics need of a saved flight."""
+
+
+def score_flight(
+    flight_folder: Path,
+    analyze_folder: Path,
+    sets: Sequence[str],
+    *,
+    present: str = "present",
+    settings: ScoringSettings | None = None,
+) -> None:
+    """Score every parameter set of one flight and write `metrics.parquet`, `scores.parquet`, `samples.parquet`,
+    `scoring.json` and `onboard.innovations.parquet` to `analyze_folder`.
+
+    Parameters
+    ----------
+    flight_folder : the saved flight, `results/save/<flight>`
+    analyze_folder : holds the replays of all sets, `results/analyze/<flight>`
+    sets : names of the sets, the present one among them or added
+    present : the set that flies now; the others are compared with it
+
+    Raises
+    ------
+    UserError
+        If a file of a replay is missing or damaged. A flight that cannot be scored is no error: its files say why.
+    """
+    settings = settings or ScoringSettings()
+    flight = canonical(load_flight(Path(flight_folder), topics=TOPICS))
+    records = [read_set(Path(analyze_folder), name) for name in dict.fromkeys((present, *sets))]
+    airborne = airborne_intervals(flight, records[0].flags)
+    window = scoring_window(records, present, airborne, imu_gaps(flight, settings.log_gap_s), settings)
+    phase = _flight_after_warm_up(airborne, window)
+    events = {record.name: filter_events(record, phase) for record in records}
+
+    table = MetricsTable(flight.name)
+    flight_s = sum(stop - start for start, stop in phase) * 1e-6
+    for name, event in events.items():
+        add_events(table, name, event, flight_s)
+    onboard = onboard_samples(flight)
+    blocks: list[pa.Table] = []
+    samples: list[pa.Table] = []
+    if window.intervals:
+        scored = [record for record in records if record.name not in window.excluded]
+        blocks, samples = _score_samples(table, scored, present, window, settings)
+        _add_onboard(table, onboard, window, settings, records[0].parameters)
+        truth = read_truth(flight)
+        if truth is not None:
+            for record in scored:
+                figures = true_errors(record, Path(analyze_folder), truth, window, settings.confidence)
+                add_true_errors(table, record.name, figures)
+    summary = _summary(flight, records, present, window, events, settings)
+    _write(Path(analyze_folder), table, blocks, samples, summary)
+    write_onboard(Path(analyze_folder) / f"{ONBOARD}.innovations.parquet", onboard)
+
+
+def _flight_after_warm_up(airborne: Sequence[Interval], window: ScoringWindow) -> tuple[Interval, ...]:
+    if window.warm_up_end is None:
+        return tuple(airborne)
+    return subtract(airborne, [Cut(-(2**62), window.warm_up_end, "warm-up")])
+
+
+def _score_samples(
+    table: MetricsTable, records: list[SetRecord], present: str, window: ScoringWindow, settings: ScoringSettings
+) -> tuple[list[pa.Table], list[pa.Table]]:
+    edges = window.block_edges(settings.block_s)
+    blocks, samples = [], []
+    for source in AID_SOURCES.values():
+        pairs: dict[int, PairedSamples] = {}
+        for axis in range(source.axes):
+            found = paired_samples(records, (source.name, axis), present, window)
+            if found is not None:
+                pairs[axis] = found
+        for one in pairs.values():
+            add_axis_metrics(table, one, settings)
+            blocks.append(block_rows(table.flight, one, edges))
+            if source.name not in _NOT_IN_SAMPLES:
+                samples.append(_sample_rows(one))
+        if pairs:
+            add_group_metrics(table, pairs, settings)
+    return blocks, samples
+
+
+def _sample_rows(pairs: PairedSamples) -> pa.Table:
+    sets, n = len(pairs.sets), pairs.time.size
+    names = pa.DictionaryArray.from_arrays(
+        pa.array(np.repeat(np.arange(sets, dtype=np.int32), n)), pa.array(pairs.sets, pa.string())
+    )
+    source = pa.DictionaryArray.from_arrays(
+        pa.array(np.zeros(sets * n, dtype=np.int32)), pa.array([pairs.source], pa.string())
+    )
+    columns = {
+        "set": names,
+        "source": source,
+        "axis": pa.array(np.full(sets * n, pairs.axis, dtype=np.int8)),
+        "time_us": pa.array(np.tile(pairs.time, sets)),
+    }
+    for name in ("innovation", "innovation_variance", "test_ratio"):
+        columns[name] = pa.array(getattr(pairs, name).astype(np.float32).ravel())
+    return pa.table(columns, schema=SAMPLES_SCHEMA)
+
+
+def _add_onboard(
+    table: MetricsTable,
+    onboard: dict,
+    window: ScoringWindow,
+    settings: ScoringSettings,
+    parameters: dict[str, float],
+) -> None:
+    """Append the vehicle's own figures, on the same part of the flight but at the times that it logged."""
+    record = SetRecord(ONBOARD, parameters, {}, {}, onboard, {}, {})
+    for source in AID_SOURCES.values():
+        pairs = {}
+        for axis in range(source.axes):
+            found = paired_samples([record], (source.name, axis), ONBOARD, window)
+            if found is not None:
+                pairs[axis] = found
+                add_axis_metrics(table, found, settings)
+        if pairs:
+            add_group_metrics(table, pairs, settings)
+
+
+def _summary(
+    flight: Flight,
+    records: list[SetRecord],
+    present: str,
+    window: ScoringWindow,
+    events: dict[str, FilterEvents],
+    settings: ScoringSettings,
+) -> dict[str, Any]:
+    by_name = {record.name: record for record in records}
+    return {
+        "flight": flight.name,
+        "status": "scored" if window.intervals else "not_scored",
+        "reason": window.reason,
+        "checksum": flight.checksum,
+        "firmware": flight.release_name,
+        "present": present,
+        "scored_s": round(window.duration_s, 3),
+        "warm_up_end_us": window.warm_up_end,
+        "intervals_us": [list(interval) for interval in window.intervals],
+        "block_edges_us": window.block_edges(settings.block_s).tolist() if window.intervals else [],
+        "cuts": [{"start_us": cut.start, "stop_us": cut.stop, "reason": cut.reason} for cut in window.cuts],
+        "sets": {
+            name: _set_summary(record, by_name[present], window, events[name], flight)
+            for name, record in by_name.items()
+        },
+    }
+
+
+def _set_summary(
+    record: SetRecord, present: SetRecord, window: ScoringWindow, events: FilterEvents, flight: Flight
+) -> dict[str, Any]:
+    excluded = window.excluded.get(record.name, "")
+    ok = record.status == "ok"
+    outcome = "excluded" if excluded else "scored" if window.intervals else "not_scored"
+    return {
+        "status": outcome if ok else record.status,
+        "reason": excluded,
+        "overrides": record.overrides,
+        "parameters": record.parameters,
+        "resets": events.resets,
+        "timeouts": {name: count for name, count in events.timeouts.items() if count},
+        "faults": list(events.faults),
+        "fault_flags": events.fault_flags,
+        "dead_reckoning_s": round(events.dead_reckoning_s, 3),
+        "same_results_as_present": record is not present and ok and same_results(record, present),
+        "inactive": inactive_parameters(record, present, flight) if ok and record is not present else {},
+    }
+
+
+def _write(
+    folder: Path, table: MetricsTable, blocks: list[pa.Table], samples: list[pa.Table], summary: dict[str, Any]
+) -> None:
+    tables = {
+        "metrics.parquet": table.finished(),
+        "scores.parquet": pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
+        "samples.parquet": pa.concat_tables(samples).unify_dictionaries() if samples else SAMPLES_SCHEMA.empty_table(),
+    }
+    for name, content in tables.items():
+        with atomic_path(folder / name) as temporary:
+            pq.write_table(content, temporary)
+    with atomic_path(folder / "scoring.json") as temporary:
+        temporary.write_text(json.dumps(summary, indent=1, sort_keys=True) + "\n", encoding="utf-8")

@@ -1,0 +1,189 @@
+"""Which part of a flight is scored: in the air, after the warm-up, away from resets and gaps, alike for all sets."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.set_files import SetRecord, reset_times
+from fusetune.analyze.settings import ScoringSettings
+from fusetune.analyze.sources import HORIZONTAL_AIDING
+
+Interval = tuple[int, int]
+
+FUSION_DELAY_US = 500_000
+"""Innovations belong to the fusion horizon, up to this much before the time of the output that shows a reset."""
+
+_LONGEST_CUT_SHARE = 0.5
+"""A set whose own resets cost more of the flight than this does not cut the flight of the others."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A part of the flight that is not scored, µs, and why."""
+
+    start: int
+    stop: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class ScoringWindow:
+    """Scored intervals of a flight, µs, half-open and in order, with what was cut and which sets were left out."""
+
+    intervals: tuple[Interval, ...]
+    cuts: tuple[Cut, ...]
+    excluded: dict[str, str]
+    warm_up_end: int | None
+    reason: str = ""
+
+    @property
+    def duration_s(self) -> float:
+        return sum(stop - start for start, stop in self.intervals) * 1e-6
+
+    def contains(self, time: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+        """True for the times (N,), µs, that are scored."""
+        inside = np.zeros(time.shape, dtype=bool)
+        for start, stop in self.intervals:
+            inside |= (time >= start) & (time < stop)
+        return inside
+
+    def block_edges(self, length_s: float) -> npt.NDArray[np.int64]:
+        """Edges of blocks of equal length, as near to `length_s` as the span of the window allows, µs."""
+        start, stop = self.intervals[0][0], self.intervals[-1][1]
+        blocks = max(1, round((stop - start) * 1e-6 / length_s))
+        return start + (np.arange(blocks + 1, dtype=np.int64) * (stop - start)) // blocks
+
+
+def subtract(intervals: Sequence[Interval], cuts: Iterable[Cut]) -> tuple[Interval, ...]:
+    """Remove cuts from intervals; all half-open, µs."""
+    remaining = [interval for interval in intervals if interval[1] > interval[0]]
+    for cut in cuts:
+        pieces: list[Interval] = []
+        for start, stop in remaining:
+            if cut.stop <= start or cut.start >= stop:
+                pieces.append((start, stop))
+                continue
+            if start < cut.start:
+                pieces.append((start, cut.start))
+            if cut.stop < stop:
+                pieces.append((cut.stop, stop))
+        remaining = pieces
+    return tuple(sorted(remaining))
+
+
+def aiding_start(record: SetRecord) -> int | None:
+    """Time at which the set first fuses something that stops horizontal drift, else anything at all, µs."""
+    for sources in (HORIZONTAL_AIDING, tuple({source for source, _ in record.samples} - {"gravity"})):
+        starts = [
+            int(samples.timestamp_sample[np.argmax(samples.fused)])
+            for (source, _), samples in record.samples.items()
+            if source in sources and samples.fused.any()
+        ]
+        if starts:
+            return min(starts)
+    return None
+
+
+def scoring_window(
+    records: Sequence[SetRecord],
+    present: str,
+    airborne: Sequence[Interval],
+    gaps: Sequence[Interval],
+    settings: ScoringSettings,
+) -> ScoringWindow:
+    """Find the part of a flight on which all its parameter sets are scored alike.
+
+    Parameters
+    ----------
+    records : replays of all sets on this flight, the present one among them
+    present : name of the present set; what it cannot do is not asked of the others
+    airborne : flight time, µs
+    gaps : gaps in the IMU data, µs
+
+    Returns
+    -------
+    ScoringWindow
+        Without intervals, and with a reason, where nothing can be scored. A set that diverged, that never or
+        late starts aiding, or that resets all the time is left out with its reason: it would cut the others.
+    """
+    present_record = next(record for record in records if record.name == present)
+    excluded = {record.name: _failure(record) for record in records if _failure(record)}
+    if present in excluded:
+        return ScoringWindow((), (), excluded, None, f"the present set: {excluded[present]}")
+    if not airborne:
+        return ScoringWindow((), (), excluded, None, "the log holds no flight time")
+    reference = aiding_start(present_record)
+    assert reference is not None, "a set without aiding has failed"
+    starts = {}
+    for record in records:
+        if record.name in excluded:
+            continue
+        start = aiding_start(record)
+        assert start is not None, "a set without aiding has failed"
+        late_s = (start - reference) * 1e-6
+        if late_s > settings.max_start_delay_s:
+            excluded[record.name] = f"starts aiding {late_s:.1f} s later than the present set"
+        else:
+            starts[record.name] = start
+    warm_up_end = max(starts.values()) + round(settings.settle_s * 1e6)
+    flying = subtract(airborne, [Cut(-(2**62), warm_up_end, "warm-up")])
+    cuts = _cuts(records, excluded, flying, present, gaps, settings)
+    intervals = subtract(flying, cuts)
+    window = ScoringWindow(intervals, cuts, excluded, warm_up_end)
+    if window.duration_s < settings.minimum_scored_s:
+        reason = (
+            f"only {window.duration_s:.1f} s of flight remain after the warm-up and the cuts, "
+            f"{settings.minimum_scored_s:g} s are needed"
+        )
+        return ScoringWindow((), cuts, excluded, warm_up_end, reason)
+    return window
+
+
+def _failure(record: SetRecord) -> str:
+    if record.status != "ok":
+        return f"{record.status}: {record.summary.get('reason', '')}".rstrip(": ")
+    if aiding_start(record) is None:
+        return "no aid source was ever fused"
+    return ""
+
+
+def _cuts(
+    records: Sequence[SetRecord],
+    excluded: dict[str, str],
+    flying: Sequence[Interval],
+    present: str,
+    gaps: Sequence[Interval],
+    settings: ScoringSettings,
+) -> tuple[Cut, ...]:
+    after = round(settings.reset_cut_s * 1e6)
+    cuts = [Cut(start, stop + after, "gap in the log") for start, stop in gaps]
+    total = sum(stop - start for start, stop in flying)
+    for record in records:
+        if record.name in excluded:
+            continue
+        own = [
+            Cut(int(time) - FUSION_DELAY_US, int(time) + after, f"reset of {kind.replace('_', ' ')}")
+            for kind, times in reset_times(record).items()
+            for time in times
+        ]
+        lost = total - sum(stop - start for start, stop in subtract(flying, own))
+        if record.name != present and lost > _LONGEST_CUT_SHARE * total:
+            excluded[record.name] = f"its resets would cut {lost * 1e-6:.1f} s of {total * 1e-6:.1f} s"
+        else:
+            cuts.extend(own)
+    relevant = [cut for cut in cuts if any(cut.stop > start and cut.start < stop for start, stop in flying)]
+    return _merged(relevant)
+
+
+def _merged(cuts: list[Cut]) -> tuple[Cut, ...]:
+    merged: list[Cut] = []
+    for cut in sorted(cuts, key=lambda cut: (cut.start, cut.stop, cut.reason)):
+        if merged and cut.start <= merged[-1].stop:
+            last = merged[-1]
+            reasons = sorted({*last.reason.split(", "), cut.reason})
+            merged[-1] = Cut(last.start, max(last.stop, cut.stop), ", ".join(reasons))
+        else:
+            merged.append(cut)
+    return tuple(merged)

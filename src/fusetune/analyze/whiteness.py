@@ -1,0 +1,65 @@
+"""Are successive innovations independent? Autocorrelation, effective number of samples, Ljung–Box statistic."""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import chdtrc
+
+Array = npt.NDArray[np.float64]
+
+LJUNG_BOX_LAGS = 10
+MAXIMUM_LAGS = 50
+
+
+def autocorrelation(values: Array, lags: int) -> Array:
+    """Sample autocorrelation ρ_1 … ρ_lags of the last axis.
+
+    Parameters
+    ----------
+    values : (..., N) array; its mean is removed, so a constant offset does not count as correlation
+    lags : number of lags, < N
+
+    Returns
+    -------
+    (..., lags) array; 0 where the values do not vary
+    """
+    centred = values - np.mean(values, axis=-1, keepdims=True)
+    power = np.sum(np.square(centred), axis=-1)
+    products = [np.sum(centred[..., lag:] * centred[..., :-lag], axis=-1) for lag in range(1, lags + 1)]
+    stacked = np.stack(products, axis=-1) if products else np.zeros((*power.shape, 0))
+    return np.divide(stacked, power[..., None], out=np.zeros_like(stacked), where=power[..., None] > 0.0)
+
+
+def lag_limit(samples: int) -> int:
+    """Number of lags that `samples` values can tell about: a quarter of them, at most 50."""
+    return max(0, min(MAXIMUM_LAGS, samples // 4))
+
+
+def effective_samples(correlation: Array, samples: int) -> Array:
+    """Number of independent samples that carry as much about a mean square: N / (1 + 2 Σ ρ_k²).
+
+    The squares of a Gaussian process correlate as ρ². The sum ends before the first lag whose |ρ| is below
+    1.96/√N, as the estimates behind it are noise that would add up.
+
+    Parameters
+    ----------
+    correlation : (..., K) array from `autocorrelation`
+    samples : N
+
+    Returns
+    -------
+    (...) array, 1 ≤ N_eff ≤ N
+    """
+    significant = np.cumprod(np.abs(correlation) >= 1.96 / np.sqrt(samples), axis=-1)
+    total = np.sum(significant * np.square(correlation), axis=-1)
+    return np.maximum(samples / (1.0 + 2.0 * total), 1.0)
+
+
+def ljung_box(correlation: Array, samples: int, lags: int = LJUNG_BOX_LAGS) -> tuple[Array, Array]:
+    """Ljung–Box statistic Q = N (N + 2) Σ ρ_k² / (N − k) and its p-value under whiteness, χ²(lags).
+
+    Receiver-filtered GNSS is never white: the statistic compares sets, it does not reject one.
+    """
+    lags = min(lags, correlation.shape[-1])
+    weights = 1.0 / (samples - np.arange(1, lags + 1))
+    statistic = samples * (samples + 2.0) * np.sum(np.square(correlation[..., :lags]) * weights, axis=-1)
+    return statistic, np.asarray(chdtrc(max(lags, 1), statistic), dtype=np.float64)

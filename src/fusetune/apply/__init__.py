@@ -1,0 +1,1 @@
+"""The apply room: compares the parameter sets over all flights, decides, and writes what the vehicle loads."""

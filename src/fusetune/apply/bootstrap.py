@@ -1,0 +1,124 @@
+"""Paired hierarchical bootstrap: flights are redrawn, and in each drawn flight its blocks, alike for all sets."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import ndtr, stdtr, stdtrit
+
+from fusetune.apply.evidence import FlightEvidence, score_of_sums
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Confidence interval of a mean difference."""
+
+    lower: float
+    upper: float
+
+    @property
+    def excludes_zero(self) -> bool:
+        return self.lower > 0.0 or self.upper < 0.0
+
+
+def bootstrap_scores(flights: Sequence[FlightEvidence], sets: Sequence[str], draws: int, seed: int) -> Array:
+    """Redraw the mean score of every set.
+
+    Parameters
+    ----------
+    flights : evidence, F ≥ 1, in a fixed order
+    sets : names, S; each must be scored on every flight
+    draws : D
+    seed : of the generator; the same seed gives the same draws on any number of cores
+
+    Returns
+    -------
+    (D, S) array of mean scores. In one draw all sets see the same flights and blocks, so differences are paired.
+    """
+    generator = np.random.Generator(np.random.PCG64(seed))
+    count = len(flights)
+    drawn = generator.integers(0, count, size=(draws, count))
+    total = np.zeros((draws, len(sets)))
+    for index, flight in enumerate(flights):
+        draw_of_slot = np.nonzero(drawn == index)[0]
+        columns = [flight.sets.index(name) for name in sets]
+        scores = _redrawn_flight(flight, np.array(columns), draw_of_slot.size, generator)
+        np.add.at(total, draw_of_slot, scores)
+    return total / count
+
+
+def _redrawn_flight(
+    flight: FlightEvidence, columns: npt.NDArray[np.int64], slots: int, generator: np.random.Generator
+) -> Array:
+    """(slots, S) scores of a flight whose blocks are drawn anew for each slot."""
+    blocks, axes = flight.n.shape
+    picks = generator.integers(0, blocks, size=(slots, blocks))
+    cells = (np.arange(slots)[:, None] * blocks + picks).ravel()
+    weights = np.bincount(cells, minlength=slots * blocks).reshape(slots, blocks).astype(np.float64)
+    n = np.zeros((slots, 1, axes))
+    nis = np.zeros((slots, columns.size, axes))
+    log_variance = np.zeros_like(nis)
+    # Summed block by block, not by a matrix product: its order of summation could change with the number of cores.
+    for block in range(blocks):
+        weight = weights[:, block, None, None]
+        n += weight * flight.n[block]
+        nis += weight * flight.sum_nis[columns, block]
+        log_variance += weight * flight.sum_log_variance[columns, block]
+    return score_of_sums(n, nis, log_variance)
+
+
+def expanded_interval(differences: Array, flights: int, confidence: float) -> Interval:
+    """Percentile interval, widened for the small number of flights.
+
+    The plain percentile interval is as narrow as if the spread of a few flights were known. Its tails are moved
+    to Φ(−√(F/(F−1)) t), with t the quantile of Student's distribution with F − 1 degrees of freedom.
+
+    Parameters
+    ----------
+    differences : (D,) redrawn mean differences
+    flights : F; with one flight only its blocks speak and nothing can be widened
+
+    References
+    ----------
+    Hesterberg, "What Teachers Should Know About the Bootstrap", The American Statistician 69(4), 2015.
+    """
+    tail = 0.5 * (1.0 - confidence)
+    if flights > 1:
+        tail = float(ndtr(np.sqrt(flights / (flights - 1.0)) * stdtrit(flights - 1, tail)))
+    lower, upper = np.quantile(differences, [tail, 1.0 - tail])
+    return Interval(float(lower), float(upper))
+
+
+def p_value(difference: float, differences: Array, flights: int) -> float:
+    """Two-sided p-value of a mean difference against 0: Student's t with the bootstrap's standard error.
+
+    With one flight the normal distribution stands in for Student's; 1 where the draws do not vary around 0.
+    """
+    error = float(np.std(differences))
+    if flights > 1:
+        error *= np.sqrt(flights / (flights - 1.0))
+    if error == 0.0:
+        return 1.0 if difference == 0.0 else 0.0
+    statistic = -abs(difference) / error
+    tail = stdtr(flights - 1, statistic) if flights > 1 else ndtr(statistic)
+    return float(min(2.0 * tail, 1.0))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Holm's adjusted p-values in the order of the arguments: they hold for all candidates together."""
+    order = np.argsort(p_values, kind="stable")
+    adjusted = np.empty(len(p_values))
+    largest = 0.0
+    for rank, index in enumerate(order):
+        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[index]))
+        adjusted[index] = largest
+    return [float(value) for value in adjusted]
+
+
+def probability_best(scores: Array) -> Array:
+    """Share of draws in which each set has the lowest score, (D, S) → (S,); equal sets share a draw."""
+    best = scores == scores.min(axis=1, keepdims=True)
+    return (best / best.sum(axis=1, keepdims=True)).mean(axis=0)

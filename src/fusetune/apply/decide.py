@@ -1,0 +1,224 @@
+"""Decides over all flights and writes the ranking, the decision and the parameter files."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+
+from fusetune.apply.choice import Choice, choose
+from fusetune.apply.criteria import Criteria, criteria, paper_entries, read_metrics
+from fusetune.apply.evidence import AnalyzedFlight, read_flights
+from fusetune.apply.paper_mode import paper_ranking
+from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
+from fusetune.apply.provenance import flight_rows, provenance
+from fusetune.apply.ranking import RankedSet, rank
+from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.vetoes import vetoes
+from fusetune.apply.wording import paragraph
+from fusetune.errors import UserError
+from fusetune.files import atomic_path
+
+_SIGNIFICANT_DIGITS = 9
+
+
+def decide(
+    analyze_folders: Sequence[Path],
+    flights_table: Path,
+    output_folder: Path,
+    *,
+    sets: Sequence[str],
+    present: str = "present",
+    newest_flight: str | None = None,
+    descriptions: Mapping[str, str] | None = None,
+    configuration_files: Sequence[Path] = (),
+    settings: DecisionSettings | None = None,
+) -> None:
+    """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
+    `decision.json`, `best_params.params` and `rollback.params` to `output_folder`.
+
+    Parameters
+    ----------
+    analyze_folders : `results/analyze/<flight>` of every replayed flight, in any order; may be empty
+    flights_table : `results/save/flights.parquet`, with the refused logs too
+    sets : all sets, the present one among them or added
+    present : the configuration that the vehicle flies now, replayed on every flight like any other set. Its
+        parameters on the newest flight are the "previous values". Given with explicit values it is one
+        configuration on all flights; with none it is each flight's own.
+    newest_flight : by whose log the vehicle's present parameters are known; the last by name if None
+    descriptions : a line about each set, from the study
+    configuration_files : hashed into the decision
+
+    Raises
+    ------
+    UserError
+        If the newest flight is none of the flights, or a configuration file cannot be read.
+    """
+    settings = settings or DecisionSettings()
+    sets = list(dict.fromkeys((present, *sets)))
+    flights = read_flights(analyze_folders, settings.source, present)
+    newest = _newest(flights, newest_flight, flights_table)
+    metrics = read_metrics([flight.folder for flight in flights])
+    vetoed = {name: vetoes(name, present, flights, metrics) for name in sets if name != present}
+    ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
+    scored = sum(flight.evidence is not None for flight in flights)
+    choice = choose(ranked, present, scored, settings)
+    values = criteria(sets, settings.source, flights, metrics)
+    changes = _changes(choice, newest, present)
+    text = paragraph(choice, ranked, flights, settings)
+    decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    decision["provenance"] = provenance(configuration_files)
+    decision["flights"] = flight_rows(flights_table, flights)
+    decision["sets"] = _sets(sets, present, newest, descriptions or {}, flights)
+    decision["paper_mode"] = _paper_mode(sets, flights, metrics, values, choice)
+
+    output = Path(output_folder)
+    _write_ranking(output, ranked, values)
+    _write_per_flight(output, flights)
+    firmware = newest.summary["firmware"] if newest else "unknown"
+    write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
+    with atomic_path(output / "decision.json") as temporary:
+        content = json.dumps(_rounded(decision), indent=1, ensure_ascii=False, allow_nan=False)
+        temporary.write_text(content + "\n", encoding="utf-8")
+
+
+def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: Path) -> AnalyzedFlight | None:
+    if not flights:
+        return None
+    if name is None:
+        return flights[-1]
+    for flight in flights:
+        if flight.name == name:
+            return flight
+    raise UserError(flights_table, f"the newest flight {name!r} was not replayed", "Name one of the replayed flights")
+
+
+def _changes(choice: Choice, newest: AnalyzedFlight | None, present: str) -> tuple[ParameterChange, ...]:
+    if choice.status != "change" or newest is None:
+        return ()
+    sets = newest.summary["sets"]
+    return parameter_changes(sets[choice.chosen]["overrides"], sets[present]["parameters"])
+
+
+def _decision(
+    choice: Choice,
+    ranked: Sequence[RankedSet],
+    flights: Sequence[AnalyzedFlight],
+    newest: AnalyzedFlight | None,
+    changes: Sequence[ParameterChange],
+    text: str,
+    settings: DecisionSettings,
+) -> dict[str, Any]:
+    return {
+        "status": choice.status,
+        "chosen": choice.chosen,
+        "best_candidate": choice.best.name if choice.best else None,
+        "exploratory": choice.exploratory,
+        "paragraph": text,
+        "flights_scored": sum(flight.evidence is not None for flight in flights),
+        "newest_flight": newest.name if newest else None,
+        "changes": [asdict(change) for change in changes],
+        "rule": asdict(settings),
+        "ranking": [asdict(one) for one in ranked],
+    }
+
+
+def _sets(
+    sets: Sequence[str],
+    present: str,
+    newest: AnalyzedFlight | None,
+    descriptions: Mapping[str, str],
+    flights: Sequence[AnalyzedFlight],
+) -> list[dict[str, Any]]:
+    rows = []
+    for name in sets:
+        summary = newest.summary["sets"].get(name, {}) if newest else {}
+        inactive = {f.name: why for f in flights if (why := f.summary["sets"].get(name, {}).get("inactive"))}
+        rows.append(
+            {
+                "set": name,
+                "description": descriptions.get(name, "the configuration that flies now" if name == present else ""),
+                "overrides": summary.get("overrides", {}),
+                "inactive": inactive,
+            }
+        )
+    return rows
+
+
+def _paper_mode(
+    sets: Sequence[str],
+    flights: Sequence[AnalyzedFlight],
+    metrics: pa.Table,
+    values: dict[str, Criteria],
+    choice: Choice,
+) -> dict[str, Any]:
+    order = paper_ranking(paper_entries(sets, flights, metrics, values))
+    first = order[0].name if order and not math.isnan(order[0].aggregate_rms) else None
+    return {
+        "rule": "lowest RMS of the GNSS position, height and velocity innovations together, inside the χ² bounds",
+        "first": first,
+        "agrees": first == choice.chosen if first is not None else None,
+        "ranking": [asdict(entry) for entry in order],
+    }
+
+
+def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, Criteria]) -> None:
+    rows = []
+    for position, one in enumerate(ranked, start=1):
+        row: dict[str, Any] = {"rank": position, **asdict(one), **values[one.name]}
+        row["reasons"] = "; ".join(one.reasons)
+        rows.append(row)
+    table = pa.Table.from_pylist([_rounded(row, keep_nan=True) for row in rows])
+    with atomic_path(folder / "ranking.parquet") as temporary:
+        pq.write_table(table, temporary)
+    with atomic_path(folder / "ranking.csv") as temporary:
+        pa.csv.write_csv(table, temporary)
+
+
+def _write_per_flight(folder: Path, flights: Sequence[AnalyzedFlight]) -> None:
+    rows: list[dict[str, Any]] = []
+    for flight in flights:
+        if flight.evidence is not None:
+            for name, score in zip(flight.evidence.sets, flight.evidence.scores, strict=True):
+                rows.append({"flight": flight.name, "set": name, "score": float(score)})
+    schema = pa.schema([("flight", pa.string()), ("set", pa.string()), ("score", pa.float64())])
+    with atomic_path(folder / "per_flight.parquet") as temporary:
+        pq.write_table(pa.Table.from_pylist(rows, schema=schema), temporary)
+
+
+def _reason(choice: Choice) -> str:
+    if choice.status != "change" or choice.best is None:
+        return ""
+    best = choice.best
+    note = ", exploratory" if choice.exploratory else ""
+    return (
+        f"set {best.name}: prediction errors {best.improvement_percent:.1f} % smaller, "
+        f"better on {best.flights_better} of {best.flights} flights{note}"
+    )
+
+
+def _file_origin(choice: Choice, decision: dict[str, Any], newest: AnalyzedFlight | None) -> tuple[str, ...]:
+    lines = [f"written by {decision['provenance']['product']}, decision: {choice.status} ({choice.chosen})"]
+    if newest is not None:
+        lines.append(f"previous values from flight {newest.name}, firmware {newest.summary['firmware']}")
+    if choice.exploratory:
+        lines.append(f"exploratory: only {decision['flights_scored']} scored flight(s)")
+    return tuple(lines)
+
+
+def _rounded(value: Any, keep_nan: bool = False) -> Any:
+    """Round every float to nine significant digits: the last bits may differ between machines."""
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            return value if keep_nan else None
+        return float(f"{value:.{_SIGNIFICANT_DIGITS}g}")
+    if isinstance(value, Mapping):
+        return {key: _rounded(item, keep_nan) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(item, keep_nan) for item in value]
+    return value
