@@ -1,0 +1,1 @@
+"""Design: the mission that is flown and the parameter sets that are compared on it."""

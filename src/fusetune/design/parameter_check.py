@@ -1,0 +1,23 @@
+"""Checks the parameters of a set against the metadata of PX4's EKF2 parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from fusetune.px4.ekf2_parameters import PARAMETERS, ParameterError, check_value
+
+
+def parameter_problem(name: str, value: float) -> str | None:
+    """What is wrong with a parameter and its value and what was expected, in words; `None` where nothing is."""
+    try:
+        check_value(name, value)
+    except ParameterError as error:
+        return f"{error.name}: {error.reason} – {error.remedy[0].lower()}{error.remedy[1:]}"
+    return None
+
+
+def typed_values(parameters: Mapping[str, float]) -> dict[str, float]:
+    """Known parameters with `int` values where the type is INT32 and `float` values elsewhere."""
+    return {
+        name: int(value) if PARAMETERS[name].type == "INT32" else float(value) for name, value in parameters.items()
+    }

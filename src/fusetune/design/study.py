@@ -1,0 +1,147 @@
+"""Parameter studies: the named parameter sets that are compared.
+
+Three kinds: an explicit list of sets; one parameter at a time, each of its values a set; a grid of all
+combinations. The sets depend on the study file alone, and values appended to a list, a parameter or the axes of a
+grid leave the sets before them as they are, with the same names: only what is new has to be computed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fusetune.design.config_file import load_schema, raise_problems, read_yaml, validate
+from fusetune.design.parameter_check import parameter_problem, typed_values
+
+RESERVED_SET_NAMES = ("present", "onboard", "sets")
+"""Names the product gives itself: the parameters as logged, the vehicle's own estimator, the table of sets."""
+
+LONGEST_SET_NAME = 120
+REMEDY = "Mend the named keys; the examples in config/studies/ show studies of every kind"
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """A named set of EKF2 parameters that differ from those of the log."""
+
+    name: str
+    overrides: dict[str, float]
+    """Parameter name → value; `int` for INT32 parameters."""
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A parameter study."""
+
+    name: str
+    kind: str
+    sets: tuple[ParameterSet, ...]
+    description: str = ""
+
+    def set_named(self, name: str) -> ParameterSet:
+        """The set of that name; raises `KeyError` where the study has none."""
+        for parameter_set in self.sets:
+            if parameter_set.name == name:
+                return parameter_set
+        raise KeyError(name)
+
+
+def load_study(path: str | os.PathLike[str]) -> Study:
+    """Read and check a study file.
+
+    Raises
+    ------
+    UserError
+        The file is broken; the message names every key at fault and what was expected.
+    """
+    document = read_yaml(path)
+    validate(document, load_schema("fusetune.design", "study"), path)
+    raise_problems(path, _parameter_problems(document), REMEDY)
+    sets = tuple(_SETS_OF_KIND[document["kind"]](document))
+    raise_problems(path, _name_problems(sets), REMEDY)
+    return Study(document["name"], document["kind"], sets, document.get("description", "").strip())
+
+
+def _listed_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
+    fixed = document.get("fixed", {})
+    for entry in document["sets"]:
+        overrides = typed_values({**fixed, **entry["parameters"]})
+        yield ParameterSet(entry["name"], overrides, entry.get("description", "").strip())
+
+
+def _one_at_a_time_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
+    for parameter, values in document["vary"].items():
+        for value in values:
+            yield _varied_set(document, {parameter: value})
+
+
+def _grid_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
+    """All combinations, ordered by their largest value index.
+
+    In this order a grid that grows along all its axes keeps its former sets as the first ones; row by row it would not.
+    """
+    vary = document["vary"]
+    combinations = itertools.product(*(range(len(values)) for values in vary.values()))
+    for indices in sorted(combinations, key=lambda combination: (max(combination), combination)):
+        yield _varied_set(document, {name: vary[name][index] for name, index in zip(vary, indices, strict=True)})
+
+
+_SETS_OF_KIND = {"list": _listed_sets, "one_at_a_time": _one_at_a_time_sets, "grid": _grid_sets}
+
+
+def _varied_set(document: Mapping[str, Any], varied: Mapping[str, float]) -> ParameterSet:
+    varied = typed_values(varied)
+    name = "-".join(f"{_short(parameter)}_{_value_text(value)}" for parameter, value in varied.items())
+    description = ", ".join(f"{parameter} {value:g}" for parameter, value in varied.items())
+    return ParameterSet(name, {**typed_values(document.get("fixed", {})), **varied}, description)
+
+
+def _short(parameter: str) -> str:
+    return parameter.removeprefix("EKF2_").lower()
+
+
+def _value_text(value: float) -> str:
+    """A number as part of a file name: 0.35 → ``0p35``, −2 → ``m2``, 1e-05 → ``1em05``."""
+    return format(value, ".9g").replace("+", "").replace("-", "m").replace(".", "p")
+
+
+def _parameter_problems(document: Mapping[str, Any]) -> Iterable[str]:
+    for place, name, value in _parameters_with_places(document):
+        problem = parameter_problem(name, value)
+        if problem:
+            yield f"{place}: {problem}"
+    for name in set(document.get("fixed", {})) & set(document.get("vary", {})):
+        yield f"vary.{name}: the parameter is fixed too; expected it in only one of fixed and vary"
+    for name, values in document.get("vary", {}).items():
+        for value in {value for value in values if values.count(value) > 1}:
+            yield f"vary.{name}: the value {value:g} stands more than once"
+
+
+def _parameters_with_places(document: Mapping[str, Any]) -> Iterable[tuple[str, str, float]]:
+    for name, value in document.get("fixed", {}).items():
+        yield "fixed", name, value
+    for index, entry in enumerate(document.get("sets", ())):
+        for name, value in entry["parameters"].items():
+            yield f"sets[{index}] ({entry['name']}).parameters", name, value
+    for name, values in document.get("vary", {}).items():
+        for index, value in enumerate(values):
+            yield f"vary.{name}[{index}]", name, value
+
+
+def _name_problems(sets: tuple[ParameterSet, ...]) -> Iterable[str]:
+    seen: dict[str, str] = {}
+    for index, parameter_set in enumerate(sets):
+        name = parameter_set.name
+        # File systems that ignore case would keep only one of two such sets.
+        folded = name.casefold()
+        if name in RESERVED_SET_NAMES:
+            yield f"sets[{index}].name: {name!r} is a name the product uses itself; expected another name"
+        if folded in seen:
+            yield f"sets[{index}].name: duplicate set name {name!r}; expected names that differ in more than case"
+        if len(name) > LONGEST_SET_NAME:
+            yield f"the set name {name!r} has {len(name)} characters; expected at most {LONGEST_SET_NAME} (vary fewer)"
+        seen[folded] = name

@@ -1,0 +1,140 @@
+"""The vehicle's logger: what of a flight gets into the log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fusetune.execute.faults import DefaultProfile, Fault, LoggerDropout, of_kind
+from fusetune.execute.flight_plan import FlightEvents
+from fusetune.execute.noise import random_stream
+from fusetune.px4.flight import Dropout, TopicKey, TopicTable, select_rows
+
+NO_SAMPLE = 32767
+ESTIMATOR_LATENCY_US = 450
+"""From the end of an IMU sample to the run of the estimator that takes it."""
+LONGEST_LOSS = 4
+"""A busy logger loses up to this many IMU samples in a row."""
+RELATIVE_TIMESTAMPS = {
+    "airspeed_timestamp_rel": None,
+    "airspeed_validated_timestamp_rel": None,
+    "distance_sensor_timestamp_rel": None,
+    "optical_flow_timestamp_rel": None,
+    "vehicle_air_data_timestamp_rel": "vehicle_air_data",
+    "vehicle_magnetometer_timestamp_rel": "vehicle_magnetometer",
+    "visual_odometry_timestamp_rel": None,
+}
+
+DEFAULT_INTERVAL_MS = {
+    "vehicle_magnetometer": 500,
+    "vehicle_air_data": 200,
+    "vehicle_gps_position": 100,
+    "vehicle_attitude": 50,
+    "vehicle_local_position": 100,
+    "vehicle_global_position": 200,
+    "estimator_states": 1000,
+    "estimator_status": 200,
+    "estimator_status_flags": 0,
+    "estimator_event_flags": 0,
+    "estimator_sensor_bias": 0,
+    "estimator_innovations": 500,
+    "estimator_innovation_variances": 500,
+    "estimator_innovation_test_ratios": 500,
+    "estimator_baro_bias": 500,
+    "estimator_gnss_hgt_bias": 500,
+    "estimator_gps_status": 1000,
+    "yaw_estimator_status": 1000,
+}
+"""Smallest time between two logged messages of a topic in PX4 v1.16's default profile, ms."""
+AID_SOURCE_INTERVAL_MS = 100
+REPLAY_ONLY_TOPICS = ("ekf2_timestamps",)
+
+
+def ekf2_timestamps(topics: dict[TopicKey, TopicTable]) -> TopicTable:
+    """Which sample each run of the estimator took, as PX4 logs it for replay.
+
+    One row per IMU sample. A run takes a sample once it is published; its time is told relative to that of the IMU in
+    steps of 0.1 ms, computed from times that were cut to 0.1 ms.
+    """
+    imu_us = topics["sensor_combined", 0]["timestamp"]
+    table: TopicTable = {"timestamp": imu_us.copy()}
+    for column, topic in RELATIVE_TIMESTAMPS.items():
+        relative = np.full(len(imu_us), NO_SAMPLE, np.int16)
+        if topic is not None and (topic, 0) in topics:
+            published_us = topics[topic, 0]["timestamp"]
+            run = np.searchsorted(imu_us + ESTIMATOR_LATENCY_US, published_us)
+            taken = run < len(imu_us)
+            relative[run[taken]] = published_us[taken] // 100 - imu_us[run[taken]] // 100
+        table[column] = relative
+    return table
+
+
+def logged_topics(
+    topics: dict[TopicKey, TopicTable], events: FlightEvents, faults: Sequence[Fault], seed: int
+) -> tuple[dict[TopicKey, TopicTable], list[Dropout]]:
+    """Topics as they get into the log, and the times in which the logger lost messages."""
+    for profile in of_kind(faults, DefaultProfile):
+        topics = _default_profile(topics, events, profile, seed)
+    dropouts = []
+    for fault in of_kind(faults, LoggerDropout):
+        begin_us = round((events.takeoff_s + fault.start_s) * 1e6)
+        topics = {key: _without(table, begin_us, fault.duration_s) for key, table in topics.items()}
+        dropouts.append(Dropout(begin_us, round(fault.duration_s * 1e3)))
+    return topics, dropouts
+
+
+def _without(table: TopicTable, begin_us: int, duration_s: float) -> TopicTable:
+    timestamp = table["timestamp"]
+    lost = (timestamp >= begin_us) & (timestamp < begin_us + round(duration_s * 1e6))
+    return select_rows(table, ~lost)
+
+
+def _default_profile(
+    topics: dict[TopicKey, TopicTable], events: FlightEvents, profile: DefaultProfile, seed: int
+) -> dict[TopicKey, TopicTable]:
+    logged = {}
+    for (topic, instance), table in topics.items():
+        if topic in REPLAY_ONLY_TOPICS:
+            continue
+        interval_ms = AID_SOURCE_INTERVAL_MS if "aid_src" in topic else DEFAULT_INTERVAL_MS.get(topic, 0)
+        logged[topic, instance] = _thinned(table, interval_ms * 1000)
+    imu = logged["sensor_combined", 0]
+    logged["sensor_combined", 0] = select_rows(imu, ~_lost_samples(len(imu["timestamp"]), profile.imu_loss, seed))
+    if profile.from_arming:
+        first_us = round(events.armed_s * 1e6)
+        logged = {key: _from(table, first_us) for key, table in logged.items()}
+    return logged
+
+
+def _thinned(table: TopicTable, interval_us: int) -> TopicTable:
+    """Rows that follow the one logged before by at least the interval."""
+    if not interval_us:
+        return table
+    kept, last_us = [], -interval_us
+    for row, timestamp in enumerate(table["timestamp"].tolist()):
+        if timestamp - last_us >= interval_us:
+            kept.append(row)
+            last_us = timestamp
+    return select_rows(table, np.array(kept, dtype=np.intp))
+
+
+def _lost_samples(samples: int, share: float, seed: int) -> np.ndarray:
+    """Which of the samples the logger misses, in short runs, (samples,) bool."""
+    rng = random_stream(seed, "logger loss")
+    run_starts = rng.random(samples) < 2.0 * share / (LONGEST_LOSS + 1.0)
+    run_lengths = rng.integers(1, LONGEST_LOSS + 1, samples)
+    lost = np.zeros(samples, np.bool_)
+    for offset in range(LONGEST_LOSS):
+        begins = np.flatnonzero(run_starts & (run_lengths > offset)) + offset
+        lost[begins[begins < samples]] = True
+    return lost
+
+
+def _from(table: TopicTable, first_us: int) -> TopicTable:
+    """Rows from a time on; of a topic published before, the last earlier message, as the logger writes it at its start."""
+    timestamp = table["timestamp"]
+    first = int(np.searchsorted(timestamp, first_us))
+    return select_rows(
+        table, np.arange(first if first == 0 or len(timestamp) - first > 10 else first - 1, len(timestamp))
+    )

@@ -1,0 +1,159 @@
+"""A simulated flight from the mission to the log."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fusetune.design.mission import Mission
+from fusetune.errors import UserError
+from fusetune.execute.barometer import vehicle_air_data
+from fusetune.execute.faults import DefaultProfile, Fault, of_kind
+from fusetune.execute.flight_plan import FlightPlan, plan_flight
+from fusetune.execute.gnss import vehicle_gps_position
+from fusetune.execute.groundtruth import groundtruth_topics
+from fusetune.execute.imu import sensor_combined
+from fusetune.execute.logger import ekf2_timestamps, logged_topics
+from fusetune.execute.magnetometer import vehicle_magnetometer
+from fusetune.execute.onboard_estimator import estimator_topics
+from fusetune.execute.parameters import flown_parameters
+from fusetune.execute.truth import Truth, simulate_truth
+from fusetune.execute.vehicle import Vehicle
+from fusetune.execute.vehicle_state import sensor_selection, vehicle_land_detected, vehicle_status
+from fusetune.px4.flight import Flight, LoggedMessage, ParameterHistory, TopicKey, TopicTable
+from fusetune.px4.ulog_writer import write_ulog
+
+LONGEST_FLIGHT_S = 1800.0
+RELEASE = (1 << 24) | (16 << 16) | 255
+"""v1.16.0 as PX4 encodes it; the last byte marks a release."""
+
+
+def simulate(
+    mission: Mission,
+    vehicle: Vehicle,
+    parameters: Mapping[str, float],
+    seed: int,
+    faults: Sequence[Fault],
+    path: str | os.PathLike[str],
+) -> Flight:
+    """Fly a mission and write the log.
+
+    Parameters
+    ----------
+    mission, vehicle
+        What is flown, and with what.
+    parameters
+        EKF2 parameters flown, beside those of the vehicle.
+    seed
+        Of all chance; the same seed gives the same bytes.
+    faults
+        What goes wrong, see `faults.parse_faults`.
+    path
+        The ULog that is written.
+
+    Returns
+    -------
+    Flight
+        What was written.
+
+    Raises
+    ------
+    UserError
+        The mission takes longer than half an hour.
+    ParameterError
+        A parameter is unknown, of the wrong type or out of range.
+    """
+    flight = fly(mission, vehicle, parameters, seed, faults, Path(path).stem)
+    write_ulog(path, flight)
+    return flight
+
+
+def fly(
+    mission: Mission,
+    vehicle: Vehicle,
+    parameters: Mapping[str, float],
+    seed: int,
+    faults: Sequence[Fault] = (),
+    name: str = "",
+) -> Flight:
+    """The flight that `simulate` writes."""
+    default_profile = bool(of_kind(faults, DefaultProfile))
+    flown = flown_parameters(vehicle, parameters, default_profile=default_profile)
+    plan = plan_flight(mission, vehicle.limits)
+    if plan.events.end_s > LONGEST_FLIGHT_S:
+        raise UserError(
+            f"mission {mission.name}",
+            f"takes {plan.events.end_s / 60:.0f} minutes with vehicle {vehicle.name}",
+            f"Keep simulated flights below {LONGEST_FLIGHT_S / 60:.0f} minutes",
+        )
+    truth = simulate_truth(plan, vehicle, seed)
+    sensed = sensor_topics(truth, plan, mission, vehicle, faults, seed)
+    estimated = estimator_topics(_flight(name, mission, vehicle, plan, flown, sensed))
+    everything = sensed | estimated | groundtruth_topics(truth, mission.home.geoid_undulation_m)
+    logged, dropouts = logged_topics(everything, plan.events, faults, seed)
+    flight = _flight(name, mission, vehicle, plan, flown, logged)
+    flight.dropouts = dropouts
+    return flight
+
+
+def sensor_topics(
+    truth: Truth, plan: FlightPlan, mission: Mission, vehicle: Vehicle, faults: Sequence[Fault], seed: int
+) -> dict[TopicKey, TopicTable]:
+    """All that the estimator is fed with, at full rate."""
+    undulation_m = mission.home.geoid_undulation_m
+    topics: dict[TopicKey, TopicTable] = {
+        ("sensor_combined", 0): sensor_combined(truth, vehicle.imu, faults, seed),
+        ("vehicle_magnetometer", 0): vehicle_magnetometer(
+            truth, vehicle.magnetometer, vehicle.environment, faults, seed
+        ),
+        ("vehicle_air_data", 0): vehicle_air_data(truth, vehicle.barometer, undulation_m, seed),
+        ("vehicle_gps_position", 0): vehicle_gps_position(
+            truth, vehicle.gnss, vehicle.environment, undulation_m, faults, seed
+        ),
+        ("vehicle_land_detected", 0): vehicle_land_detected(plan, truth),
+        ("vehicle_status", 0): vehicle_status(plan, truth),
+        ("sensor_selection", 0): sensor_selection(truth),
+    }
+    topics["ekf2_timestamps", 0] = ekf2_timestamps(topics)
+    return topics
+
+
+def _flight(
+    name: str,
+    mission: Mission,
+    vehicle: Vehicle,
+    plan: FlightPlan,
+    parameters: ParameterHistory,
+    topics: dict[TopicKey, TopicTable],
+) -> Flight:
+    imu_us = topics["sensor_combined", 0]["timestamp"]
+    return Flight(
+        name=name,
+        topics=topics,
+        parameters=parameters,
+        info={
+            "sys_name": "PX4",
+            "sys_os_name": "fusetune",
+            "ver_hw": "FUSETUNE_SIM",
+            "ver_sw": "0" * 40,
+            "ver_sw_release": RELEASE,
+            "sys_mcu": vehicle.name,
+            "time_ref_utc": 0,
+        },
+        messages=_messages(mission, vehicle, plan),
+        start_timestamp=int(imu_us[0]),
+        last_timestamp=max(int(table["timestamp"][-1]) for table in topics.values() if len(table["timestamp"])),
+    )
+
+
+def _messages(mission: Mission, vehicle: Vehicle, plan: FlightPlan) -> list[LoggedMessage]:
+    events = plan.events
+    texts = (
+        (events.log_start_s + 0.01, f"[fusetune] simulated flight: mission {mission.name}, vehicle {vehicle.name}"),
+        (events.armed_s, "[commander] Armed by mission"),
+        (events.takeoff_s, "[commander] Takeoff detected"),
+        (events.touchdown_s, "[commander] Landing detected"),
+        (events.disarmed_s, "[commander] Disarmed by landing"),
+    )
+    return [LoggedMessage(round(time_s * 1e6), "INFO", text) for time_s, text in texts]
