@@ -166,7 +166,7 @@ def is_height_reset_required(ekf):
 def is_yaw_final_align_complete(ekf):
     """Whether the yaw is aligned, with a magnetometer in use only one second after its in-flight alignment."""
     if ekf.cs.mag_3d or ekf.cs.mag_hdg:
-        settled = ekf.time_delayed_us - ekf.mag.flt_mag_align_start_time > MAG_FLIGHT_ALIGNMENT_SETTLING_US
+        settled = ekf.time_delayed_us - ekf.mag.flight_alignment_start_time > MAG_FLIGHT_ALIGNMENT_SETTLING_US
         return ekf.cs.yaw_align and ekf.cs.mag_aligned_in_flight and settled
     return ekf.cs.yaw_align
 

@@ -39,7 +39,7 @@ MAX_VARIANCE_REDUCTIONS = 1000
 
 
 @njit(cache=True, error_model="numpy")
-def clear_inhibited_state_kalman_gains(ekf, K):
+def clear_inhibited_state_kalman_gains(ekf, params, K):
     """Zero the gains of the states that are not being estimated now."""
     for i in range(3):
         if ekf.gyro_bias_inhibit[i]:
@@ -65,7 +65,7 @@ def joseph_update(P, K, PH, S):
 
 
 @njit(cache=True, error_model="numpy")
-def reduce_variance(ekf, state_index):
+def reduce_variance(ekf, params, state_index):
     """Fuse a zero innovation of ten times the state's variance, which takes about 10 % off that variance.
 
     Clipping would strengthen the correlations with other states; this does not.
@@ -78,7 +78,7 @@ def reduce_variance(ekf, state_index):
     for i in range(ERROR_STATE_SIZE):
         PH[i] = P[state_index, i]
         K[i] = PH[i] / S
-    clear_inhibited_state_kalman_gains(ekf, K)
+    clear_inhibited_state_kalman_gains(ekf, params, K)
     joseph_update(P, K, PH, S)
 
 
@@ -129,13 +129,13 @@ def _first_excessive_variance(ekf):
 
 
 @njit(cache=True, error_model="numpy")
-def constrain_state_variances(ekf):
+def constrain_state_variances(ekf, params):
     """Keep every variance within the limits of its group of states."""
     for _ in range(MAX_VARIANCE_REDUCTIONS):
         i = _first_excessive_variance(ekf)
         if i < 0:
             return
-        reduce_variance(ekf, i)
+        reduce_variance(ekf, params, i)
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,7 +180,7 @@ def measurement_update(ekf, params, K, H, R, innovation):
     -------
     bool : True, as in v1.16 an update cannot fail
     """
-    clear_inhibited_state_kalman_gains(ekf, K)
+    clear_inhibited_state_kalman_gains(ekf, params, K)
     P = ekf.P
     PH = ekf.scratch.PH
     for i in range(ERROR_STATE_SIZE):
@@ -194,7 +194,7 @@ def measurement_update(ekf, params, K, H, R, innovation):
     for k in range(ERROR_STATE_SIZE):
         S += H[k] * PH[k]
     joseph_update(P, K, PH, S)
-    constrain_state_variances(ekf)
+    constrain_state_variances(ekf, params)
     fuse(ekf, params, K, innovation)
     return True
 
@@ -212,8 +212,8 @@ def fuse_direct_state(ekf, params, innovation, innovation_var, R, state_index):
     for i in range(ERROR_STATE_SIZE):
         PH[i] = P[state_index, i]
         K[i] = PH[i] * inverse
-    clear_inhibited_state_kalman_gains(ekf, K)
+    clear_inhibited_state_kalman_gains(ekf, params, K)
     joseph_update(P, K, PH, P[state_index, state_index] + R)
-    constrain_state_variances(ekf)
+    constrain_state_variances(ekf, params)
     fuse(ekf, params, K, innovation)
     return True
