@@ -46,14 +46,14 @@ def metres_per_radian(lat, alt):
 
 @njit(cache=True, error_model="numpy")
 def add_to_lat_lon(lat, lon, alt, north, east):
-    """Latitude and longitude of the point a small step away from the given one."""
+    """Latitude and longitude of the point a small step (m) away, by the radii at the starting point."""
     dn_dlat, de_dlon = metres_per_radian(lat, alt)
     return wrap_pi(lat + north / dn_dlat), wrap_pi(lon + east / de_dlon)
 
 
 @njit(cache=True, error_model="numpy")
 def lat_lon_difference(lat, lon, alt, lat_from, lon_from):
-    """North and east (m) from (`lat_from`, `lon_from`) to (`lat`, `lon`), by the radii at the latter."""
+    """North and east (m) of a point, seen from another close by; by the radii at the first."""
     dn_dlat, de_dlon = metres_per_radian(lat, alt)
     return wrap_pi(lat - lat_from) * dn_dlat, wrap_pi(lon - lon_from) * de_dlon
 

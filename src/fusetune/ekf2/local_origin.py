@@ -58,13 +58,13 @@ def set_origin_altitude(ekf, alt):
 
 
 @njit(cache=True, error_model="numpy")
-def local_position_of(ekf, lat, lon):
+def project_to_local(ekf, lat, lon):
     """Local north and east (m) of a latitude and longitude (rad)."""
     return project(ekf.origin.lat_rad, ekf.origin.lon_rad, lat, lon)
 
 
 @njit(cache=True, error_model="numpy")
-def global_position_of(ekf, north, east):
+def reproject_to_global(ekf, north, east):
     """Latitude and longitude (rad) of a local north and east (m)."""
     return reproject(ekf.origin.lat_rad, ekf.origin.lon_rad, north, east)
 
@@ -72,7 +72,7 @@ def global_position_of(ekf, north, east):
 @njit(cache=True, error_model="numpy")
 def get_local_horizontal_position(ekf):
     """Local north and east (m) of the position estimate."""
-    return local_position_of(ekf, ekf.gpos_lat, ekf.gpos_lon)
+    return project_to_local(ekf, ekf.gpos_lat, ekf.gpos_lon)
 
 
 @njit(cache=True, error_model="numpy")

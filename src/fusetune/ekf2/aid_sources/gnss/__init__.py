@@ -1,0 +1,1 @@
+"""GNSS: quality checks, velocity, position, height and dual-antenna heading."""
