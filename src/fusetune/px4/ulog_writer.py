@@ -147,9 +147,7 @@ def _parameters(flight: Flight) -> list[bytes]:
     records = [_record(b"P", _parameter(name, value)) for name, value in sorted(history.initial.items())]
     defaults = [(_SYSTEM_DEFAULT_BIT, history.default_system), (_CURRENT_SETUP_BIT, history.default_current_setup)]
     for bit, values in defaults:
-        records += [
-            _record(b"Q", bytes([bit]) + _parameter(name, value)) for name, value in sorted(values.items())
-        ]
+        records += [_record(b"Q", bytes([bit]) + _parameter(name, value)) for name, value in sorted(values.items())]
     return records
 
 
