@@ -244,8 +244,8 @@ def _metadata_from(row: dict[str, str]) -> ParameterMetadata:
 
 def _read_metadata() -> dict[str, ParameterMetadata]:
     file = resources.files(__package__) / "ekf2_parameters.csv"
-    with file.open(encoding="utf-8", newline="") as stream:
-        return {row["name"]: _metadata_from(row) for row in csv.DictReader(stream)}
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return {row["name"]: _metadata_from(row) for row in csv.DictReader(lines)}
 
 
 ALL_PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(_read_metadata())

@@ -126,7 +126,7 @@ def row_count(table: TopicTable) -> int:
 
 def field_names(table: TopicTable, name: str) -> list[str]:
     """Columns of the array field `name` in order: ``q`` → ``["q[0]", "q[1]", …]``; empty where it is no array."""
-    names = []
+    names: list[str] = []
     while f"{name}[{len(names)}]" in table:
         names.append(f"{name}[{len(names)}]")
     return names

@@ -13,6 +13,7 @@ import numpy as np
 from fusetune.px4.ekf2_parameters import complete
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count, select_rows
 
+_TOPIC_PREFIX = "estimator_aid_src_"
 _SAME_PUBLICATION_US = 2000
 """The three topics of v1.11+ are published one after the other; before v1.12 they share no sample time."""
 
@@ -68,18 +69,19 @@ def aid_source_tables(flight: Flight) -> dict[TopicKey, TopicTable]:
     are unknown (NaN). `test_ratio` is ν² / (gate² S) per axis with the log's own gate, and the logged one where no
     parameter gives the gate. `innovation_rejected` is true where the logged ratio (or, where none is logged, the
     computed one) of any axis exceeds 1; `fused` where that is not so and the control flags name the source.
-    Topics that the log holds itself are left out.
+    An instance of which the log holds `estimator_aid_src_*` itself is left as it is.
     """
     gates = complete(flight.parameters.initial, {}, flight.release)
     tables: dict[TopicKey, TopicTable] = {}
-    for instance in sorted({*flight.instances("estimator_innovations"), *flight.instances("ekf2_innovations")}):
+    own = {instance for name, instance in flight.topics if name.startswith(_TOPIC_PREFIX)}
+    logged = {*flight.instances("estimator_innovations"), *flight.instances("ekf2_innovations")}
+    for instance in sorted(logged - own):
         series = _modern_series(flight, instance) if flight.topic("estimator_innovations", instance) else None
         series = series or _old_series(flight, instance)
         for name, source in _SOURCES.items():
-            key = (f"estimator_aid_src_{name}", instance)
-            table = None if key in flight.topics or series is None else _aid_source(name, source, series, gates)
+            table = None if series is None else _aid_source(name, source, series, gates)
             if table is not None:
-                tables[key] = table
+                tables[_TOPIC_PREFIX + name, instance] = table
     return tables
 
 

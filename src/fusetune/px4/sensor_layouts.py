@@ -17,7 +17,7 @@ RELATIVE_TIMESTAMP_INVALID = 0x7FFFFFFF
 DOWNWARD_FACING = 25
 _ROTARY_WING, _FIXED_WING = 1, 2
 _POSE_FRAME_OF_LOCAL_FRAME = {0: 1, 1: 2, 3: 3}
-"""vehicle_odometry's LOCAL_FRAME_* (NED, FRD, BODY_FRD) as POSE_FRAME_* / VELOCITY_FRAME_* of v1.14; others: unknown."""
+"""LOCAL_FRAME_* (NED, FRD, BODY_FRD) of the odometry message as POSE_FRAME_* / VELOCITY_FRAME_* of v1.14."""
 
 _COVARIANCE_DIAGONAL = (0, 6, 11, 15, 18, 20)
 """Diagonal of a 6×6 matrix in the row-major upper triangle of 21 entries."""
