@@ -12,11 +12,12 @@ from numba import njit
 
 from fusetune.ekf2.aid_sources.airspeed.airspeed_memory import AIRSPEED_MEMORY
 from fusetune.ekf2.aid_sources.barometer.baro_memory import BARO_MEMORY
+from fusetune.ekf2.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
 from fusetune.ekf2.aid_sources.gnss.gnss_memory import GNSS_MEMORY, initialise_gnss_memory
 from fusetune.ekf2.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
 from fusetune.ekf2.aid_sources.magnetometer.mag_memory import MAG_MEMORY, initialise_mag_memory
-from fusetune.ekf2.aid_sources.optical_flow.flow_memory import FLOW_MEMORY
+from fusetune.ekf2.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, initialise_flow_memory
 from fusetune.ekf2.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.aid_sources.zero_gyro import ZERO_GYRO_MEMORY
 from fusetune.ekf2.bias_estimator.height_bias_estimator import HEIGHT_BIAS_ESTIMATOR, initialise_height_bias_estimator
@@ -93,6 +94,7 @@ ESTIMATOR = np.dtype(
         ("flow", FLOW_MEMORY),
         ("ev", EV_MEMORY),
         ("airspeed", AIRSPEED_MEMORY),
+        ("drag", DRAG_MEMORY),
         ("gravity", GRAVITY_MEMORY),
         ("wind", WIND_MEMORY),
         ("zero_gyro", ZERO_GYRO_MEMORY),
@@ -145,6 +147,7 @@ def _initialise(ekf):
     initialise_mag_memory(ekf.mag)
     initialise_range_memory(ekf.range)
     initialise_ev_memory(ekf.ev)
+    initialise_flow_memory(ekf.flow)
 
 
 @njit(cache=True, error_model="numpy")

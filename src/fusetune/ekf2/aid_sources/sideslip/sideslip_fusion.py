@@ -1,0 +1,121 @@
+"""Synthetic sideslip of a fixed wing: it flies without slipping, so the air comes from ahead.
+
+With b = Rᵀ (v - w) the sideslip angle is h = b_y / b_x (small angles), observed as zero. ∂b/∂θ = Rᵀ [v - w]×,
+∂b/∂v = Rᵀ, ∂b/∂w = -Rᵀ. Unless the filter is dead reckoning by the wind, only the wind states move.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/sideslip/sideslip_fusion.cpp`.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.covariance import initialise_covariance, reset_wind_cov
+from fusetune.ekf2.measurement_update import measurement_update
+from fusetune.ekf2.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.state import ATTITUDE, VELOCITY, WIND
+from fusetune.ekf2.timing import is_timed_out
+from fusetune.ekf2.wind import keep_only_wind_gains
+
+FUSION_INTERVAL_US = 150_000
+FORWARD_SPEED_EPSILON = 1e-3
+MIN_NOISE = 0.01
+FLT_EPSILON = float(np.finfo(np.float32).eps)
+
+
+@njit(cache=True, error_model="numpy")
+def _air_velocity_body(ekf, axis):
+    R = ekf.R_to_earth
+    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
+    return R[0, axis] * x + R[1, axis] * y + R[2, axis] * z
+
+
+@njit(cache=True, error_model="numpy")
+def _forward_air_speed(ekf):
+    """Kept from zero, where the angle is not defined."""
+    forward = _air_velocity_body(ekf, 0)
+    return forward + math.copysign(FORWARD_SPEED_EPSILON, forward)
+
+
+@njit(cache=True, error_model="numpy")
+def predict_sideslip(ekf):
+    """Sideslip angle (rad)."""
+    return _air_velocity_body(ekf, 1) / _forward_air_speed(ekf)
+
+
+@njit(cache=True, error_model="numpy")
+def compute_sideslip_jacobian(ekf, H):
+    """Write the derivative of the sideslip angle into `H` (24,)."""
+    R = ekf.R_to_earth
+    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
+    inverse = 1.0 / _forward_air_speed(ekf)
+    slope = -predict_sideslip(ekf)
+    # the derivative of a / b is (da - (a / b) db) / b: one earth vector takes both body axes
+    ex = (R[0, 1] + slope * R[0, 0]) * inverse
+    ey = (R[1, 1] + slope * R[1, 0]) * inverse
+    ez = (R[2, 1] + slope * R[2, 0]) * inverse
+    clear_jacobian(H)
+    H[ATTITUDE] = ey * z - ez * y
+    H[ATTITUDE + 1] = ez * x - ex * z
+    H[ATTITUDE + 2] = ex * y - ey * x
+    H[VELOCITY] = ex
+    H[VELOCITY + 1] = ey
+    H[VELOCITY + 2] = ez
+    H[WIND] = -ex
+    H[WIND + 1] = -ey
+
+
+@njit(cache=True, error_model="numpy")
+def control_beta_fusion(ekf, params):
+    """Fuse a sideslip of zero at regular intervals while a fixed wing, or a vehicle with airspeed, flies."""
+    ekf.cs.fuse_beta = (
+        int(params.EKF2_FUSE_BETA) != 0
+        and (ekf.cs.fixed_wing or ekf.cs.fuse_aspd)
+        and ekf.cs.in_air
+        and not ekf.cs.fake_pos
+    )
+    aid = ekf.aid.sideslip
+    if ekf.cs.fuse_beta and is_timed_out(ekf, aid.time_last_fuse, FUSION_INTERVAL_US):
+        _update_sideslip(ekf, params)
+        ekf.reject.sideslip = aid.innovation_rejected
+        if _fuse_sideslip(ekf, params):
+            ekf.cs.wind = True
+        elif not ekf.wind.external_init and not ekf.cs.wind:
+            reset_wind_cov(ekf)
+
+
+@njit(cache=True, error_model="numpy")
+def _update_sideslip(ekf, params):
+    H = ekf.scratch.H
+    variance = max(params.EKF2_BETA_NOISE * params.EKF2_BETA_NOISE, MIN_NOISE * MIN_NOISE)
+    compute_sideslip_jacobian(ekf, H)
+    innovation_variance = compute_innovation_variance(ekf, H, variance)
+    set_axis(ekf.aid.sideslip, 0, 0.0, variance, predict_sideslip(ekf), innovation_variance)
+    update_aid_source_status(ekf, ekf.aid.sideslip, 1, ekf.time_delayed_us, max(params.EKF2_BETA_GATE, 1.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _fuse_sideslip(ekf, params):
+    aid, H, K = ekf.aid.sideslip, ekf.scratch.H, ekf.scratch.K
+    if aid.innovation_rejected:
+        return False
+    update_wind_only = not ekf.cs.wind_dead_reckoning
+    variance = aid.innovation_variance[0]
+    if variance < aid.observation_variance[0] or variance < FLT_EPSILON:
+        ekf.fs.bad_sideslip = True
+        if update_wind_only:
+            reset_wind_cov(ekf)
+        else:
+            initialise_covariance(ekf, params)
+            ekf.wind_vel[0], ekf.wind_vel[1] = 0.0, 0.0
+        return False
+    ekf.fs.bad_sideslip = False
+    compute_kalman_gain(ekf, H, variance, K)
+    if update_wind_only:
+        keep_only_wind_gains(K)
+    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
+    aid.fused = True
+    aid.time_last_fuse = ekf.time_delayed_us
+    return True
