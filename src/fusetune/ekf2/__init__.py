@@ -1,0 +1,16 @@
+"""Our own implementation of PX4's EKF2, behaviour of release v1.16, compiled with Numba.
+
+Importing it decides where compiled kernels are kept (see `fusetune.kernel_cache`), unless NUMBA_CACHE_DIR says so.
+"""
+
+import os
+import sys
+
+from fusetune.kernel_cache import use_kernel_cache
+
+if "NUMBA_CACHE_DIR" not in os.environ:
+    _folder = use_kernel_cache()
+    if "numba" in sys.modules:
+        import numba
+
+        numba.config.CACHE_DIR = str(_folder)

@@ -18,7 +18,7 @@ from fusetune.ekf2.conditions import (
 )
 from fusetune.ekf2.control_status import CONTROL_STATUS_NAMES, FAULT_STATUS_NAMES, REJECTION_NAMES
 from fusetune.ekf2.geodesy import add_to_lat_lon
-from fusetune.ekf2.local_origin import local_position_of, origin_altitude
+from fusetune.ekf2.local_origin import origin_altitude, project_to_local
 
 INNOVATION_ROW = np.dtype(
     [
@@ -206,7 +206,7 @@ def _record_local_position(ekf, params, row, timestamp):
     lat, lon = add_to_lat_lon(
         output.ref_lat, output.ref_lon, output.ref_alt, newest.pos[0] - offset_n, newest.pos[1] - offset_e
     )
-    x, y = local_position_of(ekf, lat, lon)
+    x, y = project_to_local(ekf, lat, lon)
     row.timestamp = timestamp
     row.timestamp_sample = ekf.time_delayed_us
     row.x = x
