@@ -22,7 +22,7 @@ include: "workflow/rules/report.smk"
 
 
 wildcard_constraints:
-    flight=r"[^/]+",
+    flight="|".join(map(re.escape, LOGS)),
 
 
 rule all:

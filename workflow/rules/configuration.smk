@@ -1,4 +1,6 @@
 # What the user asked for: settings, parameter sets, mission and logs, checked before anything runs.
+import re
+
 from fusetune.design.config_file import read_yaml, validate
 from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study

@@ -20,8 +20,6 @@ rule simulate_flight:
         "results/execute/{flight}.ulg",
     log:
         "results/logs/execute/{flight}.log",
-    wildcard_constraints:
-        flight="|".join(map(re.escape, DEMONSTRATION)),
     conda:
         "../envs/fusetune.yaml"
     params:

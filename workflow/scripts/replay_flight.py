@@ -1,17 +1,30 @@
 """Replay one flight with several parameter sets; sets whose files are up to date are left as they are."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.replay_flight import replay_flight
+from fusetune.ledger import Ledger, key_of
 from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
+
+def files_of(name: str) -> list[str]:
+    return [file for file in snakemake.output if Path(file).name.startswith(f"{name}.")]
+
+
 with logged_job(snakemake.log[0]):
+    flight = Path(snakemake.input.flight)
+    source = [json.loads((flight / "metadata.json").read_text(encoding="utf-8"))["checksum"], snakemake.params.code]
+    ledger = Ledger(snakemake.params.ledger)
+    keys = {name: key_of([*source, overrides]) for name, overrides in snakemake.params.sets.items()}
+    outdated = [name for name, key in keys.items() if not ledger.is_current(name, key, files_of(name))]
     replay_flight(
-        Path(snakemake.input.flight),
-        Path(snakemake.output[0]).parent,
-        snakemake.params.sets,
+        flight, Path(snakemake.output[0]).parent, {name: snakemake.params.sets[name] for name in outdated}
     )
+    for name in outdated:
+        ledger.record(name, keys[name], files_of(name))
+    print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(keys) - len(outdated)}")
