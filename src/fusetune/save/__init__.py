@@ -1,1 +1,33 @@
-"""Third room: every log becomes a folder of tables with a verdict."""
+"""Third room: every log becomes a folder of tables with a verdict.
+
+The functions load what they need when they are asked for, so that reading a saved flight costs no more than NumPy and
+pyarrow.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fusetune.save.flight_folder import load_flight
+    from fusetune.save.flights_table import write_flights_table
+    from fusetune.save.log_folder import save_log
+    from fusetune.save.verdict import Verdict, VerdictThresholds, judge
+
+__all__ = ["Verdict", "VerdictThresholds", "judge", "load_flight", "save_log", "write_flights_table"]
+
+_MODULES = {
+    "Verdict": "verdict",
+    "VerdictThresholds": "verdict",
+    "judge": "verdict",
+    "load_flight": "flight_folder",
+    "save_log": "log_folder",
+    "write_flights_table": "flights_table",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

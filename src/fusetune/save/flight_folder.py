@@ -1,0 +1,182 @@
+"""A flight as a folder: one Parquet file per topic and instance, and `metadata.json` for all else."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import os
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fusetune.errors import UserError
+from fusetune.px4.flight import (
+    Dropout,
+    Flight,
+    LoggedMessage,
+    ParameterChange,
+    ParameterHistory,
+    ParameterValue,
+    TopicTable,
+)
+
+METADATA_FILE = "metadata.json"
+_FORMAT = 1
+_BYTES_KEY = "base64"
+_RUN_AGAIN = "Delete the folder and run the pipeline again"
+
+
+def write_flight(folder: str | os.PathLike[str], flight: Flight, extra: dict[str, Any] | None = None) -> None:
+    """Write a flight to a folder, which must exist.
+
+    Parameters
+    ----------
+    extra
+        Further entries of `metadata.json`.
+    """
+    target = Path(folder)
+    entries = []
+    for (topic, instance), table in sorted(flight.topics.items()):
+        file = f"{topic}_{instance}.parquet"
+        _write_table(target / file, table)
+        entries.append({"topic": topic, "instance": instance, "rows": len(table["timestamp"]), "file": file})
+    document = _metadata(flight) | (extra or {}) | {"topics": entries}
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    (target / METADATA_FILE).write_text(text + "\n", encoding="utf-8")
+
+
+def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None = None) -> Flight:
+    """Read a flight from its folder.
+
+    Parameters
+    ----------
+    folder
+        As written by `write_flight`.
+    topics
+        Names of the topics to read, all instances of each; `None` reads all. Names that the flight lacks are no error.
+
+    Raises
+    ------
+    UserError
+        The folder is not one of a saved flight, or a file in it is damaged.
+    """
+    source = Path(folder)
+    document = read_metadata(source)
+    wanted = [entry for entry in document["topics"] if topics is None or entry["topic"] in topics]
+    tables = {(entry["topic"], entry["instance"]): _read_table(source / entry["file"]) for entry in wanted}
+    parameters = document["parameters"]
+    return Flight(
+        name=document["name"],
+        topics=tables,
+        parameters=ParameterHistory(
+            initial=_values_of(parameters["initial"]),
+            changed=[
+                ParameterChange(change["timestamp"], change["name"], _value_of(change["value"]))
+                for change in parameters["changed"]
+            ],
+            default_system=_values_of(parameters["default_system"]),
+            default_current_setup=_values_of(parameters["default_current_setup"]),
+        ),
+        info={key: _info_of(value) for key, value in document["info"].items()},
+        multi_info=document["multi_info"],
+        dropouts=[Dropout(entry["timestamp"], entry["duration_ms"]) for entry in document["dropouts"]],
+        messages=[LoggedMessage(entry["timestamp"], entry["level"], entry["text"]) for entry in document["messages"]],
+        start_timestamp=document["start_timestamp"],
+        last_timestamp=document["last_timestamp"],
+        checksum=document["checksum"],
+        size_bytes=document["size_bytes"],
+        corruption=tuple(document["corruption"]),
+    )
+
+
+def read_metadata(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """`metadata.json` of a saved flight.
+
+    Raises
+    ------
+    UserError
+        There is none, or it cannot be read.
+    """
+    file = Path(folder) / METADATA_FILE
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UserError(file, f"is not the metadata of a saved flight ({error})", _RUN_AGAIN) from error
+    if not isinstance(document, dict) or document.get("format") != _FORMAT or "topics" not in document:
+        raise UserError(file, "is not the metadata of a readable flight", _RUN_AGAIN)
+    return document
+
+
+def _write_table(file: Path, table: TopicTable) -> None:
+    columns = {name: pa.array(values) for name, values in table.items()}
+    pq.write_table(
+        pa.table(columns), file, compression="zstd", compression_level=1, use_dictionary=False, write_statistics=False
+    )
+
+
+def _read_table(file: Path) -> TopicTable:
+    try:
+        # read_table would go through the data set machinery, twice as slow on so many small files
+        with pq.ParquetFile(file, memory_map=True) as parquet:
+            table = parquet.read(use_threads=False)
+    except (OSError, pa.ArrowException) as error:
+        raise UserError(file, f"cannot be read ({error})", _RUN_AGAIN) from error
+    return {
+        name: np.ascontiguousarray(column.to_numpy())
+        for name, column in zip(table.column_names, table.columns, strict=True)
+    }
+
+
+def _metadata(flight: Flight) -> dict[str, Any]:
+    history = flight.parameters
+    return {
+        "format": _FORMAT,
+        "name": flight.name,
+        "checksum": flight.checksum,
+        "size_bytes": flight.size_bytes,
+        "start_timestamp": flight.start_timestamp,
+        "last_timestamp": flight.last_timestamp,
+        "corruption": list(flight.corruption),
+        "info": {key: _storable(value) for key, value in sorted(flight.info.items())},
+        "multi_info": flight.multi_info,
+        "parameters": {
+            "initial": _storable_values(history.initial),
+            "changed": [change._asdict() | {"value": _storable(change.value)} for change in history.changed],
+            "default_system": _storable_values(history.default_system),
+            "default_current_setup": _storable_values(history.default_current_setup),
+        },
+        "dropouts": [dropout._asdict() for dropout in flight.dropouts],
+        "messages": [message._asdict() for message in flight.messages],
+    }
+
+
+def _storable_values(values: dict[str, ParameterValue]) -> dict[str, Any]:
+    return {name: _storable(value) for name, value in values.items()}
+
+
+def _storable(value: Any) -> Any:
+    """A value as JSON has it: bytes in base64, numbers that JSON lacks as text."""
+    if isinstance(value, bytes | bytearray):
+        return {_BYTES_KEY: base64.b64encode(value).decode()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value)
+    if isinstance(value, str | int | float) or value is None:
+        return value
+    return str(value)
+
+
+def _value_of(value: Any) -> ParameterValue:
+    return float(value) if isinstance(value, str) else value
+
+
+def _values_of(values: dict[str, Any]) -> dict[str, ParameterValue]:
+    return {name: _value_of(value) for name, value in values.items()}
+
+
+def _info_of(value: Any) -> object:
+    return base64.b64decode(value[_BYTES_KEY]) if isinstance(value, dict) and _BYTES_KEY in value else value

@@ -1,0 +1,81 @@
+"""One table of all flights with their verdicts."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+
+from fusetune.errors import UserError
+from fusetune.files import atomic_path
+from fusetune.save.flight_folder import METADATA_FILE
+from fusetune.save.log_folder import VERDICT_FILE
+
+SCHEMA = pa.schema(
+    [
+        ("flight", pa.string()),
+        ("status", pa.string()),
+        ("reason", pa.string()),
+        ("remedy", pa.string()),
+        ("warnings", pa.string()),
+        ("firmware", pa.string()),
+        ("hardware", pa.string()),
+        ("recorded", pa.string()),
+        ("duration_s", pa.float64()),
+        ("airborne_s", pa.float64()),
+        ("checksum", pa.string()),
+        ("size_bytes", pa.int64()),
+    ]
+)
+"""Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused."""
+
+
+def write_flights_table(
+    folders: Sequence[str | os.PathLike[str]], table: str | os.PathLike[str], csv: str | os.PathLike[str]
+) -> None:
+    """Put the verdicts of saved flights into one table, in the order given, as Parquet and as CSV.
+
+    Raises
+    ------
+    UserError
+        A folder lacks its verdict or its metadata.
+    """
+    rows = pa.Table.from_pylist([_row(Path(folder)) for folder in folders], schema=SCHEMA)
+    with atomic_path(table) as temporary:
+        pq.write_table(rows, temporary)
+    with atomic_path(csv) as temporary:
+        pa_csv.write_csv(rows, temporary)
+
+
+def _row(folder: Path) -> dict[str, Any]:
+    verdict, metadata = _read(folder / VERDICT_FILE), _read(folder / METADATA_FILE)
+    failed = [check for check in verdict["checks"] if check["status"] == "fail"]
+    warned = [check for check in verdict["checks"] if check["status"] == "warning"]
+    return {
+        "flight": verdict["flight"],
+        "status": verdict["status"],
+        "reason": "; ".join(check["reason"] for check in failed),
+        "remedy": "; ".join(check["remedy"] for check in failed),
+        "warnings": "; ".join(check["reason"] for check in warned),
+        "firmware": metadata.get("firmware", "unknown"),
+        "hardware": metadata.get("hardware", {}).get("ver_hw", ""),
+        "recorded": metadata.get("recorded", ""),
+        "duration_s": metadata.get("duration_s"),
+        "airborne_s": metadata.get("airborne_s"),
+        "checksum": metadata["checksum"],
+        "size_bytes": metadata["size_bytes"],
+    }
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        reason = f"cannot be read ({error})"
+        raise UserError(file, reason, "Delete the folder and run the pipeline again") from error

@@ -1,0 +1,85 @@
+"""From a log to its folder of tables, with the verdict whether it can be replayed."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+from fusetune.errors import UserError
+from fusetune.px4.ekf2_parameters import migrate
+from fusetune.px4.flight import Flight
+from fusetune.px4.release_layouts import canonical
+from fusetune.px4.ulog_reader import file_checksum, read_ulog
+from fusetune.save.flight_folder import METADATA_FILE, write_flight
+from fusetune.save.log_facts import log_facts
+from fusetune.save.verdict import Verdict, VerdictThresholds, judge, unreadable
+
+VERDICT_FILE = "verdict.json"
+
+
+def save_log(
+    log: str | os.PathLike[str], folder: str | os.PathLike[str], thresholds: VerdictThresholds | None = None
+) -> Verdict:
+    """Save a log: tables, `metadata.json` and `verdict.json`.
+
+    The folder appears as a whole or not at all; one of an earlier run is replaced. A log that cannot be read gets a
+    folder that says why, and no error is raised.
+
+    Parameters
+    ----------
+    log
+        ULog file.
+    folder
+        Folder of the flight.
+    thresholds
+        From where on a flight can be replayed.
+
+    Raises
+    ------
+    UserError
+        The folder cannot be written.
+    """
+    target = Path(folder)
+    partial = target.with_name(f".{target.name}.partial")
+    try:
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir(parents=True)
+        verdict = _write(Path(log), partial, thresholds or VerdictThresholds())
+        shutil.rmtree(target, ignore_errors=True)
+        os.replace(partial, target)
+    except OSError as error:
+        raise UserError(target, f"cannot be written: {error.strerror}", "Make room or mend its permissions") from error
+    return verdict
+
+
+def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
+    try:
+        flight = read_ulog(log)
+    except UserError as error:
+        verdict = unreadable(log.stem, error)
+        _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log))
+    else:
+        verdict = judge(canonical(flight), thresholds)
+        write_flight(folder, flight, {"file": log.name, "ekf2_parameters": _present_ekf2(flight)} | log_facts(flight))
+    _write_json(folder / VERDICT_FILE, verdict.document())
+    return verdict
+
+
+def _present_ekf2(flight: Flight) -> dict[str, float]:
+    """EKF2 parameters at the end of the log under the names of the baseline release."""
+    return migrate(flight.parameters.at_end(), flight.release)
+
+
+def _metadata_of_unreadable(log: Path) -> dict[str, Any]:
+    try:
+        checksum, size = file_checksum(log), log.stat().st_size
+    except (UserError, OSError):
+        checksum, size = "", 0
+    return {"name": log.stem, "file": log.name, "checksum": checksum, "size_bytes": size}
+
+
+def _write_json(file: Path, document: dict[str, Any]) -> None:
+    file.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

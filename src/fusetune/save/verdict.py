@@ -1,0 +1,102 @@
+"""Whether a flight can be replayed: named checks with figures, thresholds and remedies."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from fusetune.errors import UserError
+from fusetune.px4.flight import Flight
+
+Status = Literal["pass", "warning", "fail", "does-not-apply"]
+
+
+@dataclass(frozen=True)
+class VerdictThresholds:
+    """From where on a flight can be replayed, and from where on it is replayed with a warning."""
+
+    min_imu_rate_hz: float = 50.0
+    """Below it the attitude cannot be integrated (EKF2 itself predicts at 100 Hz)."""
+    low_imu_rate_hz: float = 100.0
+    min_imu_duration_s: float = 10.0
+    """EKF2's GNSS checks alone must hold for EKF2_REQ_GPS_H = 10 s before anything is aided."""
+    min_imu_coverage: float = 0.5
+    """Integrated share of the time between the first and the last IMU sample."""
+    low_imu_coverage: float = 0.97
+    max_imu_step_back_s: float = 1.0
+    """A step of the clock against time that means records are lost or out of order, not merely swapped."""
+    low_magnetometer_rate_hz: float = 1.0
+    low_barometer_rate_hz: float = 2.0
+    low_gnss_rate_hz: float = 1.0
+    low_gnss_fix_share: float = 0.8
+    low_airborne_s: float = 10.0
+
+
+@dataclass(frozen=True)
+class Check:
+    """Outcome of one check."""
+
+    name: str
+    status: Status
+    reason: str
+    """What was found, in words; for warnings and failures what is wrong."""
+    remedy: str = ""
+    figure: float | None = None
+    threshold: float | None = None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Outcome of all checks of one flight."""
+
+    flight: str
+    checks: tuple[Check, ...]
+
+    @property
+    def status(self) -> Literal["replayable", "refused"]:
+        """Refused when any check failed."""
+        return "refused" if any(check.status == "fail" for check in self.checks) else "replayable"
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the flight is refused; empty for a replayable one."""
+        return tuple(check.reason for check in self.checks if check.status == "fail")
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What lessens the worth of the replay."""
+        return tuple(check.reason for check in self.checks if check.status == "warning")
+
+    def document(self) -> dict[str, Any]:
+        """The verdict as the JSON object of `verdict.json`."""
+        return {
+            "flight": self.flight,
+            "status": self.status,
+            "reasons": list(self.reasons),
+            "warnings": list(self.warnings),
+            "checks": [asdict(check) for check in self.checks],
+        }
+
+
+def judge(flight: Flight, thresholds: VerdictThresholds | None = None) -> Verdict:
+    """Judge a flight that could be read, in the layout of `fusetune.px4.release_layouts.canonical`.
+
+    Of the checks of the IMU those after a failed one are left out, since they would only say the same again.
+    """
+    from fusetune.save import aid_checks, imu_checks
+
+    limits = thresholds or VerdictThresholds()
+    checks = [imu_checks.readable(flight), imu_checks.imu_present(flight)]
+    if checks[-1].status == "fail":
+        return Verdict(flight.name, tuple(checks))
+    for check in imu_checks.CHECKS:
+        checks.append(check(flight, limits))
+        if checks[-1].status == "fail":
+            break
+    checks += [check(flight, limits) for check in aid_checks.CHECKS]
+    return Verdict(flight.name, tuple(checks))
+
+
+def unreadable(name: str, error: UserError) -> Verdict:
+    """Verdict on a log that cannot be read."""
+    return Verdict(name, (Check("readable", "fail", f"the log {error.reason}", error.remedy),))
