@@ -20,7 +20,7 @@ from fusetune.ekf2.timing import is_recent
 VERT_INNOV_TEST_LIM = 3.0
 VERT_INNOV_TEST_MIN = 1.0
 INNOVATION_VARIANCE_MIN = 1.1920929e-07
-BADACC_PROBATION = 10_000_000
+BADACC_PROBATION = 3_000_000
 
 FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
 
@@ -72,7 +72,7 @@ def check_vertical_acceleration_health(ekf):
     """Detect accelerations that clipping or vibration bias towards free fall.
 
     Such a bias shows as vertical innovations that are all positive (prediction below the observation, in NED).
-    `fs.bad_acc_vertical` persists for 10 s after the last detection.
+    `fs.bad_acc_vertical` persists for 3 s after the last detection.
     """
     falling = estimate_inertial_nav_falling_likelihood(ekf)
     is_clipping_frequently = _count_clipping(ekf)
