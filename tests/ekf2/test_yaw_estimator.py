@@ -1,0 +1,171 @@
+"""Expected values: a simulated vehicle that accelerates and turns, and the matrix form of the filter equations."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fusetune.ekf2.rotations import euler_yaw, quat_to_dcm, wrap_pi
+from fusetune.ekf2.sensor_samples import IMU_SAMPLE
+from fusetune.ekf2.yaw_estimator import velocity_yaw_filter as vyf
+from fusetune.ekf2.yaw_estimator.attitude_filter import accel_fusion_gain
+from fusetune.ekf2.yaw_estimator.gaussian_sum import fuse_gsf_velocity, predict_gsf
+from fusetune.ekf2.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory, set_gyro_bias, set_true_airspeed
+
+DT = 0.01
+GRAVITY = 9.80665
+
+
+def imu_sample(delta_ang=(0.0, 0.0, 0.0), delta_vel=(0.0, 0.0, -GRAVITY * DT)):
+    sample = np.zeros(1, IMU_SAMPLE)[0]
+    sample["delta_ang"][:] = delta_ang
+    sample["delta_vel"][:] = delta_vel
+    sample["delta_ang_dt"] = DT
+    sample["delta_vel_dt"] = DT
+    return sample
+
+
+@pytest.fixture
+def gsf():
+    record = np.zeros(1, GSF_MEMORY)[0]
+    initialise_gsf_memory(record)
+    return record
+
+
+def stand(gsf):
+    """Stand level until the filtered acceleration, which starts from nought, has let the tilt be aligned."""
+    for _ in range(300):
+        predict_gsf(gsf, imu_sample(), False)
+    assert gsf["tilt_aligned"]
+
+
+def fly(gsf, yaw, seconds, velocity):
+    """A level vehicle that accelerates along its nose and turns slowly; returns yaw and velocity at the end."""
+    velocity = np.array(velocity)
+    for step in range(int(seconds / DT)):
+        yaw_rate = 0.3 * math.sin(0.01 * step)
+        forward = 1.5 * math.cos(0.013 * step)
+        sample = imu_sample((0.0, 0.0, yaw_rate * DT), (forward * DT, 0.0, -GRAVITY * DT))
+        predict_gsf(gsf, sample, True)
+        yaw += yaw_rate * DT
+        velocity = velocity + forward * DT * np.array([math.cos(yaw), math.sin(yaw)])
+        if step % 20 == 19:
+            fuse_gsf_velocity(gsf, velocity[0], velocity[1], 0.3, True)
+    return yaw, velocity
+
+
+@pytest.mark.parametrize("yaw", [-2.9, -1.3, 0.0, 0.6, 2.2])
+def test_converges_to_the_true_yaw_whatever_it_is(gsf, yaw):
+    stand(gsf)
+    true_yaw, _ = fly(gsf, yaw, 30.0, (0.0, 0.0))
+    assert abs(wrap_pi(gsf["yaw"] - true_yaw)) < math.radians(3.0)
+    assert gsf["yaw_variance"] < 0.262**2
+    assert gsf["weight"].sum() == pytest.approx(1.0)
+    best = int(np.argmax(gsf["weight"]))
+    assert abs(wrap_pi(gsf["x"][best, 2] - true_yaw)) < math.radians(3.0)
+
+
+def test_turning_the_world_turns_the_answer(gsf):
+    other = np.zeros(1, GSF_MEMORY)[0]
+    initialise_gsf_memory(other)
+    turn = 2.0 * math.pi / 5.0
+    yaws = []
+    for record, offset in ((gsf, 0.0), (other, turn)):
+        stand(record)
+        fly(record, 0.4 + offset, 10.0, (0.0, 0.0))
+        yaws.append(record["yaw"])
+    # the bank has five-fold symmetry, so a turn by a fifth of the circle must give the same figures
+    assert wrap_pi(yaws[1] - yaws[0]) == pytest.approx(turn, abs=1e-6)
+
+
+def test_does_not_start_before_the_vehicle_moves(gsf):
+    predict_gsf(gsf, imu_sample(), False)
+    fuse_gsf_velocity(gsf, 0.2, 0.0, 0.3, False)
+    assert not gsf["vel_fuse_started"]
+    fuse_gsf_velocity(gsf, 0.4, 0.0, 0.3, False)
+    assert gsf["vel_fuse_started"]
+    np.testing.assert_allclose(np.diff(gsf["x"][:, 2]), 2.0 * math.pi / 5.0)
+
+
+def test_tilt_is_taken_from_gravity_only_near_one_g(gsf):
+    predict_gsf(gsf, imu_sample(delta_vel=(0.0, 0.0, -1.2 * GRAVITY * DT)), False)
+    assert not gsf["tilt_aligned"]
+    tilted = (0.0, -GRAVITY * DT * math.sin(0.2), -GRAVITY * DT * math.cos(0.2))
+    # the filtered acceleration, with 0.5 s time constant, has to come into the range, too
+    for _ in range(400):
+        predict_gsf(gsf, imu_sample(delta_vel=tilted), False)
+    assert gsf["tilt_aligned"]
+    R = np.empty((3, 3))
+    quat_to_dcm(gsf["q"][0], R)
+    assert math.atan2(R[2, 1], R[2, 2]) == pytest.approx(0.2, abs=1e-3)
+
+
+def test_model_update_is_the_kalman_filter_in_matrix_form(gsf):
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(3, 3))
+    P = root @ root.T
+    gsf["P"][2] = P
+    gsf["x"][2] = (1.0, -0.5, 0.3)
+    H = np.eye(2, 3)
+    S = H @ P @ H.T + 0.4**2 * np.eye(2)
+    K = P @ H.T @ np.linalg.inv(S)
+    innovation = np.array([1.0, -0.5]) - np.array([1.2, -0.8])
+    vyf.update_model(gsf, 2, 1.2, -0.8, 0.4)
+    np.testing.assert_allclose(gsf["P"][2], (np.eye(3) - K @ H) @ P, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(gsf["x"][2], np.array([1.0, -0.5, 0.3]) - K @ innovation, rtol=1e-6)
+    assert gsf["nis"][2] == pytest.approx(innovation @ np.linalg.solve(S, innovation), rel=1e-5)
+    density = math.exp(-0.5 * gsf["nis"][2]) / (2.0 * math.pi * math.sqrt(np.linalg.det(S)))
+    assert vyf.gaussian_density(gsf, 2) == pytest.approx(density, rel=1e-5)
+
+
+def test_a_wild_velocity_counts_as_five_sigma(gsf):
+    gsf["P"][0] = np.eye(3)
+    vyf.update_model(gsf, 0, 100.0, 0.0, 1.0)
+    assert gsf["nis"][0] == 25.0
+    assert gsf["innovation"][0, 0] == pytest.approx(-5.0 * math.sqrt(2.0), rel=1e-6)
+
+
+def test_model_prediction_is_the_jacobian_form(gsf):
+    rng = np.random.default_rng(2)
+    root = rng.normal(size=(3, 3))
+    P = root @ root.T
+    gsf["P"][1] = P
+    gsf["q"][1] = (math.cos(0.35), 0.0, 0.0, math.sin(0.35))
+    sample = imu_sample((0.0, 0.0, 0.01), (0.05, 0.02, -0.1))
+    vyf.predict_model(gsf, 1, sample, True)
+    yaw = 0.7
+    dv = np.array([0.05 * math.cos(yaw) - 0.02 * math.sin(yaw), 0.05 * math.sin(yaw) + 0.02 * math.cos(yaw)])
+    # d(velocity)/d(yaw): the increment turned by 90°
+    F = np.array([[1.0, 0.0, -dv[1]], [0.0, 1.0, dv[0]], [0.0, 0.0, 1.0]])
+    Q = np.diag([(2.0 * DT) ** 2, (2.0 * DT) ** 2, (0.1 * DT) ** 2])
+    np.testing.assert_allclose(gsf["P"][1], F @ P @ F.T + Q, rtol=1e-12)
+    np.testing.assert_allclose(gsf["x"][1, :2], dv, rtol=1e-12)
+    assert gsf["x"][1, 2] == pytest.approx(yaw)
+
+
+def test_attitude_of_each_model_follows_its_yaw_correction(gsf):
+    stand(gsf)
+    fly(gsf, 1.0, 5.0, (0.0, 0.0))
+    R = np.empty((3, 3))
+    for model in range(5):
+        quat_to_dcm(gsf["q"][model], R)
+        assert euler_yaw(R) == pytest.approx(gsf["x"][model, 2], abs=1e-9)
+
+
+def test_airspeed_widens_the_range_of_the_tilt_correction(gsf):
+    gsf["accel_lpf"][2] = -1.6 * GRAVITY
+    assert accel_fusion_gain(gsf) == 0.0
+    set_true_airspeed(gsf, 15.0)
+    assert accel_fusion_gain(gsf) == pytest.approx(0.2 * 0.4**2)
+
+
+def test_gyro_bias_is_taken_over_until_the_bank_has_started(gsf):
+    set_gyro_bias(gsf, np.array([0.01, 0.02, 0.03]), False)
+    assert gsf["gyro_bias"][4, 2] == 0.03
+    stand(gsf)
+    fuse_gsf_velocity(gsf, 5.0, 0.0, 0.3, True)
+    learnt = gsf["gyro_bias"].copy()
+    set_gyro_bias(gsf, np.zeros(3), False)
+    np.testing.assert_array_equal(gsf["gyro_bias"], learnt)
+    set_gyro_bias(gsf, np.zeros(3), True)
+    assert not gsf["gyro_bias"].any()
