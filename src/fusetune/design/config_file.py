@@ -32,7 +32,12 @@ _JSON_TYPE_NAMES = {
 
 
 class _Loader(yaml.SafeLoader):
-    """Safe YAML that refuses a key written twice and reads ``1e-3`` as the number it is."""
+    """Safe YAML that refuses a key written twice, reads ``1e-3`` as the number it is and leaves dates as texts."""
+
+    yaml_implicit_resolvers = {  # noqa: RUF012 - PyYAML's own way of telling a loader what plain texts mean
+        first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith(":timestamp")]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         first_line: dict[str, int] = {}
@@ -147,18 +152,25 @@ def _problems(error: jsonschema.ValidationError) -> list[str]:
     """What one schema violation means, in words."""
     place = key_path(error.absolute_path)
     prefix = f"{place}: " if place else ""
+    schema: dict[str, Any] = dict(error.schema) if isinstance(error.schema, Mapping) else {}
     if error.validator == "additionalProperties":
-        known = list(error.schema.get("properties", {}))
-        unknown = [str(key) for key in error.instance if key not in known]
+        known = list(schema.get("properties", {}))
+        unknown = [str(key) for key in _keys(error.instance) if key not in known]
         return [
             f"{prefix}unknown key {key!r}{nearest(key, known)}; expected one of {', '.join(known)}" for key in unknown
         ]
     if error.validator == "required":
-        missing = [key for key in error.validator_value if key not in error.instance]
-        return [f"{prefix}the key {key!r} is missing; expected {_expected_of(error.schema, key)}" for key in missing]
+        missing = [key for key in _keys(error.validator_value) if key not in _keys(error.instance)]
+        return [f"{prefix}the key {key!r} is missing; expected {_expected_of(schema, key)}" for key in missing]
+    if error.validator == "not":
+        return [f"{prefix}{schema.get('description', 'is not allowed here')}"]
     if error.validator == "propertyNames":
-        return [f"{prefix}the key {error.instance!r} is not a valid name; expected {_expected(error.schema)}"]
-    return [f"{place or 'top level'} is {_describe(error.instance)}; expected {_expected(error.schema)}"]
+        return [f"{prefix}the key {error.instance!r} is not a valid name; expected {_expected(schema)}"]
+    return [f"{place or 'top level'} is {_describe(error.instance)}; expected {_expected(schema)}"]
+
+
+def _keys(value: object) -> list[str]:
+    return list(value) if isinstance(value, Mapping | list) else []
 
 
 def _expected_of(schema: Mapping[str, Any], key: str) -> str:
@@ -174,7 +186,7 @@ def _expected(schema: Mapping[str, Any]) -> str:
     kind = schema.get("type", "a value")
     kinds = kind if isinstance(kind, list) else [kind]
     text = " or ".join(_JSON_TYPE_NAMES.get(str(name), str(name)) for name in kinds) + _bounds(schema)
-    if "description" in schema:
+    if schema.get("description"):
         text += f" – {str(schema['description']).strip().rstrip('.')}"
     return text
 
@@ -189,9 +201,9 @@ def _bounds(schema: Mapping[str, Any]) -> str:
             ("exclusiveMinimum", "greater than"),
             ("maximum", "of at most"),
             ("exclusiveMaximum", "less than"),
-            ("minItems", "with at least this many entries:"),
-            ("maxItems", "with at most this many entries:"),
-            ("minProperties", "with at least this many keys:"),
+            ("minItems", "of length at least"),
+            ("maxItems", "of length at most"),
+            ("minProperties", "of size at least"),
         )
         if keyword in schema
     ]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 from pygeomag import GeoMag
 
 SEMI_MAJOR_AXIS_M = 6_378_137.0
@@ -21,8 +22,9 @@ MAP_RADIUS_M = 6_371_000.0
 NANOTESLA_PER_GAUSS = 1e5
 
 
-def ecef_from_geodetic(lat_rad: np.ndarray, lon_rad: np.ndarray, height_m: np.ndarray) -> np.ndarray:
+def ecef_from_geodetic(lat_rad: npt.ArrayLike, lon_rad: npt.ArrayLike, height_m: npt.ArrayLike) -> np.ndarray:
     """Earth-centred, earth-fixed position, (…, 3) m, from latitude, longitude and height above the ellipsoid."""
+    lat_rad, lon_rad, height_m = np.asarray(lat_rad), np.asarray(lon_rad), np.asarray(height_m)
     sin_lat, cos_lat = np.sin(lat_rad), np.cos(lat_rad)
     prime_vertical = SEMI_MAJOR_AXIS_M / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin_lat**2)
     return np.stack(
@@ -58,7 +60,7 @@ def geodetic_from_ecef(position_ecef: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return lat, np.arctan2(y, x), height
 
 
-def ned_axes(lat_rad: np.ndarray, lon_rad: np.ndarray) -> np.ndarray:
+def ned_axes(lat_rad: npt.ArrayLike, lon_rad: npt.ArrayLike) -> np.ndarray:
     """Rotation from local north-east-down to the earth-fixed frame, (…, 3, 3)."""
     sin_lat, cos_lat, sin_lon, cos_lon = np.sin(lat_rad), np.cos(lat_rad), np.sin(lon_rad), np.cos(lon_rad)
     zero = np.zeros_like(sin_lat)
@@ -100,19 +102,19 @@ class TangentFrame:
     @cached_property
     def origin_ecef(self) -> np.ndarray:
         """Place of the origin, (3,) m."""
-        return ecef_from_geodetic(np.float64(self.lat_rad), np.float64(self.lon_rad), np.float64(self.height_m))
+        return ecef_from_geodetic(self.lat_rad, self.lon_rad, self.height_m)
 
     @cached_property
     def axes(self) -> np.ndarray:
         """Rotation from this frame to the earth-fixed one, (3, 3)."""
-        return ned_axes(np.float64(self.lat_rad), np.float64(self.lon_rad))
+        return ned_axes(self.lat_rad, self.lon_rad)
 
     @cached_property
     def earth_rate(self) -> np.ndarray:
         """Rotation of the earth in this frame, (3,) rad/s."""
         return np.asarray(self.axes.T @ np.array([0.0, 0.0, EARTH_RATE_RAD_S]))
 
-    def from_geodetic(self, lat_rad: np.ndarray, lon_rad: np.ndarray, height_m: np.ndarray) -> np.ndarray:
+    def from_geodetic(self, lat_rad: npt.ArrayLike, lon_rad: npt.ArrayLike, height_m: npt.ArrayLike) -> np.ndarray:
         """Position in this frame, (…, 3) m."""
         return np.asarray((ecef_from_geodetic(lat_rad, lon_rad, height_m) - self.origin_ecef) @ self.axes)
 

@@ -115,7 +115,8 @@ def parse_faults(entries: Sequence[dict[str, Any]], file: str | os.PathLike[str]
     faults = []
     for entry in entries:
         values = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
-        faults.append(_KINDS[values.pop("kind")](**values))
+        del values["kind"]
+        faults.append(_KINDS[entry["kind"]](**values))
     return tuple(faults)
 
 

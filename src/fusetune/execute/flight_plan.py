@@ -78,7 +78,7 @@ def plan_flight(mission: Mission, limits: Limits, log_start_s: float = 2.0) -> F
         times.append(times[-1] + leg.duration_s)
         knots.append(leg.end)
     path = FilteredPath(np.array(times), np.array(knots), windows)
-    touchdown_s = times[-1] + half_window_s
+    touchdown_s = float(times[-1] + half_window_s)
     events = FlightEvents(
         log_start_s=log_start_s,
         armed_s=takeoff_s - ARMED_BEFORE_TAKEOFF_S,
@@ -140,7 +140,7 @@ def _legs(mission: Mission, frame: TangentFrame, limits: Limits, half_window_s: 
 
 def _place(waypoint: Waypoint, mission: Mission, frame: TangentFrame) -> np.ndarray:
     height = frame.height_m + waypoint.alt
-    return frame.from_geodetic(np.radians(waypoint.lat), np.radians(waypoint.lon), np.float64(height))
+    return frame.from_geodetic(math.radians(waypoint.lat), math.radians(waypoint.lon), height)
 
 
 def _legs_to(

@@ -32,22 +32,28 @@ DEFAULT_INTERVAL_MS = {
     "vehicle_gps_position": 100,
     "vehicle_attitude": 50,
     "vehicle_local_position": 100,
-    "vehicle_global_position": 200,
     "estimator_states": 1000,
     "estimator_status": 200,
-    "estimator_status_flags": 0,
-    "estimator_event_flags": 0,
-    "estimator_sensor_bias": 0,
+    "estimator_sensor_bias": 1000,
     "estimator_innovations": 500,
     "estimator_innovation_variances": 500,
     "estimator_innovation_test_ratios": 500,
-    "estimator_baro_bias": 500,
-    "estimator_gnss_hgt_bias": 500,
-    "estimator_gps_status": 1000,
-    "yaw_estimator_status": 1000,
 }
 """Smallest time between two logged messages of a topic in PX4 v1.16's default profile, ms."""
 AID_SOURCE_INTERVAL_MS = 100
+
+REPLAY_PROFILE_INTERVAL_MS = {
+    "vehicle_attitude": 20,
+    "vehicle_local_position": 20,
+    "estimator_states": 100,
+    "estimator_status": 200,
+    "estimator_sensor_bias": 1000,
+    "estimator_innovations": 100,
+    "estimator_innovation_variances": 100,
+    "estimator_innovation_test_ratios": 100,
+}
+"""The same when the profile for estimator replay is on: sensors and aid sources at full rate, the rest often enough."""
+SLOW_TOPIC_INTERVAL_US = 400_000
 REPLAY_ONLY_TOPICS = ("ekf2_timestamps",)
 
 
@@ -74,7 +80,11 @@ def logged_topics(
     topics: dict[TopicKey, TopicTable], events: FlightEvents, faults: Sequence[Fault], seed: int
 ) -> tuple[dict[TopicKey, TopicTable], list[Dropout]]:
     """Topics as they get into the log, and the times in which the logger lost messages."""
-    for profile in of_kind(faults, DefaultProfile):
+    profiles = of_kind(faults, DefaultProfile)
+    if not profiles:
+        intervals = REPLAY_PROFILE_INTERVAL_MS
+        topics = {key: _thinned(table, intervals.get(key[0], 0) * 1000) for key, table in topics.items()}
+    for profile in profiles:
         topics = _default_profile(topics, events, profile, seed)
     dropouts = []
     for fault in of_kind(faults, LoggerDropout):
@@ -132,9 +142,11 @@ def _lost_samples(samples: int, share: float, seed: int) -> np.ndarray:
 
 
 def _from(table: TopicTable, first_us: int) -> TopicTable:
-    """Rows from a time on; of a topic published before, the last earlier message, as the logger writes it at its start."""
+    """Rows from a time on; of a slow topic also the last one before, which the logger writes when it starts."""
     timestamp = table["timestamp"]
     first = int(np.searchsorted(timestamp, first_us))
-    return select_rows(
-        table, np.arange(first if first == 0 or len(timestamp) - first > 10 else first - 1, len(timestamp))
-    )
+    return select_rows(table, np.arange(max(first - 1, 0) if _is_slow(timestamp) else first, len(timestamp)))
+
+
+def _is_slow(timestamp: np.ndarray) -> bool:
+    return len(timestamp) < 2 or (timestamp[-1] - timestamp[0]) / (len(timestamp) - 1) > SLOW_TOPIC_INTERVAL_US

@@ -172,9 +172,6 @@ def load_vehicle(path: str | os.PathLike[str]) -> Vehicle:
         The file is broken; the message names every key at fault and what was expected.
     """
     document = read_yaml(path)
-    environment = document.get("environment")
-    if isinstance(environment, dict) and isinstance(environment.get("date"), datetime.date):
-        environment["date"] = environment["date"].isoformat()
     validate(document, load_schema("fusetune.execute", "vehicle"), path)
     raise_problems(path, _problems(document), "Mend the named keys; config/vehicles/ holds examples")
     return _vehicle_of(document)

@@ -68,7 +68,7 @@ def vehicle_status(plan: FlightPlan, truth: Truth) -> TopicTable:
     armed = (time_s >= events.armed_s) & (time_s < events.disarmed_s)
     was_armed, was_disarmed = time_s >= events.armed_s, time_s >= events.disarmed_s
     taken_off = (time_s >= events.takeoff_s) & ~was_disarmed
-    fields = {
+    fields: TopicTable = {
         "armed_time": np.where(armed, round(events.armed_s * 1e6), 0).astype(np.uint64),
         "takeoff_time": np.where(taken_off, round(events.takeoff_s * 1e6), 0).astype(np.uint64),
         "arming_state": np.where(armed, ARMED, STANDBY).astype(np.uint8),

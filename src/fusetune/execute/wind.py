@@ -55,7 +55,7 @@ def gusts(environment: Environment, time_s: np.ndarray, height_m: float, cruise_
     scales = turbulence_scales(height_m, environment.turbulence_wind_m_s, airspeed)
     step_s = 1.0 / TURBULENCE_RATE_HZ
     settling_s = 6.0 * max(scales.time_constant_s)
-    samples = int(math.ceil((time_s[-1] - time_s[0]) / step_s)) + 2
+    samples = math.ceil((time_s[-1] - time_s[0]) / step_s) + 2
     rng = random_stream(seed, "turbulence")
     warm_up = int(settling_s / step_s)
     along = gauss_markov(rng, samples, 1, step_s, scales.deviation[0], scales.time_constant_s[0])[:, 0]

@@ -16,7 +16,6 @@ from fusetune.execute.groundtruth import groundtruth_topics
 from fusetune.execute.imu import sensor_combined
 from fusetune.execute.logger import ekf2_timestamps, logged_topics
 from fusetune.execute.magnetometer import vehicle_magnetometer
-from fusetune.execute.onboard_estimator import estimator_topics
 from fusetune.execute.parameters import flown_parameters
 from fusetune.execute.truth import Truth, simulate_truth
 from fusetune.execute.vehicle import Vehicle
@@ -76,8 +75,10 @@ def fly(
     seed: int,
     faults: Sequence[Fault] = (),
     name: str = "",
+    *,
+    with_estimator: bool = True,
 ) -> Flight:
-    """The flight that `simulate` writes."""
+    """The flight that `simulate` writes; `with_estimator` False leaves out the topics of the vehicle's own estimator."""
     default_profile = bool(of_kind(faults, DefaultProfile))
     flown = flown_parameters(vehicle, parameters, default_profile=default_profile)
     plan = plan_flight(mission, vehicle.limits)
@@ -89,7 +90,12 @@ def fly(
         )
     truth = simulate_truth(plan, vehicle, seed)
     sensed = sensor_topics(truth, plan, mission, vehicle, faults, seed)
-    estimated = estimator_topics(_flight(name, mission, vehicle, plan, flown, sensed))
+    estimated: dict[TopicKey, TopicTable] = {}
+    if with_estimator:
+        # Loads the compiled estimator, which the sensors do without.
+        from fusetune.execute.onboard_estimator import estimator_topics
+
+        estimated = estimator_topics(_flight(name, mission, vehicle, plan, flown, sensed))
     everything = sensed | estimated | groundtruth_topics(truth, mission.home.geoid_undulation_m)
     logged, dropouts = logged_topics(everything, plan.events, faults, seed)
     flight = _flight(name, mission, vehicle, plan, flown, logged)

@@ -1,0 +1,106 @@
+"""What design leaves on disk: a plan and parameter files for QGroundControl, and the table of sets."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from fusetune.design.mission import Mission, Waypoint, load_mission
+from fusetune.design.study import ParameterSet, Study, load_study
+from fusetune.files import atomic_path
+from fusetune.px4.ekf2_parameters import PARAMETERS
+from fusetune.px4.params_file import ParamEntry, ParamsHeader, write_params
+from fusetune.px4.plan_file import (
+    Plan,
+    PlanItem,
+    PlanPosition,
+    change_speed,
+    land,
+    return_to_launch,
+    take_off,
+    waypoint,
+    write_plan,
+)
+
+FLY_OVER_ACCEPTANCE_M = 0.5
+"""PX4 turns once it is this near, so a small radius makes it cross the waypoint; 0 leaves the vehicle's own."""
+
+
+def write_design(
+    mission_file: str | os.PathLike[str], study_file: str | os.PathLike[str], folder: str | os.PathLike[str]
+) -> None:
+    """Write all that a mission and a study lead to: ``<mission>.plan``, ``<set>.params`` and ``sets.parquet``.
+
+    Raises
+    ------
+    UserError
+        The mission or the study is broken.
+    """
+    mission, study = load_mission(mission_file), load_study(study_file)
+    target = Path(folder)
+    write_mission_plan(mission, target / f"{mission.name}.plan")
+    for parameter_set in study.sets:
+        write_set_params(study, parameter_set, target / f"{parameter_set.name}.params")
+    write_sets_table(study, target / "sets.parquet")
+
+
+def write_mission_plan(mission: Mission, path: str | os.PathLike[str]) -> None:
+    """Write the mission as a QGroundControl plan."""
+    home = PlanPosition(mission.home.lat, mission.home.lon, mission.home.alt)
+    write_plan(path, Plan(home, tuple(plan_items(mission)), hover_speed_m_s=mission.speed_m_s))
+
+
+def plan_items(mission: Mission) -> list[PlanItem]:
+    """Mission items: take-off, speed changes where the speed changes, waypoints, and the way down."""
+    home = mission.home
+    items = [
+        take_off(PlanPosition(home.lat, home.lon, mission.takeoff.altitude_m)),
+        change_speed(mission.waypoints[0].speed_m_s),
+    ]
+    speed_m_s = mission.waypoints[0].speed_m_s
+    for point in mission.waypoints:
+        if point.speed_m_s != speed_m_s:
+            items.append(change_speed(point.speed_m_s))
+            speed_m_s = point.speed_m_s
+        items.append(_waypoint_item(point))
+    if mission.landing.mode == "return":
+        return [*items, return_to_launch()]
+    last = mission.waypoints[-1]
+    return [*items, land(PlanPosition(last.lat, last.lon, 0.0))]
+
+
+def _waypoint_item(point: Waypoint) -> PlanItem:
+    return waypoint(
+        PlanPosition(point.lat, point.lon, point.alt),
+        hold_s=point.hold_s,
+        acceptance_radius_m=FLY_OVER_ACCEPTANCE_M if point.turn == "fly_over" else 0.0,
+        yaw_deg=point.heading_deg,
+    )
+
+
+def write_set_params(study: Study, parameter_set: ParameterSet, path: str | os.PathLike[str]) -> None:
+    """Write a set as a QGroundControl parameter file, with what each parameter is as a comment above it."""
+    entries = [_entry(name, value) for name, value in sorted(parameter_set.overrides.items())]
+    about = f": {parameter_set.description}" if parameter_set.description else ""
+    header = ParamsHeader(comments=(f"Study {study.name}, set {parameter_set.name}{about}",))
+    write_params(path, entries, header)
+
+
+def _entry(name: str, value: float) -> ParamEntry:
+    metadata = PARAMETERS[name]
+    unit = f" {metadata.unit}" if metadata.unit else ""
+    reboot = "; takes effect after a reboot" if metadata.reboot_required else ""
+    return ParamEntry(name, value, metadata.type, (f"{name}: default {metadata.default:.9g}{unit}{reboot}",))
+
+
+def write_sets_table(study: Study, path: str | os.PathLike[str]) -> None:
+    """Write the sets as a Parquet table, one row per set and parameter, in the order of the study."""
+    # Imported here: everything else of this room is also read when the workflow starts, and that must stay quick.
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rows = [(one.name, name, float(value)) for one in study.sets for name, value in sorted(one.overrides.items())]
+    schema = pa.schema([("set", pa.string()), ("parameter", pa.string()), ("value", pa.float64())])
+    table = pa.Table.from_pylist([dict(zip(schema.names, row, strict=True)) for row in rows], schema)
+    with atomic_path(path) as temporary:
+        pq.write_table(table, temporary)
