@@ -53,8 +53,7 @@ def present_flight():
 def present_overrides():
     """What the set `present` gives to the parameters that the study varies: the vehicle's present values."""
     with open(f"results/save/{present_flight()}/metadata.json", encoding="utf-8") as file:
-        parameters = json.load(file)["parameters"]
-    values = parameters["initial"] | {change["name"]: change["value"] for change in parameters["changed"]}
+        values = json.load(file)["ekf2_parameters"]
     varied = {name for overrides in OVERRIDES.values() for name in overrides}
     return {name: values[name] for name in sorted(varied & values.keys())}
 

@@ -26,7 +26,7 @@ def checked_settings():
 
 
 def discovered_logs():
-    """Logs below the folder of flights, name of the flight -> file; a folder in between becomes part of the name."""
+    """Logs in the folder of flights and in folders below it, name of the flight -> file."""
     folder = SETTINGS["flights_dir"]
     if not os.path.isdir(folder):
         raise UserError(
@@ -37,8 +37,8 @@ def discovered_logs():
     found = glob_wildcards(os.path.join(folder, "{flight}.{suffix,[uU][lL][gG]}"))
     logs = {}
     for stem, suffix in sorted(zip(found.flight, found.suffix)):
-        file, flight = os.path.join(folder, f"{stem}.{suffix}"), stem.replace(os.sep, "__")
-        if os.path.basename(stem).startswith("."):
+        file, flight = os.path.join(folder, f"{stem}.{suffix}"), os.path.basename(stem)
+        if flight.startswith("."):
             continue
         if flight in logs:
             raise UserError(

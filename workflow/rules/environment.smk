@@ -64,7 +64,7 @@ recover_from_interruption()
 
 # Changed sources run again what depends on them.
 BASE = ("errors.py", "files.py", "px4")
-REPLAY_SOURCES = ("ekf2", "save", "ledger.py", "analyze/replay_flight.py")
+REPLAY_SOURCES = ("ekf2", "save", "ledger.py", "analyze/replay_flight.py", "analyze/replay_files.py")
 DIGEST = {
     "design": source_digest(*BASE, "design"),
     "execute": source_digest(*BASE, "ekf2", "design", "execute"),

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusetune.apply.decide import decide
 from job import logged_job
 
+from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
 
 if TYPE_CHECKING:

@@ -4,9 +4,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusetune.analyze.replay_flight import replay_flight
-from fusetune.ledger import Ledger, key_of
 from job import logged_job
+
+from fusetune.analyze.replay_flight import replay_saved_flight
+from fusetune.ledger import Ledger, key_of
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -22,9 +23,8 @@ with logged_job(snakemake.log[0]):
     ledger = Ledger(snakemake.params.ledger)
     keys = {name: key_of([*source, overrides]) for name, overrides in snakemake.params.sets.items()}
     outdated = [name for name, key in keys.items() if not ledger.is_current(name, key, files_of(name))]
-    replay_flight(
-        flight, Path(snakemake.output[0]).parent, {name: snakemake.params.sets[name] for name in outdated}
-    )
+    values = {name: snakemake.params.sets[name] for name in outdated}
+    replay_saved_flight(flight, values, Path(snakemake.output[0]).parent)
     for name in outdated:
         ledger.record(name, keys[name], files_of(name))
     print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(keys) - len(outdated)}")

@@ -1,0 +1,186 @@
+"""The command `fusetune`: single steps of the pipeline on single files.
+
+Each sub-command loads only the rooms it needs. Bad input ends it with status 2 and one line that says what to do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fusetune import __version__
+from fusetune.errors import UserError
+
+if TYPE_CHECKING:
+    from fusetune.analyze.fidelity import ReplayFidelity
+
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+USER_ERROR_STATUS = 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one sub-command; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except UserError as error:
+        print(f"fusetune: {error}", file=sys.stderr)
+        return USER_ERROR_STATUS
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fusetune", description="Single steps of the pipeline; `snakemake` runs them all."
+    )
+    parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    _add_design(commands)
+    _add_simulate(commands)
+    _add_save(commands)
+    _add_replay(commands)
+    _add_fidelity(commands)
+    return parser
+
+
+def _add_design(commands: Commands) -> None:
+    parser = commands.add_parser("design", help="write a mission plan and the parameter files of a study")
+    parser.add_argument("--mission", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--study", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    parser.set_defaults(run=_design)
+
+
+def _design(options: argparse.Namespace) -> None:
+    from fusetune.design import write_design
+
+    write_design(options.mission, options.study, options.out)
+
+
+def _add_simulate(commands: Commands) -> None:
+    parser = commands.add_parser("simulate", help="fly a mission with a simulated vehicle and write its log")
+    parser.add_argument("--mission", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--vehicle", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--study", type=Path, metavar="FILE", help="study that holds the set to fly")
+    parser.add_argument(
+        "--set", metavar="NAME", help="set of the study to fly; without it the vehicle's own parameters"
+    )
+    parser.add_argument("--faults", type=Path, metavar="FILE", help="YAML file with a list `faults`")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, required=True, metavar="LOG.ulg")
+    parser.set_defaults(run=_simulate)
+
+
+def _simulate(options: argparse.Namespace) -> None:
+    from fusetune.design.config_file import read_yaml
+    from fusetune.design.mission import load_mission
+    from fusetune.execute import simulate
+    from fusetune.execute.faults import parse_faults
+    from fusetune.execute.vehicle import load_vehicle
+
+    faults = parse_faults(read_yaml(options.faults).get("faults", []), options.faults) if options.faults else ()
+    flight = simulate(
+        load_mission(options.mission),
+        load_vehicle(options.vehicle),
+        _flown_set(options.study, options.set),
+        options.seed,
+        faults,
+        options.out,
+    )
+    print(f"{options.out}: {flight.duration_s:.1f} s")
+
+
+def _flown_set(study_file: Path | None, name: str | None) -> dict[str, float]:
+    if study_file is None and name is None:
+        return {}
+    if study_file is None or name is None:
+        raise UserError("command line", "--study and --set belong together", "Give both or neither")
+    from fusetune.design.study import load_study
+
+    study = load_study(study_file)
+    try:
+        return study.set_named(name).overrides
+    except KeyError:
+        names = ", ".join(pset.name for pset in study.sets)
+        raise UserError(study_file, f"has no set {name!r}", f"Choose one of {names}") from None
+
+
+def _add_save(commands: Commands) -> None:
+    parser = commands.add_parser("save", help="turn logs into folders of tables, each with a verdict")
+    parser.add_argument("logs", type=Path, nargs="+", metavar="LOG.ulg")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="takes one folder per log")
+    parser.set_defaults(run=_save)
+
+
+def _save(options: argparse.Namespace) -> None:
+    from fusetune.save import save_log
+
+    for log in options.logs:
+        verdict = save_log(log, options.out / log.stem)
+        print(f"{log.stem}: {verdict.status}", *verdict.reasons, sep="\n  ")
+
+
+def _add_replay(commands: Commands) -> None:
+    parser = commands.add_parser("replay", help="replay parameter sets on a log")
+    parser.add_argument("log", type=Path, metavar="LOG.ulg")
+    parser.add_argument(
+        "--sets",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help='folder with one SET.json per set: {"params": {NAME: value}, "overrides": {NAME: value}}',
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    parser.set_defaults(run=_replay)
+
+
+def _replay(options: argparse.Namespace) -> None:
+    from fusetune.analyze.replay_flight import replay_log
+
+    print("replayed:", *replay_log(options.log, options.sets, options.out))
+
+
+def _add_fidelity(commands: Commands) -> None:
+    parser = commands.add_parser("fidelity", help="compare replays with reference replays of the same flight")
+    parser.add_argument("reference", type=Path, metavar="REFERENCE_DIR")
+    parser.add_argument("replay", type=Path, metavar="REPLAY_DIR")
+    parser.set_defaults(run=_fidelity)
+
+
+def _fidelity(options: argparse.Namespace) -> None:
+    from fusetune.analyze.fidelity import compare_folders, order_agreement
+
+    results = compare_folders(options.reference, options.replay)
+    for result in results:
+        _print_fidelity(result)
+    if len(results) > 2:
+        print(f"order of the sets by NLL, Kendall tau: {order_agreement(results):.2f}")
+
+
+def _print_fidelity(result: ReplayFidelity) -> None:
+    print(f"{result.set}")
+    print(
+        f"  {'source':<16}{'samples':>8}{'RMS diff.':>11}{'variance':>11}{'fused =':>10}{'rejected =':>11}{'NLL':>10}"
+    )
+    for axis in result.axes:
+        print(
+            f"  {f'{axis.source}[{axis.axis}]':<16}{axis.samples:>8}{axis.relative_rms:>11.3%}"
+            f"{axis.variance_difference:>11.3%}{axis.fused_equal:>11.3%}{axis.rejected_equal:>11.3%}"
+            f"{axis.nll_difference:>+11.4f}"
+        )
+    print(
+        f"  flags equal {result.flags_equal:.2%} of the time; resets {'equal' if result.resets_equal else 'differ'}; "
+        f"samples without partner {result.missing:.2%}"
+    )
+    print(
+        f"  RMS difference: velocity {result.velocity_rms:.4f} m/s, attitude {result.attitude_rms_deg:.4f} deg, "
+        f"gyro bias {result.gyro_bias_rms:.2e} rad/s"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
