@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.files import atomic_path
+from fusetune.px4.estimator_instances import primary_instance
 from fusetune.px4.flight import Flight, TopicTable
 
 ONBOARD = "onboard"
@@ -29,7 +30,7 @@ def onboard_samples(flight: Flight) -> dict[SourceAxis, AxisSamples]:
     -------
     Samples by source and axis; empty where the log holds none. Of several estimator instances the primary counts.
     """
-    instance = _primary_instance(flight)
+    instance = primary_instance(flight)
     samples: dict[SourceAxis, AxisSamples] = {}
     for name, source in AID_SOURCES.items():
         topic = f"estimator_aid_src_{name}"
@@ -43,14 +44,6 @@ def onboard_samples(flight: Flight) -> dict[SourceAxis, AxisSamples]:
             if f"innovation{column}" in table and f"innovation_variance{column}" in table:
                 samples[name, axis] = _axis_samples(table, column)
     return samples
-
-
-def _primary_instance(flight: Flight) -> int:
-    table = flight.topic("estimator_selector_status")
-    if table is None or table["timestamp"].size == 0:
-        return 0
-    values, counts = np.unique(table["primary_instance"], return_counts=True)
-    return int(values[np.argmax(counts)])
 
 
 def _axis_samples(table: TopicTable, column: str) -> AxisSamples:

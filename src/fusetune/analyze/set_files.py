@@ -159,6 +159,7 @@ def reset_times(record: SetRecord) -> dict[str, npt.NDArray[np.int64]]:
             times[kind] = np.zeros(0, dtype=np.int64)
             continue
         # The counter is a byte that wraps in the log.
-        steps = np.diff(values.astype(np.int64)) & 0xFF
+        counts: npt.NDArray[np.int64] = values.astype(np.int64)
+        steps = np.subtract(counts[1:], counts[:-1]) & 0xFF
         times[kind] = np.repeat(time[1:], steps)
     return times

@@ -43,6 +43,7 @@ AID_SOURCES: dict[str, AidSource] = {
         AidSource("baro_hgt", "barometer height", "m", 1, _HEIGHT, "EKF2_BARO_GATE", "EKF2_BARO_DELAY"),
         AidSource("rng_hgt", "range finder height", "m", 1, _HEIGHT, "EKF2_RNG_GATE", "EKF2_RNG_DELAY"),
         AidSource("mag", "magnetometer", "G", 3, _TRIAXIAL, "EKF2_MAG_GATE", "EKF2_MAG_DELAY"),
+        AidSource("mag_heading", "magnetic heading", "rad", 1, _ANGLE, "EKF2_HDG_GATE", "EKF2_MAG_DELAY"),
         AidSource("ev_pos", "vision position", "m", 2, _PLANE, "EKF2_EVP_GATE", "EKF2_EV_DELAY"),
         AidSource("ev_vel", "vision velocity", "m/s", 3, _SPACE, "EKF2_EVV_GATE", "EKF2_EV_DELAY"),
         AidSource("ev_hgt", "vision height", "m", 1, _HEIGHT, "EKF2_EVP_GATE", "EKF2_EV_DELAY"),
@@ -56,7 +57,9 @@ AID_SOURCES: dict[str, AidSource] = {
         AidSource("aux_global_position", "auxiliary position", "m", 2, _PLANE, "EKF2_AGP_GATE", "EKF2_AGP_DELAY"),
     )
 }
-"""Every source that measures something; `fake_pos`, `fake_hgt` and the like are the filter's own inventions."""
+"""Every source that measures something; `fake_pos`, `fake_hgt` and the like are the filter's own inventions.
+
+`mag_heading` exists only as flown, in releases before v1.16."""
 
 HORIZONTAL_AIDING = ("gnss_vel", "gnss_pos", "ev_vel", "ev_pos", "optical_flow", "aux_vel", "aux_global_position")
 """Sources that stop the horizontal drift; the warm-up ends some seconds after the first of them is fused."""

@@ -45,7 +45,7 @@ def _comparison(choice: Choice, axes: int, label: str, settings: DecisionSetting
     if best is None:
         return "No other set was eligible for comparison."
     low, high = improvement_percent(best.upper, axes), improvement_percent(best.lower, axes)
-    span = f"{settings.confidence:.0%} interval {low:+.1f} % to {high:+.1f} %"
+    span = f"{settings.confidence:.0%} interval {low:+.1f} % to {high:+.1f} %".replace("-", "−")
     wins = f"better on {best.flights_better} of {best.flights} flights"
     if choice.status == "change":
         percent = f"{best.improvement_percent:.1f} %"

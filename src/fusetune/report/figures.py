@@ -1,0 +1,87 @@
+"""Drawing without a display: the style, colours of the sets, and files that are the same bytes every time."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Literal
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from fusetune.files import atomic_path
+
+STYLE = Path(__file__).with_name("figures.mplstyle")
+
+PRESENT_COLOUR = "#222222"
+CHOSEN_COLOUR = "#0072B2"
+CANDIDATE_COLOUR = "#56B4E9"
+VETOED_COLOUR = "#B0B0B0"
+
+_PNG_COLOURS = 96
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Everything drawn inside has the report's style."""
+    with matplotlib.rc_context(fname=STYLE):
+        yield
+
+
+def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure of a size in inches, drawn by Agg, with room made for its labels.
+
+    With `layout=None` the caller places the axes; finding the room takes longer than drawing a figure.
+    """
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save_svg(figure: Figure, path: Path) -> None:
+    """Write an SVG without date or random names."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="svg", metadata={"Date": None, "Creator": None})
+
+
+def save_png(figure: Figure, path: Path) -> None:
+    """Write a PNG with a small palette: a third of the size of full colour, and no difference to see in a plot."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": None})
+    image = Image.open(buffer).convert("RGB")
+    with atomic_path(path) as temporary:
+        image.quantize(_PNG_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
+            temporary, format="PNG", optimize=True
+        )
+
+
+def set_colours(sets: Sequence[str], present: str) -> dict[str, str]:
+    """A colour per set: black for the present one, the cycle for the others."""
+    cycle = [entry["color"] for entry in matplotlib.rcParams["axes.prop_cycle"] if entry["color"] != "#000000"]
+    others = [name for name in sets if name != present]
+    colours = {name: _hex(cycle[i % len(cycle)]) for i, name in enumerate(others)}
+    colours[present] = PRESENT_COLOUR
+    return colours
+
+
+def _hex(colour: str) -> str:
+    return colour if colour.startswith("#") else f"#{colour}"
+
+
+def empty_figure(message: str) -> Figure:
+    """A figure that says why there is nothing to see."""
+    figure = new_figure(7.0, 1.2)
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, message, ha="center", va="center", color="#666666", transform=axes.transAxes)
+    return figure
+
+
+def label_sets(axes: Axes, sets: Sequence[str]) -> None:
+    """One row per set, the first on top."""
+    axes.set_yticks(range(len(sets)), sets)
+    axes.set_ylim(len(sets) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")

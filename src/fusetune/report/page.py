@@ -1,0 +1,70 @@
+"""Puts the report together: one page that needs no network."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fusetune.files import atomic_path
+from fusetune.report.decision_sections import decision_section, evidence_section, paper_section, sets_section
+from fusetune.report.flight_sections import (
+    as_flown_section,
+    flight_figure_paths,
+    flights_section,
+    innovations_section,
+    provenance_section,
+    single_flights_section,
+    truth_section,
+)
+from fusetune.report.results import read_results
+
+STYLE_SHEET = Path(__file__).with_name("page.css")
+
+_PRINT = "addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>d.open=true))"
+
+
+def build_report(
+    flights_table: Path,
+    analyze_folders: Sequence[Path],
+    flight_figures: Sequence[Path],
+    apply_folder: Path,
+    figure_folder: Path,
+    output: Path,
+) -> None:
+    """Write the report as one HTML file with its figures inside.
+
+    Parameters
+    ----------
+    flights_table : `results/save/flights.parquet`, all logs with their verdicts
+    analyze_folders : `results/analyze/<flight>` of the replayed flights
+    flight_figures : a picture per flight (`plot_flight`), in the order of `analyze_folders`
+    apply_folder : `results/apply`
+    figure_folder : holds `SUMMARY_FIGURES` (`plot_summary`)
+    output : `results/report.html`
+    """
+    results = read_results(analyze_folders, apply_folder)
+    figures = Path(figure_folder)
+    pictures = flight_figure_paths([Path(folder).name for folder in analyze_folders], flight_figures)
+    sections = (
+        decision_section(results),
+        evidence_section(results, figures),
+        sets_section(results),
+        flights_section(results, Path(flights_table)),
+        innovations_section(results, figures),
+        truth_section(results),
+        as_flown_section(results),
+        paper_section(results),
+        single_flights_section(results, pictures),
+        provenance_section(results),
+    )
+    product = results.decision["provenance"]["product"]
+    page = (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>EKF2 parameters: the decision</title><style>{STYLE_SHEET.read_text(encoding='utf-8')}</style>"
+        "</head><body>"
+        f"<header><h1>Which EKF2 parameters to fly</h1><p>{product}, from "
+        f"{len(results.flights)} scored flights</p></header>"
+        + "\n".join(sections)
+        + f"<script>{_PRINT}</script></body></html>\n"
+    )
+    with atomic_path(output) as temporary:
+        temporary.write_text(page, encoding="utf-8")
