@@ -1,4 +1,4 @@
-"""Strap-down navigation for tests, written apart from the simulator: curvilinear position, local NED axes, plain floats.
+"""Strap-down navigation for tests, apart from the simulator: curvilinear position, local NED axes, plain floats.
 
 P. Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd edition, section 5.4, with
 the attitude kept as a quaternion and gravity from the Somigliana formula with the free-air gradient of GRS80.

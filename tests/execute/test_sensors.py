@@ -86,7 +86,7 @@ def test_gnss_errors_have_the_configured_statistics(truth: Truth, vehicle: Vehic
         position_errors.append([(noisy["altitude_msl_m"] - exact_altitude(truth, noisy))[::100]])
     configured = vehicle.gnss.velocity
     total = math.hypot(configured.noise, configured.correlated)
-    errors = np.array([[axis for axis in run] for run in velocity_errors])
+    errors = np.array(velocity_errors)
     assert errors[:, :2].std() == pytest.approx(total, rel=0.1)
     assert errors[:, 2].std() == pytest.approx(total * configured.vertical_factor, rel=0.15)
     position = vehicle.gnss.position

@@ -23,6 +23,19 @@ from fusetune.px4.ulog_writer import write_ulog
 
 FLOWN = {"EKF2_ACC_NOISE": 0.7, "EKF2_GPS_CTRL": 7}
 SEED = 11
+COMPARED_TOPICS = (
+    "sensor_combined",
+    "vehicle_magnetometer",
+    "vehicle_air_data",
+    "vehicle_gps_position",
+    "vehicle_status",
+    "vehicle_land_detected",
+    "ekf2_timestamps",
+    "vehicle_attitude_groundtruth",
+    "vehicle_angular_velocity_groundtruth",
+    "vehicle_local_position_groundtruth",
+    "vehicle_global_position_groundtruth",
+)
 
 
 def sensors_only(mission: Mission, vehicle: Vehicle, faults: tuple[Fault, ...] = (), seed: int = SEED) -> Flight:
@@ -62,9 +75,7 @@ def test_pyulog_reads_what_px4_would_have_written(log: Path) -> None:
 
 def test_field_types_are_those_of_px4(log: Path, shared_logs: Path) -> None:
     ours, theirs = ULog(str(log)), ULog(str(shared_logs / "erdemarslan380__sitl_windy.ulg"))
-    for topic in ("sensor_combined", "vehicle_magnetometer", "vehicle_air_data", "vehicle_gps_position", "ekf2_timestamps",
-                  "vehicle_attitude_groundtruth", "vehicle_local_position_groundtruth", "vehicle_status",
-                  "vehicle_global_position_groundtruth", "vehicle_angular_velocity_groundtruth", "vehicle_land_detected"):  # fmt: skip
+    for topic in COMPARED_TOPICS:
         expected = {field.field_name: field.type_str for field in theirs.get_dataset(topic).field_data}
         for field in ours.get_dataset(topic).field_data:
             assert expected.get(field.field_name, field.type_str) == field.type_str, (topic, field.field_name)

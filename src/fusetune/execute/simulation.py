@@ -78,7 +78,7 @@ def fly(
     *,
     with_estimator: bool = True,
 ) -> Flight:
-    """The flight that `simulate` writes; `with_estimator` False leaves out the topics of the vehicle's own estimator."""
+    """The flight that `simulate` writes; without the estimator its topics are left out."""
     default_profile = bool(of_kind(faults, DefaultProfile))
     flown = flown_parameters(vehicle, parameters, default_profile=default_profile)
     plan = plan_flight(mission, vehicle.limits)
