@@ -6,11 +6,11 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from job import logged_job
-
 import fusetune
 from fusetune.ekf2.warm_up import compile_kernels
 from fusetune.files import atomic_path
+
+from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

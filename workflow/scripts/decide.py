@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from job import logged_job
-
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
+
+from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

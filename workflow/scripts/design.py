@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING, Any
 
-from job import logged_job
-
 from fusetune.design import write_design
+
+from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.flight_figures import plot_flight
+
 from job import logged_job
 
 if TYPE_CHECKING:

@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from job import logged_job
-
 from fusetune.analyze.replay_flight import replay_saved_flight
 from fusetune.ledger import Ledger, key_of
+
+from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

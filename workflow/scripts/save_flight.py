@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING, Any
 
-from job import logged_job
-
 from fusetune.save import save_log
+
+from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

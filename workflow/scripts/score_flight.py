@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from job import logged_job
-
 from fusetune.analyze.score_flight import score_flight
 from fusetune.analyze.settings import ScoringSettings
+
+from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

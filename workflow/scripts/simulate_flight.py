@@ -2,12 +2,12 @@
 
 from typing import TYPE_CHECKING, Any
 
-from job import logged_job
-
 from fusetune.design.mission import load_mission
 from fusetune.execute import simulate
 from fusetune.execute.faults import parse_faults
 from fusetune.execute.vehicle import load_vehicle
+
+from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

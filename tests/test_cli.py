@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fusetune import __version__
+from fusetune.cli import main
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.split() == ["fusetune", __version__]
+
+
+def test_save_lists_a_file_that_is_no_log_with_its_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "broken.ulg"
+    log.write_bytes(b"this is no ULog")
+    assert main(["save", str(log), "--out", str(tmp_path / "saved")]) == 0
+    assert capsys.readouterr().out.startswith("broken: refused\n  ")
+    assert (tmp_path / "saved" / "broken" / "verdict.json").exists()
+
+
+def test_design_writes_what_the_vehicle_loads(tmp_path: Path, project_root: Path) -> None:
+    config = project_root / "config"
+    study, mission = config / "studies" / "paper_table11.yaml", config / "missions" / "survey.yaml"
+    assert main(["design", "--mission", str(mission), "--study", str(study), "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "survey.plan").exists()
+    assert (tmp_path / "paper4.params").exists()
+
+
+def test_a_mistake_of_the_user_is_one_line_and_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    missing = tmp_path / "no_study.yaml"
+    assert main(["design", "--mission", "config/missions/survey.yaml", "--study", str(missing), "--out", "x"]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("fusetune: ")
+    assert len(printed.splitlines()) == 1
+
+
+def test_simulate_names_the_sets_that_a_study_has(
+    tmp_path: Path, project_root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = project_root / "config"
+    files = {
+        "mission": "missions/survey.yaml",
+        "vehicle": "vehicles/quadrotor.yaml",
+        "study": "studies/paper_table11.yaml",
+    }
+    options = [part for name, file in files.items() for part in (f"--{name}", str(config / file))]
+    assert main(["simulate", *options, "--set", "paper9", "--out", str(tmp_path / "x.ulg")]) == 2
+    assert "paper1, paper2" in capsys.readouterr().err

@@ -1,0 +1,119 @@
+"""The workflow from end to end, on a short simulated mission."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from tests.workflow.conftest import STUDY, Workspace
+
+SUMMARIES = {"list_flights": 1, "decide": 1, "plot_summary": 1, "build_report": 1, "all": 1}
+PATIENCE_S = 300.0
+
+
+def replay_times(workspace: Workspace, pattern: str) -> dict[str, int]:
+    files = (workspace.folder / "results" / "analyze").glob(pattern)
+    return {str(file): file.stat().st_mtime_ns for file in files}
+
+
+def read_flights(workspace: Workspace) -> dict[str, dict[str, str]]:
+    with open(workspace.folder / "results" / "save" / "flights.csv", encoding="utf-8", newline="") as file:
+        return {row["flight"]: row for row in csv.DictReader(file)}
+
+
+def test_an_empty_folder_plans_one_simulated_flight_per_set(workspace: Workspace) -> None:
+    planned = workspace.planned_jobs()
+    planned.pop("compile_kernels", None)
+    assert planned == {"design": 1, "simulate_flight": 2, "save_flight": 2, **SUMMARIES}
+
+
+def test_the_demonstration_ends_with_parameters_decision_and_report(demonstration: Workspace) -> None:
+    results = demonstration.folder / "results"
+    for name in ("apply/best_params.params", "apply/rollback.params", "apply/ranking.csv", "design/hop.plan"):
+        assert (results / name).stat().st_size > 0
+    json.loads((results / "apply" / "decision.json").read_text(encoding="utf-8"))
+    page = (results / "report.html").read_text(encoding="utf-8")
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    flights = read_flights(demonstration)
+    assert {row["status"] for row in flights.values()} == {"replayable"}
+    assert list(flights) == ["flight_1_low", "flight_2_high"]
+    for flight in flights:
+        for name in ("present", "low", "high"):
+            summary = json.loads((results / "analyze" / flight / f"{name}.json").read_text(encoding="utf-8"))
+            assert summary["status"] == "ok"
+
+
+def test_the_present_set_carries_the_values_of_the_newest_flight(demonstration: Workspace) -> None:
+    summary = demonstration.folder / "results" / "analyze" / "flight_1_low" / "present.json"
+    overrides = json.loads(summary.read_text(encoding="utf-8"))["overrides"]
+    flown_last = STUDY["sets"][-1]["parameters"]
+    assert overrides.keys() == flown_last.keys()
+    for name, value in flown_last.items():
+        assert abs(overrides[name] - value) < 1e-6  # a log keeps parameters in single precision
+
+
+def test_a_second_run_has_nothing_to_do(demonstration: Workspace) -> None:
+    assert demonstration.planned_jobs() == {}
+
+
+def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown: Workspace) -> None:
+    flown.run_ok("--cores", "2")
+    flights = read_flights(flown)
+    assert flights["first"]["status"] == "replayable"
+    assert flights["broken"]["status"] == "refused"
+    assert flights["broken"]["reason"]
+    assert (flown.folder / "results" / "report.html").exists()
+
+    before = replay_times(flown, "first/*.json")
+    shutil.copy(flown.folder / "flights" / "first.ulg", flown.folder / "flights" / "second.ulg")
+    assert flown.planned_jobs() == {"save_flight": 1, **SUMMARIES}
+    flown.run_ok("--cores", "2")
+    assert read_flights(flown)["second"]["status"] == "replayable"
+    assert replay_times(flown, "first/*.json") == before
+
+    before = replay_times(flown, "*/low.*") | replay_times(flown, "*/high.*") | replay_times(flown, "*/present.*")
+    flown.write(
+        "small.yaml", STUDY | {"sets": [*STUDY["sets"], {"name": "new", "parameters": {"EKF2_ACC_NOISE": 0.5}}]}
+    )
+    flown.run_ok("--cores", "2")
+    after = replay_times(flown, "*/low.*") | replay_times(flown, "*/high.*") | replay_times(flown, "*/present.*")
+    assert after == before
+    assert len(replay_times(flown, "*/new.json")) == 2
+
+
+def test_only_broken_logs_still_end_with_a_report(workspace: Workspace) -> None:
+    (workspace.folder / "flights" / "broken.ulg").write_bytes(b"this is no ULog")
+    workspace.run_ok("--cores", "2")
+    assert (workspace.folder / "results" / "report.html").exists()
+    assert (workspace.folder / "results" / "apply" / "best_params.params").exists()
+
+
+def test_killed_at_any_moment_the_next_run_completes_to_the_same_results(
+    workspace: Workspace, demonstration: Workspace
+) -> None:
+    for trace in ("execute/*.ulg", "analyze/*/present.states.parquet", "apply/decision.json"):
+        kill_when_seen(workspace, trace)
+    workspace.run_ok("--cores", "1")
+    assert workspace.planned_jobs() == {}
+    ours, uninterrupted = workspace.results(), demonstration.results()
+    assert ours.keys() == uninterrupted.keys()
+    assert [name for name in ours if ours[name] != uninterrupted[name]] == []
+
+
+def kill_when_seen(workspace: Workspace, trace: str) -> None:
+    """Start a run and kill it, as the system would, as soon as a result appears that was not there before."""
+    results = workspace.folder / "results"
+    seen = set(results.glob(trace))
+    with open(workspace.folder / "killed_run.log", "a", encoding="utf-8") as printed:
+        run = subprocess.Popen(workspace.command("--cores", "2"), stdout=printed, stderr=printed)
+        end = time.monotonic() + PATIENCE_S
+        while set(results.glob(trace)) <= seen and run.poll() is None and time.monotonic() < end:
+            time.sleep(0.02)
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+    assert set(results.glob(trace)) - seen, Path(printed.name).read_text(encoding="utf-8")
