@@ -13,6 +13,7 @@ from pyulog import ULog
 
 from fusetune.errors import UserError
 from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory, TopicKey, TopicTable
+from fusetune.px4.guarded_stream import GuardedStream
 
 _MAGIC = ULog.HEADER_BYTES
 _HEADER_BYTES = 16
@@ -86,14 +87,17 @@ def _content(file: Path) -> bytes:
 
 
 def _parse(file: Path, content: bytes) -> tuple[ULog, list[str]]:
-    printed = io.StringIO()
+    printed, stream = io.StringIO(), GuardedStream(content)
     try:
         with redirect_stdout(printed):
-            log = ULog(io.BytesIO(content))
+            log = ULog(stream)
     except Exception as error:  # pyulog raises whatever the damaged bytes happen to cause
         reason = f"cannot be parsed ({type(error).__name__}: {error})"
         raise UserError(file, reason, _COPY_AGAIN) from error
-    return log, [line.strip() for line in printed.getvalue().splitlines() if line.strip()]
+    notes = [line.strip() for line in printed.getvalue().splitlines() if line.strip()]
+    if stream.gave_up_at is not None:
+        notes.append(f"everything after byte {stream.gave_up_at} is damaged and was left out")
+    return log, notes
 
 
 def _topics(log: ULog) -> dict[TopicKey, TopicTable]:

@@ -62,10 +62,19 @@ def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
         verdict = unreadable(log.stem, error)
         _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log))
     else:
-        verdict = judge(canonical(flight), thresholds)
+        verdict = _judge(flight, thresholds)
         write_flight(folder, flight, {"file": log.name, "ekf2_parameters": _present_ekf2(flight)} | log_facts(flight))
     _write_json(folder / VERDICT_FILE, verdict.document())
     return verdict
+
+
+def _judge(flight: Flight, thresholds: VerdictThresholds) -> Verdict:
+    try:
+        return judge(canonical(flight), thresholds)
+    except (LookupError, ValueError, TypeError) as error:
+        # damage can take any field away from any topic
+        reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
+        return unreadable(flight.name, UserError(flight.name, reason, "Copy the log from the vehicle again"))
 
 
 def _present_ekf2(flight: Flight) -> dict[str, float]:

@@ -1,0 +1,169 @@
+"""Logs become folders; bad ones become refusals and never errors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fusetune.errors import UserError
+from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory
+from fusetune.px4.ulog_reader import read_ulog
+from fusetune.px4.ulog_writer import write_ulog
+from fusetune.save import load_flight, save_log, write_flights_table
+
+
+@pytest.fixture(scope="module")
+def log_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    time = np.arange(2600, dtype=np.int64) * 5000 + 1_000_000
+    rows = len(time)
+    imu = {"timestamp": time, "gyro_integral_dt": np.full(rows, 5000, np.uint32)}
+    imu["accelerometer_integral_dt"] = imu["gyro_integral_dt"]
+    for axis in range(3):
+        imu |= {f"gyro_rad[{axis}]": np.zeros(rows, np.float32)}
+        imu |= {f"accelerometer_m_s2[{axis}]": np.full(rows, -9.81 * (axis == 2), np.float32)}
+    slow = time[::40]
+    gnss = {
+        "timestamp": slow,
+        "time_utc_usec": (slow + 1_600_000_000_000_000).astype(np.uint64),
+        "fix_type": np.full(len(slow), 3, np.uint8),
+        "lat": np.full(len(slow), 473977418, np.int32),
+        "vel_ned_valid": np.ones(len(slow), bool),
+    }
+    topics = {
+        ("sensor_combined", 0): imu,
+        ("vehicle_gps_position", 0): gnss,
+        ("vehicle_air_data", 0): {"timestamp": slow, "baro_alt_meter": np.zeros(len(slow), np.float32)},
+        ("vehicle_land_detected", 0): {"timestamp": slow[:2], "landed": np.array([True, False])},
+    }
+    parameters = ParameterHistory(
+        {"EKF2_AID_MASK": 1, "EKF2_GPS_V_NOISE": 0.5, "NAN_PARAMETER": float("nan")},
+        [ParameterChange(int(slow[3]), "EKF2_GPS_V_NOISE", 0.25)],
+        {"EKF2_GPS_V_NOISE": 0.25},
+        {"EKF2_AID_MASK": 1},
+    )
+    flight = Flight(
+        "made",
+        topics,
+        parameters,
+        info={"sys_name": "PX4", "ver_hw": "PX4_SITL", "ver_sw_release": 0x010D01FF},
+        dropouts=[Dropout(int(slow[2]), 30)],
+        messages=[LoggedMessage(int(slow[1]), "INFO", "Takeoff detected")],
+        start_timestamp=1_000_000,
+    )
+    path = tmp_path_factory.mktemp("log") / "made.ulg"
+    write_ulog(path, flight)
+    return path.read_bytes()
+
+
+@pytest.fixture
+def log(tmp_path: Path, log_bytes: bytes) -> Path:
+    (tmp_path / "made.ulg").write_bytes(log_bytes)
+    return tmp_path / "made.ulg"
+
+
+def test_flight_comes_back_as_it_was_read(tmp_path: Path, log: Path) -> None:
+    assert save_log(log, tmp_path / "saved" / "made").status == "replayable"
+    saved, read = load_flight(tmp_path / "saved" / "made"), read_ulog(log)
+    assert saved.topics.keys() == read.topics.keys()
+    for key, table in read.topics.items():
+        assert saved.topics[key].keys() == table.keys()
+        for name, values in table.items():
+            assert saved.topics[key][name].dtype == values.dtype
+            np.testing.assert_array_equal(saved.topics[key][name], values)
+    assert np.isnan(saved.parameters.initial.pop("NAN_PARAMETER"))
+    assert np.isnan(read.parameters.initial.pop("NAN_PARAMETER"))
+    assert saved.parameters == read.parameters
+    for name in ("info", "multi_info", "dropouts", "messages", "start_timestamp", "checksum", "size_bytes", "release"):
+        assert getattr(saved, name) == getattr(read, name), name
+
+
+def test_only_the_wanted_topics_are_read(tmp_path: Path, log: Path) -> None:
+    save_log(log, tmp_path / "made")
+    flight = load_flight(tmp_path / "made", topics=("sensor_combined", "vehicle_visual_odometry"))
+    assert list(flight.topics) == [("sensor_combined", 0)]
+
+
+def test_metadata_says_who_when_and_how_long(tmp_path: Path, log: Path) -> None:
+    save_log(log, tmp_path / "made")
+    metadata = json.loads((tmp_path / "made" / "metadata.json").read_text())
+    assert metadata["firmware"] == "v1.13.1"
+    assert metadata["hardware"] == {"ver_hw": "PX4_SITL"}
+    assert metadata["recorded"] == "2020-09-13T12:26:41Z"  # 1.6e9 s of Unix time and one second
+    assert metadata["duration_s"] == pytest.approx(2599 * 0.005)
+    assert metadata["airborne_s"] == pytest.approx(2599 * 0.005 - 0.2)
+    assert metadata["ekf2_parameters"]["EKF2_GPS_CTRL"] == 7.0
+    assert metadata["ekf2_parameters"]["EKF2_GPS_V_NOISE"] == 0.25
+    assert metadata["parameters"]["changed"] == [{"timestamp": 1600000, "name": "EKF2_GPS_V_NOISE", "value": 0.25}]
+
+
+def test_saving_again_replaces_all_and_gives_equal_bytes(tmp_path: Path, log: Path) -> None:
+    save_log(log, tmp_path / "made")
+    first = {file.name: file.read_bytes() for file in (tmp_path / "made").iterdir()}
+    (tmp_path / "made" / "stray.parquet").write_bytes(b"left by another version")
+    save_log(log, tmp_path / "made")
+    assert {file.name: file.read_bytes() for file in (tmp_path / "made").iterdir()} == first
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["made", "made.ulg"]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "is empty"),
+        (b"GIF89a", "is not a ULog file"),
+        (b"ULog\x01\x12\x35\x01" + bytes(8), "ends after its header"),
+    ],
+)
+def test_bad_log_becomes_a_refusal(tmp_path: Path, content: bytes, reason: str) -> None:
+    (tmp_path / "bad.ulg").write_bytes(content)
+    verdict = save_log(tmp_path / "bad.ulg", tmp_path / "bad")
+    assert verdict.status == "refused"
+    assert reason in verdict.reasons[0]
+    assert verdict.checks[0].remedy
+    with pytest.raises(UserError, match="readable flight"):
+        load_flight(tmp_path / "bad")
+
+
+def test_absent_log_becomes_a_refusal(tmp_path: Path) -> None:
+    assert "cannot be opened" in save_log(tmp_path / "absent.ulg", tmp_path / "absent").reasons[0]
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes=st.lists(st.tuples(st.integers(0, 3000), st.integers(0, 255)), max_size=10), cut=st.integers(1, 100_000))
+def test_no_damage_raises(tmp_path: Path, log_bytes: bytes, changes: list[tuple[int, int]], cut: int) -> None:
+    """Damage of definitions and first data records, and a cut anywhere."""
+    damaged = bytearray(log_bytes)
+    for position, value in changes:
+        damaged[position] = value
+    (tmp_path / "damaged.ulg").write_bytes(bytes(damaged[: 16 + cut]))
+    verdict = save_log(tmp_path / "damaged.ulg", tmp_path / "damaged")
+    assert verdict.status == "replayable" or verdict.reasons
+    write_flights_table([tmp_path / "damaged"], tmp_path / "flights.parquet", tmp_path / "flights.csv")
+
+
+def test_flights_table_keeps_the_given_order(tmp_path: Path, log: Path) -> None:
+    (tmp_path / "bad.ulg").write_bytes(b"")
+    for name in ("made", "bad"):
+        save_log(tmp_path / f"{name}.ulg", tmp_path / name)
+    write_flights_table([tmp_path / "made", tmp_path / "bad"], tmp_path / "flights.parquet", tmp_path / "flights.csv")
+    rows = pq.read_table(tmp_path / "flights.parquet").to_pylist()
+    assert [(row["flight"], row["status"]) for row in rows] == [("made", "replayable"), ("bad", "refused")]
+    assert rows[0]["reason"] == ""
+    assert rows[1]["reason"] == "the log is empty"
+    assert rows[0]["checksum"] == read_ulog(log).checksum
+    assert rows[1]["airborne_s"] is None
+    csv = pa_csv.read_csv(tmp_path / "flights.csv")
+    assert csv.column_names == list(rows[0])
+    assert csv.column("status").to_pylist() == ["replayable", "refused"]
+
+
+def test_flights_table_names_a_folder_without_verdict(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"verdict\.json"):
+        write_flights_table([tmp_path], tmp_path / "flights.parquet", tmp_path / "flights.csv")
+    assert not (tmp_path / "flights.parquet").exists()
