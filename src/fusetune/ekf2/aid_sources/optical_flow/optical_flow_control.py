@@ -30,11 +30,7 @@ from fusetune.ekf2.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.covariance import reset_covariance_block
 from fusetune.ekf2.global_position import single_precision
 from fusetune.ekf2.observation_gain import compute_innovation_variance
-from fusetune.ekf2.resets import (
-    reset_horizontal_position_to_last_known,
-    reset_horizontal_velocity_to,
-    update_terrain_reset_status,
-)
+from fusetune.ekf2.resets import reset_horizontal_velocity_to, update_terrain_reset_status
 from fusetune.ekf2.state import TERRAIN
 from fusetune.ekf2.timing import NO_AID_TIMEOUT_MAX, RESET_TIMEOUT_MAX, is_timed_out
 
@@ -220,7 +216,7 @@ def _settle_flow_status(ekf):
 
 @njit(cache=True, error_model="numpy")
 def reset_flow_fusion(ekf, params):
-    """Set the horizontal velocity to that of flow; on ground, return to the last known position, too."""
+    """Set the horizontal velocity to that of flow."""
     ekf.events.reset_vel_to_flow = True
     distance = predict_flow_range(ekf, params)
     variance = distance * distance * calc_opt_flow_meas_var(params, ekf.flow_sample.quality)
@@ -228,8 +224,6 @@ def reset_flow_fusion(ekf, params):
     north = R[0, 0] * forward + R[0, 1] * right
     east = R[1, 0] * forward + R[1, 1] * right
     reset_horizontal_velocity_to(ekf, params, north, east, variance, variance)
-    if not ekf.cs.in_air:
-        reset_horizontal_position_to_last_known(ekf, params)
     _settle_flow_status(ekf)
 
 
