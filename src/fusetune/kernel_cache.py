@@ -13,7 +13,7 @@ from fusetune.digest import source_digest
 
 
 def kernel_cache() -> Path:
-    """Folder for the kernels of these sources: below the checkout, or in the user's cache where there is no checkout."""
+    """Folder for the kernels of these sources: below the checkout, or in the user's cache where there is none."""
     checkout = Path(__file__).resolve().parents[2]
     if (checkout / "Snakefile").is_file():
         caches = checkout / ".cache"
@@ -23,7 +23,7 @@ def kernel_cache() -> Path:
 
 
 def use_kernel_cache() -> Path:
-    """Let this process and its children keep compiled kernels in `kernel_cache`; to be called before Numba is imported.
+    """Let this process and its children keep compiled kernels in `kernel_cache`; call it before Numba is imported.
 
     Returns
     -------

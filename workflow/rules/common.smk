@@ -64,10 +64,12 @@ def overrides_of(names):
 
 
 def closing_words():
+    if not os.path.exists("results/save/flights.csv"):
+        return "Done."
     statuses = [row["status"] for row in read_csv("results/save/flights.csv")]
     kind = "flights" if FLOWN_LOGS else "simulated flights"
     refused = len(statuses) - statuses.count("replayable")
-    return (
-        f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv). "
-        "The decision and its evidence: results/report.html"
-    )
+    flights = f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv)."
+    if not os.path.exists("results/report.html"):
+        return flights
+    return f"{flights} The decision and its evidence: results/report.html"
