@@ -72,6 +72,7 @@ def decide(
     changes = _changes(choice, newest, present)
     text = paragraph(choice, ranked, flights, settings)
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    decision["present"] = present
     decision["provenance"] = provenance(configuration_files)
     decision["flights"] = flight_rows(flights_table, flights)
     decision["sets"] = _sets(sets, present, newest, descriptions or {}, flights)

@@ -56,9 +56,7 @@ def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results
         scoring[summary["flight"]] = summary
         folders[summary["flight"]] = folder
         metrics.append(pd.read_parquet(folder / "metrics.parquet"))
-    present = str(ranking.loc[ranking["status"] == "present", "name"].iloc[0]) if len(ranking) else ""
-    if not present:
-        present = decision["chosen"]
+    present = decision["present"]
     return Results(
         decision=decision,
         ranking=ranking,

@@ -22,6 +22,7 @@ from fusetune.report.figures import (
     figure_style,
     label_sets,
     new_figure,
+    panel_grid,
     save_svg,
 )
 from fusetune.report.results import PooledSamples, Results, figure_values, pooled_samples, read_results
@@ -208,17 +209,11 @@ def boxes(results: Results, pooled: Sequence[PooledSamples], *, normalised: bool
     """Box plots of the innovations, or of ν/√S, per set, all flights together."""
     if not pooled:
         return empty_figure("No innovations were scored.")
-    columns = 3
-    rows = math.ceil(len(pooled) / columns)
-    figure = new_figure(8.6, 0.5 + rows * (0.75 + 0.17 * len(results.shown)))
-    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
-    for axes, samples in zip(grid.flat, pooled, strict=False):
-        _boxes(axes, samples, results, normalised)
-    for axes in grid.flat[len(pooled) :]:
-        axes.set_visible(False)
     what = "Innovations divided by their standard deviation" if normalised else "Innovations"
     title = f"{what}, all scored flights: box 25–75 %, whiskers 5–95 %"
-    figure.suptitle(title, fontsize=9.5, x=0.01, ha="left")
+    figure, panels = panel_grid(len(pooled), results.shown, 0.17, title)
+    for axes, samples in zip(panels, pooled, strict=True):
+        _boxes(axes, samples, results, normalised)
     return figure
 
 
@@ -237,7 +232,6 @@ def _boxes(axes: Axes, samples: PooledSamples, results: Results, normalised: boo
         axes.barh(row, q3 - q1, left=q1, height=0.6, color=colour, alpha=0.45, edgecolor=colour, linewidth=0.8)
         axes.plot([median, median], [row - 0.3, row + 0.3], color=colour, linewidth=1.4)
     axes.axvline(0.0, color="#888888", linewidth=0.6)
-    label_sets(axes, results.shown)
     if normalised:
         for limit in (-1.64, 1.64):
             axes.axvline(limit, color="#009E73", linewidth=0.8, linestyle="--")
@@ -265,16 +259,10 @@ def consistency(results: Results) -> Figure:
             groups.append((source, axis, rows))
     if not groups:
         return empty_figure("No aid source has enough samples for a consistency check.")
-    columns = min(3, len(groups))
-    lines = math.ceil(len(groups) / columns)
-    figure = new_figure(8.6, 0.5 + lines * (0.8 + 0.17 * len(results.shown)))
-    grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
-    for axes, (source, axis, rows) in zip(grid.flat, groups, strict=False):
-        _consistency_panel(axes, results, source, axis, rows)
-    for axes in grid.flat[len(groups) :]:
-        axes.set_visible(False)
     title = "Mean NIS / expectation, a dot per flight: left of the band too cautious, right of it too sure"
-    figure.suptitle(title, fontsize=9.5, x=0.01, ha="left")
+    figure, panels = panel_grid(len(groups), results.shown, 0.17, title)
+    for axes, (source, axis, rows) in zip(panels, groups, strict=True):
+        _consistency_panel(axes, results, source, axis, rows)
     return figure
 
 
@@ -292,8 +280,8 @@ def _consistency_panel(axes: Axes, results: Results, source: str, axis: str, row
         colour = PRESENT_COLOUR if name == results.present else _set_colour(results, name)
         axes.plot(values, np.full(len(values), row), "o", color=colour, markersize=3.5, alpha=0.7)
     axes.set_xscale("log")
+    axes.minorticks_off()
     axes.axvline(1.0, color="#009E73", linewidth=1.0)
-    label_sets(axes, results.shown)
     axes.set_title(AID_SOURCES[source].label)
     axes.set_xlabel("mean NIS / dim [–]")
 
@@ -303,19 +291,13 @@ def breaks(results: Results) -> Figure:
     sources = [name for name, _ in _CONSISTENCY_GROUPS if len(figure_values(results, name, "x", "break_rate_gate"))]
     if not sources:
         return empty_figure("No fusion breaks could be counted.")
-    columns = min(3, len(sources))
-    lines = math.ceil(len(sources) / columns)
-    figure = new_figure(8.6, 0.6 + lines * (0.8 + 0.2 * len(results.shown)))
-    grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
-    for axes, source in zip(grid.flat, sources, strict=False):
-        _break_panel(axes, results, source)
-    for axes in grid.flat[len(sources) :]:
-        axes.set_visible(False)
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=3)
     confidence = results.decision["rule"]["confidence"]
     title = f"Fusion break rate of any axis, {confidence:.0%} Clopper–Pearson interval"
-    figure.suptitle(title, fontsize=9.5, x=0.01, ha="left")
+    figure, panels = panel_grid(len(sources), results.shown, 0.2, title)
+    for axes, source in zip(panels, sources, strict=True):
+        _break_panel(axes, results, source)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper right", ncols=3, borderaxespad=0.1)
     return figure
 
 
@@ -337,7 +319,6 @@ def _break_panel(axes: Axes, results: Results, source: str) -> None:
             axes.plot([low, high], [row + offset] * 2, color=colour, linewidth=1.6)
             axes.plot(100.0 * float(bounds.value), row + offset, "o", color=colour, markersize=3, label="_")
         axes.plot([], [], "o-", color=colour, markersize=3, label=label)
-    label_sets(axes, results.shown)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.set_xlim(0.0, 110.0)
     axes.set_xticks([0, 1, 10, 100], ["0", "1", "10", "100"])

@@ -1,0 +1,210 @@
+"""The decision on made studies of which the right answer is known."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from tests.analyze.made_flight import MadeSet
+from tests.apply.study import make_study
+
+from fusetune.apply.decide import decide
+from fusetune.apply.settings import DecisionSettings
+from fusetune.errors import UserError
+from fusetune.px4.params_file import read_params
+
+OUTPUTS = (
+    "ranking.parquet",
+    "ranking.csv",
+    "per_flight.parquet",
+    "decision.json",
+    "best_params.params",
+    "rollback.params",
+)
+QUIET = {"EKF2_ACC_NOISE": 0.2, "EKF2_GYR_NOISE": 0.015}
+PRESENT = {"EKF2_ACC_NOISE": 0.35, "EKF2_GYR_NOISE": 0.015}
+
+
+def run(root: Path, sets: dict[str, MadeSet], flights: int = 6, **options: Any) -> dict[str, Any]:
+    folders, table = make_study(
+        root, sets, flights, **{k: options.pop(k) for k in ("refused", "landing_s") if k in options}
+    )
+    decide(folders, table, root / "apply", sets=list(sets), **options)
+    return json.loads((root / "apply" / "decision.json").read_text())
+
+
+def ranked(decision: dict[str, Any], name: str) -> dict[str, Any]:
+    return next(one for one in decision["ranking"] if one["name"] == name)
+
+
+def test_a_clearly_better_set_is_chosen_and_written(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
+    decision = run(tmp_path, sets)
+    assert (decision["status"], decision["chosen"], decision["exploratory"]) == ("change", "better", False)
+    assert ranked(decision, "better")["improvement_percent"] == pytest.approx(100 * (1 - 0.1 / 0.13), abs=3.0)
+    # Only what changes, with the value before; the gyroscope noise is the same in both sets.
+    (entry,) = read_params(tmp_path / "apply" / "best_params.params")
+    assert (entry.name, entry.type) == ("EKF2_ACC_NOISE", "FLOAT")
+    assert entry.value == pytest.approx(0.2, abs=1e-7)
+    assert "previous value 0.35 m/s^2, new value 0.2 m/s^2" in entry.comments[0]
+    assert "better on 6 of 6 flights" in entry.comments[1]
+    (back,) = read_params(tmp_path / "apply" / "rollback.params")
+    assert (back.name, back.value) == ("EKF2_ACC_NOISE", pytest.approx(0.35, abs=1e-7))
+
+
+def test_identical_sets_keep_the_present_one(tmp_path: Path) -> None:
+    same = {name: MadeSet(own=0.0, overrides=PRESENT) for name in ("present", "twin", "triplet")}
+    decision = run(tmp_path, same)
+    assert (decision["status"], decision["chosen"]) == ("keep", "present")
+    assert ranked(decision, "twin")["equal_to_present"]
+    assert ranked(decision, "twin")["p_best"] == pytest.approx(1 / 3)
+    assert read_params(tmp_path / "apply" / "best_params.params") == []
+    assert "nothing to load" in (tmp_path / "apply" / "best_params.params").read_text()
+
+
+def test_a_difference_of_chance_keeps_the_present_set(tmp_path: Path) -> None:
+    sets = {name: MadeSet(own=1.0) for name in ("present", "a", "b", "c")}
+    decision = run(tmp_path, sets)
+    assert decision["status"] == "keep"
+    assert "Keep the parameters that fly now." in decision["paragraph"]
+
+
+def test_inflated_noise_is_not_chosen_though_its_mean_nis_is_least(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.1, claimed=0.1), "inflated": MadeSet(error=0.105, claimed=1.0)}
+    decision = run(tmp_path, sets)
+    assert decision["chosen"] == "present"
+    ranking = pd.read_parquet(tmp_path / "apply" / "ranking.parquet").set_index("name")
+    assert ranking.loc["inflated", "mean_nis_gnss_vel"] < 0.1 * ranking.loc["present", "mean_nis_gnss_vel"]
+
+
+def test_fewer_than_five_flights_are_exploratory(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.15), "better": MadeSet(error=0.1, overrides=QUIET)}
+    decision = run(tmp_path, sets, flights=4)
+    assert decision["exploratory"]
+    assert "exploratory" in decision["paragraph"]
+    assert "exploratory" in (tmp_path / "apply" / "best_params.params").read_text()
+
+
+def test_a_single_flight_is_decided_by_its_blocks_only_and_called_exploratory(tmp_path: Path) -> None:
+    decision = run(tmp_path, {"present": MadeSet(), "b": MadeSet(own=1.0)}, flights=1)
+    assert decision["exploratory"]
+    assert decision["flights_scored"] == 1
+
+
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        (MadeSet(error=0.05, resets_s=(40.0,)), "6 resets, the present set has 0"),
+        (MadeSet(error=0.05, fault_flags=8), "filter fault fs_bad_hdg on flight_0"),
+        (MadeSet(error=0.05, lost_gnss_s=40.0), "6 lost aid sources, the present set has 0"),
+        (MadeSet(error=0.05, status="diverged"), "flight_0: diverged: the covariance is not finite"),
+        (MadeSet(error=0.05, overrides={"EKF2_ACC_NOISE": 9.0}), "EKF2_ACC_NOISE"),
+        (MadeSet(error=0.05, claimed=0.01), "beyond the gate, the present set has 0.0 %"),
+    ],
+)
+def test_vetoes(tmp_path: Path, made: MadeSet, reason: str) -> None:
+    decision = run(tmp_path, {"present": MadeSet(error=0.1), "tempting": made})
+    assert decision["chosen"] == "present"
+    assert any(reason in one for one in ranked(decision, "tempting")["reasons"])
+    assert "tempting" in decision["paragraph"] or ranked(decision, "tempting")["status"] == "not_scored"
+
+
+def test_a_set_that_fails_on_one_flight_is_not_eligible_but_shown(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.1), "tempting": MadeSet(error=0.05)}
+    folders, table = make_study(tmp_path, sets)
+    summary = json.loads((folders[2] / "scoring.json").read_text())
+    summary["sets"]["tempting"] |= {"status": "excluded", "reason": "starts aiding 28.0 s later than the present set"}
+    (folders[2] / "scoring.json").write_text(json.dumps(summary))
+    scores = pd.read_parquet(folders[2] / "scores.parquet")
+    scores[scores["set"] != "tempting"].to_parquet(folders[2] / "scores.parquet")
+    decide(folders, table, tmp_path / "apply", sets=list(sets))
+    decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
+    one = ranked(decision, "tempting")
+    assert (one["status"], one["flights"], decision["status"]) == ("vetoed", 5, "keep")
+    assert "flight_2: starts aiding 28.0 s later" in one["reasons"][0]
+
+
+def test_no_flight_at_all_is_no_evidence_and_a_valid_file(tmp_path: Path) -> None:
+    decision = run(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=0, refused=("bad",))
+    assert (decision["status"], decision["chosen"]) == ("no_evidence", "present")
+    assert all((tmp_path / "apply" / name).exists() for name in OUTPUTS)
+    assert read_params(tmp_path / "apply" / "best_params.params") == []
+
+
+def test_flights_that_cannot_be_scored_are_no_evidence_with_the_reason(tmp_path: Path) -> None:
+    decision = run(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=2, landing_s=12.0)
+    assert decision["status"] == "no_evidence"
+    assert "s of flight remain" in decision["paragraph"]
+    assert decision["flights"][0]["reason"].startswith("only 2.0 s")
+
+
+def test_the_decision_is_the_same_bytes_twice_and_in_any_order_of_flights(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "b": MadeSet(overrides=QUIET), "c": MadeSet(error=0.2)}
+    folders, table = make_study(tmp_path, sets)
+    contents = []
+    for attempt, order in enumerate((folders, folders[::-1])):
+        output = tmp_path / f"apply_{attempt}"
+        decide(order, table, output, sets=list(sets))
+        contents.append({name: (output / name).read_bytes() for name in OUTPUTS})
+    assert contents[0] == contents[1]
+
+
+def test_provenance_names_every_log_and_configuration_file(tmp_path: Path) -> None:
+    config = tmp_path / "config.yaml"
+    config.write_text("seed: 1\n")
+    decision = run(tmp_path, {"present": MadeSet()}, flights=2, refused=("bad",), configuration_files=[config])
+    assert [(row["flight"], row["status"], row["scored"]) for row in decision["flights"]] == [
+        ("bad", "refused", False),
+        ("flight_0", "replayable", True),
+        ("flight_1", "replayable", True),
+    ]
+    assert all(len(row["checksum"]) == 64 and row["firmware"] for row in decision["flights"])
+    # SHA-256 of "seed: 1\n"
+    import hashlib
+
+    expected = hashlib.sha256(b"seed: 1\n").hexdigest()
+    assert decision["provenance"]["configuration_files"] == {"config.yaml": expected}
+    assert decision["provenance"]["product"].startswith("fusetune ")
+
+
+def test_previous_values_are_those_of_the_newest_flight(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13), "better": MadeSet(error=0.1, overrides=QUIET)}
+    folders, table = make_study(tmp_path, sets)
+    summary = json.loads((folders[1] / "scoring.json").read_text())
+    summary["sets"]["present"]["parameters"]["EKF2_ACC_NOISE"] = 0.5
+    (folders[1] / "scoring.json").write_text(json.dumps(summary))
+    decide(folders, table, tmp_path / "apply", sets=list(sets), newest_flight="flight_1")
+    decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
+    assert decision["changes"][0]["previous"] == 0.5
+
+
+def test_an_unknown_newest_flight_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="nowhere"):
+        run(tmp_path, {"present": MadeSet()}, flights=1, newest_flight="nowhere")
+
+
+def test_holm_guards_the_best_of_many(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.1)} | {f"s{i}": MadeSet(error=0.1, own=0.6) for i in range(8)}
+    sets["s3"] = MadeSet(error=0.096, own=0.6)
+    folders, table = make_study(tmp_path, sets)
+    decisions = []
+    for corrected in (True, False):
+        output = tmp_path / f"apply_{corrected}"
+        decide(folders, table, output, sets=list(sets), settings=DecisionSettings(correct_for_candidates=corrected))
+        decisions.append(json.loads((output / "decision.json").read_text()))
+    best = ranked(decisions[0], decisions[0]["best_candidate"])
+    assert best["p_holm"] > best["p_value"]
+    significant = best["upper"] < 0.0
+    assert (decisions[1]["status"] == "change") == significant
+    assert (decisions[0]["status"] == "change") == (significant and best["p_holm"] <= 0.05)
+
+
+def test_settings_refuse_an_unknown_source() -> None:
+    with pytest.raises(UserError, match="no aid source"):
+        DecisionSettings.from_mapping({"source": "sonar"})
+
+
+def test_the_seed_of_the_configuration_counts_unless_the_section_has_its_own() -> None:
+    assert DecisionSettings.from_mapping({}, seed=5).seed == 5
+    assert DecisionSettings.from_mapping({"seed": 2}, seed=5).seed == 2

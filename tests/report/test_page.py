@@ -1,0 +1,109 @@
+"""The report of a made study: complete, self-contained, of the same bytes every time."""
+
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from tests.analyze.made_flight import MadeSet
+from tests.apply.study import make_study
+
+from fusetune.apply.decide import decide
+from fusetune.report.flight_figures import plot_flight
+from fusetune.report.page import build_report
+from fusetune.report.summary_figures import SUMMARY_FIGURES, plot_summary
+
+SETS = {
+    "present": MadeSet(error=0.13, overrides={"EKF2_ACC_NOISE": 0.35}),
+    "better": MadeSet(error=0.1, overrides={"EKF2_ACC_NOISE": 0.2}),
+    "<restless>": MadeSet(resets_s=(40.0,)),
+}
+
+
+def report(root: Path, sets: dict[str, MadeSet], flights: int, landing_s: float = 70.0) -> str:
+    folders, table = make_study(root, sets, flights, refused=("bad",), landing_s=landing_s)
+    decide(folders, table, root / "apply", sets=list(sets))
+    pictures = []
+    for folder in folders:
+        pictures.append(root / "report" / "flights" / f"{folder.name}.png")
+        plot_flight(root / "save" / folder.name, folder, list(sets), pictures[-1])
+    plot_summary(folders, root / "apply", root / "report")
+    build_report(table, folders, pictures, root / "apply", root / "report", root / "report.html")
+    return (root / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    root = tmp_path_factory.mktemp("report")
+    return root, report(root, SETS, flights=5)
+
+
+def test_the_page_needs_no_network(made: tuple[Path, str]) -> None:
+    _, page = made
+    sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
+    assert len(sources) == len(SUMMARY_FIGURES) + 5
+    assert all(source.startswith("data:image/") for source in sources)
+    outside_figures = re.sub(r'src="data:[^"]*"', "", page)
+    assert "http" not in outside_figures
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+def test_the_page_says_what_was_decided_and_why(made: tuple[Path, str]) -> None:
+    _, page = made
+    assert "Change to “better”" in page
+    assert "better on 5 of 5 flights" in page
+    assert "EKF2_ACC_NOISE" in page
+    assert "5 resets, the present set has 0" in page
+    assert "IMU at 20 Hz" in page
+    assert "ab" * 32 in page
+    for heading in (
+        "The flights",
+        "The parameter sets",
+        "The innovations",
+        "True errors",
+        "Paper mode",
+        "Flight by flight",
+    ):
+        assert f"<h2>{heading}" in page
+
+
+def test_names_are_escaped(made: tuple[Path, str]) -> None:
+    _, page = made
+    assert "<restless>" not in page
+    assert "&lt;restless&gt;" in page
+
+
+def test_all_figures_are_there_and_the_pictures_are_readable_images(made: tuple[Path, str]) -> None:
+    root, _ = made
+    assert all(
+        (root / "report" / name).read_text(encoding="utf-8").lstrip().startswith("<?xml") for name in SUMMARY_FIGURES
+    )
+    with Image.open(root / "report" / "flights" / "flight_0.png") as image:
+        assert image.size == (1000, 680)
+        assert len(image.convert("RGB").getcolors(100_000) or []) > 10
+
+
+def test_figures_are_the_same_bytes_twice(made: tuple[Path, str], tmp_path: Path) -> None:
+    root, _ = made
+    folders = [root / "analyze" / f"flight_{i}" for i in range(5)]
+    plot_summary(folders, root / "apply", tmp_path)
+    for name in SUMMARY_FIGURES:
+        assert (tmp_path / name).read_bytes() == (root / "report" / name).read_bytes(), name
+    plot_flight(root / "save" / "flight_0", folders[0], list(SETS), tmp_path / "flight.png")
+    assert (tmp_path / "flight.png").read_bytes() == (root / "report" / "flights" / "flight_0.png").read_bytes()
+
+
+def test_no_flights_still_make_a_page(tmp_path: Path) -> None:
+    page = report(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=0)
+    assert "no flight could be replayed" in page
+
+
+def test_flights_that_cannot_be_scored_still_make_a_page(tmp_path: Path) -> None:
+    page = report(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=1, landing_s=12.0)
+    assert "s of flight remain after the warm-up" in page
+
+
+def test_a_set_that_diverged_is_drawn_around(tmp_path: Path) -> None:
+    page = report(tmp_path, {"present": MadeSet(), "b": MadeSet(status="diverged")}, flights=1)
+    assert "diverged: the covariance is not finite" in page
