@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from fusetune.ekf2.kernel import kernel
 
 AID_SOURCE = np.dtype(
     [
@@ -56,7 +57,7 @@ NORMALISED_INNOVATION_LIMIT = 2.0
 TEST_RATIO_LIMIT = NORMALISED_INNOVATION_LIMIT**2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_axis(aid, axis, observation, observation_variance, innovation, innovation_variance):
     """Store one axis of a new observation; `update_aid_source_status` judges all of them."""
     aid.observation[axis] = observation
@@ -65,7 +66,7 @@ def set_axis(aid, axis, observation, observation_variance, innovation, innovatio
     aid.innovation_variance[axis] = innovation_variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_aid_source_status(ekf, aid, n_axes, time_us, gate):
     """Judge the axes that `set_axis` stored, and filter their innovations for the published status.
 
@@ -98,7 +99,7 @@ def update_aid_source_status(ekf, aid, n_axes, time_us, gate):
     aid.fused = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _filter_axis(aid, i, alpha, innovation, test_ratio, innovation_limit):
     """First-order filters of the signed test ratio and of the innovation, bounded while the test fails badly."""
     signed_ratio = test_ratio
@@ -119,7 +120,7 @@ def _filter_axis(aid, i, alpha, innovation, test_ratio, innovation_limit):
         aid.innovation_filtered[i] = min(max(aid.innovation_filtered[i], -innovation_limit), innovation_limit)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_aid_source_status_zero_innovation(ekf, aid, n_axes):
     """The state was reset to this source: keep the observation, with an innovation of zero."""
     aid.time_last_fuse = ekf.time_delayed_us

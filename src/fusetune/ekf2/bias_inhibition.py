@@ -2,21 +2,20 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.conditions import IMU_CTRL_ACCEL_BIAS, IMU_CTRL_GYRO_BIAS
+from fusetune.ekf2.kernel import kernel
 
 COSINE_OF_15_DEGREES = 0.966
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _decaying_maximum(previous, x, y, z, dt, time_constant):
     """Envelope of a vector's length: rises at once, decays with the time constant (s)."""
     decay = 1.0 - min(max(dt / time_constant, 0.0), 1.0)
     return max(math.sqrt(x * x + y * y + z * z), decay * previous)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_imu_bias_inhibit(ekf, params):
     """Set `gyro_bias_inhibit` and `accel_bias_inhibit` per axis.
 
@@ -53,7 +52,7 @@ def update_imu_bias_inhibit(ekf, params):
         )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_accel_bias_observable(ekf, axis):
     if ekf.cs.vehicle_at_rest:
         return True

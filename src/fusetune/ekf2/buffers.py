@@ -10,8 +10,8 @@ the horizon moves through the ring are refused.
 """
 
 import numpy as np
-from numba import njit
 
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.sensor_samples import DRAG_SAMPLE, IMU_SAMPLE
 
 RING_CAPACITY = 256
@@ -61,7 +61,7 @@ BUFFERS_MEMORY = np.dtype(
 """The estimator's sub-record `ekf.buffers`."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_ring(ring, size):
     """Empty a ring and give it `size` places."""
     ring.time_us[:] = 0
@@ -71,7 +71,7 @@ def reset_ring(ring, size):
     ring.first_write = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def advance_for_write(ring):
     """Move the write position of a ring on and return it; the oldest entry gives way when the ring is full."""
     head = ring.head
@@ -85,7 +85,7 @@ def advance_for_write(ring):
     return head
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def push(ring, time_us, slot):
     """Add the sample at position `slot` of its array, measured at `time_us`."""
     head = advance_for_write(ring)
@@ -93,7 +93,7 @@ def push(ring, time_us, slot):
     ring.slot[head] = slot
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def find_newest_due(ring, horizon_us):
     """Index in the ring of the newest sample due at the horizon and at most 0.1 s old, or -1."""
     for age in range(ring.size):
@@ -105,7 +105,7 @@ def find_newest_due(ring, horizon_us):
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def take(ring, index):
     """Remove the entry at `index` together with everything older."""
     if index == ring.head:
@@ -116,13 +116,13 @@ def take(ring, index):
     ring.time_us[index] = 0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def newest_time_us(ring):
     """Time stamp of the newest sample, 0 when it was taken already."""
     return ring.time_us[ring.head]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_buffers(ekf, params, time_us):
     """Size the buffers from EKF2_DELAY_MAX and EKF2_PREDICT_US; both act at start-up only."""
     update_period_ms = params.EKF2_PREDICT_US / 1000.0
@@ -151,7 +151,7 @@ def initialise_buffers(ekf, params, time_us):
     ekf.time_latest_us = time_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def push_imu(ekf, time_latest_us):
     """Buffer the down-sampled IMU sample in `ekf.imu_newest` and move the fusion time horizon."""
     buffers = ekf.buffers
@@ -165,7 +165,7 @@ def push_imu(ekf, time_latest_us):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def offer(ekf, ring, sample_time_us, delay_ms, slot):
     """Buffer an aiding sample unless it follows the newest one too closely.
 
@@ -180,7 +180,7 @@ def offer(ekf, ring, sample_time_us, delay_ms, slot):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def push_drag(ekf, sample):
     """Buffer a down-sampled specific force, which is made from IMU data and so stands in no input array."""
     drag = ekf.buffers.drag

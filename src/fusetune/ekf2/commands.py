@@ -5,11 +5,10 @@ Behaviour of the command handling in PX4 v1.16's EKF2 module and of `resetGlobal
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2 import state as S
 from fusetune.ekf2.conditions import is_local_horizontal_position_valid
 from fusetune.ekf2.geodesy import add_to_lat_lon, lat_lon_difference
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.local_origin import is_altitude_plausible, is_lat_lon_plausible
 from fusetune.ekf2.measurement_update import fuse_direct_state
 from fusetune.ekf2.origin_resets import initialise_altitude_to, reset_lat_lon_to, set_ekf_global_origin
@@ -27,7 +26,7 @@ EXTERNAL_GATE = 5.0
 MIN_EXTERNAL_VARIANCE = 0.01**2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def handle_command(ekf, params, message):
     """Carry out one command; others than the three above do nothing."""
     p = message.param
@@ -48,7 +47,7 @@ def handle_command(ekf, params, message):
         reset_wind_to_external_observation(ekf, p[0], blows_to, p[1], math.radians(p[3]))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def take_external_position(ekf, params, lat, lon, altitude, accuracy, timestamp):
     """Reset to, or fuse, a position (rad, m) that somebody reports for `timestamp` with an accuracy in m.
 
@@ -74,7 +73,7 @@ def take_external_position(ekf, params, lat, lon, altitude, accuracy, timestamp)
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _take_horizontal(ekf, params, lat, lon, accuracy, variance):
     north, east = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, lat, lon)
     variance_n = ekf.P[S.POSITION, S.POSITION] + variance
@@ -91,7 +90,7 @@ def _take_horizontal(ekf, params, lat, lon, accuracy, variance):
     ekf.last_known_lon = lon
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _take_vertical(ekf, params, altitude, accuracy, variance):
     innovation = altitude - ekf.gpos_alt
     innovation_variance = ekf.P[S.POSITION + 2, S.POSITION + 2] + variance

@@ -2,8 +2,6 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.airspeed.airspeed_control import control_air_data_fusion
 from fusetune.ekf2.aid_sources.auxvel.auxvel_fusion import control_aux_vel_fusion
 from fusetune.ekf2.aid_sources.drag.drag_fusion import control_drag_fusion
@@ -22,6 +20,7 @@ from fusetune.ekf2.conditions import IMU_CTRL_GYRO_BIAS, set_gnd_effect, set_in_
 from fusetune.ekf2.covariance import tilt_variance
 from fusetune.ekf2.dead_reckoning import update_dead_reckoning_status
 from fusetune.ekf2.height_control import control_height_fusion
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import remember_reset_counters
 from fusetune.ekf2.sample_arrival import (
     pop_airspeed,
@@ -40,7 +39,7 @@ from fusetune.ekf2.terrain_control import control_terrain_fake_fusion, update_te
 TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_fusion_modes(ekf, params, inputs):
     """Take the samples that are due and let every aid source start, fuse, reset or stop."""
     ekf.cs_prev = ekf.cs
@@ -72,7 +71,7 @@ def control_fusion_modes(ekf, params, inputs):
     update_dead_reckoning_status(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _pop_due_samples(ekf, params, inputs):
     """Take from every buffer the newest sample that the fusion time horizon has passed."""
     pop_system_flags(ekf, inputs)
@@ -87,7 +86,7 @@ def _pop_due_samples(ekf, params, inputs):
     pop_auxvel(ekf, inputs)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _follow_system_flags(ekf):
     """Apply what the vehicle's status and land detector said at the fusion time horizon."""
     if not ekf.system_flags_data_ready:

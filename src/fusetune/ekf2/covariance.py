@@ -1,7 +1,6 @@
 """Covariance: initial values, block resets, and the limits that PX4 v1.16 keeps its variances in."""
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -18,7 +17,7 @@ from fusetune.ekf2.state import (
 INITIAL_WIND_UNCERTAINTY = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def uncorrelate_block(ekf, index, dof):
     """Zero every covariance of the states [index, index + dof), among themselves and with the others."""
     P = ekf.P
@@ -30,7 +29,7 @@ def uncorrelate_block(ekf, index, dof):
         P[i, i] = variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_covariance_block(ekf, index, dof, variance):
     """Uncorrelate the states [index, index + dof) and give them all the same variance."""
     uncorrelate_block(ekf, index, dof)
@@ -38,7 +37,7 @@ def reset_covariance_block(ekf, index, dof, variance):
         ekf.P[i, i] = variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def uncorrelate_set_variance_vector(ekf, index, v0, v1, v2):
     """Uncorrelate three states from `index` on and set their variances."""
     uncorrelate_block(ekf, index, 3)
@@ -47,7 +46,7 @@ def uncorrelate_set_variance_vector(ekf, index, v0, v1, v2):
     ekf.P[index + 2, index + 2] = v2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_quat_cov(ekf, params, yaw_noise):
     """Attitude variances at alignment: tilt from `EKF2_ANGERR_INIT`, yaw from `yaw_noise` (rad, one sigma)."""
     tilt_sigma = max(params.EKF2_ANGERR_INIT, 0.01)
@@ -55,25 +54,25 @@ def reset_quat_cov(ekf, params, yaw_noise):
     uncorrelate_set_variance_vector(ekf, ATTITUDE, tilt_variance, tilt_variance, yaw_noise * yaw_noise)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_gyro_bias_cov(ekf, params):
     """Gyro bias variances as at switch-on."""
     reset_covariance_block(ekf, GYRO_BIAS, 3, params.EKF2_GBIAS_INIT**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_gyro_bias_z_cov(ekf, params):
     """Variance of the gyro z bias as at switch-on, so that it converges anew."""
     reset_covariance_block(ekf, GYRO_BIAS + 2, 1, params.EKF2_GBIAS_INIT**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_accel_bias_cov(ekf, params):
     """Accelerometer bias variances as at switch-on."""
     reset_covariance_block(ekf, ACCEL_BIAS, 3, params.EKF2_ABIAS_INIT**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_gyro_bias(ekf, params):
     """Forget the gyro bias, as after a new gyro calibration."""
     for i in range(3):
@@ -81,7 +80,7 @@ def reset_gyro_bias(ekf, params):
     reset_gyro_bias_cov(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_accel_bias(ekf, params):
     """Forget the accelerometer bias, as after a new accelerometer calibration."""
     for i in range(3):
@@ -89,25 +88,25 @@ def reset_accel_bias(ekf, params):
     reset_accel_bias_cov(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_mag_earth_cov(ekf, params):
     """Earth field variances at the start of magnetometer fusion."""
     reset_covariance_block(ekf, MAG_EARTH, 3, params.EKF2_MAG_NOISE**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_mag_bias_cov(ekf, params):
     """Body field variances at the start of magnetometer fusion."""
     reset_covariance_block(ekf, MAG_BODY, 3, params.EKF2_MAG_NOISE**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_wind_cov(ekf):
     """Wind variances before anything is known of the wind."""
     reset_covariance_block(ekf, WIND, 2, INITIAL_WIND_UNCERTAINTY**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_covariance(ekf, params):
     """Covariance after tilt alignment, or after a numerical fault.
 
@@ -135,13 +134,13 @@ def initialise_covariance(ekf, params):
     reset_covariance_block(ekf, TERRAIN, 1, params.EKF2_MIN_RNG**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def tilt_variance(ekf):
     """Sum of the variances (rad²) of the attitude error about north and east."""
     return ekf.P[0, 0] + ekf.P[1, 1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def yaw_variance(ekf):
     """Variance (rad²) of the attitude error about down."""
     return ekf.P[2, 2]

@@ -1,24 +1,23 @@
 """For how long the filter has navigated without aiding, and so whether position and velocity are still valid."""
 
-from numba import njit
-
 from fusetune.ekf2.conditions import is_vertical_position_aiding_active, is_vertical_velocity_aiding_active
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import NO_AID_TIMEOUT_MAX, is_recent, is_timed_out
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_dead_reckoning_status(ekf, params):
     """Renew the dead-reckoning flags and validity timers at the end of an update."""
     _update_horizontal(ekf, params)
     _update_vertical(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_fused_recently(ekf, time_last_fuse):
     return is_recent(ekf, time_last_fuse, NO_AID_TIMEOUT_MAX)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_horizontal(ekf, params):
     """Nothing that bounds horizontal drift fused for a second is inertial dead reckoning.
 
@@ -54,7 +53,7 @@ def _update_horizontal(ekf, params):
     ekf.horizontal_deadreckon_time_exceeded = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_flow_expected_in_air(ekf, params):
     return (
         not ekf.cs.in_air
@@ -63,7 +62,7 @@ def _is_flow_expected_in_air(ekf, params):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_air_data_expected_in_air(ekf, params):
     return (
         not ekf.cs.in_air
@@ -74,7 +73,7 @@ def _is_air_data_expected_in_air(ekf, params):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_vertical(ekf, params):
     """Height is invalid when unaided for too long; vertical velocity only when height is invalid, too."""
     timeout = int(params.EKF2_NOAID_TOUT)

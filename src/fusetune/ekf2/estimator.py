@@ -8,7 +8,6 @@ and corrects the output predictor.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_sources.airspeed.airspeed_memory import AIRSPEED_MEMORY
 from fusetune.ekf2.aid_sources.barometer.baro_memory import BARO_MEMORY
@@ -31,6 +30,7 @@ from fusetune.ekf2.control import control_fusion_modes
 from fusetune.ekf2.core_memory import CORE_FIELDS, HEIGHT_REF_UNKNOWN, POSITION_REF_GNSS
 from fusetune.ekf2.covariance import initialise_covariance
 from fusetune.ekf2.imu_down_sampler import DOWN_SAMPLER_MEMORY
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.local_origin import LOCAL_ORIGIN, initialise_local_origin
 from fusetune.ekf2.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.prediction import GRAVITY, predict_covariance, predict_state, update_average_interval
@@ -48,7 +48,7 @@ from fusetune.ekf2.sensor_samples import (
     SYSTEM_FLAGS_SAMPLE,
 )
 from fusetune.ekf2.wind import WIND_MEMORY
-from fusetune.ekf2.yaw_estimator.gsf_memory import GSF_MEMORY
+from fusetune.ekf2.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
 
 SAMPLES = {
     "gnss": GNSS_SAMPLE,
@@ -75,7 +75,7 @@ SAMPLE_FIELDS = [
 ]
 """Per sensor: the sample at the fusion time horizon, whether it is new, when one last arrived, whether any ever did."""
 
-ESTIMATOR = np.dtype(
+EKF = np.dtype(
     [
         *CORE_FIELDS,
         *SAMPLE_FIELDS,
@@ -114,16 +114,9 @@ LEVELLING_MAX_RATE = math.radians(15.0)
 MIN_IMU_INTERVAL_S = 1e-4
 
 
-def new_estimator() -> np.ndarray:
-    """Memory of an estimator as it is when the vehicle boots: a one-element array of `ESTIMATOR`."""
-    ekf = np.zeros(1, ESTIMATOR)
-    _initialise(ekf[0])
-    return ekf
-
-
-@njit(cache=True, error_model="numpy")
-def _initialise(ekf):
-    """What is not zero at start."""
+@kernel
+def initialise_estimator(ekf, params):
+    """Give an `EKF` record of zeros the values it has when the vehicle boots."""
     ekf.q[0] = 1.0
     for i in range(3):
         ekf.R_to_earth[i, i] = 1.0
@@ -148,21 +141,18 @@ def _initialise(ekf):
     initialise_range_memory(ekf.range)
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)
-
-
-@njit(cache=True, error_model="numpy")
-def apply_start_parameters(ekf, params):
-    """The part of the initial state that parameters decide: the assumed height of the vehicle above ground."""
+    initialise_gsf_memory(ekf.gsf)
+    # on the ground, the vehicle stands this far above it
     ekf.terrain = -ekf.gpos_alt + params.EKF2_MIN_RNG
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update(ekf, params, inputs):
     """Run the filter after an IMU sample; return whether its states are new.
 
     Parameters
     ----------
-    ekf : ESTIMATOR record, with `imu_newest` and `imu_delayed` set if `imu_updated`
+    ekf : EKF record, with `imu_newest` and `imu_delayed` set if `imu_updated`
     params : EKF2_PARAMETERS record
     inputs : named tuple of sample arrays, `fusetune.ekf2.inputs.EstimatorInputs`
     """
@@ -182,7 +172,7 @@ def update(ekf, params, inputs):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _initialise_filter(ekf, params):
     """Level the filter by the filtered specific force once it is close to 1 g and the vehicle hardly turns."""
     imu = ekf.imu_newest
@@ -200,7 +190,7 @@ def _initialise_filter(ekf, params):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _initialise_tilt(ekf):
     accel, gyro = ekf.accel_lpf, ekf.gyro_lpf
     specific_force = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)

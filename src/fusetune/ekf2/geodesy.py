@@ -5,8 +5,7 @@ Latitudes and longitudes are radians, altitudes and distances metres, north, eas
 
 import math
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import wrap_pi
 
 WGS84_EQUATORIAL_RADIUS = 6378137.0
@@ -23,7 +22,7 @@ ONE_G = 9.80665
 """Standard gravity (m/s²), which PX4 uses everywhere."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def radii_of_curvature(lat):
     """Meridian and transverse (prime vertical) radius of curvature (m) of the ellipsoid at a latitude.
 
@@ -37,28 +36,28 @@ def radii_of_curvature(lat):
     return meridian, WGS84_EQUATORIAL_RADIUS / root
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def metres_per_radian(lat, alt):
     """Metres north per radian of latitude and metres east per radian of longitude."""
     meridian, transverse = radii_of_curvature(lat)
     return meridian + alt, (transverse + alt) * math.cos(lat)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def add_to_lat_lon(lat, lon, alt, north, east):
     """Latitude and longitude of the point a small step (m) away, by the radii at the starting point."""
     dn_dlat, de_dlon = metres_per_radian(lat, alt)
     return wrap_pi(lat + north / dn_dlat), wrap_pi(lon + east / de_dlon)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def lat_lon_difference(lat, lon, alt, lat_from, lon_from):
     """North and east (m) of a point, seen from another close by; by the radii at the first."""
     dn_dlat, de_dlon = metres_per_radian(lat, alt)
     return wrap_pi(lat - lat_from) * dn_dlat, wrap_pi(lon - lon_from) * de_dlon
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def project(lat_ref, lon_ref, lat, lon):
     """North and east (m) of a point in the azimuthal equidistant projection about a reference.
 
@@ -74,7 +73,7 @@ def project(lat_ref, lon_ref, lat, lon):
     return k * (cos_ref * sin_lat - sin_ref * cos_lat * cos_d_lon), k * cos_lat * math.sin(lon - lon_ref)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reproject(lat_ref, lon_ref, north, east):
     """Latitude and longitude of the point that `project` maps to (`north`, `east`); Snyder, eqs. 20-14 and 20-15."""
     x, y = north / RADIUS_OF_EARTH, east / RADIUS_OF_EARTH
@@ -88,13 +87,13 @@ def reproject(lat_ref, lon_ref, north, east):
     return lat, wrap_pi(lon)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def earth_rate_ned(lat):
     """Rotation rate of the Earth (rad/s, NED) at a latitude."""
     return EARTH_SPIN_RATE * math.cos(lat), 0.0, -EARTH_SPIN_RATE * math.sin(lat)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def transport_rate(lat, alt, vel_n, vel_e):
     """Rotation rate (rad/s, NED) of the local level frame, caused by moving over the ellipsoid; Groves, eq. 5.44."""
     meridian, transverse = radii_of_curvature(lat)

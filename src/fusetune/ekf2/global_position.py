@@ -9,15 +9,15 @@ publishes.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.geodesy import radii_of_curvature
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import wrap_pi
 
 ELLIPSOID_LATITUDE_STEP = 1e-7
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def refresh_ellipsoid(ekf):
     """Look up radii of curvature, cosine and tangent of the present latitude if it has moved."""
     if abs(ekf.gpos_lat - ekf.ellipsoid_lat_ref) > ELLIPSOID_LATITUDE_STEP or ekf.ellipsoid_meridian_radius == 0.0:
@@ -29,13 +29,13 @@ def refresh_ellipsoid(ekf):
         ekf.ellipsoid_tan_lat = math.tan(ekf.gpos_lat)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def single_precision(value):
     """The value rounded to single precision, as PX4 stores altitudes."""
     return float(np.float32(value))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def add_to_global_position(ekf, north, east, down):
     """Move the position estimate by a small step (m)."""
     refresh_ellipsoid(ekf)

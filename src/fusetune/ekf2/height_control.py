@@ -2,8 +2,6 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.barometer.baro_height_control import control_baro_height_fusion
 from fusetune.ekf2.aid_sources.barometer.ground_effect import update_ground_effect
 from fusetune.ekf2.aid_sources.gnss.gnss_height_control import control_gnss_height_fusion
@@ -15,6 +13,7 @@ from fusetune.ekf2.core_memory import (
     HEIGHT_REF_RANGE,
     HEIGHT_REF_UNKNOWN,
 )
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import is_recent
 
 VERT_INNOV_TEST_LIM = 3.0
@@ -25,7 +24,7 @@ BADACC_PROBATION = 3_000_000
 FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_height_fusion(ekf, params):
     """Check the vertical acceleration, fuse every height source, and replace a lost height reference."""
     check_vertical_acceleration_health(ekf)
@@ -36,7 +35,7 @@ def control_height_fusion(ekf, params):
     check_height_sensor_ref_fallback(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def check_height_sensor_ref_fallback(ekf, params):
     """Where there is no height reference, take the active source that comes first for EKF2_HGT_REF."""
     if ekf.height_sensor_ref != HEIGHT_REF_UNKNOWN:
@@ -56,7 +55,7 @@ def check_height_sensor_ref_fallback(ekf, params):
             return
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_height_source_active(ekf, source):
     if source == HEIGHT_REF_BARO:
         return ekf.cs.baro_hgt
@@ -67,7 +66,7 @@ def _is_height_source_active(ekf, source):
     return ekf.cs.ev_hgt
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def check_vertical_acceleration_health(ekf):
     """Detect accelerations that clipping or vibration bias towards free fall.
 
@@ -88,7 +87,7 @@ def check_vertical_acceleration_health(ekf):
         ekf.fs.bad_acc_vertical = bad_vert_accel
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _count_clipping(ekf):
     """Count clipped samples up and clean ones down within a second's worth; return whether it is too frequent."""
     limit = int(1.0 / ekf.dt_ekf_avg)
@@ -105,7 +104,7 @@ def _count_clipping(ekf):
     return ekf.fs.bad_acc_clipping or ekf.clip_counter[2] >= limit // 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _normalised(is_active, innovation, innovation_variance):
     """Innovation over its standard deviation; 0 for a source that is not in use."""
     if not is_active or innovation_variance < INNOVATION_VARIANCE_MIN:
@@ -113,7 +112,7 @@ def _normalised(is_active, innovation, innovation_variance):
     return innovation / math.sqrt(innovation_variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def estimate_inertial_nav_falling_likelihood(ekf):
     """How likely the inertial navigation falls away from the height and vertical velocity observations.
 

@@ -7,8 +7,8 @@ stamps of aiding samples to the microsecond. Mirrors `imu_down_sampler.cpp` of P
 """
 
 import numpy as np
-from numba import njit
 
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import quat_to_rotation_vector, rotate_by_body_increment, rotation_vector_to_quat
 from fusetune.ekf2.sensor_samples import IMU_SAMPLE
 
@@ -29,13 +29,13 @@ DOWN_SAMPLER_MEMORY = np.dtype(
 INITIAL_MEAN_DT = np.float32(0.005)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_down_sampler(sampler, params):
     sampler.mean_dt = INITIAL_MEAN_DT
     reset_down_sampler(sampler, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_down_sampler(sampler, params):
     """Start the next interval; its length follows the mean gyro interval seen so far."""
     sample = sampler.sample
@@ -55,7 +55,7 @@ def reset_down_sampler(sampler, params):
     sampler.min_dt = max(mean_dt * (np.float32(sampler.required) - np.float32(1.0)), mean_dt * np.float32(0.5))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def accumulate_imu(sampler, imu):
     """Add one IMU sample; returns whether `sampler.sample` is complete."""
     sample = sampler.sample
@@ -77,7 +77,7 @@ def accumulate_imu(sampler, imu):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _carry_velocity(accumulated, delta_vel, q):
     """Turn the accumulated velocity into the frame after rotation `q` and add the new increment at mid-rotation."""
     a0, a1, a2 = _rotate_inverse(q, accumulated[0], accumulated[1], accumulated[2])
@@ -87,7 +87,7 @@ def _carry_velocity(accumulated, delta_vel, q):
     accumulated[2] = a2 + 0.5 * (delta_vel[2] + b2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _rotate_inverse(q, x, y, z):
     """Rotate a vector by the inverse of the unit quaternion q (w, x, y, z): v + 2 u×(u×v) - 2 w u×v."""
     w, qx, qy, qz = q

@@ -6,9 +6,9 @@ Before an origin is known, local positions are projected about latitude 0, longi
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.geodesy import project, reproject
+from fusetune.ekf2.kernel import kernel
 
 LOCAL_ORIGIN = np.dtype(
     [
@@ -29,7 +29,7 @@ Until `lat_lon_valid`, latitude and longitude are 0, the reference of local posi
 LOWEST_ALTITUDE, HIGHEST_ALTITUDE = -12_000.0, 100_000.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_local_origin(origin):
     """No origin known."""
     origin.lat_lon_valid = False
@@ -40,7 +40,7 @@ def initialise_local_origin(origin):
     origin.alt = np.nan
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_origin_lat_lon(ekf, lat, lon):
     """Place the origin (rad) and note the time."""
     ekf.origin.lat_rad = lat
@@ -50,44 +50,44 @@ def set_origin_lat_lon(ekf, lat, lon):
     ekf.origin.valid = math.isfinite(ekf.origin.alt)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_origin_altitude(ekf, alt):
     """Set the altitude (m) of the origin."""
     ekf.origin.alt = alt
     ekf.origin.valid = ekf.origin.lat_lon_valid and math.isfinite(alt)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def project_to_local(ekf, lat, lon):
     """Local north and east (m) of a latitude and longitude (rad)."""
     return project(ekf.origin.lat_rad, ekf.origin.lon_rad, lat, lon)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reproject_to_global(ekf, north, east):
     """Latitude and longitude (rad) of a local north and east (m)."""
     return reproject(ekf.origin.lat_rad, ekf.origin.lon_rad, north, east)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def get_local_horizontal_position(ekf):
     """Local north and east (m) of the position estimate."""
     return project_to_local(ekf, ekf.gpos_lat, ekf.gpos_lon)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def origin_altitude(ekf):
     """Altitude (m) of the origin, 0 while unknown."""
     return ekf.origin.alt if math.isfinite(ekf.origin.alt) else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_lat_lon_plausible(lat, lon):
     """Whether a latitude and longitude (rad) lie on the globe."""
     return math.isfinite(lat) and math.isfinite(lon) and abs(lat) <= 0.5 * math.pi and abs(lon) <= math.pi
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_altitude_plausible(alt):
     """Whether an altitude (m) lies between the deepest sea and the edge of space."""
     return math.isfinite(alt) and LOWEST_ALTITUDE < alt < HIGHEST_ALTITUDE

@@ -8,9 +8,8 @@ may have been set to zero, the Joseph form (I - K H) P (I - K H)ᵀ + K R Kᵀ m
 which is evaluated here in one pass that keeps P exactly symmetric.
 """
 
-from numba import njit
-
 from fusetune.ekf2.global_position import add_to_global_position, single_precision
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import quat_to_dcm, rotate_by_earth_increment
 from fusetune.ekf2.state import (
     ACCEL_BIAS,
@@ -38,7 +37,7 @@ VARIANCE_MAX_RATIO = 1e6
 MAX_VARIANCE_REDUCTIONS = 1000
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def clear_inhibited_state_kalman_gains(ekf, params, K):
     """Zero the gains of the states that are not being estimated now."""
     for i in range(3):
@@ -54,7 +53,7 @@ def clear_inhibited_state_kalman_gains(ekf, params, K):
         K[WIND + 1] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def joseph_update(P, K, PH, S):
     """P ← P - K PHᵀ - PH Kᵀ + S K Kᵀ, with PH = P Hᵀ and S = H P Hᵀ + R."""
     for i in range(ERROR_STATE_SIZE):
@@ -64,7 +63,7 @@ def joseph_update(P, K, PH, S):
             P[i, j] -= (k_i * PH[j] + ph_i * K[j]) - (k_i * K[j]) * S
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reduce_variance(ekf, params, state_index):
     """Fuse a zero innovation of ten times the state's variance, which takes about 10 % off that variance.
 
@@ -82,7 +81,7 @@ def reduce_variance(ekf, params, state_index):
     joseph_update(P, K, PH, S)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _limit_variances(ekf, index, dof, low, high):
     """Raise too small variances; return the first state whose variance exceeds `high`, or -1."""
     P = ekf.P
@@ -94,7 +93,7 @@ def _limit_variances(ekf, index, dof, low, high):
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _limit_variance_ratio(ekf, index, dof, low, high):
     """As `_limit_variances`, and no variance of the group less than 10⁻⁶ of its largest."""
     P = ekf.P
@@ -107,7 +106,7 @@ def _limit_variance_ratio(ekf, index, dof, low, high):
     return _limit_variances(ekf, index, dof, limited_min, limited_max)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _first_excessive_variance(ekf):
     """Raise all too small variances up to the first state whose variance is too large; return it, or -1."""
     i = _limit_variances(ekf, ATTITUDE, 3, 1e-9, 1.0)
@@ -128,7 +127,7 @@ def _first_excessive_variance(ekf):
     return i
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def constrain_state_variances(ekf, params):
     """Keep every variance within the limits of its group of states."""
     for _ in range(MAX_VARIANCE_REDUCTIONS):
@@ -138,12 +137,12 @@ def constrain_state_variances(ekf, params):
         reduce_variance(ekf, params, i)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _limited(value, limit):
     return min(max(value, -limit), limit)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse(ekf, params, K, innovation):
     """Correct the state by -K·innovation, each part within its limits."""
     rotate_by_earth_increment(ekf.q, -K[0] * innovation, -K[1] * innovation, -K[2] * innovation)
@@ -165,7 +164,7 @@ def fuse(ekf, params, K, innovation):
     ekf.terrain = single_precision(_limited(ekf.terrain - K[TERRAIN] * innovation, TERRAIN_LIMIT))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def measurement_update(ekf, params, K, H, R, innovation):
     """Fuse a scalar observation.
 
@@ -199,7 +198,7 @@ def measurement_update(ekf, params, K, H, R, innovation):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_direct_state(ekf, params, innovation, innovation_var, R, state_index):
     """Fuse an observation of a single state: H is one at `state_index`.
 

@@ -1,11 +1,10 @@
 """Innovation variance and Kalman gain of a scalar observation, from its Jacobian by the error state."""
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import ERROR_STATE_SIZE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_innovation_variance(ekf, H, R):
     """H P Hᵀ + R for a Jacobian `H` (24,) that is mostly zero."""
     P = ekf.P
@@ -20,7 +19,7 @@ def compute_innovation_variance(ekf, H, R):
     return variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_kalman_gain(ekf, H, innovation_variance, K):
     """Write P Hᵀ / innovation_variance into `K` (24,)."""
     P = ekf.P
@@ -34,7 +33,7 @@ def compute_kalman_gain(ekf, H, innovation_variance, K):
                 K[i] += P[j, i] * weight
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def clear_jacobian(H):
     """Set every element of `H` (24,) to zero."""
     for i in range(ERROR_STATE_SIZE):

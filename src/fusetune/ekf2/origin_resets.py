@@ -6,11 +6,10 @@ functions return False, and do nothing, when the place is not on the globe.
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.conditions import is_local_horizontal_position_valid, is_local_vertical_position_valid
 from fusetune.ekf2.covariance import reset_covariance_block
 from fusetune.ekf2.geodesy import lat_lon_difference
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.local_origin import (
     get_local_horizontal_position,
     is_altitude_plausible,
@@ -32,7 +31,7 @@ from fusetune.ekf2.resets import (
 from fusetune.ekf2.state import POSITION
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_lat_lon_to(ekf, params, lat, lon, hpos_var):
     """Set the horizontal position; where no origin is known yet, place it.
 
@@ -60,7 +59,7 @@ def reset_lat_lon_to(ekf, params, lat, lon, hpos_var):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_altitude_to(ekf, params, altitude, vpos_var):
     """Set the altitude; where the origin has none yet, give it one that keeps the local height if that is valid."""
     if not is_altitude_plausible(altitude):
@@ -74,7 +73,7 @@ def initialise_altitude_to(ekf, params, altitude, vpos_var):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_global_position_to(ekf, params, lat, lon, altitude, hpos_var, vpos_var):
     """Set the whole position, the altitude only if it is plausible."""
     if not reset_lat_lon_to(ekf, params, lat, lon, hpos_var):
@@ -83,7 +82,7 @@ def reset_global_position_to(ekf, params, lat, lon, altitude, hpos_var, vpos_var
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_lat_lon_origin(ekf, params, lat, lon, hpos_var):
     """Move the origin; a position known in the local frame alone becomes a global one."""
     if not is_lat_lon_plausible(lat, lon):
@@ -100,7 +99,7 @@ def set_lat_lon_origin(ekf, params, lat, lon, hpos_var):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_alt_origin(ekf, params, altitude, vpos_var):
     """Move the origin's altitude; a height known in the local frame alone becomes a global one."""
     if not is_altitude_plausible(altitude):
@@ -117,7 +116,7 @@ def set_alt_origin(ekf, params, altitude, vpos_var):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_ekf_global_origin(ekf, params, lat, lon, altitude, hpos_var, vpos_var):
     """Move the origin, its altitude only if it is plausible (the `SET_GPS_GLOBAL_ORIGIN` command)."""
     if not set_lat_lon_origin(ekf, params, lat, lon, hpos_var):

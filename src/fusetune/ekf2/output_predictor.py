@@ -12,10 +12,10 @@ Positions are metres north, east and down of a global reference, which is moved 
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.buffers import RING_CAPACITY
 from fusetune.ekf2.geodesy import add_to_lat_lon, lat_lon_difference
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import (
     quat_multiply,
     quat_multiply_inverse,
@@ -76,7 +76,7 @@ OUTPUT_MEMORY = np.dtype(
 """The estimator's sub-record `ekf.output`."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_output_predictor(ekf):
     """Empty history as long as the IMU buffer; call after the buffers are sized."""
     output = ekf.output
@@ -93,7 +93,7 @@ def initialise_output_predictor(ekf):
         output.R_to_earth[axis, axis] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_output(ekf, params, imu):
     """Integrate one IMU sample at the full rate (PX4: calculateOutputStates)."""
     output = ekf.output
@@ -122,7 +122,7 @@ def predict_output(ekf, params, imu):
     output.unaided_yaw = wrap_pi(output.unaided_yaw + spin)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _integrate_velocity(output, imu):
     """Velocity from the specific force, position by the trapezoidal rule."""
     newest = output.newest
@@ -145,7 +145,7 @@ def _integrate_velocity(output, imu):
     newest.dt += dt
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _velocity_of_imu_offset(output, params, delta_angle, dt):
     """Velocity of the IMU relative to the body's origin, NED: R (ω × r)."""
     wx, wy, wz = delta_angle[0] / dt, delta_angle[1] / dt, delta_angle[2] / dt
@@ -156,7 +156,7 @@ def _velocity_of_imu_offset(output, params, delta_angle, dt):
         output.vel_imu_rel_body[axis] = row[0] * body[0] + row[1] * body[1] + row[2] * body[2]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def align_output_predictor(ekf):
     """Bring the whole history into agreement with the filter at the horizon (at filter start)."""
     output = ekf.output
@@ -176,7 +176,7 @@ def align_output_predictor(ekf):
     output.newest = output.history[output.head]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def correct_output(ekf, params):
     """Steer the predictor towards the filter, once per filter update (PX4: correctOutputStates)."""
     output = ekf.output
@@ -201,7 +201,7 @@ def correct_output(ekf, params):
     output.newest.dt = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _store_newest(output):
     head = output.head
     if not output.first_write:
@@ -214,7 +214,7 @@ def _store_newest(output):
     output.history[head] = output.newest
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _correct_attitude(ekf, oldest):
     """Delta-angle correction that turns the predictor towards the filter's attitude at the horizon."""
     output = ekf.output
@@ -233,7 +233,7 @@ def _correct_attitude(ekf, oldest):
     output.tracking_error[0] = math.sqrt(norm)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _correct_velocity_and_position(ekf, pos, vel_gain, pos_gain):
     """Add a proportional-integral correction to every stored velocity and position."""
     output = ekf.output
@@ -255,7 +255,7 @@ def _correct_velocity_and_position(ekf, pos, vel_gain, pos_gain):
     output.tracking_error[2] = math.sqrt(pos_norm)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _correct_vertical(output, vel_step):
     """Correct the vertical velocity history and integrate it anew from the horizon on."""
     index = output.tail
@@ -268,7 +268,7 @@ def _correct_vertical(output, vel_step):
         index = following
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def apply_quaternion_reset(ekf, q_change):
     """Turn the history by `q_change` (w, x, y, z; in NED)."""
     output = ekf.output
@@ -277,7 +277,7 @@ def apply_quaternion_reset(ekf, q_change):
     _turn(output.newest.q, q_change)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def apply_velocity_reset(ekf, delta_north, delta_east, delta_down):
     """Add a velocity reset (m/s) to the history."""
     output = ekf.output
@@ -286,7 +286,7 @@ def apply_velocity_reset(ekf, delta_north, delta_east, delta_down):
     _add_velocity(output.newest, delta_north, delta_east, delta_down)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_velocity(sample, delta_north, delta_east, delta_down):
     sample.vel[0] += delta_north
     sample.vel[1] += delta_east
@@ -294,7 +294,7 @@ def _add_velocity(sample, delta_north, delta_east, delta_down):
     sample.vert_vel += delta_down
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def apply_position_reset(ekf, delta_north, delta_east, delta_down):
     """Follow a position reset (m) that the filter has just made.
 
@@ -320,7 +320,7 @@ def apply_position_reset(ekf, delta_north, delta_east, delta_down):
         output.newest.vert_vel_integ += delta_down
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _turn(q, change):
     quat_multiply(change, q, q)
     quat_normalise(q)

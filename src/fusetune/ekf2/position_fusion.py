@@ -2,14 +2,13 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import fuse_direct_state
 from fusetune.ekf2.state import POSITION
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_vertical_position_aid_status(ekf, aid, time_us, observation, observation_variance, innovation_gate):
     """Judge a vertical position observation (m, down).
 
@@ -31,7 +30,7 @@ def update_vertical_position_aid_status(ekf, aid, time_us, observation, observat
         aid.innovation_rejected = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_horizontal_position(ekf, params, aid):
     """Fuse north and east position of an aid source that has been judged; return whether they were fused."""
     aid.fused = not aid.innovation_rejected
@@ -45,7 +44,7 @@ def fuse_horizontal_position(ekf, params, aid):
     return aid.fused
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_vertical_position(ekf, params, aid):
     """Fuse the vertical position of an aid source that has been judged; return whether it was fused."""
     aid.fused = not aid.innovation_rejected

@@ -11,11 +11,11 @@ with the error on the global side).
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.covariance import INITIAL_WIND_UNCERTAINTY
 from fusetune.ekf2.global_position import add_to_global_position, refresh_ellipsoid
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import constrain_state_variances
 from fusetune.ekf2.rotations import quat_to_dcm, rotate_by_body_increment
 from fusetune.ekf2.state import (
@@ -39,7 +39,7 @@ ACCEL_HORIZ_LPF_TIME_CONSTANT_S = 1.0
 HEIGHT_RATE_LPF_TIME_CONSTANT_S = 10.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_average_interval(ekf, params):
     """Average the estimator interval (s), in single precision since PX4 derives time stamps (µs) from it."""
     imu = ekf.imu_delayed
@@ -49,13 +49,13 @@ def update_average_interval(ekf, params):
     ekf.dt_ekf_avg = float(np.float32(0.99) * np.float32(ekf.dt_ekf_avg) + np.float32(0.01) * limited)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _unit_range(value):
     """Noise parameters act within [0, 1]."""
     return min(max(value, 0.0), 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_covariance(ekf, params):
     """P ← F P Fᵀ + Q over `ekf.imu_delayed`, with PX4's rules of when bias, field, wind and terrain drift."""
     imu = ekf.imu_delayed
@@ -76,7 +76,7 @@ def predict_covariance(ekf, params):
     constrain_state_variances(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _propagate(ekf, dt):
     """P ← F P Fᵀ; only attitude, velocity and position (the first nine states) have dynamics.
 
@@ -135,7 +135,7 @@ def _propagate(ekf, dt):
             P[6 + j, i] = P[i, 6 + j]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_imu_noise(ekf, dt, gyro_variance, ax, ay, az):
     """Gyro noise on the attitude, accelerometer noise (variance per body axis) rotated onto the velocity."""
     P = ekf.P
@@ -150,14 +150,14 @@ def _add_imu_noise(ekf, dt, gyro_variance, ax, ay, az):
                 P[VELOCITY + j, VELOCITY + i] = P[VELOCITY + i, VELOCITY + j]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_below(P, index, limit, noise):
     """Let a variance grow as long as it is below `limit`."""
     if P[index, index] < limit:
         P[index, index] += noise
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_bias_noise(ekf, params, dt, gyro_variance, ax, ay, az):
     gyro_noise = (dt * _unit_range(params.EKF2_GYR_B_NOISE)) ** 2
     accel_noise = (dt * _unit_range(params.EKF2_ACC_B_NOISE)) ** 2
@@ -168,7 +168,7 @@ def _add_bias_noise(ekf, params, dt, gyro_variance, ax, ay, az):
     _add_below(ekf.P, ACCEL_BIAS + 2, az, accel_noise)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_field_noise(ekf, params, dt):
     limit = params.EKF2_MAG_NOISE**2
     earth_noise = (dt * _unit_range(params.EKF2_MAG_E_NOISE)) ** 2
@@ -178,7 +178,7 @@ def _add_field_noise(ekf, params, dt):
         _add_below(ekf.P, MAG_BODY + i, limit, body_noise)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_wind_noise(ekf, params, dt):
     """Wind drifts faster while climbing or descending, since it changes with height."""
     interval = ekf.imu_delayed.delta_vel_dt
@@ -190,7 +190,7 @@ def _add_wind_noise(ekf, params, dt):
         _add_below(ekf.P, WIND + i, INITIAL_WIND_UNCERTAINTY**2, noise)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_terrain_noise(ekf, params):
     """Terrain changes with the ground covered; with the range finder as height reference it is the datum."""
     if ekf.height_sensor_ref == HEIGHT_REF_RANGE:
@@ -201,7 +201,7 @@ def _add_terrain_noise(ekf, params):
     ekf.P[TERRAIN, TERRAIN] += (interval * params.EKF2_TERR_NOISE) ** 2 + gradient * gradient * speed_squared
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_earth_rate(ekf):
     """Earth rotation in NED (rad/s), looked up once per degree of latitude; zero until a latitude is known."""
     if abs(ekf.gpos_lat - ekf.earth_rate_lat_ref) > EARTH_RATE_LATITUDE_STEP:
@@ -211,7 +211,7 @@ def _update_earth_rate(ekf):
         ekf.earth_rate_ned[2] = -EARTH_SPIN_RATE * math.sin(ekf.gpos_lat)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_state(ekf, params):
     """Integrate `ekf.imu_delayed` into attitude, velocity and global position."""
     _update_earth_rate(ekf)
@@ -228,7 +228,7 @@ def predict_state(ekf, params):
     _integrate_velocity(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _integrate_velocity(ekf, params):
     """Specific force, gravity, Coriolis and transport rate; position by the trapezoidal rule."""
     imu = ekf.imu_delayed

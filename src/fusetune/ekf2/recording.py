@@ -7,7 +7,6 @@ and position at every update; flags when they change, and once a second.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2 import state as S
 from fusetune.ekf2.aid_source_status import AID_SOURCE, AID_SOURCE_AXES, AID_SOURCE_NAMES
@@ -18,6 +17,7 @@ from fusetune.ekf2.conditions import (
 )
 from fusetune.ekf2.control_status import CONTROL_STATUS_NAMES, FAULT_STATUS_NAMES, REJECTION_NAMES
 from fusetune.ekf2.geodesy import add_to_lat_lon
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.local_origin import origin_altitude, project_to_local
 
 INNOVATION_ROW = np.dtype(
@@ -139,7 +139,7 @@ def allocate_records(updates: int) -> RecordArrays:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def record_update(ekf, params, views, recorder, records, timestamp):
     """Keep what one filter update published."""
     aids = views.aids
@@ -155,7 +155,7 @@ def record_update(ekf, params, views, recorder, records, timestamp):
     _record_flags(views, recorder, records.flags, timestamp)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _record_innovations(aid, source, axes, recorder, rows):
     for axis in range(axes):
         row = rows[recorder.innovation_rows]
@@ -172,7 +172,7 @@ def _record_innovations(aid, source, axes, recorder, rows):
         recorder.innovation_rows += 1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _record_states(ekf, row, timestamp):
     row.timestamp = timestamp
     row.timestamp_sample = ekf.time_delayed_us
@@ -193,7 +193,7 @@ def _record_states(ekf, row, timestamp):
         row.covariances[i] = ekf.P[i, i]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _record_local_position(ekf, params, row, timestamp):
     """Position and velocity of the body's origin: the predictor's, which are the IMU's, less its lever arm."""
     output = ekf.output
@@ -231,7 +231,7 @@ def _record_local_position(ekf, params, row, timestamp):
     row.z_valid = is_local_vertical_position_valid(ekf) or is_local_vertical_velocity_valid(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _horizontal_accuracy(ekf):
     """Standard deviation of the horizontal position (m); after long dead reckoning at least the last innovation."""
     accuracy = np.sqrt(ekf.P[S.POSITION, S.POSITION] + ekf.P[S.POSITION + 1, S.POSITION + 1])
@@ -245,7 +245,7 @@ def _horizontal_accuracy(ekf):
     return accuracy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _record_flags(views, recorder, rows, timestamp):
     """Keep the flags if any changed since they were last kept, or a second has passed."""
     last = recorder.last_flags

@@ -11,15 +11,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from fusetune.ekf2.aid_sources.drag.drag_accumulator import accumulate_drag
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.aid_sources.drag.drag_accumulator import accumulate_drag
 from fusetune.ekf2.buffers import initialise_buffers, push_drag, push_imu
 from fusetune.ekf2.commands import handle_command
-from fusetune.ekf2.estimator import EKF, initialise_estimator, reset_accel_bias, reset_gyro_bias, update
+from fusetune.ekf2.compilation import ensure_compiled
+from fusetune.ekf2.covariance import reset_accel_bias, reset_gyro_bias
+from fusetune.ekf2.estimator import EKF, initialise_estimator, update
 from fusetune.ekf2.imu_down_sampler import accumulate_imu, initialise_down_sampler, reset_down_sampler
 from fusetune.ekf2.inputs import EstimatorInputs
+from fusetune.ekf2.kernel import entry_kernel, kernel
 from fusetune.ekf2.output_predictor import initialise_output_predictor, predict_output
 from fusetune.ekf2.parameters import PARAMETER_NAMES, parameter_record
 from fusetune.ekf2.recording import (
@@ -107,6 +109,7 @@ def replay(
     ReplayResult
         The same inputs and parameters give the same bytes.
     """
+    ensure_compiled()
     ekf = np.zeros(1, EKF)
     params = parameter_record(parameters)
     recorder = np.zeros(1, RECORDER_MEMORY)
@@ -160,7 +163,7 @@ def _stretches(inputs: EstimatorInputs, params: np.ndarray, overridden: frozense
         yield start, stop
 
 
-@njit(cache=True, error_model="numpy")
+@entry_kernel
 def run_estimator(ekf, params, inputs, views, recorder, records, start, stop):
     """Process the runs `start` to `stop` of a flight."""
     for run in range(start, stop):
@@ -177,7 +180,7 @@ def run_estimator(ekf, params, inputs, views, recorder, records, start, stop):
             record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_imu(ekf, params, imu):
     """Feed the output predictor and the down-sampler; move the horizon when an interval is complete."""
     if not ekf.buffers.initialised:
@@ -201,7 +204,7 @@ def receive_imu(ekf, params, imu):
         push_drag(ekf, ekf.drag.produced)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_aiding(ekf, params, inputs, arrivals):
     """Buffer what arrived with this IMU sample, in the order of PX4's module."""
     if arrivals.airspeed >= 0:

@@ -6,11 +6,9 @@ moves the output predictor along, and records the change. Resets within one upda
 
 import math
 
-from numba import njit
-
-from fusetune.ekf2.bias_estimator.bias_estimator import set_bias
 from fusetune.ekf2.covariance import reset_covariance_block, uncorrelate_block
 from fusetune.ekf2.global_position import single_precision
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.local_origin import project_to_local, reproject_to_global
 from fusetune.ekf2.output_predictor import apply_position_reset, apply_quaternion_reset, apply_velocity_reset
 from fusetune.ekf2.rotations import (
@@ -29,7 +27,7 @@ VERTICAL_VELOCITY_VARIANCE_AFTER_ZEROING = 10.0
 SINGLE_PRECISION_EPSILON = 1.1920929e-07
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def remember_reset_counters(ekf):
     """Note the counters at the start of an update, so that its resets are told from earlier ones."""
     now, before = ekf.state_reset, ekf.state_reset_prev
@@ -41,19 +39,19 @@ def remember_reset_counters(ekf):
     before.hagl_counter = now.hagl_counter
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _next(counter):
     """Published counters are eight bits wide."""
     return (counter + 1) % 256
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_variance(ekf, index, variance):
     if math.isfinite(variance):
         reset_covariance_block(ekf, index, 1, max(MIN_RESET_VARIANCE, variance))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_horizontal_velocity_to(ekf, params, vn, ve, var_n, var_e):
     """Set north and east velocity (m/s) and their variances; horizontal position is uncorrelated."""
     delta_n, delta_e = vn - ekf.vel[0], ve - ekf.vel[1]
@@ -73,7 +71,7 @@ def reset_horizontal_velocity_to(ekf, params, vn, ve, var_n, var_e):
     ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_vertical_velocity_to(ekf, params, vd, var):
     """Set down velocity (m/s) and its variance; vertical position is uncorrelated."""
     delta = vd - ekf.vel[2]
@@ -89,14 +87,14 @@ def reset_vertical_velocity_to(ekf, params, vd, var):
     ekf.time_last_ver_vel_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_velocity_to(ekf, params, vel, var):
     """Set the velocity (NED, m/s) and its variances, both arrays of three."""
     reset_horizontal_velocity_to(ekf, params, vel[0], vel[1], var[0], var[1])
     reset_vertical_velocity_to(ekf, params, vel[2], var[2])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_horizontal_velocity_to_zero(ekf, params):
     """Nothing is known of the horizontal velocity: start from rest."""
     ekf.events.reset_vel_to_zero = True
@@ -104,13 +102,13 @@ def reset_horizontal_velocity_to_zero(ekf, params):
     reset_horizontal_velocity_to(ekf, params, 0.0, 0.0, variance, variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_vertical_velocity_to_zero(ekf, params):
     """Nothing is known of the vertical velocity: start from rest, with room to converge."""
     reset_vertical_velocity_to(ekf, params, 0.0, VERTICAL_VELOCITY_VARIANCE_AFTER_ZEROING)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_horizontal_position_reset_status(ekf, delta_n, delta_e):
     """Record a jump (m) of the local horizontal position."""
     reset = ekf.state_reset
@@ -122,7 +120,7 @@ def update_horizontal_position_reset_status(ekf, delta_n, delta_e):
     reset.pos_ne_counter = _next(reset.pos_ne_counter)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_vertical_position_reset_status(ekf, delta_d):
     """Record a jump (m, down) of the height."""
     reset = ekf.state_reset
@@ -132,7 +130,7 @@ def update_vertical_position_reset_status(ekf, delta_d):
     reset.pos_d_counter = _next(reset.pos_d_counter)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_terrain_reset_status(ekf, delta_d):
     """Record a jump (m, down) of the terrain height."""
     reset = ekf.state_reset
@@ -142,15 +140,15 @@ def update_terrain_reset_status(ekf, delta_d):
     reset.hagl_counter = _next(reset.hagl_counter)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def shift_external_vision_position_bias(ekf, delta_n, delta_e):
     """Keep the external vision position where it was relative to the vehicle's new position."""
     bias = ekf.ev_pos_b_est
-    set_bias(bias.north, bias.north.bias - delta_n)
-    set_bias(bias.east, bias.east.bias - delta_e)
+    bias.north.bias -= delta_n
+    bias.east.bias -= delta_e
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e):
     """Set latitude and longitude (rad) and the variances (m²) of the horizontal position."""
     before_n, before_e = project_to_local(ekf, ekf.gpos_lat, ekf.gpos_lon)
@@ -165,14 +163,14 @@ def reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e):
     ekf.time_last_hor_pos_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_local_horizontal_position_to(ekf, params, north, east, var_n, var_e):
     """Set the horizontal position to a place given in the local frame (m)."""
     lat_rad, lon_rad = reproject_to_global(ekf, north, east)
     reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_horizontal_position_to_last_known(ekf, params):
     """Return to the last horizontal position that was aided."""
     ekf.events.reset_pos_to_last_known = True
@@ -180,7 +178,7 @@ def reset_horizontal_position_to_last_known(ekf, params):
     reset_horizontal_position_to(ekf, params, ekf.last_known_lat, ekf.last_known_lon, variance, variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_altitude_to(ekf, params, altitude, var):
     """Set the altitude (m) and its variance; height biases and the terrain move along."""
     altitude = single_precision(altitude)
@@ -189,22 +187,22 @@ def reset_altitude_to(ekf, params, altitude, var):
     _reset_variance(ekf, POSITION + 2, var)
     apply_position_reset(ekf, 0.0, 0.0, delta_d)
     update_vertical_position_reset_status(ekf, delta_d)
-    set_bias(ekf.baro_b_est, ekf.baro_b_est.bias + delta_d)
-    set_bias(ekf.ev_hgt_b_est, ekf.ev_hgt_b_est.bias - delta_d)
-    set_bias(ekf.gps_hgt_b_est, ekf.gps_hgt_b_est.bias + delta_d)
+    ekf.baro_b_est.bias += delta_d
+    ekf.ev_hgt_b_est.bias -= delta_d
+    ekf.gps_hgt_b_est.bias += delta_d
     update_terrain_reset_status(ekf, delta_d)
     ekf.terrain = single_precision(ekf.terrain + delta_d)
     ekf.time_last_hgt_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_height_to_last_known(ekf, params):
     """Return to the last altitude that was aided."""
     ekf.events.reset_pos_to_last_known = True
     reset_altitude_to(ekf, params, ekf.last_known_alt, params.EKF2_NOAID_NOISE**2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
     if math.isfinite(yaw_var) and yaw_var > SINGLE_PRECISION_EPSILON:
@@ -221,7 +219,7 @@ def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     ekf.time_last_heading_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _propagate_quat_reset(ekf, error):
     """Tell the output predictor and the external vision filter of an attitude jump, and record it."""
     apply_quaternion_reset(ekf, error)

@@ -7,12 +7,12 @@ pitches, 3-1-2 otherwise.
 
 import math
 
-from numba import njit
+from fusetune.ekf2.kernel import kernel
 
 ANGLE_EPSILON = 1e-10
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def wrap_pi(angle):
     """Angle (rad) brought into [-π, π)."""
     if -math.pi <= angle < math.pi:
@@ -20,7 +20,7 @@ def wrap_pi(angle):
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def quat_to_dcm(q, R):
     """Write the rotation matrix of the unit quaternion `q` into `R`, shape (3, 3)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -36,7 +36,7 @@ def quat_to_dcm(q, R):
     R[2, 2] = ww - xx - yy + zz
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def dcm_to_quat(R, q):
     """Write the unit quaternion of the rotation matrix `R` into `q` (largest component first, Shepperd 1978)."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -63,7 +63,7 @@ def dcm_to_quat(R, q):
     q[0] = (R[k, j] - R[j, k]) * s
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def quat_multiply(a, b, out):
     """Write the Hamilton product a ⊗ b into `out`, which may be `a` or `b` itself."""
     w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
@@ -73,7 +73,7 @@ def quat_multiply(a, b, out):
     out[0], out[1], out[2], out[3] = w, x, y, z
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def quat_multiply_inverse(a, b, out):
     """Write a ⊗ b⁻¹ of unit quaternions into `out`, which may be `a` or `b` itself."""
     w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
@@ -83,7 +83,7 @@ def quat_multiply_inverse(a, b, out):
     out[0], out[1], out[2], out[3] = w, x, y, z
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def quat_normalise(q):
     """Scale `q` to unit length."""
     scale = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -93,7 +93,7 @@ def quat_normalise(q):
     q[3] *= scale
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rotation_vector_to_quat(x, y, z):
     """Unit quaternion (w, x, y, z) of a rotation vector (rad)."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -103,7 +103,7 @@ def rotation_vector_to_quat(x, y, z):
     return math.cos(0.5 * angle), x * scale, y * scale, z * scale
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rotate_by_body_increment(q, x, y, z):
     """q ← q ⊗ dq(x, y, z), normalised: a rotation vector measured in the body frame."""
     bw, bx, by, bz = rotation_vector_to_quat(x, y, z)
@@ -115,7 +115,7 @@ def rotate_by_body_increment(q, x, y, z):
     quat_normalise(q)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rotate_by_earth_increment(q, x, y, z):
     """q ← dq(x, y, z) ⊗ q, normalised: a rotation vector given in the earth frame."""
     aw, ax, ay, az = rotation_vector_to_quat(x, y, z)
@@ -127,7 +127,7 @@ def rotate_by_earth_increment(q, x, y, z):
     quat_normalise(q)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def quat_to_rotation_vector(q):
     """Rotation vector (x, y, z) of a unit quaternion, its length in [0, 2π) as PX4's `AxisAngle`."""
     norm = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -137,7 +137,7 @@ def quat_to_rotation_vector(q):
     return q[1] * scale, q[2] * scale, q[3] * scale
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def quat_aligning_with_up(x, y, z, q):
     """Write into `q` the shortest rotation that turns the body vector (x, y, z) to point up, NED (0, 0, -1)."""
     norm = math.sqrt(x * x + y * y + z * z)
@@ -154,13 +154,13 @@ def quat_aligning_with_up(x, y, z, q):
     quat_normalise(q)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def should_use_321_rotation_sequence(R):
     """Whether the vehicle rolls more than it pitches."""
     return abs(R[2, 0]) < abs(R[2, 1])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def euler_yaw(R):
     """Yaw (rad) of the rotation matrix `R`, by the sequence suited to its tilt."""
     if should_use_321_rotation_sequence(R):
@@ -168,7 +168,7 @@ def euler_yaw(R):
     return math.atan2(-R[0, 1], R[1, 1])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_yaw_in_rot_mat(yaw, R_in, R_out):
     """Write into `R_out` the rotation with the tilt of `R_in` and the given yaw (rad)."""
     if should_use_321_rotation_sequence(R_in):
@@ -177,13 +177,13 @@ def update_yaw_in_rot_mat(yaw, R_in, R_out):
         _dcm_from_312(yaw, math.asin(_unit(R_in[2, 1])), math.atan2(-R_in[2, 0], R_in[2, 2]), R_out)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _unit(sine):
     """Sine limited to [-1, 1], against rounding."""
     return min(max(sine, -1.0), 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _dcm_from_321(yaw, pitch, roll, R):
     cy, sy = math.cos(yaw), math.sin(yaw)
     cp, sp = math.cos(pitch), math.sin(pitch)
@@ -199,7 +199,7 @@ def _dcm_from_321(yaw, pitch, roll, R):
     R[2, 2] = cr * cp
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _dcm_from_312(yaw, roll, pitch, R):
     cy, sy = math.cos(yaw), math.sin(yaw)
     cp, sp = math.cos(pitch), math.sin(pitch)

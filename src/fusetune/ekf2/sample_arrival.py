@@ -6,12 +6,12 @@ that `fusetune.ekf2.inputs` builds. After a `pop_…`, `ekf.<sensor>_data_ready`
 """
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.buffers import find_newest_due, offer, take
+from fusetune.ekf2.kernel import kernel
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_gnss(ekf, params, inputs, slot):
     if offer(ekf, ekf.buffers.gnss, inputs.gnss[slot].time_us, params.EKF2_GPS_DELAY, slot):
         ekf.gnss_newest_time_us = ekf.time_latest_us
@@ -20,14 +20,14 @@ def receive_gnss(ekf, params, inputs, slot):
     ekf.gnss_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_mag(ekf, params, inputs, slot):
     if offer(ekf, ekf.buffers.mag, inputs.mag[slot].time_us, params.EKF2_MAG_DELAY, slot):
         ekf.mag_newest_time_us = ekf.time_latest_us
     ekf.mag_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_baro(ekf, params, inputs, slot):
     ekf.air_density = inputs.air_density[slot]
     if offer(ekf, ekf.buffers.baro, inputs.baro[slot].time_us, params.EKF2_BARO_DELAY, slot):
@@ -35,7 +35,7 @@ def receive_baro(ekf, params, inputs, slot):
     ekf.baro_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_range(ekf, params, inputs, slot):
     if offer(ekf, ekf.buffers.range, inputs.range[slot].time_us, params.EKF2_RNG_DELAY, slot):
         ekf.range_newest_time_us = ekf.time_latest_us
@@ -44,7 +44,7 @@ def receive_range(ekf, params, inputs, slot):
     ekf.range.sensor_max_distance = inputs.range_limits[slot, 1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_flow(ekf, params, inputs, slot):
     ekf.flow.max_rate = inputs.flow_limits[slot, 0]
     ekf.flow.min_distance = inputs.flow_limits[slot, 1]
@@ -54,7 +54,7 @@ def receive_flow(ekf, params, inputs, slot):
     ekf.flow_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_ev(ekf, params, inputs, slot):
     if offer(ekf, ekf.buffers.ev, inputs.ev[slot].time_us, params.EKF2_EV_DELAY, slot):
         ekf.ev_newest_time_us = ekf.time_latest_us
@@ -63,27 +63,27 @@ def receive_ev(ekf, params, inputs, slot):
     ekf.ev_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_airspeed(ekf, params, inputs, slot):
     if offer(ekf, ekf.buffers.airspeed, inputs.airspeed[slot].time_us, params.EKF2_ASP_DELAY, slot):
         ekf.airspeed_newest_time_us = ekf.time_latest_us
     ekf.airspeed_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_auxvel(ekf, params, inputs, slot):
     if offer(ekf, ekf.buffers.auxvel, inputs.auxvel[slot].time_us, params.EKF2_AVEL_DELAY, slot):
         ekf.auxvel_newest_time_us = ekf.time_latest_us
     ekf.auxvel_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def receive_system_flags(ekf, inputs, slot):
     offer(ekf, ekf.buffers.system_flags, inputs.system_flags[slot].time_us, 0.0, slot)
     ekf.system_flags_buffer_exists = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_gnss(ekf, params, inputs):
     ring = ekf.buffers.gnss
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -95,7 +95,7 @@ def pop_gnss(ekf, params, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _apply_antenna_yaw_offset(sample, params):
     """Use EKF2_GPS_YAW_OFF where the receiver reports a heading but no offset of its own."""
     offset = np.deg2rad(params.EKF2_GPS_YAW_OFF)
@@ -105,7 +105,7 @@ def _apply_antenna_yaw_offset(sample, params):
         sample.yaw = np.arctan2(np.sin(sample.yaw - offset), np.cos(sample.yaw - offset))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_mag(ekf, inputs):
     ring = ekf.buffers.mag
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -116,7 +116,7 @@ def pop_mag(ekf, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_baro(ekf, inputs):
     ring = ekf.buffers.baro
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -127,7 +127,7 @@ def pop_baro(ekf, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_range(ekf, inputs):
     ring = ekf.buffers.range
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -138,7 +138,7 @@ def pop_range(ekf, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_flow(ekf, inputs):
     ring = ekf.buffers.flow
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -149,7 +149,7 @@ def pop_flow(ekf, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_ev(ekf, params, inputs):
     ring = ekf.buffers.ev
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -161,7 +161,7 @@ def pop_ev(ekf, params, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _apply_vision_noise(sample, params):
     """Replace the variances by the noise parameters, or floor them, as EKF2_EV_NOISE_MD asks."""
     use_reported = int(params.EKF2_EV_NOISE_MD) == 0
@@ -170,14 +170,14 @@ def _apply_vision_noise(sample, params):
     _floor_variance(sample.orientation_var, params.EKF2_EVA_NOISE, use_reported)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _floor_variance(variance, noise, use_reported):
     reported = use_reported and np.isfinite(variance[0]) and np.isfinite(variance[1]) and np.isfinite(variance[2])
     for axis in range(3):
         variance[axis] = max(noise * noise, variance[axis]) if reported else noise * noise
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_airspeed(ekf, inputs):
     ring = ekf.buffers.airspeed
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -188,7 +188,7 @@ def pop_airspeed(ekf, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_auxvel(ekf, inputs):
     ring = ekf.buffers.auxvel
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -199,7 +199,7 @@ def pop_auxvel(ekf, inputs):
         take(ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_drag(ekf):
     drag = ekf.buffers.drag
     index = find_newest_due(drag.ring, ekf.time_delayed_us)
@@ -209,7 +209,7 @@ def pop_drag(ekf):
         take(drag.ring, index)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pop_system_flags(ekf, inputs):
     ring = ekf.buffers.system_flags
     index = find_newest_due(ring, ekf.time_delayed_us)

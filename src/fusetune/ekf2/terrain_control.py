@@ -1,26 +1,25 @@
 """The terrain state where no sensor observes it, and when its estimate can be relied on."""
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.range_finder.range_hagl_fusion import compute_hagl_variance
 from fusetune.ekf2.conditions import get_hagl
 from fusetune.ekf2.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.covariance import reset_covariance_block
 from fusetune.ekf2.global_position import single_precision
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import TERRAIN
 from fusetune.ekf2.timing import HGT_FUSION_TIMEOUT_MAX, is_recent, is_timed_out
 
 NO_TERRAIN_AIDING_TIMEOUT = 1_000_000
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def init_terrain(ekf, params):
     """Put the terrain EKF2_MIN_RNG below the vehicle, as uncertain as that."""
     ekf.terrain = single_precision(params.EKF2_MIN_RNG - ekf.gpos_alt)
     reset_covariance_block(ekf, TERRAIN, 1, params.EKF2_MIN_RNG * params.EKF2_MIN_RNG)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_terrain_fake_fusion(ekf, params):
     """On the ground the terrain is right below, unless a sensor says more; it starts there anew at take-off.
 
@@ -40,7 +39,7 @@ def control_terrain_fake_fusion(ekf, params):
         init_terrain(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_terrain_validity(ekf):
     """Set `ekf.terrain_valid`.
 

@@ -1,12 +1,11 @@
 """Fusion of NED velocity observations, axis by axis."""
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import fuse_direct_state
 from fusetune.ekf2.state import VELOCITY
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_horizontal_velocity(ekf, params, aid):
     """Fuse north and east velocity of an aid source that has been judged; return whether it was fused."""
     aid.fused = _fuse_velocity_axes(ekf, params, aid, 2)
@@ -15,7 +14,7 @@ def fuse_horizontal_velocity(ekf, params, aid):
     return aid.fused
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_velocity(ekf, params, aid):
     """Fuse all three velocity axes of an aid source that has been judged; return whether they were fused."""
     aid.fused = _fuse_velocity_axes(ekf, params, aid, 3)
@@ -25,7 +24,7 @@ def fuse_velocity(ekf, params, aid):
     return aid.fused
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_velocity_axes(ekf, params, aid, n_axes):
     if aid.innovation_rejected:
         return False

@@ -6,16 +6,16 @@ Mirrors PX4 v1.16 `EKF/wind.cpp`.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.covariance import INITIAL_WIND_UNCERTAINTY, reset_covariance_block
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import WIND
 
 WIND_MEMORY = np.dtype([("external_init", "?")], align=True)
 """Sub-record `ekf.wind`: whether the wind was given from outside and no source has used it yet."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_wind_to(ekf, north, east, var_north, var_east):
     """Set the wind (m/s, towards NE) and its variances; a variance that is not finite leaves the covariance alone."""
     ekf.wind_vel[0], ekf.wind_vel[1] = north, east
@@ -26,7 +26,7 @@ def reset_wind_to(ekf, north, east, var_north, var_east):
         reset_covariance_block(ekf, WIND + 1, 1, min(largest, var_east))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_wind_to_external_observation(ekf, speed, direction, speed_accuracy, direction_accuracy):
     """Take the wind that an operator gave, on ground only.
 
@@ -46,14 +46,14 @@ def reset_wind_to_external_observation(ekf, speed, direction, speed_accuracy, di
     reset_wind_to(ekf, speed * c, speed * s, c * c * along + s * s * across, s * s * along + c * c * across)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_wind_to_zero(ekf):
     """Assume calm, with the initial uncertainty."""
     ekf.wind_vel[0], ekf.wind_vel[1] = 0.0, 0.0
     reset_covariance_block(ekf, WIND, 2, INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def keep_only_wind_gains(K):
     """Let an update move the wind states alone."""
     for i in range(WIND):

@@ -5,8 +5,7 @@ Bilinear interpolation on a grid of 10°; date and height are not considered.
 
 import math
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.world_magnetic_model_table import RESOLUTION_DEG, read_tables
 
 _TABLES = read_tables()
@@ -17,7 +16,7 @@ _RESOLUTION = float(RESOLUTION_DEG)
 _GAUSS_PER_NANOTESLA = 1e-5
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _interpolate(latitude_deg, longitude_deg, table):
     """Value of a table at a place; latitude is limited to the poles, longitude wraps once."""
     latitude = min(max(latitude_deg, -90.0), 90.0)
@@ -37,7 +36,7 @@ def _interpolate(latitude_deg, longitude_deg, table):
     return at_south + northing * (at_north - at_south)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def get_mag_declination_degrees(latitude_deg, longitude_deg):
     """Angle (deg) from true to magnetic north, positive to the east."""
     if not (math.isfinite(latitude_deg) and math.isfinite(longitude_deg)):
@@ -45,7 +44,7 @@ def get_mag_declination_degrees(latitude_deg, longitude_deg):
     return _interpolate(latitude_deg, longitude_deg, _DECLINATION) * _DECLINATION_SCALE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def get_mag_inclination_degrees(latitude_deg, longitude_deg):
     """Angle (deg) of the field below the horizon."""
     if not (math.isfinite(latitude_deg) and math.isfinite(longitude_deg)):
@@ -53,7 +52,7 @@ def get_mag_inclination_degrees(latitude_deg, longitude_deg):
     return _interpolate(latitude_deg, longitude_deg, _INCLINATION) * _INCLINATION_SCALE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def get_mag_strength_gauss(latitude_deg, longitude_deg):
     """Strength of the field (Gauss)."""
     if not (math.isfinite(latitude_deg) and math.isfinite(longitude_deg)):

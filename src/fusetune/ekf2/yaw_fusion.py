@@ -6,9 +6,8 @@ zeros elsewhere. Antenna heading passes its own H.
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.covariance import initialise_covariance, reset_gyro_bias_z_cov
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.state import ATTITUDE, ERROR_STATE_SIZE
 from fusetune.ekf2.timing import is_timed_out
@@ -17,7 +16,7 @@ LANDED_TIME_BEFORE_FORCED_YAW_US = 5_000_000
 FORCED_YAW_INTERVAL_US = 1_000_000
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_yaw_innov_var_and_h(ekf, variance, H):
     """Write H of a heading observation into `H` (24,) and return its innovation variance (rad²)."""
     for i in range(ERROR_STATE_SIZE):
@@ -26,7 +25,7 @@ def compute_yaw_innov_var_and_h(ekf, variance, H):
     return ekf.P[ATTITUDE + 2, ATTITUDE + 2] + variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_yaw(ekf, params, aid, H_yaw):
     """Fuse a judged heading observation; return whether it was fused.
 
@@ -59,7 +58,7 @@ def fuse_yaw(ekf, params, aid, H_yaw):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _may_force_yaw(ekf, aid):
     return (
         not ekf.cs.in_air

@@ -1,8 +1,7 @@
 """Hold the height where it was last known while nothing aids height or vertical velocity."""
 
-from numba import njit
-
 from fusetune.ekf2.conditions import is_vertical_aiding_active
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import fuse_direct_state
 from fusetune.ekf2.position_fusion import update_vertical_position_aid_status
 from fusetune.ekf2.resets import reset_height_to_last_known, reset_vertical_velocity_to_zero
@@ -15,7 +14,7 @@ INNOVATION_GATE = 3.0
 EXTREME_TEST_RATIO = (100.0 / INNOVATION_GATE) ** 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_fake_hgt_fusion(ekf, params):
     """Fuse, start, reset or stop the fake height."""
     if is_vertical_aiding_active(ekf):
@@ -35,7 +34,7 @@ def control_fake_hgt_fusion(ekf, params):
         _reset_fake_hgt_fusion(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse(ekf, params, aid):
     if aid.test_ratio[0] < EXTREME_TEST_RATIO and not aid.innovation_rejected:
         fuse_direct_state(
@@ -47,7 +46,7 @@ def _fuse(ekf, params, aid):
         _reset_fake_hgt_fusion(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_fake_hgt_fusion(ekf, params):
     """Take the present height as the known one, at rest."""
     ekf.last_known_alt = ekf.gpos_alt

@@ -6,12 +6,11 @@ keeps the filter from diverging, while the tilt is uncertain and dead reckoning 
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.conditions import IMU_CTRL_GRAVITY_VECTOR, is_horizontal_aiding_active
 from fusetune.ekf2.covariance import tilt_variance
 from fusetune.ekf2.geodesy import lat_lon_difference
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import fuse_direct_state
 from fusetune.ekf2.resets import reset_horizontal_position_to_last_known, reset_horizontal_velocity_to_zero
 from fusetune.ekf2.state import POSITION
@@ -25,7 +24,7 @@ SIGMA_OTHERWISE = 0.5
 TILT_UNCERTAIN_VARIANCE = math.radians(3.0) ** 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_fake_pos_fusion(ekf, params):
     """Fuse, start, reset or stop the fake position."""
     if is_horizontal_aiding_active(ekf):
@@ -47,7 +46,7 @@ def control_fake_pos_fusion(ekf, params):
     ekf.cs.valid_fake_pos = _run(ekf, params, enable_valid, ekf.cs.valid_fake_pos, aid)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_status(ekf, params, aid):
     if ekf.cs.in_air and ekf.cs.tilt_align:
         sigma = max(params.EKF2_NOAID_NOISE, 1.0)
@@ -64,7 +63,7 @@ def _update_status(ekf, params, aid):
     update_aid_source_status(ekf, aid, 2, ekf.time_delayed_us, INNOVATION_GATE)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _run(ekf, params, enabled, active, aid):
     """One step of either kind of fake position; return whether it is active from now on."""
     if not enabled:
@@ -84,7 +83,7 @@ def _run(ekf, params, enabled, active, aid):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_fake_pos_fusion(ekf, params):
     """Take the present place as the known one, at rest."""
     ekf.last_known_lat = ekf.gpos_lat

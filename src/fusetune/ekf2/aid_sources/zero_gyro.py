@@ -1,8 +1,8 @@
 """The gyro at rest measures its own bias."""
 
 import numpy as np
-from numba import njit
 
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import fuse_direct_state
 from fusetune.ekf2.state import GYRO_BIAS
 
@@ -11,7 +11,7 @@ ZERO_GYRO_MEMORY = np.dtype([("delta_ang", "f8", (3,)), ("delta_ang_dt", "f8")],
 MEAN_OVER_S = 0.2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_zero_gyro(ekf):
     """Start a new mean."""
     for i in range(3):
@@ -19,7 +19,7 @@ def reset_zero_gyro(ekf):
     ekf.zero_gyro.delta_ang_dt = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_zero_gyro_update(ekf, params):
     """While at rest, fuse the mean rate over 0.2 s as an observation of the gyro bias."""
     if not ekf.cs.vehicle_at_rest:

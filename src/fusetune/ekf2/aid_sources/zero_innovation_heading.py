@@ -1,8 +1,7 @@
 """Keep the yaw variance bounded while nothing observes the heading."""
 
-from numba import njit
-
 from fusetune.ekf2.covariance import initialise_covariance
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.state import ERROR_STATE_SIZE
 from fusetune.ekf2.timing import is_timed_out
@@ -13,7 +12,7 @@ VARIANCE_WHILE_LEVELLING = 0.001
 VARIANCE_AFTERWARDS = 0.25
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_zero_innovation_heading_update(ekf, params):
     """Fuse a heading innovation of zero every 0.2 s, always while levelling, later only if the variance is large."""
     yaw_aiding = ekf.cs.mag_hdg or ekf.cs.mag_3d or ekf.cs.ev_yaw or ekf.cs.gnss_yaw

@@ -1,8 +1,7 @@
 """Zero velocity while the vehicle is at rest: levels the attitude and holds the velocity."""
 
-from numba import njit
-
 from fusetune.ekf2.conditions import is_vertical_velocity_aiding_active
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import fuse_direct_state
 from fusetune.ekf2.state import VELOCITY
 
@@ -11,7 +10,7 @@ VARIANCE_WHILE_LEVELLING = 0.001**2
 VARIANCE_AFTERWARDS = 0.2**2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_zero_velocity_update(ekf, params):
     """Fuse zero velocity every 0.2 s; after tilt alignment only while nothing aids the vertical velocity.
 

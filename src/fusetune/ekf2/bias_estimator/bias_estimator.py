@@ -8,7 +8,8 @@ is raised a thousandfold until the offset is gone.
 import math
 
 import numpy as np
-from numba import njit
+
+from fusetune.ekf2.kernel import kernel
 
 GATE_SIZE = 3.0
 MONITORING_TIME_CONSTANT_S = 10.0
@@ -31,12 +32,14 @@ BIAS_ESTIMATOR_FIELDS = [
     ("innovation", "f8"),
     ("innovation_variance", "f8"),
     ("innovation_test_ratio", "f8"),
+    # whether the source is fused, for those that idle otherwise
+    ("fusion_active", "?"),
 ]
 
 BIAS_ESTIMATOR = np.dtype(BIAS_ESTIMATOR_FIELDS, align=True)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_bias_estimator(estimator, bias_var):
     """State before the first observation."""
     estimator.bias = 0.0
@@ -54,7 +57,7 @@ def initialise_bias_estimator(estimator, bias_var):
     estimator.innovation_test_ratio = np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_bias(estimator):
     """Forget the bias and what was noted of its innovations; noise settings stay."""
     estimator.bias = 0.0
@@ -64,25 +67,25 @@ def reset_bias(estimator):
     estimator.time_since_positive_innovation = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_bias(estimator, bias):
     """Replace the bias; its variance stays."""
     estimator.bias = bias
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_process_noise_spectral_density(estimator, noise):
     """Random-walk density, in units of the bias per √Hz and second."""
     estimator.process_psd = noise * noise
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_max_state_noise(estimator, noise):
     """Upper limit of the bias' standard deviation."""
     estimator.bias_var_max = max(MINIMUM_NOISE * MINIMUM_NOISE, noise * noise)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_offset_detected(estimator):
     """Whether the innovations have been too large on average, or of one sign for too long."""
     return (
@@ -92,7 +95,7 @@ def is_offset_detected(estimator):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_bias(estimator, dt):
     """Let the bias' variance grow over `dt` seconds."""
     growth = estimator.process_psd * dt
@@ -105,7 +108,7 @@ def predict_bias(estimator, dt):
         estimator.dt = dt
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_bias(estimator, measurement, measurement_var):
     """Correct the bias by one observation of it."""
     innovation_variance = estimator.bias_var + max(MINIMUM_NOISE * MINIMUM_NOISE, measurement_var)
@@ -122,7 +125,7 @@ def fuse_bias(estimator, measurement, measurement_var):
     estimator.innovation_test_ratio = test_ratio
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _watch_innovations(estimator, innovation, test_ratio):
     signed_ratio = 0.0
     if innovation != 0.0:
@@ -137,6 +140,6 @@ def _watch_innovations(estimator, innovation, test_ratio):
         estimator.time_since_positive_innovation += estimator.dt
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _constrain_variance(estimator):
     estimator.bias_var = min(max(estimator.bias_var, MINIMUM_VARIANCE), estimator.bias_var_max)

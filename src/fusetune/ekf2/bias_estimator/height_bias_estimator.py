@@ -1,34 +1,32 @@
 """Bias of a height source against the height reference; idle while the source is the reference or is not fused."""
 
-import numpy as np
-from numba import njit
-
 from fusetune.ekf2.bias_estimator.bias_estimator import (
-    BIAS_ESTIMATOR_FIELDS,
+    BIAS_ESTIMATOR,
     fuse_bias,
     initialise_bias_estimator,
     predict_bias,
 )
+from fusetune.ekf2.kernel import kernel
 
-HEIGHT_BIAS_ESTIMATOR = np.dtype([*BIAS_ESTIMATOR_FIELDS, ("fusion_active", "?")], align=True)
+HEIGHT_BIAS_ESTIMATOR = BIAS_ESTIMATOR
 """A bias estimator and whether its source is fused; the plain functions of `bias_estimator` work on it, too."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_height_bias_estimator(estimator):
     """State at start: no bias, known exactly, source not fused."""
     initialise_bias_estimator(estimator, 0.0)
     estimator.fusion_active = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_height_bias(ekf, estimator, sensor, dt):
     """Predict over `dt` (s) unless the source (`sensor`, a `HEIGHT_REF_…` value) is the reference or not fused."""
     if ekf.height_sensor_ref != sensor and estimator.fusion_active:
         predict_bias(estimator, dt)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_height_bias(ekf, estimator, sensor, bias, bias_var):
     """Fuse an observed bias (m) unless the source is the reference or not fused."""
     if ekf.height_sensor_ref != sensor and estimator.fusion_active:

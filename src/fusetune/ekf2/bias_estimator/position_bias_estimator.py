@@ -1,7 +1,6 @@
 """North and east bias of a position source against the position reference."""
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.bias_estimator.bias_estimator import (
     BIAS_ESTIMATOR,
@@ -12,13 +11,14 @@ from fusetune.ekf2.bias_estimator.bias_estimator import (
     set_max_state_noise,
     set_process_noise_spectral_density,
 )
+from fusetune.ekf2.kernel import kernel
 
 POSITION_BIAS_ESTIMATOR = np.dtype(
     [("north", BIAS_ESTIMATOR), ("east", BIAS_ESTIMATOR), ("fusion_active", "?")], align=True
 )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_position_bias_estimator(estimator):
     """State at start: no bias, standard variance of 0.1 m², source not fused."""
     initialise_bias_estimator(estimator.north, 0.1)
@@ -26,7 +26,7 @@ def initialise_position_bias_estimator(estimator):
     estimator.fusion_active = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_position_bias(ekf, estimator, sensor, dt):
     """Predict over `dt` (s) unless the source (`sensor`, a `POSITION_REF_…` value) is the reference or not fused."""
     if ekf.position_sensor_ref != sensor and estimator.fusion_active:
@@ -34,7 +34,7 @@ def predict_position_bias(ekf, estimator, sensor, dt):
         predict_bias(estimator.east, dt)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_position_bias(ekf, estimator, sensor, north, east, north_var, east_var):
     """Fuse an observed bias (m) unless the source is the reference or not fused."""
     if ekf.position_sensor_ref != sensor and estimator.fusion_active:
@@ -42,21 +42,21 @@ def fuse_position_bias(ekf, estimator, sensor, north, east, north_var, east_var)
         fuse_bias(estimator.east, east, east_var)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_position_bias(estimator, north, east):
     """Replace the bias; its variance stays."""
     estimator.north.bias = north
     estimator.east.bias = east
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_position_bias(estimator):
     """Forget the bias of both axes."""
     reset_bias(estimator.north)
     reset_bias(estimator.east)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_position_bias_noise(estimator, nsd, max_noise_north, max_noise_east):
     """Random-walk density (m/√Hz/s) and upper limits of the standard deviations (m)."""
     set_process_noise_spectral_density(estimator.north, nsd)

@@ -7,9 +7,8 @@ taken off.
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.geodesy import ONE_G
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import (
     dcm_to_quat,
     quat_aligning_with_up,
@@ -31,7 +30,7 @@ ALIGNMENT_LOW, ALIGNMENT_HIGH = 0.9 * ONE_G, 1.1 * ONE_G
 MIN_DT_S = 0.001
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def filter_acceleration(gsf, imu):
     """Low-pass the specific force (m/s², body) with a time constant of 1/10 of the tilt correction's."""
     coefficient = min(ACCEL_LPF_GAIN * imu.delta_vel_dt, 1.0)
@@ -40,7 +39,7 @@ def filter_acceleration(gsf, imu):
         gsf.accel_lpf[axis] = gsf.accel_lpf[axis] * (1.0 - coefficient) + acceleration * coefficient
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def try_align_tilt(gsf, imu):
     """Take the tilt from the accelerometer if the vehicle looks at rest (0.9–1.1 g, now and filtered)."""
     now = _norm(imu.delta_vel) / imu.delta_vel_dt
@@ -53,7 +52,7 @@ def try_align_tilt(gsf, imu):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def align_yaw_of_attitudes(gsf):
     """Turn each model's attitude to the yaw of its velocity-and-yaw filter."""
     for model in range(N_MODELS):
@@ -62,7 +61,7 @@ def align_yaw_of_attitudes(gsf):
         dcm_to_quat(gsf.R_aligned, gsf.q[model])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def accel_fusion_gain(gsf):
     """Tilt correction gain (1/s): full at 1 g, nought at 0.5 g and 1.5 g, or 2 g where airspeed is known."""
     norm = _norm(gsf.accel_lpf)
@@ -73,7 +72,7 @@ def accel_fusion_gain(gsf):
     return TILT_GAIN * fade * fade
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_attitude(gsf, model, imu, gain):
     """Propagate one model's attitude over an IMU sample; `gain` is `accel_fusion_gain`."""
     dt = imu.delta_ang_dt
@@ -100,7 +99,7 @@ def predict_attitude(gsf, model, imu, gain):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _tilt_correction(gsf, model, rate_y, rate_z, gain):
     """Rotation rate (rad/s, body) that turns the estimated down direction towards the measured one."""
     q = gsf.q[model]
@@ -120,16 +119,16 @@ def _tilt_correction(gsf, model, rate_y, rate_z, gain):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _knows_airspeed(gsf):
     return math.isfinite(gsf.true_airspeed) and gsf.true_airspeed > 1.2e-7
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _limited_bias(bias):
     return min(max(bias, -GYRO_BIAS_LIMIT), GYRO_BIAS_LIMIT)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _norm(v):
     return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])

@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import wrap_pi
 from fusetune.ekf2.yaw_estimator.attitude_filter import (
     MIN_DT_S,
@@ -24,7 +23,7 @@ from fusetune.ekf2.yaw_estimator.velocity_yaw_filter import (
 MIN_WEIGHT = 1e-5
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_gsf(gsf, imu, in_air):
     """Propagate all models by one IMU sample (an IMU_SAMPLE record)."""
     if imu.delta_vel_dt <= MIN_DT_S:
@@ -39,7 +38,7 @@ def predict_gsf(gsf, imu, in_air):
             predict_model(gsf, model, imu, in_air)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_gsf_velocity(gsf, vel_n, vel_e, vel_accuracy, in_air):
     """Fuse a horizontal velocity (m/s) of given accuracy; the bank starts in the air or once the vehicle moves."""
     if not gsf.vel_fuse_started:
@@ -55,7 +54,7 @@ def fuse_gsf_velocity(gsf, vel_n, vel_e, vel_accuracy, in_air):
         reset_gsf(gsf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_weights(gsf):
     total = 0.0
     for model in range(N_MODELS):
@@ -65,7 +64,7 @@ def _update_weights(gsf):
         gsf.weight[model] /= total
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _combine_yaw(gsf):
     """Weighted mean direction of the yaws, and the variance of their mixture."""
     north, east = 0.0, 0.0

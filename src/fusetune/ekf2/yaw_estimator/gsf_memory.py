@@ -1,7 +1,8 @@
 """What the yaw estimator remembers: a bank of attitude filters, a bank of velocity-and-yaw filters, their weights."""
 
 import numpy as np
-from numba import njit
+
+from fusetune.ekf2.kernel import kernel
 
 N_MODELS = 5
 
@@ -34,7 +35,7 @@ unless known; `yaw_variance` (rad²) is infinite until velocity fusion has start
 """
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_gsf_memory(gsf):
     """State before the first IMU sample."""
     gsf.tilt_aligned = False
@@ -53,20 +54,20 @@ def initialise_gsf_memory(gsf):
     reset_gsf(gsf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_gsf(gsf):
     """Stop the velocity-and-yaw filters; the attitude filters run on."""
     gsf.vel_fuse_started = False
     gsf.yaw_variance = np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_true_airspeed(gsf, true_airspeed):
     """True airspeed (m/s) for the centripetal correction of a banking fixed wing."""
     gsf.true_airspeed = true_airspeed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def set_gyro_bias(gsf, gyro_bias, force):
     """Take over the main filter's gyro bias (rad/s): always if forced, else until the bank has started."""
     if not gsf.tilt_aligned or not gsf.vel_fuse_started or force:

@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import euler_yaw, quat_to_dcm, rotate_by_earth_increment, wrap_pi
 from fusetune.ekf2.yaw_estimator.gsf_memory import N_MODELS
 
@@ -15,7 +14,7 @@ NIS_LIMIT = 25.0
 SINGLE_PRECISION_EPSILON = 1.1920929e-07
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_models(gsf, vel_n, vel_e, vel_accuracy):
     """Start all models at the measured velocity, their yaws spread evenly over the circle, with equal weights."""
     gsf.yaw = 0.0
@@ -36,7 +35,7 @@ def initialise_models(gsf, vel_n, vel_e, vel_accuracy):
         gsf.S_det_inverse[model] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_model(gsf, model, imu, in_air):
     """Propagate velocity and covariance of one model by an IMU sample; the yaw is that of its attitude.
 
@@ -69,7 +68,7 @@ def predict_model(gsf, model, imu, in_air):
     gsf.x[model, 1] += dv_e
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_model(gsf, model, vel_n, vel_e, vel_accuracy):
     """Fuse a horizontal velocity, its innovation shortened to 5 σ; the yaw correction turns the attitude, too."""
     R = max(vel_accuracy, MIN_VELOCITY_ACCURACY) ** 2
@@ -114,13 +113,13 @@ def update_model(gsf, model, vel_n, vel_e, vel_accuracy):
     rotate_by_earth_increment(gsf.q[model], 0.0, 0.0, yaw_correction)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def gaussian_density(gsf, model):
     """Likelihood of the last innovation of one model."""
     return math.sqrt(gsf.S_det_inverse[model]) * math.exp(-0.5 * gsf.nis[model]) / (2.0 * math.pi)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _mirror_and_constrain(P):
     for i in range(3):
         P[i, i] = max(P[i, i], MIN_VARIANCE)

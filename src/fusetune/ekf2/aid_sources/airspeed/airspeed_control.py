@@ -6,11 +6,11 @@ Mirrors PX4 v1.16 `EKF/aid_sources/airspeed/airspeed_fusion.cpp`.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_sources.airspeed.airspeed_fusion import fuse_airspeed, update_airspeed
 from fusetune.ekf2.aid_sources.airspeed.airspeed_resets import reset_vel_using_airspeed, reset_wind_using_airspeed
 from fusetune.ekf2.covariance import INITIAL_WIND_UNCERTAINTY
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import WIND
 from fusetune.ekf2.timing import is_recent, is_timed_out
 
@@ -18,7 +18,7 @@ WIND_TIMEOUT_US = 10_000_000
 DATA_STOPPED_US = 1_000_000
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_air_data_fusion(ekf, params):
     """Start, continue or stop airspeed, and give up the wind when nothing has observed it for 10 s."""
     aid = ekf.aid.airspeed
@@ -38,7 +38,7 @@ def control_air_data_fusion(ekf, params):
         stop_airspeed_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _assume_yaw_estimator_airspeed(ekf, params):
     """While no airspeed is fused, the yaw estimator of a fixed wing compensates turns by an assumed one."""
     if ekf.cs.fixed_wing:
@@ -48,7 +48,7 @@ def _assume_yaw_estimator_airspeed(ekf, params):
             ekf.gsf.true_airspeed = params.EKF2_GSF_TAS
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _use_airspeed_sample(ekf, params):
     aid, sample = ekf.aid.airspeed, ekf.airspeed_sample
     update_airspeed(ekf, params)
@@ -74,7 +74,7 @@ def _use_airspeed_sample(ekf, params):
         _start_airspeed(ekf, params, is_consistent)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_airspeed(ekf, params, is_consistent):
     largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
     wind_unknown = math.hypot(ekf.P[WIND, WIND], ekf.P[WIND + 1, WIND + 1]) > largest
@@ -87,7 +87,7 @@ def _start_airspeed(ekf, params, is_consistent):
     ekf.cs.fuse_aspd = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_airspeed_fusion(ekf):
     """Leave airspeed; the yaw estimator goes without."""
     if ekf.cs.fuse_aspd:

@@ -7,11 +7,11 @@ states move. Mirrors PX4 v1.16 `EKF/aid_sources/airspeed/airspeed_fusion.cpp`.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.aid_sources.airspeed.airspeed_resets import airspeed_variance, reset_wind_using_airspeed
 from fusetune.ekf2.covariance import initialise_covariance
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
 from fusetune.ekf2.state import VELOCITY, WIND
@@ -20,14 +20,14 @@ from fusetune.ekf2.wind import keep_only_wind_gains
 FLT_EPSILON = float(np.finfo(np.float32).eps)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_airspeed(ekf):
     """Speed (m/s) of the vehicle through the air."""
     x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
     return math.sqrt(x * x + y * y + z * z + FLT_EPSILON)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_airspeed_jacobian(ekf, H):
     """Write the derivative of the airspeed into `H` (24,)."""
     inverse = 1.0 / predict_airspeed(ekf)
@@ -38,7 +38,7 @@ def compute_airspeed_jacobian(ekf, H):
     H[VELOCITY + 2] = ekf.vel[2] * inverse
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_airspeed(ekf, params):
     """Judge the airspeed that is due now."""
     sample, H = ekf.airspeed_sample, ekf.airspeed.H
@@ -50,7 +50,7 @@ def update_airspeed(ekf, params):
     update_aid_source_status(ekf, ekf.aid.airspeed, 1, sample.time_us, max(params.EKF2_TAS_GATE, 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_airspeed(ekf, params):
     """Fuse the judged airspeed unless it was rejected."""
     aid, H, K = ekf.aid.airspeed, ekf.airspeed.H, ekf.scratch.K
@@ -72,7 +72,7 @@ def fuse_airspeed(ekf, params):
         ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _recover_from_bad_covariance(ekf, params, update_wind_only):
     if update_wind_only:
         reset_wind_using_airspeed(ekf, params)

@@ -6,10 +6,10 @@ Mirrors PX4 v1.16 `EKF/aid_sources/airspeed/airspeed_fusion.cpp`.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import reset_aid_source_status_zero_innovation
 from fusetune.ekf2.covariance import reset_covariance_block, yaw_variance
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import reset_horizontal_velocity_to
 from fusetune.ekf2.rotations import euler_yaw
 from fusetune.ekf2.state import VELOCITY, WIND
@@ -17,14 +17,14 @@ from fusetune.ekf2.state import VELOCITY, WIND
 SIDESLIP_VARIANCE_AT_RESET = math.radians(15.0) ** 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def airspeed_variance(params, eas2tas):
     """Observation variance ((m/s)²) of true airspeed."""
     noise = min(max(params.EKF2_EAS_NOISE, 0.5), 5.0) * min(max(eas2tas, 0.9), 10.0)
     return noise * noise
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_wind_using_airspeed(ekf, params):
     """Set the wind as for level flight without sideslip: velocity less airspeed along the heading.
 
@@ -47,7 +47,7 @@ def reset_wind_using_airspeed(ekf, params):
     reset_aid_source_status_zero_innovation(ekf, ekf.aid.airspeed, 1)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_vel_using_airspeed(ekf, params):
     """Set the velocity as for level flight without sideslip in the wind last known; its variance stays."""
     airspeed = ekf.airspeed_sample.true_airspeed

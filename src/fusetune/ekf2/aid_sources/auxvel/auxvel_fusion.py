@@ -4,17 +4,16 @@ It supports other horizontal aiding and is not fused without. Mirrors PX4 v1.16
 `EKF/aid_sources/auxvel/auxvel_fusion.cpp`.
 """
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.conditions import is_horizontal_aiding_active
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import VELOCITY
 from fusetune.ekf2.velocity_fusion import fuse_horizontal_velocity
 
 AUXVEL_GATE = 5.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_aux_vel_fusion(ekf, params):
     """Judge the auxiliary velocity due now, and fuse it beside another horizontal aid."""
     if not ekf.auxvel_data_ready:

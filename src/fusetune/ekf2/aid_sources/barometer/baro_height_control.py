@@ -2,8 +2,6 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import reset_aid_source_status_zero_innovation
 from fusetune.ekf2.aid_sources.barometer.ground_effect import apply_ground_effect_deadzone
 from fusetune.ekf2.aid_sources.barometer.static_pressure import compensate_baro_for_dynamic_pressure
@@ -16,6 +14,7 @@ from fusetune.ekf2.bias_estimator.bias_estimator import (
 from fusetune.ekf2.bias_estimator.height_bias_estimator import fuse_height_bias, predict_height_bias
 from fusetune.ekf2.conditions import is_height_reset_required, is_vertical_velocity_aiding_active
 from fusetune.ekf2.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.origin_resets import initialise_altitude_to
 from fusetune.ekf2.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.resets import reset_altitude_to, reset_vertical_velocity_to_zero
@@ -32,7 +31,7 @@ BARO_LPF_ALPHA = 0.1
 BARO_BIAS_NSD = 0.13
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_baro_height_fusion(ekf, params):
     """Process the barometer sample that reached the fusion time horizon, if any."""
     predict_height_bias(ekf, ekf.baro_b_est, HEIGHT_REF_BARO, ekf.dt_ekf_avg)
@@ -51,7 +50,7 @@ def control_baro_height_fusion(ekf, params):
         stop_baro_hgt_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _filter_measurement(ekf, measurement):
     """Low-pass the height; while the filter fills, the bias is what the height differs from the estimate by."""
     baro = ekf.baro
@@ -66,7 +65,7 @@ def _filter_measurement(ekf, measurement):
         set_bias(ekf.baro_b_est, baro.lpf - ekf.gpos_alt)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_baro_status(ekf, params, measurement, variance):
     """Judge the height less its bias, then forgive what ground effect explains."""
     aid, bias = ekf.aid.baro_hgt, ekf.baro_b_est
@@ -82,7 +81,7 @@ def _update_baro_status(ekf, params, measurement, variance):
         aid.innovation[0] = apply_ground_effect_deadzone(aid.innovation[0], params.EKF2_GND_EFF_DZ)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_bias(ekf, measurement, variance):
     """Update the bias with the state that gave the innovation, before the filter fuses it."""
     bias = ekf.baro_b_est
@@ -92,7 +91,7 @@ def _update_bias(ekf, measurement, variance):
     fuse_height_bias(ekf, bias, HEIGHT_REF_BARO, measurement - ekf.gpos_alt, variance + height_variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _control_with_sample(ekf, params, measurement, variance, valid):
     continuing = (
         int(params.EKF2_BARO_CTRL) == 1
@@ -109,7 +108,7 @@ def _control_with_sample(ekf, params, measurement, variance, valid):
         _start(ekf, params, measurement, variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_or_recover(ekf, params, variance):
     """Fuse; reset the height if all sources fail and this is the reference; give up if only this one fails."""
     aid = ekf.aid.baro_hgt
@@ -131,7 +130,7 @@ def _fuse_or_recover(ekf, params, variance):
             ekf.cs.baro_fault = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start(ekf, params, measurement, variance):
     """Begin fusion: as the height reference by setting the altitude, else with a bias that starts at agreement."""
     if int(params.EKF2_HGT_REF) == HEIGHT_REF_BARO:
@@ -147,7 +146,7 @@ def _start(ekf, params, measurement, variance):
     ekf.cs.baro_hgt = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_baro_hgt_fusion(ekf):
     """Stop fusing barometric height; another source becomes the reference if this was it."""
     if ekf.cs.baro_hgt:

@@ -1,14 +1,13 @@
 """Rotor wash near the ground raises the static pressure, so the barometer reads low there."""
 
-from numba import njit
-
 from fusetune.ekf2.conditions import get_hagl, is_terrain_estimate_valid
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import is_timed_out
 
 GND_EFFECT_TIMEOUT = 10_000_000
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_ground_effect(ekf, params):
     """Keep `cs.gnd_effect` by the height above a known terrain or, where it is unknown, for at most 10 s."""
     if not ekf.cs.in_air or ekf.cs.fixed_wing:
@@ -19,7 +18,7 @@ def update_ground_effect(ekf, params):
         ekf.cs.gnd_effect = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def apply_ground_effect_deadzone(innovation, deadzone):
     """Innovation (m) with the part explained by ground effect taken off: none for observations above the estimate."""
     if innovation >= 0.0:

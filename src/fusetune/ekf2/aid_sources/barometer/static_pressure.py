@@ -4,14 +4,13 @@ The error pressure is a body-fixed fraction of the dynamic pressure, ½ ρ Σ K�
 backward, right and left. As height it is that over ρ g, so the air density drops out.
 """
 
-from numba import njit
-
 from fusetune.ekf2.conditions import is_local_horizontal_position_valid
+from fusetune.ekf2.kernel import kernel
 
 STANDARD_GRAVITY = 9.80665
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def static_pressure_height_correction(params, airspeed_x, airspeed_y, airspeed_z):
     """Height (m) to add to the barometer's for an airspeed vector in the body frame (m/s)."""
     limit = params.EKF2_ASPD_MAX * params.EKF2_ASPD_MAX
@@ -25,7 +24,7 @@ def static_pressure_height_correction(params, airspeed_x, airspeed_y, airspeed_z
     return 0.5 * weighted / STANDARD_GRAVITY
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compensate_baro_for_dynamic_pressure(ekf, params, height):
     """Corrected barometric height (m); unchanged without a wind estimate or a valid horizontal position."""
     if not (ekf.cs.wind and is_local_horizontal_position_valid(ekf)):

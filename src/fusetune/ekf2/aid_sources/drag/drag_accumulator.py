@@ -3,12 +3,12 @@
 Mirrors `setDragData` of PX4 v1.16's `estimator_interface.cpp`, which runs for every raw IMU sample.
 """
 
-from numba import njit
+from fusetune.ekf2.kernel import kernel
 
 MIN_SAMPLES_PER_MEAN = 5
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _restart(drag):
     drag.sample_count = 0
     drag.delta_vel_sum[0] = 0.0
@@ -17,7 +17,7 @@ def _restart(drag):
     drag.dt_sum = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def accumulate_drag(ekf, params, imu, imu_buffer_length, obs_buffer_length):
     """Take in one raw IMU sample; return whether `ekf.drag.produced` holds a new mean to be buffered.
 

@@ -11,10 +11,10 @@ fused; the measurement follows the accelerometer bias. The status counts as fuse
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.covariance import reset_wind_cov
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
 from fusetune.ekf2.state import ATTITUDE, VELOCITY, WIND
@@ -26,14 +26,14 @@ DRAG_GATE = 5.0
 FLT_EPSILON = float(np.finfo(np.float32).eps)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def momentum_drag_coefficient(ekf, params):
     """Momentum drag (1/s) at the present air density."""
     rho = max(ekf.air_density, MIN_AIR_DENSITY)
     return max(params.EKF2_MCOEF * math.sqrt(rho / AIR_DENSITY_SEA_LEVEL), 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _air_velocity_body(ekf):
     R = ekf.R_to_earth
     x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
@@ -44,7 +44,7 @@ def _air_velocity_body(ekf):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def inverse_ballistic_coefficients(params, bx, by):
     """1/C (m²/kg) of both axes for air coming along (bx, by); an axis with C ≤ 1 has none.
 
@@ -59,7 +59,7 @@ def inverse_ballistic_coefficients(params, bx, by):
     return inverse_x, inverse_y
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_drag(ekf, axis, rho, inverse_bcoef, mcoef):
     """Specific force (m/s²) along body axis 0 or 1."""
     b = _air_velocity_body(ekf)
@@ -67,7 +67,7 @@ def predict_drag(ekf, axis, rho, inverse_bcoef, mcoef):
     return -0.5 * inverse_bcoef * rho * b[axis] * speed - mcoef * b[axis]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
     """Write the derivative of `predict_drag`, at a given coefficient, into `H` (24,)."""
     R = ekf.R_to_earth
@@ -91,7 +91,7 @@ def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
     H[WIND + 1] = -H[VELOCITY + 1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_drag_fusion(ekf, params):
     """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
     if int(params.EKF2_DRAG_CTRL) <= 0 or not ekf.drag_buffer_exists:
@@ -104,7 +104,7 @@ def control_drag_fusion(ekf, params):
         _fuse_drag(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_drag(ekf, params):
     aid, drag = ekf.aid.drag, ekf.drag
     using_mcoef = params.EKF2_MCOEF > 0.001

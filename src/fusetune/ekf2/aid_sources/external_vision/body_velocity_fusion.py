@@ -4,22 +4,21 @@ h = Rᵀ v; with the attitude error in the NED frame ∂h/∂θ = Rᵀ [v]× and
 first state, while innovations and their variances follow the updates. Mirrors PX4 v1.16 `fuseBodyFrameVelocity`.
 """
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
 from fusetune.ekf2.state import ATTITUDE, VELOCITY
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_body_velocity(ekf, axis):
     """Velocity (m/s) along one body axis."""
     R, v = ekf.R_to_earth, ekf.vel
     return R[0, axis] * v[0] + R[1, axis] * v[1] + R[2, axis] * v[2]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_body_velocity_jacobian(ekf, jacobian):
     """Write, for each body axis, the derivatives by attitude error and velocity, shape (3, 6)."""
     R, v = ekf.R_to_earth, ekf.vel
@@ -33,14 +32,14 @@ def compute_body_velocity_jacobian(ekf, jacobian):
         jacobian[axis, 5] = rz
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _load_jacobian(jacobian, axis, H):
     for i in range(3):
         H[ATTITUDE + i] = jacobian[axis, i]
         H[VELOCITY + i] = jacobian[axis, 3 + i]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_body_frame_velocity(ekf, params, aid, time_us, measurement, variance, gate, jacobian):
     """Judge and fuse a body velocity (m/s, FRD); `jacobian` is work space of shape (3, 6)."""
     H, K = ekf.scratch.H, ekf.scratch.K

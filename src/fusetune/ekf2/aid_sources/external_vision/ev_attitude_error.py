@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import (
     quat_multiply,
     quat_normalise,
@@ -18,7 +17,7 @@ FILTER_ALPHA = FILTER_INTERVAL_S / (FILTER_INTERVAL_S + FILTER_TIME_CONSTANT_S)
 """PX4 sets the gain once, from the nominal update interval."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_ev_attitude_error_filter(ekf, ev_reset):
     """Filter the rotation between the vision attitude and the estimate; restart it when vision was reset."""
     error = ekf.scratch.quat_error
@@ -37,7 +36,7 @@ def update_ev_attitude_error_filter(ekf, ev_reset):
         _step_towards(ekf.ev.q_error_filt, error, ekf.scratch.quat_before)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _step_towards(q, target, work):
     """Turn `q` by the fraction `FILTER_ALPHA` of the shortest rotation to `target`."""
     work[0], work[1], work[2], work[3] = q[0], -q[1], -q[2], -q[3]
@@ -50,7 +49,7 @@ def _step_towards(q, target, work):
     quat_multiply(q, work, q)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def refresh_ev_rotation(ekf):
     """Write the matrix of the filtered rotation into `ekf.ev.R_ev_to_ekf`."""
     quat_to_dcm(ekf.ev.q_error_filt, ekf.ev.R_ev_to_ekf)

@@ -3,8 +3,6 @@
 Mirrors PX4 v1.16 `EKF/aid_sources/external_vision/ev_control.cpp`.
 """
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.external_vision.ev_attitude_error import update_ev_attitude_error_filter
 from fusetune.ekf2.aid_sources.external_vision.ev_height_control import control_ev_height_fusion, stop_ev_hgt_fusion
 from fusetune.ekf2.aid_sources.external_vision.ev_position_control import control_ev_pos_fusion, stop_ev_pos_fusion
@@ -13,11 +11,12 @@ from fusetune.ekf2.aid_sources.external_vision.ev_yaw_control import control_ev_
 from fusetune.ekf2.bias_estimator.height_bias_estimator import predict_height_bias
 from fusetune.ekf2.bias_estimator.position_bias_estimator import predict_position_bias
 from fusetune.ekf2.core_memory import HEIGHT_REF_EV, POSITION_REF_EV
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_UNKNOWN
 from fusetune.ekf2.timing import EV_MAX_INTERVAL, is_newer_than_latest, is_timed_out
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _assume_missing_frames(sample):
     """Of a sample without position or velocity PX4 takes the frame to be local FRD or body FRD."""
     if sample.pos_frame == EV_FRAME_UNKNOWN:
@@ -26,7 +25,7 @@ def _assume_missing_frames(sample):
         sample.vel_frame = EV_FRAME_BODY_FRD
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _are_starting_conditions_passing(ekf, minimum_quality):
     """Whether samples come regularly, and this, the one before and the newest are good enough."""
     ev, sample = ekf.ev, ekf.ev_sample
@@ -38,7 +37,7 @@ def _are_starting_conditions_passing(ekf, minimum_quality):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_external_vision_fusion(ekf, params):
     """Use the external vision sample due now, if there is one; stop when none has come for two intervals."""
     ev, sample = ekf.ev, ekf.ev_sample

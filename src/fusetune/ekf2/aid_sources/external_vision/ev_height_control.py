@@ -5,8 +5,6 @@ Mirrors PX4 v1.16 `EKF/aid_sources/external_vision/ev_height_control.cpp`. Heigh
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.external_vision.ev_attitude_error import refresh_ev_rotation
 from fusetune.ekf2.aid_sources.external_vision.ev_memory import (
     EV_CTRL_VEL,
@@ -26,6 +24,7 @@ from fusetune.ekf2.bias_estimator.bias_estimator import (
 from fusetune.ekf2.bias_estimator.height_bias_estimator import fuse_height_bias
 from fusetune.ekf2.conditions import is_height_reset_required
 from fusetune.ekf2.core_memory import HEIGHT_REF_EV, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.resets import reset_altitude_to, reset_vertical_velocity_to, reset_vertical_velocity_to_zero
 from fusetune.ekf2.sensor_samples import EV_FRAME_BODY_FRD
@@ -35,7 +34,7 @@ from fusetune.ekf2.timing import HGT_FUSION_TIMEOUT_MAX, is_timed_out
 BIAS_NOISE_SPECTRAL_DENSITY = 0.13
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _measured_height(ekf, params):
     """Down position (m) of the IMU by external vision, and its variance."""
     sample = ekf.ev_sample
@@ -53,13 +52,13 @@ def _measured_height(ekf, params):
     return position - rotate(ekf.R_to_earth, 2, px, py, pz), variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _set_bias_to_difference(ekf, measurement):
     """Let the measurement agree with the estimate."""
     set_bias(ekf.ev_hgt_b_est, measurement + ekf.gpos_alt)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_ev_hgt_bias(ekf, measurement, variance):
     bias = ekf.ev_hgt_b_est
     set_max_state_noise(bias, math.sqrt(variance))
@@ -67,7 +66,7 @@ def _fuse_ev_hgt_bias(ekf, measurement, variance):
     fuse_height_bias(ekf, bias, HEIGHT_REF_EV, measurement + ekf.gpos_alt, variance + ekf.P[POSITION + 2, POSITION + 2])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_ev_height_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the height of external vision for one sample."""
     bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
@@ -93,13 +92,13 @@ def control_ev_height_fusion(ekf, params, common_starting_conditions_passing, ev
         _start_ev_hgt(ekf, params, measurement, variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_height_to_ev(ekf, params, measurement, variance):
     ekf.events.reset_hgt_to_ev = True
     reset_altitude_to(ekf, params, -measurement, variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_sufficient):
     bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
     if ev_reset:
@@ -127,7 +126,7 @@ def _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_suffi
         stop_ev_hgt_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_vertical_velocity(ekf, params):
     """To that of external vision where it is to be used, else to rest."""
     sample, R = ekf.ev_sample, ekf.R_to_earth
@@ -147,7 +146,7 @@ def _reset_vertical_velocity(ekf, params):
     reset_vertical_velocity_to(ekf, params, velocity, max(variance, min_variance))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_ev_hgt(ekf, params, measurement, variance):
     if int(params.EKF2_HGT_REF) == HEIGHT_REF_EV:
         _reset_height_to_ev(ekf, params, measurement, variance)
@@ -160,7 +159,7 @@ def _start_ev_hgt(ekf, params, measurement, variance):
     ekf.cs.ev_hgt = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_ev_hgt_fusion(ekf):
     """Leave external vision as height source, and as height reference."""
     if ekf.cs.ev_hgt:

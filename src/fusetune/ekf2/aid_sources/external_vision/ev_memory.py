@@ -1,8 +1,8 @@
 """What the external vision aid sources remember between updates, and the bits of `EKF2_EV_CTRL`."""
 
 import numpy as np
-from numba import njit
 
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.sensor_samples import EV_SAMPLE
 
 EV_MEMORY = np.dtype(
@@ -36,7 +36,7 @@ RESETS_AVAILABLE_AT_START = 5
 MIN_NOISE = 0.01
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_ev_memory(ev):
     """Forget everything; vision and NED frame are taken to agree."""
     ev.prev.time_us = 0
@@ -53,13 +53,13 @@ def initialise_ev_memory(ev):
     ev.nb_yaw_reset_available = 0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_yaw_alignment_changed(ekf):
     """Whether the yaw that vision positions and velocities refer to was newly aligned in this update."""
     return (not ekf.cs_prev.ev_yaw and ekf.cs.ev_yaw) or (ekf.cs_prev.yaw_align != ekf.cs.yaw_align)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sensor_offset_body(params):
     """Position (m, FRD) of the vision sensor relative to the IMU."""
     return (
@@ -69,7 +69,7 @@ def sensor_offset_body(params):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sensor_velocity_body(ekf, params):
     """Velocity (m/s, FRD) of the vision sensor relative to the IMU, from the vehicle's rotation."""
     imu = ekf.imu_delayed
@@ -80,13 +80,13 @@ def sensor_velocity_body(ekf, params):
     return wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rotate(R, axis, x, y, z):
     """Component `axis` of R (x, y, z)."""
     return R[axis, 0] * x + R[axis, 1] * y + R[axis, 2] * z
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rotate_variance(R, axis, variance):
     """Variance of component `axis` of a vector with independent components, after rotation by `R`."""
     return (

@@ -9,7 +9,6 @@ Mirrors PX4 v1.16 `EKF/aid_sources/external_vision/ev_pos_control.cpp`.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.aid_sources.external_vision.ev_attitude_error import refresh_ev_rotation
@@ -30,6 +29,7 @@ from fusetune.ekf2.bias_estimator.position_bias_estimator import (
 )
 from fusetune.ekf2.conditions import is_other_source_of_horizontal_aiding_than
 from fusetune.ekf2.core_memory import POSITION_REF_EV
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.local_origin import get_local_horizontal_position
 from fusetune.ekf2.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.resets import reset_local_horizontal_position_to
@@ -40,7 +40,7 @@ from fusetune.ekf2.timing import NO_AID_TIMEOUT_MAX, is_timed_out
 BIAS_NOISE_SPECTRAL_DENSITY = 0.13
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _position_in_ekf_frame(ekf, params, axis):
     """One axis of the measured position (m) of the IMU and its variance, in the frame of the estimate.
 
@@ -68,7 +68,7 @@ def _position_in_ekf_frame(ekf, params, axis):
     return position - rotate(ekf.R_to_earth, axis, px, py, pz), variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _select_bias_fusion(ekf):
     """Estimate the bias of vision where GNSS position is the reference; return whether the frame is usable."""
     frame, estimator = ekf.ev_sample.pos_frame, ekf.ev_pos_b_est
@@ -83,7 +83,7 @@ def _select_bias_fusion(ekf):
     return frame == EV_FRAME_FRD
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_ev_pos(ekf, params, north, east, var_north, var_east):
     """Judge the position with its bias taken off."""
     aid, bias = ekf.aid.ev_pos, ekf.ev_pos_b_est
@@ -102,14 +102,14 @@ def _update_ev_pos(ekf, params, north, east, var_north, var_east):
     update_aid_source_status(ekf, aid, 2, ekf.ev_sample.time_us, max(params.EKF2_EVP_GATE, 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _set_bias_to_difference(ekf, north, east):
     """Let the measurement agree with the estimate."""
     estimate_north, estimate_east = get_local_horizontal_position(ekf)
     set_position_bias(ekf.ev_pos_b_est, north - estimate_north, east - estimate_east)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_ev_pos_bias(ekf, north, east, var_north, var_east):
     estimate_north, estimate_east = get_local_horizontal_position(ekf)
     set_position_bias_noise(ekf.ev_pos_b_est, BIAS_NOISE_SPECTRAL_DENSITY, math.sqrt(var_north), math.sqrt(var_east))
@@ -124,14 +124,14 @@ def _fuse_ev_pos_bias(ekf, north, east, var_north, var_east):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_position_to_ev(ekf, params, north, east, var_north, var_east):
     ekf.events.reset_pos_to_vision = True
     reset_local_horizontal_position_to(ekf, params, north, east, var_north, var_east)
     reset_position_bias(ekf.ev_pos_b_est)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_ev_pos_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the horizontal position of external vision for one sample."""
     sample, estimator = ekf.ev_sample, ekf.ev_pos_b_est
@@ -173,7 +173,7 @@ def control_ev_pos_fusion(ekf, params, common_starting_conditions_passing, ev_re
         _start_ev_pos_fusion(ekf, params, north, east, var_north, var_east)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_ev_pos_fusion(ekf, params, north, east, var_north, var_east):
     if ekf.cs.gnss_pos:
         _set_bias_to_difference(ekf, north, east)
@@ -186,7 +186,7 @@ def _start_ev_pos_fusion(ekf, params, north, east, var_north, var_east):
     ekf.cs.ev_pos = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_ev_pos_fusion(ekf, params, north, east, var_north, var_east, quality_sufficient, reset):
     aid = ekf.aid.ev_pos
     if reset:
@@ -210,7 +210,7 @@ def _update_ev_pos_fusion(ekf, params, north, east, var_north, var_east, quality
             stop_ev_pos_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _recover_ev_pos(ekf, params, north, east, var_north, var_east):
     """Fusion has failed for too long though the data seem good: reset the bias or the position."""
     bias = ekf.ev_pos_b_est
@@ -234,7 +234,7 @@ def _recover_ev_pos(ekf, params, north, east, var_north, var_east):
         ekf.ev.nb_pos_reset_available -= 1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_ev_pos_fusion(ekf):
     """Leave external vision as horizontal position source."""
     ekf.cs.ev_pos = False

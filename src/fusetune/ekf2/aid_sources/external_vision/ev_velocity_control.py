@@ -8,7 +8,6 @@ component of the measurement as vertical velocity, in the body frame, too.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -31,6 +30,7 @@ from fusetune.ekf2.conditions import (
     is_horizontal_aiding_active,
     is_only_active_source_of_horizontal_aiding,
 )
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import reset_velocity_to, reset_vertical_velocity_to
 from fusetune.ekf2.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_NED
 from fusetune.ekf2.state import VELOCITY
@@ -44,7 +44,7 @@ BODY_RESET_VARIANCE_FACTOR = 5.0
 START_GATE_FACTOR = math.sqrt(10.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _prepare_measurement(ekf, params):
     """Refer the velocity to the IMU, in the frame in which it is fused; NaN while that frame is not aligned."""
     sample, ev, R = ekf.ev_sample, ekf.ev, ekf.R_to_earth
@@ -72,7 +72,7 @@ def _prepare_measurement(ekf, params):
         ev.vel_measurement_var[i] = max(ev.vel_measurement_var[i], min_variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_measurement_valid(ekf, params):
     sample, ev = ekf.ev_sample, ekf.ev
     speed_squared = 0.0
@@ -83,7 +83,7 @@ def _is_measurement_valid(ekf, params):
     return speed_squared <= params.EKF2_VEL_LIM * params.EKF2_VEL_LIM
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_ev_velocity(ekf, params, gate):
     aid, ev = ekf.aid.ev_vel, ekf.ev
     if ekf.ev_sample.vel_frame == EV_FRAME_BODY_FRD:
@@ -107,7 +107,7 @@ def _fuse_ev_velocity(ekf, params, gate):
     return aid.fused
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_velocity_to_ev(ekf, params):
     ev, R = ekf.ev, ekf.R_to_earth
     ekf.events.reset_vel_to_vision = True
@@ -123,7 +123,7 @@ def _reset_velocity_to_ev(ekf, params):
     reset_aid_source_status_zero_innovation(ekf, ekf.aid.ev_vel, 3)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continue_ev_vel(ekf, params, ev_reset, quality_sufficient, yaw_alignment_changed, gate):
     aid, ev = ekf.aid.ev_vel, ekf.ev
     if (ev_reset and is_only_active_source_of_horizontal_aiding(ekf, ekf.cs.ev_vel)) or yaw_alignment_changed:
@@ -147,7 +147,7 @@ def _continue_ev_vel(ekf, params, ev_reset, quality_sufficient, yaw_alignment_ch
         reset_vertical_velocity_to(ekf, params, ev.vel_measurement[2], ev.vel_measurement_var[2])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_ev_vel(ekf, params, yaw_alignment_changed, gate):
     aiding = is_horizontal_aiding_active(ekf)
     if not aiding or yaw_alignment_changed:
@@ -160,7 +160,7 @@ def _start_ev_vel(ekf, params, yaw_alignment_changed, gate):
         ekf.events.starting_vision_vel_fusion = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_ev_vel_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the velocity of external vision for one sample."""
     _prepare_measurement(ekf, params)
@@ -178,7 +178,7 @@ def control_ev_vel_fusion(ekf, params, common_starting_conditions_passing, ev_re
         _start_ev_vel(ekf, params, yaw_alignment_changed, gate)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_ev_vel_fusion(ekf):
     """Leave external vision as velocity source."""
     ekf.cs.ev_vel = False

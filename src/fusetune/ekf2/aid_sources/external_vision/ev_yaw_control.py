@@ -9,10 +9,9 @@ observation variance as it stands, not squared.
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.aid_sources.external_vision.ev_memory import EV_CTRL_YAW, MIN_NOISE, RESETS_AVAILABLE_AT_START
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import reset_quat_state_yaw
 from fusetune.ekf2.rotations import euler_yaw, quat_to_dcm, wrap_pi
 from fusetune.ekf2.sensor_samples import EV_FRAME_FRD, EV_FRAME_NED
@@ -22,7 +21,7 @@ from fusetune.ekf2.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw
 RESTART_INTERVAL_US = 1_000_000
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_ev_yaw_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the yaw of external vision for one sample."""
     sample, aid = ekf.ev_sample, ekf.aid.ev_yaw
@@ -53,7 +52,7 @@ def control_ev_yaw_fusion(ekf, params, common_starting_conditions_passing, ev_re
         _start_ev_yaw(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_ev_yaw(ekf, params):
     R = ekf.scratch.R
     quat_to_dcm(ekf.ev_sample.quat, R)
@@ -65,14 +64,14 @@ def _update_ev_yaw(ekf, params):
     update_aid_source_status(ekf, ekf.aid.ev_yaw, 1, ekf.ev_sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_yaw_to_ev(ekf, params):
     aid = ekf.aid.ev_yaw
     reset_quat_state_yaw(ekf, params, aid.observation[0], aid.observation_variance[0])
     aid.time_last_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continue_ev_yaw(ekf, params, ev_reset, quality_sufficient):
     aid = ekf.aid.ev_yaw
     if ev_reset:
@@ -94,7 +93,7 @@ def _continue_ev_yaw(ekf, params, ev_reset, quality_sufficient):
             stop_ev_yaw_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_ev_yaw(ekf, params):
     frame = ekf.ev_sample.pos_frame
     if frame == EV_FRAME_NED:
@@ -113,7 +112,7 @@ def _start_ev_yaw(ekf, params):
         ekf.ev.nb_yaw_reset_available = RESETS_AVAILABLE_AT_START
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_ev_yaw_fusion(ekf):
     """Leave external vision as yaw source."""
     ekf.cs.ev_yaw = False

@@ -1,9 +1,9 @@
 """Where the GNSS antenna sits relative to the IMU."""
 
-from numba import njit
+from fusetune.ekf2.kernel import kernel
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def antenna_offset_body(params):
     """Vector (m, FRD) from the IMU to the antenna."""
     return (
@@ -13,7 +13,7 @@ def antenna_offset_body(params):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rotate_to_earth(R, x, y, z):
     """Body vector in NED, by the rotation matrix `R`."""
     return (

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.geodesy import project
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import is_timed_out
 
 DRIFT_TIME_CONSTANT_S = 10.0
@@ -28,7 +28,7 @@ MIN_PASSING_TIME_US = 1_000_000
 ) = (1 << bit for bit in range(10))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def check_gnss_sample(ekf, params, sample):
     """Run the checks on a new sample; return whether it may be used.
 
@@ -48,7 +48,7 @@ def check_gnss_sample(ekf, params, sample):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def run_gnss_checks(ekf, params, sample):
     """Judge one sample by the enabled checks and note the time of success or failure."""
     gnss = ekf.gnss
@@ -68,7 +68,7 @@ def run_gnss_checks(ekf, params, sample):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _check_reported_quality(fail, params, sample):
     fail.spoofed = sample.spoofed
     fail.fix = sample.fix_type < MIN_FIX_TYPE
@@ -79,7 +79,7 @@ def _check_reported_quality(fail, params, sample):
     fail.sacc = sample.sacc > params.EKF2_REQ_SACC
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _check_drift(ekf, params, sample):
     """Drift is known at rest on the ground only; it counts as passed in the air, and keeps its result in between."""
     gnss = ekf.gnss
@@ -94,7 +94,7 @@ def _check_drift(ekf, params, sample):
     _reset_drift_filters(gnss)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _filter_drift(gnss, params, sample):
     dt = min(max((sample.time_us - gnss.prev_time_us) * 1e-6, MIN_DT_S), DRIFT_TIME_CONSTANT_S)
     coefficient = dt / DRIFT_TIME_CONSTANT_S
@@ -124,7 +124,7 @@ def _filter_drift(gnss, params, sample):
     gnss.fail.vspeed = abs(gnss.vel_d_filt) > vdrift
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_drift_filters(gnss):
     gnss.vel_ne_filt[:] = 0.0
     gnss.vel_d_filt = 0.0
@@ -134,7 +134,7 @@ def _reset_drift_filters(gnss):
     gnss.filtered_horizontal_velocity = np.nan
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _check_speed_limit(fail, params, sample):
     """No vehicle moves faster than EKF2_VEL_LIM."""
     if math.hypot(sample.vel[0], sample.vel[1]) > params.EKF2_VEL_LIM:
@@ -143,7 +143,7 @@ def _check_speed_limit(fail, params, sample):
         fail.vspeed = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _any_enabled_check_fails(fail, mask):
     return (
         fail.fix
@@ -160,11 +160,11 @@ def _any_enabled_check_fails(fail, mask):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _low_pass(state, value, coefficient):
     return value * coefficient + state * (1.0 - coefficient)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _limited(value, limit):
     return min(max(value, -limit), limit)

@@ -1,7 +1,5 @@
 """What GNSS does at each update: checks, yaw estimator, heading, velocity and position, in the order of PX4 v1.16."""
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.gnss.gnss_checks import check_gnss_sample
 from fusetune.ekf2.aid_sources.gnss.gnss_height_control import stop_gps_hgt_fusion
 from fusetune.ekf2.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS
@@ -21,6 +19,7 @@ from fusetune.ekf2.aid_sources.gnss.yaw_emergency import (
     is_yaw_failure,
     try_yaw_emergency_reset,
 )
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import GNSS_MAX_INTERVAL, RESET_TIMEOUT_MAX, is_newer_than_latest, is_recent, is_timed_out
 from fusetune.ekf2.yaw_estimator.gaussian_sum import predict_gsf
 from fusetune.ekf2.yaw_estimator.gsf_memory import reset_gsf, set_gyro_bias
@@ -29,7 +28,7 @@ YAW_EMERGENCY_DELAY = 1_000_000
 """How long (µs) horizontal velocity must have been rejected before the yaw is blamed."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_gnss_fusion(ekf, params):
     """Run GNSS for one update, with the sample in `ekf.gnss_sample` if `ekf.gnss_data_ready`.
 
@@ -60,12 +59,12 @@ def control_gnss_fusion(ekf, params):
         control_gnss_pos_fusion(ekf, params, force_reset)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _uses_gnss(ekf):
     return ekf.cs.gnss_vel or ekf.cs.gnss_pos
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _run_yaw_estimator(ekf):
     inhibited = ekf.gyro_bias_inhibit[0] or ekf.gyro_bias_inhibit[1] or ekf.gyro_bias_inhibit[2]
     if not inhibited:
@@ -73,7 +72,7 @@ def _run_yaw_estimator(ekf):
     predict_gsf(ekf.gsf, ekf.imu_delayed, ekf.cs.in_air and not ekf.cs.vehicle_at_rest)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_reset_due(ekf, params):
     """Whether velocity and position are to be reset; decided once for both, since resetting one would hide the need.
 
@@ -92,7 +91,7 @@ def _is_reset_due(ekf, params):
     return due
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def should_reset_gnss_fusion(ekf, params):
     """Whether nothing has bounded the horizontal drift for 7 s, or no position has for 14 s."""
     pos_timed_out = is_timed_out(ekf, ekf.time_last_hor_pos_fuse, RESET_TIMEOUT_MAX)
@@ -115,7 +114,7 @@ def should_reset_gnss_fusion(ekf, params):
     return aiding_timed_out or position_lost or failing_since_take_off
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_gnss_fusion(ekf):
     """Stop everything that GNSS gives."""
     if _uses_gnss(ekf):

@@ -2,8 +2,6 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import reset_aid_source_status_zero_innovation
 from fusetune.ekf2.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
 from fusetune.ekf2.aid_sources.gnss.gnss_memory import GPS_CTRL_VPOS
@@ -16,6 +14,7 @@ from fusetune.ekf2.bias_estimator.bias_estimator import (
 from fusetune.ekf2.bias_estimator.height_bias_estimator import fuse_height_bias, predict_height_bias
 from fusetune.ekf2.conditions import is_height_reset_required, is_only_active_source_of_vertical_position_aiding
 from fusetune.ekf2.core_memory import HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.origin_resets import initialise_altitude_to
 from fusetune.ekf2.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.resets import reset_altitude_to
@@ -27,7 +26,7 @@ HEIGHT_BIAS_NOISE_DENSITY = 0.13
 """Random walk of the height bias (m/√Hz/s)."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_gnss_height_fusion(ekf, params):
     """Run GNSS height for one update, with the sample in `ekf.gnss_sample` if `ekf.gnss_data_ready`."""
     predict_height_bias(ekf, ekf.gps_hgt_b_est, HEIGHT_REF_GNSS, ekf.dt_ekf_avg)
@@ -37,7 +36,7 @@ def control_gnss_height_fusion(ekf, params):
         stop_gps_hgt_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _use_gnss_height(ekf, params, sample):
     aid = ekf.aid.gnss_hgt
     bias_est = ekf.gps_hgt_b_est
@@ -81,7 +80,7 @@ def _use_gnss_height(ekf, params, sample):
         stop_gps_hgt_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continue_gnss_height(ekf, params, measurement, variance):
     aid = ekf.aid.gnss_hgt
     fuse_vertical_position(ekf, params, aid)
@@ -97,7 +96,7 @@ def _continue_gnss_height(ekf, params, measurement, variance):
         stop_gps_hgt_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_gnss_height(ekf, params, measurement, variance, may_start, may_initialise):
     """Start fusing GNSS height, or at least let it set the altitude of the origin if it is to be the reference."""
     aid = ekf.aid.gnss_hgt
@@ -122,7 +121,7 @@ def _start_gnss_height(ekf, params, measurement, variance, may_start, may_initia
         reset_bias(bias_est)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_gps_hgt_fusion(ekf):
     """Stop fusing GNSS height."""
     if ekf.cs.gps_hgt:

@@ -1,7 +1,8 @@
 """What the GNSS aid source remembers between updates."""
 
 import numpy as np
-from numba import njit
+
+from fusetune.ekf2.kernel import kernel
 
 GNSS_CHECK_NAMES = (
     "fix",
@@ -49,7 +50,7 @@ GPS_CTRL_HPOS, GPS_CTRL_VPOS, GPS_CTRL_VEL, GPS_CTRL_YAW = 1, 2, 4, 8
 """Bits of EKF2_GPS_CTRL."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_gnss_memory(gnss):
     """State before the first sample."""
     fail = gnss.fail

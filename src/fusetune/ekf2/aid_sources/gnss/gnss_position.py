@@ -2,8 +2,6 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -12,7 +10,8 @@ from fusetune.ekf2.aid_source_status import (
 from fusetune.ekf2.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
 from fusetune.ekf2.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS
 from fusetune.ekf2.conditions import is_other_source_of_horizontal_aiding_than
-from fusetune.ekf2.geodesy import lat_lon_alt_difference, lat_lon_alt_plus
+from fusetune.ekf2.geodesy import add_to_lat_lon, lat_lon_difference
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.origin_resets import reset_lat_lon_to
 from fusetune.ekf2.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.state import POSITION
@@ -20,16 +19,16 @@ from fusetune.ekf2.state import POSITION
 MIN_NOISE = 0.01
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_gnss_position(ekf, params, sample):
     """Judge a position sample, moved from the antenna to the IMU; its observation is latitude and longitude (deg)."""
     aid = ekf.aid.gnss_pos
     x, y, z = antenna_offset_body(params)
-    offset_n, offset_e, offset_d = rotate_to_earth(ekf.R_to_earth, x, y, z)
-    lat, lon, alt = lat_lon_alt_plus(
-        math.radians(sample.lat_deg), math.radians(sample.lon_deg), sample.alt, -offset_n, -offset_e, -offset_d
+    offset_n, offset_e, _ = rotate_to_earth(ekf.R_to_earth, x, y, z)
+    lat, lon = add_to_lat_lon(
+        math.radians(sample.lat_deg), math.radians(sample.lon_deg), sample.alt, -offset_n, -offset_e
     )
-    innovation_n, innovation_e, _ = lat_lon_alt_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, lat, lon, alt)
+    innovation_n, innovation_e = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, lat, lon)
 
     noise = max(sample.hacc, params.EKF2_GPS_P_NOISE)
     # as the only thing that bounds attitude errors, the position must keep some weight
@@ -41,7 +40,7 @@ def update_gnss_position(ekf, params, sample):
     update_aid_source_status(ekf, aid, 2, sample.time_us, max(params.EKF2_GPS_P_GATE, 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_gnss_pos_fusion(ekf, params, force_reset):
     """Start, continue or stop fusing GNSS position with the sample just judged; the first good one sets the origin."""
     aid = ekf.aid.gnss_pos
@@ -62,7 +61,7 @@ def control_gnss_pos_fusion(ekf, params, force_reset):
         reset_horizontal_position_to_gnss(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_horizontal_position_to_gnss(ekf, params):
     """Set the position to the last GNSS position; both axes get the sum of the two variances."""
     ekf.events.reset_pos_to_gps = True
@@ -77,7 +76,7 @@ def reset_horizontal_position_to_gnss(ekf, params):
     reset_aid_source_status_zero_innovation(ekf, aid, 2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_gnss_pos_fusion(ekf):
     """Stop fusing position; with velocity stopped, too, the quality checks start anew."""
     if ekf.cs.gnss_pos:

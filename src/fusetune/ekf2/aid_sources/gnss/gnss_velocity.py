@@ -2,8 +2,6 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -12,6 +10,7 @@ from fusetune.ekf2.aid_source_status import (
 from fusetune.ekf2.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
 from fusetune.ekf2.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL
 from fusetune.ekf2.conditions import is_height_reset_required, is_horizontal_aiding_active
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import reset_velocity_to, reset_vertical_velocity_to
 from fusetune.ekf2.state import VELOCITY
 from fusetune.ekf2.timing import RESET_TIMEOUT_MAX, is_timed_out
@@ -21,7 +20,7 @@ MIN_NOISE = 0.01
 VERTICAL_NOISE_RATIO = 1.5
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_gnss_velocity(ekf, params, sample):
     """Judge a velocity sample, moved from the antenna to the IMU."""
     aid = ekf.aid.gnss_vel
@@ -41,7 +40,7 @@ def update_gnss_velocity(ekf, params, sample):
         aid.innovation_rejected = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _velocity_of_antenna_offset(ekf, params):
     """Velocity (m/s, NED) of the antenna relative to the IMU, from the rotation rate."""
     x, y, z = antenna_offset_body(params)
@@ -54,13 +53,13 @@ def _velocity_of_antenna_offset(ekf, params):
     return rotate_to_earth(ekf.R_to_earth, q * z - r * y, r * x - p * z, p * y - q * x)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _set_velocity_axis(ekf, aid, axis, velocity, variance):
     index = VELOCITY + axis
     set_axis(aid, axis, velocity, variance, ekf.vel[axis] - velocity, ekf.P[index, index] + variance)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_gnss_vel_fusion(ekf, params, force_reset):
     """Start, continue or stop fusing GNSS velocity with the sample that has just been judged."""
     aid = ekf.aid.gnss_vel
@@ -87,7 +86,7 @@ def control_gnss_vel_fusion(ekf, params, force_reset):
         ekf.cs.gnss_vel = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_velocity_to_gnss(ekf, params):
     """Set the velocity to the last GNSS velocity."""
     ekf.events.reset_vel_to_gps = True
@@ -96,7 +95,7 @@ def reset_velocity_to_gnss(ekf, params):
     reset_aid_source_status_zero_innovation(ekf, aid, 3)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_gnss_vel_fusion(ekf):
     """Stop fusing velocity; with position stopped, too, the quality checks start anew."""
     if ekf.cs.gnss_vel:

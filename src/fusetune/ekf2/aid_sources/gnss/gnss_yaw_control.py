@@ -7,7 +7,6 @@ v = R a in NED, the observed yaw is atan2(v_e, v_n). An attitude error δθ (NED
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -18,6 +17,7 @@ from fusetune.ekf2.aid_sources.gnss.antenna_offset import rotate_to_earth
 from fusetune.ekf2.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW
 from fusetune.ekf2.conditions import is_north_east_aiding_active
 from fusetune.ekf2.covariance import initialise_covariance, reset_gyro_bias_z_cov
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.resets import reset_quat_state_yaw
 from fusetune.ekf2.rotations import wrap_pi
@@ -33,7 +33,7 @@ GYRO_BIAS_RESET_INTERVAL = 1_000_000
 SINGLE_PRECISION_EPSILON = 1.1920929e-07
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_gnss_yaw(R, yaw_offset, H):
     """Predicted antenna yaw (rad); its derivative by the attitude error goes into `H[0:3]`, the rest is zeroed."""
     v_n, v_e, v_d = rotate_to_earth(R, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
@@ -47,7 +47,7 @@ def predict_gnss_yaw(R, yaw_offset, H):
     return math.atan2(v_e, v_n)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def gnss_yaw_innovation_variance(P, H, R):
     """H P Hᵀ + R of a row `H` that is nonzero for the attitude only."""
     variance = R
@@ -57,7 +57,7 @@ def gnss_yaw_innovation_variance(P, H, R):
     return variance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_gnss_yaw_fusion(ekf, params, sample):
     """Start, continue or stop fusing the heading of a GNSS sample."""
     if int(params.EKF2_GPS_CTRL) & GPS_CTRL_YAW == 0 or ekf.cs.gnss_yaw_fault:
@@ -85,7 +85,7 @@ def control_gnss_yaw_fusion(ekf, params, sample):
         _start_gnss_yaw(ekf, params, sample)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continue_gnss_yaw(ekf, params, sample):
     fuse_gnss_yaw(ekf, params, sample.yaw_offset)
     if is_timed_out(ekf, ekf.aid.gnss_yaw.time_last_fuse, RESET_TIMEOUT_MAX):
@@ -95,7 +95,7 @@ def _continue_gnss_yaw(ekf, params, sample):
             ekf.cs.yaw_align = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_gnss_yaw(ekf, params, sample):
     if not ekf.cs.in_air or not ekf.cs.yaw_align or not is_north_east_aiding_active(ekf):
         if reset_yaw_to_gnss(ekf, params, sample.yaw, sample.yaw_offset):
@@ -108,7 +108,7 @@ def _start_gnss_yaw(ekf, params, sample):
         fuse_gnss_yaw(ekf, params, sample.yaw_offset)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_gnss_yaw(ekf, params, sample):
     """Judge the heading of a sample; the observation is the yaw of the antenna baseline."""
     aid = ekf.aid.gnss_yaw
@@ -128,7 +128,7 @@ def update_gnss_yaw(ekf, params, sample):
     update_aid_source_status(ekf, aid, 1, sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_gnss_yaw(ekf, params, yaw_offset):
     """Fuse the heading that has been judged."""
     aid = ekf.aid.gnss_yaw
@@ -164,7 +164,7 @@ def fuse_gnss_yaw(ekf, params, yaw_offset):
     ekf.time_last_heading_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_yaw_to_gnss(ekf, params, yaw, yaw_offset):
     """Set the yaw to the receiver's heading, unless the antenna baseline is within 30° of the vertical."""
     _, _, v_d = rotate_to_earth(ekf.R_to_earth, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
@@ -174,7 +174,7 @@ def reset_yaw_to_gnss(ekf, params, yaw, yaw_offset):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_gnss_yaw_fusion(ekf):
     """Stop fusing the GNSS heading."""
     ekf.cs.gnss_yaw = False

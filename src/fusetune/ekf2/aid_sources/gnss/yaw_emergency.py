@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, GPS_CTRL_VEL
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import reset_quat_state_yaw
 from fusetune.ekf2.rotations import euler_yaw, wrap_pi
 from fusetune.ekf2.yaw_estimator.gaussian_sum import fuse_gsf_velocity
@@ -16,14 +16,14 @@ CONVERGED_YAW_DEVIATION = 0.262
 YAW_FAILURE = math.radians(25.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_yaw_emergency_estimate_available(ekf):
     """Whether the yaw estimator has converged."""
     variance = ekf.gsf.yaw_variance
     return ekf.gsf.vel_fuse_started and 0.0 < variance < CONVERGED_YAW_DEVIATION * CONVERGED_YAW_DEVIATION
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_yaw_failure(ekf):
     """Whether the filter's yaw is off the converged yaw estimator's by more than 25°."""
     if not is_yaw_emergency_estimate_available(ekf):
@@ -31,7 +31,7 @@ def is_yaw_failure(ekf):
     return abs(wrap_pi(euler_yaw(ekf.R_to_earth) - ekf.gsf.yaw)) > YAW_FAILURE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_yaw_to_ekf_gsf(ekf, params):
     """Set the yaw to the yaw estimator's, if that has converged and the yaw was not reset in this update already."""
     if not is_yaw_emergency_estimate_available(ekf):
@@ -44,7 +44,7 @@ def reset_yaw_to_ekf_gsf(ekf, params):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def try_yaw_emergency_reset(ekf, params):
     """Put the yaw right in flight; the heading source that led it astray counts as faulty from then on."""
     if not reset_yaw_to_ekf_gsf(ekf, params):
@@ -58,7 +58,7 @@ def try_yaw_emergency_reset(ekf, params):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_gnss_yaw_estimator(ekf, params):
     """Give the last GNSS velocity to the yaw estimator, and align the yaw by it where nothing else has."""
     aid = ekf.aid.gnss_vel

@@ -10,10 +10,10 @@ every update, even while its flag is off; the axes are fused one after the other
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.conditions import IMU_CTRL_GRAVITY_VECTOR, is_horizontal_aiding_active
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import clear_jacobian, compute_kalman_gain
 from fusetune.ekf2.state import ATTITUDE
@@ -28,7 +28,7 @@ GRAVITY_GATE = 0.25
 MIN_NOISE = 0.01
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_gravity_jacobian(ekf, jacobian):
     """Write the derivative of each body axis of the up vector by the errors about north and east, shape (3, 2)."""
     for axis in range(3):
@@ -36,14 +36,14 @@ def compute_gravity_jacobian(ekf, jacobian):
         jacobian[axis, 1] = ekf.R_to_earth[0, axis]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _innovation_variance(ekf, jacobian, axis, R):
     north, east = jacobian[axis, 0], jacobian[axis, 1]
     P = ekf.P
     return P[0, 0] * north * north + 2.0 * P[0, 1] * north * east + P[1, 1] * east * east + R
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_gravity(ekf, params):
     """Judge the specific force at the fusion time horizon as an observation of the vertical."""
     imu, aid, jacobian = ekf.imu_delayed, ekf.aid.gravity, ekf.gravity.jacobian
@@ -61,7 +61,7 @@ def _update_gravity(ekf, params):
     update_aid_source_status(ekf, aid, 3, imu.time_us, GRAVITY_GATE)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_gravity(ekf, params):
     aid, jacobian, H, K = ekf.aid.gravity, ekf.gravity.jacobian, ekf.scratch.H, ekf.scratch.K
     clear_jacobian(H)
@@ -75,7 +75,7 @@ def _fuse_gravity(ekf, params):
         measurement_update(ekf, params, K, H, aid.observation_variance[axis], aid.innovation[axis])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_gravity_fusion(ekf, params):
     """Hold the tilt to the vertical while the vehicle hardly accelerates and no other source aids horizontally."""
     imu, aid = ekf.imu_delayed, ekf.aid.gravity

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_sources.magnetometer.mag_memory import CHECK_FORCE_WMM, CHECK_INCLINATION, CHECK_STRENGTH
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.rotations import wrap_pi
 
 AVERAGE_STRENGTH = 0.45
@@ -14,13 +14,13 @@ MIN_HEALTH_TIME = 1_000_000
 NORM_FLOOR = 1e-4
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_measured_matching_expected(measured, expected, gate):
     """Whether `measured` lies within `gate` of `expected`."""
     return expected - gate <= measured <= expected + gate
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_strength_wrong(ekf, params):
     """Strength outside EKF2_MAG_CHK_STR of the model or, where there is none, outside what the Earth has anywhere."""
     if np.isfinite(ekf.mag.wmm_strength):
@@ -28,7 +28,7 @@ def is_strength_wrong(ekf, params):
     return not is_measured_matching_expected(ekf.mag.strength, AVERAGE_STRENGTH, AVERAGE_STRENGTH_TOLERANCE)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def check_mag_field(ekf, params, mag_sample):
     """Run the checks of EKF2_MAG_CHECK; True once none failed for more than 1 s.
 

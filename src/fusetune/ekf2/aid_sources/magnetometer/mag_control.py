@@ -6,8 +6,6 @@ was aligned in flight). `cs.mag_3d`: every state. `cs.mag_dec`: declination too,
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -43,6 +41,7 @@ from fusetune.ekf2.aid_sources.magnetometer.world_field import (
 )
 from fusetune.ekf2.conditions import is_north_east_aiding_active
 from fusetune.ekf2.covariance import reset_mag_bias_cov
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.observation_gain import compute_innovation_variance
 from fusetune.ekf2.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.timing import MAG_MAX_INTERVAL, RESET_TIMEOUT_MAX, is_newer_than_latest, is_timed_out
@@ -54,7 +53,7 @@ DECLINATION_VARIANCE_WMM = 0.5
 DECLINATION_VARIANCE = 0.5**2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_mag_fusion(ekf, params):
     """Process the magnetometer sample that reached the fusion time horizon, if any."""
     if ekf.cs.in_air and not ekf.cs_prev.in_air:
@@ -72,7 +71,7 @@ def control_mag_fusion(ekf, params):
         stop_mag_fusion(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _filter_sample(ekf, params):
     """Low-pass the field; start anew at the first sample and when sensor or calibration changed."""
     sample, mag = ekf.mag_sample.mag, ekf.mag
@@ -92,7 +91,7 @@ def _filter_sample(ekf, params):
         ekf.cs.yaw_align = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _control_with_sample(ekf, params, wmm_updated):
     """Judge the sample, choose the mode, then fuse, reset, start or stop."""
     sample, aid = ekf.mag_sample.mag, ekf.aid.mag
@@ -132,7 +131,7 @@ def _control_with_sample(ekf, params, wmm_updated):
             stop_mag_fusion(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _synthesise_z(ekf, params, sample):
     """With EKF2_SYNT_MAG_Z, replace the sample's z by what the model and the other axes leave for it."""
     ekf.cs.synthetic_mag_z = (
@@ -144,7 +143,7 @@ def _synthesise_z(ekf, params, sample):
         sample[2] = synthetic_mag_z(ekf, sample[0], sample[1])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_mag_status(ekf, params, sample, R_mag):
     """Innovations and variances of all axes before any is fused, and their verdict."""
     H = ekf.scratch.H
@@ -155,7 +154,7 @@ def _update_mag_status(ekf, params, sample, R_mag):
     update_aid_source_status(ekf, ekf.aid.mag, 3, ekf.mag_sample.time_us, max(params.EKF2_MAG_GATE, 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continuing_conditions_passing(ekf, params, sample):
     """Enabled, levelled, not waiting for external vision to align yaw, and a field that is a field."""
     enabled = int(params.EKF2_MAG_TYPE) in (MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_INIT)
@@ -169,7 +168,7 @@ def _continuing_conditions_passing(ekf, params, sample):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _may_start(ekf):
     """Enough samples filtered, none missing now, and neither yaw alignment nor yaw changed in this update."""
     return (
@@ -180,7 +179,7 @@ def _may_start(ekf):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _choose_mode(ekf, params, no_ne_aiding_or_not_moving):
     """Set which states the magnetometer may correct."""
     cs = ekf.cs
@@ -200,14 +199,14 @@ def _choose_mode(ekf, params, no_ne_aiding_or_not_moving):
     cs.mag_dec = cs.mag and no_ne_aiding_or_not_moving
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reset_to_filtered(ekf, params, reset_heading):
     """Reset the field states, and yaw if asked, to the filtered measurement."""
     reset_mag_states(ekf, params, ekf.mag.lpf, reset_heading)
     ekf.aid.mag.time_last_fuse = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_sample(ekf, params, sample, R_mag):
     """Fuse the three axes and, where nothing else fixes north, the declination."""
     aid = ekf.aid.mag
@@ -229,7 +228,7 @@ def _fuse_sample(ekf, params, sample, R_mag):
             fuse_declination(ekf, params, 0.0, DECLINATION_VARIANCE, False)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start(ekf, params, sample, R_mag, wmm_updated):
     """Begin fusion: with a reset if the field states (or yaw) are not known, else with a fusion that must succeed."""
     field = ekf.mag_I

@@ -7,9 +7,9 @@ field h = Rᵀ m_I + m_B with H_θ = Rᵀ[m_I]×, H_mI = Rᵀ, H_mB = I; declina
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.covariance import reset_mag_bias_cov, reset_mag_earth_cov, reset_quat_cov
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import compute_innovation_variance, compute_kalman_gain
 from fusetune.ekf2.rotations import wrap_pi
@@ -19,14 +19,14 @@ R_MAG_MIN = 0.01**2
 FLT_EPSILON = float(np.finfo(np.float32).eps)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_mag(ekf, axis):
     """Predicted field (Gauss) along one body axis."""
     R, field = ekf.R_to_earth, ekf.mag_I
     return R[0, axis] * field[0] + R[1, axis] * field[1] + R[2, axis] * field[2] + ekf.mag_B[axis]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_mag_h(ekf, axis, H):
     """Write the observation Jacobian of one body axis into H (24,)."""
     R, field = ekf.R_to_earth, ekf.mag_I
@@ -41,14 +41,14 @@ def compute_mag_h(ekf, axis, H):
     H[MAG_BODY + axis] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def keep_only_mag_gains(K):
     """Let the update move nothing but the field states."""
     K[:MAG_EARTH] = 0.0
     K[MAG_BODY + 3 :] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def recover_from_bad_mag_covariance(ekf, params, update_all_states):
     """The innovation variance fell below the noise: start the covariances that made it anew."""
     if update_all_states:
@@ -57,7 +57,7 @@ def recover_from_bad_mag_covariance(ekf, params, update_all_states):
     reset_mag_bias_cov(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
     """Fuse the axes one after the other, all linearised at the first state; return whether all were fused.
 
@@ -102,7 +102,7 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_declination_h(mag_I, H):
     """Write the Jacobian of declination into H (24,); return the predicted declination (rad).
 
@@ -118,7 +118,7 @@ def compute_declination_h(mag_I, H):
     return math.atan2(east, north)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_declination(ekf, params, declination, R, update_all_states):
     """Fuse a declination (rad) of variance R (rad²) into the earth field states; return whether it was fused."""
     H = ekf.scratch.H

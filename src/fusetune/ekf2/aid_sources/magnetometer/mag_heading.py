@@ -6,10 +6,9 @@ The field's azimuth in the tilt-compensated frame is yaw-independent: with R = R
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.magnetometer.world_field import get_mag_declination
 from fusetune.ekf2.conditions import is_north_east_aiding_active
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import reset_quat_state_yaw
 from fusetune.ekf2.rotations import euler_yaw, wrap_pi
 from fusetune.ekf2.state import MAG_BODY
@@ -18,7 +17,7 @@ HEADING_LPF_ALPHA = 0.1
 YAW_VARIANCE_MIN = 0.01**2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_mag_bias_good(ekf, params):
     """Whether every body-field variance is positive and no larger than the measurement noise allows."""
     P = ekf.P
@@ -27,7 +26,7 @@ def is_mag_bias_good(ekf, params):
     return min(var_x, var_y, var_z) > 0.0 and max(var_x, var_y, var_z) <= variance_limit
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def field_azimuth(ekf, params, mag):
     """Azimuth (rad) of the bias-corrected body-frame field `mag` seen in the estimated earth frame."""
     bx, by, bz = 0.0, 0.0, 0.0
@@ -38,7 +37,7 @@ def field_azimuth(ekf, params, mag):
     return math.atan2(R[1, 0] * x + R[1, 1] * y + R[1, 2] * z, R[0, 0] * x + R[0, 1] * y + R[0, 2] * z)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def check_mag_heading_consistency(ekf, params, mag):
     """Low-pass the heading innovation; consistent once it is small while the vehicle accelerates enough to tell."""
     if ekf.cs.yaw_align:
@@ -55,7 +54,7 @@ def check_mag_heading_consistency(ekf, params, mag):
         ekf.cs.mag_heading_consistent = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_mag_heading(ekf, params, mag):
     """Reset yaw to the heading of the body-frame field `mag` (Gauss), keeping roll and pitch."""
     yaw = euler_yaw(ekf.R_to_earth) - field_azimuth(ekf, params, mag) + get_mag_declination(ekf, params)

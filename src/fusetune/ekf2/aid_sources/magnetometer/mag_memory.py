@@ -1,8 +1,8 @@
 """What the magnetometer aid source remembers between updates."""
 
 import numpy as np
-from numba import njit
 
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import ERROR_STATE_SIZE
 
 MAG_MEMORY = np.dtype(
@@ -37,7 +37,7 @@ CHECK_STRENGTH, CHECK_INCLINATION, CHECK_FORCE_WMM = 1, 2, 4
 """Bits of EKF2_MAG_CHECK."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_mag_memory(mag):
     """Forget everything; the world magnetic model is unknown (NaN) until the origin is known."""
     mag.lpf[:] = 0.0

@@ -2,25 +2,24 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.magnetometer.mag_heading import reset_mag_heading
 from fusetune.ekf2.aid_sources.magnetometer.world_field import is_wmm_field_known
 from fusetune.ekf2.conditions import get_terrain_vpos, is_north_east_aiding_active
 from fusetune.ekf2.covariance import reset_mag_bias_cov, reset_mag_earth_cov
+from fusetune.ekf2.kernel import kernel
 
 EARTH_FIELD_MIN_CHANGE = 0.01
 MAG_ANOMALIES_MAX_HAGL = 1.5
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_mag_body_to_zero(ekf, params):
     """Forget the body field."""
     ekf.mag_B[:] = 0.0
     reset_mag_bias_cov(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def move_earth_field_to(ekf, params, north, east, down):
     """Set the earth field (Gauss) unless it is within 0.01 Gauss already; return whether it moved."""
     distance = math.sqrt((ekf.mag_I[0] - north) ** 2 + (ekf.mag_I[1] - east) ** 2 + (ekf.mag_I[2] - down) ** 2)
@@ -33,7 +32,7 @@ def move_earth_field_to(ekf, params, north, east, down):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_mag_states_to_wmm(ekf, params, mag, reset_heading):
     """Earth field from the world magnetic model; the body field explains the rest of `mag`, unless yaw is reset too."""
     field = ekf.mag.wmm_earth_field
@@ -51,7 +50,7 @@ def reset_mag_states_to_wmm(ekf, params, mag, reset_heading):
         reset_mag_heading(ekf, params, mag)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_mag_states_to_measurement(ekf, params, mag, reset_heading):
     """Earth field from the measurement turned into NED, body field zero."""
     reset_mag_body_to_zero(ekf, params)
@@ -67,7 +66,7 @@ def reset_mag_states_to_measurement(ekf, params, mag, reset_heading):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_mag_states(ekf, params, mag, reset_heading):
     """Reset field states (and yaw, if asked) from the filtered measurement `mag` (body frame, Gauss)."""
     if is_wmm_field_known(ekf):
@@ -79,7 +78,7 @@ def reset_mag_states(ekf, params, mag, reset_heading):
         ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def check_hagl_yaw_reset_req(ekf):
     """Whether the vehicle has just climbed clear (1.5 m) of what disturbs the field near the ground."""
     if not (ekf.cs.in_air and ekf.cs.yaw_align) or ekf.cs.mag_aligned_in_flight:
@@ -87,7 +86,7 @@ def check_hagl_yaw_reset_req(ekf):
     return get_terrain_vpos(ekf) + ekf.gpos_alt > MAG_ANOMALIES_MAX_HAGL
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_mag_fusion(ekf, params):
     """Stop using the magnetometer; yaw stays aligned only if horizontal aiding keeps it observable."""
     if not ekf.cs.mag:

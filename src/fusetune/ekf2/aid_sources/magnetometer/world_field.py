@@ -3,10 +3,10 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_sources.magnetometer.mag_memory import DECLINATION_FROM_WMM, DECLINATION_SAVED
 from fusetune.ekf2.conditions import is_local_horizontal_position_valid
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import is_timed_out
 from fusetune.ekf2.world_magnetic_model import (
     get_mag_declination_degrees,
@@ -19,7 +19,7 @@ WMM_ANGLE_CHANGE = math.radians(1.0)
 WMM_STRENGTH_CHANGE = 0.01
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def earth_field_vector(declination, inclination, strength, field):
     """Write the NED field of given declination, inclination (rad, positive down) and strength into `field`."""
     horizontal = strength * math.cos(inclination)
@@ -28,7 +28,7 @@ def earth_field_vector(declination, inclination, strength, field):
     field[2] = strength * math.sin(inclination)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_wmm_field_known(ekf):
     """Whether the world magnetic model has given a usable field vector."""
     field = ekf.mag.wmm_earth_field
@@ -36,7 +36,7 @@ def is_wmm_field_known(ekf):
     return np.isfinite(squared) and squared > 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_world_magnetic_model(ekf, latitude_deg, longitude_deg):
     """Look the field up at a place; return True when it differs enough (1°, 0.01 Gauss) to replace the known one."""
     declination = math.radians(get_mag_declination_degrees(latitude_deg, longitude_deg))
@@ -63,7 +63,7 @@ def update_world_magnetic_model(ekf, latitude_deg, longitude_deg):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def check_world_magnetic_model(ekf):
     """Look the field up when the origin is newer than the last mag fusion, and every 10 s of valid position."""
     if not ekf.origin.lat_lon_valid:
@@ -78,13 +78,13 @@ def check_world_magnetic_model(ekf):
     return update_world_magnetic_model(ekf, math.degrees(ekf.gpos_lat), math.degrees(ekf.gpos_lon))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def has_wmm_declination(ekf, params):
     """Whether EKF2_DECL_TYPE wants the model's declination and the model knows it."""
     return (int(params.EKF2_DECL_TYPE) & DECLINATION_FROM_WMM) != 0 and np.isfinite(ekf.mag.wmm_declination)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def has_saved_declination(params):
     """Whether EKF2_DECL_TYPE allows the saved declination and one is saved (not 0)."""
     return (
@@ -94,7 +94,7 @@ def has_saved_declination(params):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def get_mag_declination(ekf, params):
     """Declination (rad) for heading: of the earth field state once aligned in flight, else model, parameter, or 0."""
     if ekf.cs.mag_aligned_in_flight:
@@ -106,7 +106,7 @@ def get_mag_declination(ekf, params):
     return 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def synthetic_mag_z(ekf, mag_x, mag_y):
     """Body z field (Gauss) that completes x and y to the model's strength, with the model's sign."""
     field = ekf.mag.wmm_earth_field

@@ -1,8 +1,8 @@
 """What the optical flow aid source remembers between updates."""
 
 import numpy as np
-from numba import njit
 
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.state import ERROR_STATE_SIZE
 
 FLOW_MEMORY = np.dtype(
@@ -27,7 +27,7 @@ velocities from flow (m/s, FRD), compensated rates (rad/s), samples seen since t
 """
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_flow_memory(flow):
     """No sample seen; limits as before the sensor reports its own."""
     flow.max_rate = 1.0

@@ -6,8 +6,6 @@ estimator's sign: positive where the scene turns right-handed, so a flow gyro re
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -29,6 +27,7 @@ from fusetune.ekf2.conditions import (
 from fusetune.ekf2.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.covariance import reset_covariance_block
 from fusetune.ekf2.global_position import single_precision
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.observation_gain import compute_innovation_variance
 from fusetune.ekf2.resets import reset_horizontal_velocity_to, update_terrain_reset_status
 from fusetune.ekf2.state import TERRAIN
@@ -44,7 +43,7 @@ RESTART_INTERVAL_US = 2_000_000
 TERRAIN_VARIANCE_AFTER_RESET = 100.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _complete_gyro_rate(ekf, params):
     """Fill in the gyro rates that the sensor lacks from the IMU, or replace them all if so configured."""
     imu, flow, rate = ekf.imu_delayed, ekf.flow, ekf.flow_sample.gyro_rate
@@ -57,7 +56,7 @@ def _complete_gyro_rate(ekf, params):
             rate[i] = flow.ref_body_rate[i]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_gyro_bias(ekf):
     """Follow the difference between the sensor's gyro and the IMU slowly, whatever its spikes."""
     flow, rate = ekf.flow, ekf.flow_sample.gyro_rate
@@ -66,7 +65,7 @@ def _update_gyro_bias(ekf):
         flow.gyro_bias[i] = (1.0 - GYRO_BIAS_FORGETTING) * flow.gyro_bias[i] + GYRO_BIAS_FORGETTING * difference
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_optical_flow(ekf, params):
     """Judge the sample, and keep the velocity that it amounts to."""
     sample, flow, aid = ekf.flow_sample, ekf.flow, ekf.aid.optical_flow
@@ -86,7 +85,7 @@ def _update_optical_flow(ekf, params):
     _filter_flow_velocity(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _filter_flow_velocity(ekf, params):
     flow = ekf.flow
     distance = predict_flow_range(ekf, params)
@@ -100,7 +99,7 @@ def _filter_flow_velocity(ekf, params):
     flow.counter += 1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_magnitude_good(ekf):
     """Whether flow stays below what the sensor can follow, raw and compensated."""
     raw, compensated = ekf.flow_sample.flow_rate, ekf.flow.rate_compensated
@@ -113,13 +112,13 @@ def _is_magnitude_good(ekf):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_quality_good(ekf, params):
     minimum = params.EKF2_OF_QMIN if ekf.cs.in_air else params.EKF2_OF_QMIN_GND
     return ekf.flow_sample.quality >= minimum
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_optical_flow_fusion(ekf, params):
     """Start, continue, reset or stop optical flow."""
     if not ekf.flow_buffer_exists or int(params.EKF2_OF_CTRL) != 1:
@@ -131,7 +130,7 @@ def control_optical_flow_fusion(ekf, params):
         stop_flow_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _use_flow_sample(ekf, params):
     _complete_gyro_rate(ekf, params)
     _update_gyro_bias(ekf)
@@ -160,13 +159,13 @@ def _use_flow_sample(ekf, params):
         _update_terrain_flag(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_terrain_flag(ekf):
     """Terrain is observable by flow unless the height itself is measured from the ground."""
     ekf.cs.opt_flow_terrain = ekf.cs.opt_flow and ekf.height_sensor_ref != HEIGHT_REF_RANGE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_flow_required(ekf):
     """Whether in flight nothing but flow can hold the horizontal drift."""
     return ekf.cs.in_air and (
@@ -174,7 +173,7 @@ def _is_flow_required(ekf):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _continue_flow(ekf, params, sample_good, reset_possible):
     flow_required = _is_flow_required(ekf)
     if sample_good:
@@ -188,7 +187,7 @@ def _continue_flow(ekf, params, sample_good, reset_possible):
             stop_flow_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_flow(ekf, params):
     height_from_ground = ekf.height_sensor_ref == HEIGHT_REF_RANGE
     update_terrain = not height_from_ground
@@ -207,14 +206,14 @@ def _start_flow(ekf, params):
         ekf.cs.opt_flow = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _settle_flow_status(ekf):
     reset_aid_source_status_zero_innovation(ekf, ekf.aid.optical_flow, 2)
     ekf.reject.optflow_x = False
     ekf.reject.optflow_y = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_flow_fusion(ekf, params):
     """Set the horizontal velocity to that of flow."""
     ekf.events.reset_vel_to_flow = True
@@ -227,7 +226,7 @@ def reset_flow_fusion(ekf, params):
     _settle_flow_status(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_terrain_to_flow(ekf, params):
     """Take the vehicle to stand on the ground: flow will find the true height as it moves."""
     terrain = single_precision(params.EKF2_MIN_RNG - ekf.gpos_alt)
@@ -238,7 +237,7 @@ def reset_terrain_to_flow(ekf, params):
     update_terrain_reset_status(ekf, change)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_flow_fusion(ekf):
     """Leave optical flow."""
     if ekf.cs.opt_flow:

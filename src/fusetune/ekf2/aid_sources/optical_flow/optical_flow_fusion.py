@@ -10,10 +10,9 @@ sensor's lever arm, which the innovation accounts for.
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.conditions import get_hagl
 from fusetune.ekf2.covariance import initialise_covariance
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
 from fusetune.ekf2.state import ATTITUDE, POSITION, TERRAIN, VELOCITY
@@ -24,7 +23,7 @@ MIN_FLOW_NOISE = 0.05
 BEST_QUALITY = 255.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def flow_sensor_offset_body(params):
     """Position (m, FRD) of the flow sensor relative to the IMU."""
     return (
@@ -34,7 +33,7 @@ def flow_sensor_offset_body(params):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_flow_hagl(ekf, params):
     """Height (m) of the flow sensor above the terrain estimate, never less than 1 cm."""
     px, py, pz = flow_sensor_offset_body(params)
@@ -43,13 +42,13 @@ def predict_flow_hagl(ekf, params):
     return max(abs(get_hagl(ekf) - offset_down), MIN_HAGL)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_flow_range(ekf, params):
     """Distance (m) from the flow sensor to the ground along its optical axis."""
     return predict_flow_hagl(ekf, params) / ekf.R_to_earth[2, 2]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_flow(ekf, params, gyro_x, gyro_y, gyro_z):
     """Predicted rates (rad/s) about body X and Y, for a flow gyro reading (rad/s, minus the body rate)."""
     px, py, pz = flow_sensor_offset_body(params)
@@ -62,7 +61,7 @@ def predict_flow(ekf, params, gyro_x, gyro_y, gyro_z):
     return right * scale, -forward * scale
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_flow_jacobian(ekf, axis, H):
     """Write the derivative of the predicted rate about body axis 0 or 1 into `H` (24,)."""
     R, v = ekf.R_to_earth, ekf.vel
@@ -87,7 +86,7 @@ def compute_flow_jacobian(ekf, axis, H):
     H[TERRAIN] = by_height
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def calc_opt_flow_meas_var(params, quality):
     """Observation variance ((rad/s)²): the noise falls linearly from `EKF2_OF_N_MAX` at the least quality used."""
     best = max(params.EKF2_OF_N_MIN, MIN_FLOW_NOISE)
@@ -100,7 +99,7 @@ def calc_opt_flow_meas_var(params, quality):
     return noise * noise
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _repredict_second_axis(ekf, params):
     """Account for what the first axis changed; the Jacobian of the second stays as first linearised."""
     aid, flow, gyro = ekf.aid.optical_flow, ekf.flow, ekf.flow_sample.gyro_rate
@@ -113,7 +112,7 @@ def _repredict_second_axis(ekf, params):
     aid.test_ratio[1] = aid.innovation[1] * aid.innovation[1] / (gate * gate * aid.innovation_variance[1])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_opt_flow(ekf, params, update_terrain):
     """Fuse the judged flow, X before Y; return whether it was fused.
 

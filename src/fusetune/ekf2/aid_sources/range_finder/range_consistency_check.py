@@ -5,7 +5,7 @@ a lasting disagreement show even where every single one is small. Over uneven gr
 vertical motion, so nothing is concluded while the vehicle moves horizontally.
 """
 
-from numba import njit
+from fusetune.ekf2.kernel import kernel
 
 SIGNED_TEST_RATIO_TAU = 2.0
 MIN_VZ_FOR_VALID_CONSISTENCY = 0.5
@@ -15,7 +15,7 @@ HORIZONTAL_MOTION_HOLD = 2
 """PX4 v1.16 compares its time constant of 2 (s) with microseconds, so motion counts for 2 µs only: for this sample."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_range_consistency(rng, distance, distance_variance, vz, vz_variance, horizontal_motion, time_us, gate):
     """Take in one distance to ground (m, up from ground) with the velocity estimate of its time (m/s, down)."""
     if horizontal_motion:
@@ -36,7 +36,7 @@ def update_range_consistency(rng, distance, distance_variance, vz, vz_variance, 
     rng.kin_dist_bottom_prev = distance
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _judge_consistency(rng, vz, time_us):
     """Inconsistent when the filtered ratio fails; consistent again only while climbing or descending shows it."""
     if abs(rng.kin_signed_test_ratio_lpf) >= 1.0:

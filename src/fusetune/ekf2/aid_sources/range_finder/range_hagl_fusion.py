@@ -2,12 +2,11 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.aid_sources.range_finder.range_memory import dist_bottom
 from fusetune.ekf2.conditions import get_hagl
 from fusetune.ekf2.covariance import reset_covariance_block
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import compute_kalman_gain
 from fusetune.ekf2.resets import update_terrain_reset_status
@@ -16,7 +15,7 @@ from fusetune.ekf2.state import POSITION, TERRAIN
 HEIGHT = POSITION + 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_hagl_h(H):
     """Write the observation Jacobian of height above ground into H (24,)."""
     H[:] = 0.0
@@ -24,21 +23,21 @@ def compute_hagl_h(H):
     H[TERRAIN] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_hagl_variance(ekf):
     """Variance (m²) of the estimated height above ground."""
     P = ekf.P
     return P[HEIGHT, HEIGHT] - P[HEIGHT, TERRAIN] - P[TERRAIN, HEIGHT] + P[TERRAIN, TERRAIN]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def get_range_variance(ekf, params):
     """Observation variance (m²): noise, a part that grows with range, and the height's own variance."""
     scaled = params.EKF2_RNG_SFE * ekf.range.sample.range
     return max(ekf.P[HEIGHT, HEIGHT] + params.EKF2_RNG_NOISE * params.EKF2_RNG_NOISE + scaled * scaled, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_range_hagl(ekf, params):
     """Judge the distance to ground.
 
@@ -57,7 +56,7 @@ def update_range_hagl(ekf, params):
         aid.innovation_rejected = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def fuse_hagl_rng(ekf, params, update_height, update_terrain):
     """Fuse the judged distance into the terrain, into everything else (height), or both; return whether fused."""
     aid = ekf.aid.rng_hgt
@@ -82,7 +81,7 @@ def fuse_hagl_rng(ekf, params, update_height, update_terrain):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reset_terrain_to_rng(ekf, params):
     """Put the whole innovation into the terrain.
 

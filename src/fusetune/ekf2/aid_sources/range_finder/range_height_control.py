@@ -6,8 +6,6 @@
 
 import math
 
-from numba import njit
-
 from fusetune.ekf2.aid_sources.range_finder.range_consistency_check import update_range_consistency
 from fusetune.ekf2.aid_sources.range_finder.range_hagl_fusion import (
     fuse_hagl_rng,
@@ -24,6 +22,7 @@ from fusetune.ekf2.conditions import (
     is_vertical_velocity_aiding_active,
 )
 from fusetune.ekf2.core_memory import HEIGHT_REF_RANGE, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.resets import reset_altitude_to, reset_vertical_velocity_to_zero
 from fusetune.ekf2.state import VELOCITY
 from fusetune.ekf2.timing import HGT_FUSION_TIMEOUT_MAX, RNG_MAX_INTERVAL, is_newer_than_latest, is_timed_out
@@ -34,7 +33,7 @@ START_HYSTERESIS = 0.7
 START_TEST_RATIO = 0.01
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_range_hagl_fusion(ekf, params):
     """Process the range sample that reached the fusion time horizon, if any, and watch over the sensor."""
     if not ekf.range_buffer_exists:
@@ -48,12 +47,12 @@ def control_range_hagl_fusion(ekf, params):
         stop_rng_terr_fusion(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _has_recent_sample(ekf):
     return is_newer_than_latest(ekf, ekf.range_newest_time_us, 2 * RNG_MAX_INTERVAL)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _check_sensor(ekf, params):
     """Run the sensor's checks; a healthy sample is moved to the IMU and tested against the vertical velocity."""
     rng, R = ekf.range, ekf.R_to_earth
@@ -79,7 +78,7 @@ def _check_sensor(ekf, params):
     ekf.cs.rng_kin_consistent = rng.is_kinematically_consistent
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _check_consistency(ekf, params):
     speed_squared = ekf.vel[0] * ekf.vel[0] + ekf.vel[1] * ekf.vel[1]
     speed_variance = ekf.P[VELOCITY, VELOCITY] + ekf.P[VELOCITY + 1, VELOCITY + 1]
@@ -98,7 +97,7 @@ def _check_consistency(ekf, params):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _control_with_sample(ekf, params):
     """Choose between height and terrain, then fuse, reset, start or stop."""
     aid, cs, rng = ekf.aid.rng_hgt, ekf.cs, ekf.range
@@ -132,7 +131,7 @@ def _control_with_sample(ekf, params):
         _start_terrain_aiding(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_height_aiding(ekf, params, conditional_aid):
     """Let the distance correct the height; as unconditional height reference it also becomes the altitude."""
     aid = ekf.aid.rng_hgt
@@ -150,7 +149,7 @@ def _start_height_aiding(ekf, params, conditional_aid):
         reset_terrain_to_rng(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_or_recover(ekf, params):
     """Fuse; when that fails too long, reset the height (as the reference of last resort) or the terrain."""
     aid = ekf.aid.rng_hgt
@@ -171,7 +170,7 @@ def _fuse_or_recover(ekf, params):
             reset_terrain_to_rng(ekf, params)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_terrain_aiding(ekf, params):
     """Begin terrain fusion: optical flow's terrain must agree, any other is reset if it does not."""
     rejected = ekf.aid.rng_hgt.innovation_rejected
@@ -185,7 +184,7 @@ def _start_terrain_aiding(ekf, params):
     ekf.cs.rng_terrain = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_conditional_range_aid_suitable(ekf, params):
     """Whether the vehicle is low and slow enough, over ground steady enough, for range to aid the height.
 
@@ -201,7 +200,7 @@ def is_conditional_range_aid_suitable(ekf, params):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_rng_hgt_fusion(ekf):
     """Stop correcting the height; another source becomes the reference if this was it."""
     if ekf.cs.rng_hgt:
@@ -210,7 +209,7 @@ def stop_rng_hgt_fusion(ekf):
         ekf.cs.rng_hgt = False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def stop_rng_terr_fusion(ekf):
     """Stop correcting the terrain."""
     ekf.cs.rng_terrain = False

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.sensor_samples import RANGE_SAMPLE
 
 FOG_MEDIAN_WINDOW = 5
@@ -47,7 +47,7 @@ RANGE_MEMORY = np.dtype(
 """Sub-record `ekf.range`: distances m, times µs."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def initialise_range_memory(rng):
     """Forget everything; a range finder is taken to be consistent until it proves otherwise."""
     rng.sample.time_us = 0
@@ -80,19 +80,19 @@ def initialise_range_memory(rng):
     rng.is_kinematically_consistent = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_cos_tilt(rng, R_to_earth, pitch_offset):
     """Cosine of the angle between the beam and down, for a beam turned by `pitch_offset` (rad) about body y."""
     rng.cos_tilt = R_to_earth[2, 0] * math.sin(pitch_offset) + R_to_earth[2, 2] * math.cos(pitch_offset)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def dist_bottom(rng):
     """Vertical part (m) of the measured distance."""
     return rng.sample.range * rng.cos_tilt
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def is_data_healthy(rng):
     """Whether a new sample is at hand and passed the checks."""
     return rng.is_sample_ready and rng.is_sample_valid

@@ -1,9 +1,9 @@
 """Can the range finder's sample be used: regular, of good quality, not tilted too far, in range, not stuck, no fog."""
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_sources.range_finder.range_memory import FOG_MEDIAN_WINDOW, dist_bottom
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import RNG_MAX_INTERVAL
 
 COS_MAX_TILT = 0.7071
@@ -16,7 +16,7 @@ STUCK_MIN_UNSET = 0.1
 FOG_FACTOR = 2.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def run_range_sensor_checks(rng, time_us, quality_hysteresis_s, fog_distance):
     """Update the verdict on the range finder's sample.
 
@@ -54,7 +54,7 @@ def run_range_sensor_checks(rng, time_us, quality_hysteresis_s, fog_distance):
         rng.time_last_valid = rng.sample.time_us
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_stuck_check(rng):
     """After 10 s without a valid sample, the distance must vary by more than 0.1 m before it is trusted again."""
     if rng.sample.time_us - rng.time_last_valid <= STUCK_AFTER_INVALID_TIME:
@@ -70,7 +70,7 @@ def update_stuck_check(rng):
     rng.is_stuck = True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def update_fog_check(rng, fog_distance):
     """The beam is blocked when the median of five distances drops by more than twice the fog distance to below it.
 

@@ -9,10 +9,10 @@ Mirrors PX4 v1.16 `EKF/aid_sources/sideslip/sideslip_fusion.cpp`.
 import math
 
 import numpy as np
-from numba import njit
 
 from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.covariance import initialise_covariance, reset_wind_cov
+from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
 from fusetune.ekf2.state import ATTITUDE, VELOCITY, WIND
@@ -25,27 +25,27 @@ MIN_NOISE = 0.01
 FLT_EPSILON = float(np.finfo(np.float32).eps)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _air_velocity_body(ekf, axis):
     R = ekf.R_to_earth
     x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
     return R[0, axis] * x + R[1, axis] * y + R[2, axis] * z
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _forward_air_speed(ekf):
     """Kept from zero, where the angle is not defined."""
     forward = _air_velocity_body(ekf, 0)
     return forward + math.copysign(FORWARD_SPEED_EPSILON, forward)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict_sideslip(ekf):
     """Sideslip angle (rad)."""
     return _air_velocity_body(ekf, 1) / _forward_air_speed(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def compute_sideslip_jacobian(ekf, H):
     """Write the derivative of the sideslip angle into `H` (24,)."""
     R = ekf.R_to_earth
@@ -67,7 +67,7 @@ def compute_sideslip_jacobian(ekf, H):
     H[WIND + 1] = -ey
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def control_beta_fusion(ekf, params):
     """Fuse a sideslip of zero at regular intervals while a fixed wing, or a vehicle with airspeed, flies."""
     ekf.cs.fuse_beta = (
@@ -86,7 +86,7 @@ def control_beta_fusion(ekf, params):
             reset_wind_cov(ekf)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _update_sideslip(ekf, params):
     H = ekf.scratch.H
     variance = max(params.EKF2_BETA_NOISE * params.EKF2_BETA_NOISE, MIN_NOISE * MIN_NOISE)
@@ -96,7 +96,7 @@ def _update_sideslip(ekf, params):
     update_aid_source_status(ekf, ekf.aid.sideslip, 1, ekf.time_delayed_us, max(params.EKF2_BETA_GATE, 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _fuse_sideslip(ekf, params):
     aid, H, K = ekf.aid.sideslip, ekf.scratch.H, ekf.scratch.K
     if aid.innovation_rejected:

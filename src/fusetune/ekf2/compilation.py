@@ -1,0 +1,110 @@
+"""Compile the estimator in one piece, in a process of its own, and keep it in the kernel cache.
+
+Numba optimises and translates every function by itself, each time together with everything it calls: the estimator's
+few hundred nested functions would pass through the optimiser some thirty times. Here the inner functions are only
+joined, and the optimiser sees the whole once, at the entry. The inner functions cannot be called from Python in a
+process that compiled this way, so it is a child that does it; everybody else loads the result.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numba
+from numba.core import codegen, compiler, types
+
+LOCK_NAME = "compile.lock"
+ENTRY = "replay.run_estimator"
+CHILD_MARK = "FUSETUNE_COMPILING"
+
+
+def ensure_compiled() -> None:
+    """Make sure the kernel cache holds the estimator; of several processes one compiles and the others wait.
+
+    Does nothing where Numba is switched off. If the child fails, the caller compiles the usual, slower way.
+    """
+    if numba.config.DISABLE_JIT or CHILD_MARK in os.environ or _is_cached():
+        return
+    folder = Path(numba.config.CACHE_DIR)
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / LOCK_NAME).open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not _is_cached():
+            environment = os.environ | {"NUMBA_CACHE_DIR": str(folder)}
+            subprocess.run([sys.executable, "-m", __name__], env=environment, check=False)
+
+
+def _is_cached() -> bool:
+    folder = Path(numba.config.CACHE_DIR or ".")
+    return any(folder.glob(f"*/{ENTRY}-*.nbi"))
+
+
+@contextmanager
+def joined_without_optimising() -> Iterator[None]:
+    """Join functions as they are compiled; only what is compiled last, the entry, is optimised and translated."""
+    library, native = codegen.JITCodeLibrary, codegen.JITCPUCodegen
+    finalize, pointer, set_env = library.finalize, library.get_pointer_to_function, native.set_env
+    compile_function = compiler.CompilerBase.compile_extra
+    depth = 0
+
+    def count_depth(self, function):  # type: ignore[no-untyped-def]
+        nonlocal depth
+        depth += 1
+        try:
+            return compile_function(self, function)
+        finally:
+            depth -= 1
+
+    def join(self):  # type: ignore[no-untyped-def]
+        if depth <= 1:
+            return finalize(self)
+        self._raise_if_finalized()
+        for linked in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(linked._reload_init)
+            self._final_module.link_in(linked._get_module_for_linking(), preserve=True)
+        self._finalize_dynamic_globals()
+        self._finalized = True
+        self._only_joined = True
+        return None
+
+    def pointer_if_translated(self, name):  # type: ignore[no-untyped-def]
+        self._ensure_finalized()
+        return 0 if getattr(self, "_only_joined", False) else pointer(self, name)
+
+    def set_env_if_translated(self, name, env):  # type: ignore[no-untyped-def]
+        if self._engine.is_symbol_defined(name):
+            set_env(self, name, env)
+
+    library.finalize, library.get_pointer_to_function = join, pointer_if_translated
+    native.set_env, compiler.CompilerBase.compile_extra = set_env_if_translated, count_depth
+    record_repr, types.Record.__repr__ = types.Record.__repr__, _short_repr
+    try:
+        yield
+    finally:
+        library.finalize, library.get_pointer_to_function = finalize, pointer
+        native.set_env, compiler.CompilerBase.compile_extra = set_env, compile_function
+        types.Record.__repr__ = record_repr
+
+
+def _short_repr(record: types.Record) -> str:
+    """Numba spells out all fields of a record in each of its progress events, a fifth of the time it takes."""
+    return f"Record({len(record.fields)} fields, {record.size} bytes)"
+
+
+def main() -> None:
+    """Compile and cache the estimator; the entry point of the child process."""
+    os.environ[CHILD_MARK] = "1"
+    from fusetune.ekf2.warm_up import compile_kernels
+
+    with joined_without_optimising():
+        compile_kernels()
+
+
+if __name__ == "__main__":
+    main()
