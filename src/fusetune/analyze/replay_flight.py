@@ -15,6 +15,8 @@ from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
 
+WRITTEN_BACK = "EKF2_MAG_DECL"
+
 
 def replay_saved_flight(flight_folder: Path, sets: Mapping[str, Mapping[str, float]], output_folder: Path) -> None:
     """Replay sets on a saved flight.
@@ -64,6 +66,8 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path) -> list[str]:
     inputs = build_inputs(canonical(flight))
     for file in set_files:
         params, overrides = _read_set(file)
+        # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.
+        params.pop(WRITTEN_BACK, None)
         values = complete(flight.parameters.initial, params | overrides, flight.release)
         result = replay(inputs, values, overridden=frozenset(overrides))
         write_replay(output_folder, ReplayIdentity(file.stem, overrides, values), result)
