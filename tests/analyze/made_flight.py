@@ -189,7 +189,8 @@ def _local_position(made: MadeSet) -> pa.Table:
     return pa.table(
         {
             "timestamp": time,
-            "timestamp_sample": time,
+            # The output holds at `timestamp`; the fusion horizon lags behind it.
+            "timestamp_sample": time - 200_000,
             **{axis: position[:, i] for i, axis in enumerate("xyz")},
             "vx": np.full(time.size, 2.0 + made.error),
             "vy": np.zeros(time.size),

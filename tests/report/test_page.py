@@ -107,3 +107,8 @@ def test_flights_that_cannot_be_scored_still_make_a_page(tmp_path: Path) -> None
 def test_a_set_that_diverged_is_drawn_around(tmp_path: Path) -> None:
     page = report(tmp_path, {"present": MadeSet(), "b": MadeSet(status="diverged")}, flights=1)
     assert "diverged: the covariance is not finite" in page
+
+
+def test_a_present_set_that_diverged_leaves_the_flight_unscored(tmp_path: Path) -> None:
+    page = report(tmp_path, {"present": MadeSet(status="diverged"), "b": MadeSet()}, flights=1)
+    assert "the present set: diverged: the covariance is not finite" in page

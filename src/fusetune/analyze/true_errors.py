@@ -89,7 +89,8 @@ def true_errors(
     """
     figures: list[ErrorFigure] = []
     local = record.local_position
-    time = local["timestamp_sample"].astype(np.int64)
+    # The output predictor carries the state from the fusion horizon to `timestamp`; that is when it holds.
+    time = local["timestamp"].astype(np.int64)
     rows = window.contains(time) & (time >= truth.time[0]) & (time <= truth.time[-1])
     if np.count_nonzero(rows) > 1:
         time = time[rows]

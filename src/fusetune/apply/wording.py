@@ -45,13 +45,13 @@ def _comparison(choice: Choice, axes: int, label: str, settings: DecisionSetting
     if best is None:
         return "No other set was eligible for comparison."
     low, high = improvement_percent(best.upper, axes), improvement_percent(best.lower, axes)
-    span = f"{settings.confidence:.0%} interval {low:+.1f} % to {high:+.1f} %".replace("-", "−")
+    span = _span(low, high, settings.confidence)
     wins = f"better on {best.flights_better} of {best.flights} flights"
     if choice.status == "change":
         percent = f"{best.improvement_percent:.1f} %"
         return f"Its prediction errors of the {label} are {percent} smaller than now ({span}; {wins})."
     if best.difference >= 0.0:
-        percent = f"{-best.improvement_percent:.1f} %"
+        percent, span = f"{-best.improvement_percent:.1f} %", _span(-high, -low, settings.confidence)
         return f"No other set did better; the nearest, “{best.name}”, has errors {percent} larger ({span})."
     if best.upper >= 0.0:
         return (
@@ -63,6 +63,10 @@ def _comparison(choice: Choice, axes: int, label: str, settings: DecisionSetting
         f"the best of several candidates is favoured by chance, and after correcting for that (Holm, p = "
         f"{best.p_holm:.2g}) the difference is not certain enough for a change."
     )
+
+
+def _span(low: float, high: float, confidence: float) -> str:
+    return f"{confidence:.0%} interval {low:+.1f} % to {high:+.1f} %".replace("-", "−")
 
 
 def _no_evidence(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) -> str:

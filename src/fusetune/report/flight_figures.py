@@ -13,7 +13,7 @@ from fusetune.analyze.set_files import AxisSamples, SourceAxis, read_columns, re
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.analyze.true_errors import Truth, interpolate, read_truth
 from fusetune.px4.flight import Flight
-from fusetune.report.figures import figure_style, new_figure, save_png, set_colours
+from fusetune.report.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
 
 Array = npt.NDArray[np.float64]
@@ -31,6 +31,8 @@ _SOURCES = (
     "optical_flow",
 )
 _MOST_SETS = 8
+_DRAWN = ("scored", "excluded", "not_scored")
+"""States of a set whose replay ran to the end; others may hold no rows at all."""
 _SMALLEST_RATIO = 1e-4
 
 
@@ -45,13 +47,13 @@ class _FlightData:
         self.truth: Truth | None = read_truth(flight)
         self.present = present
         names = [present, *(name for name in sets if name != present)][:_MOST_SETS]
-        self.sets = [name for name in names if self.summary["sets"].get(name, {}).get("status") != "diverged"]
+        self.sets = [name for name in names if self.summary["sets"].get(name, {}).get("status") in _DRAWN]
         self.samples: dict[str, dict[SourceAxis, AxisSamples]] = {}
         self.local: dict[str, dict[str, npt.NDArray]] = {}
         for name in self.sets:
             parameters = self.summary["sets"][name]["parameters"]
             self.samples[name] = read_innovations(analyze_folder / f"{name}.innovations.parquet", parameters)
-            columns = ["timestamp", "timestamp_sample", "x", "y", "z", "xy_valid"]
+            columns = ["timestamp", "x", "y", "z", "xy_valid"]
             self.local[name] = read_columns(analyze_folder / f"{name}.local_position.parquet", columns)
 
     def seconds(self, time: npt.NDArray[np.int64]) -> Array:
@@ -73,6 +75,10 @@ def plot_flight(
     """
     data = _FlightData(Path(flight_folder), Path(analyze_folder), sets, present)
     with figure_style():
+        if present not in data.sets:
+            reason = data.summary["sets"][present]["reason"]
+            save_png(empty_figure(f"The replay of the present set did not come to its end: {reason}"), Path(output))
+            return
         figure = new_figure(10.0, 6.8, layout=None)
         margins = {"left": 0.06, "right": 0.985, "bottom": 0.07, "top": 0.965, "hspace": 0.42, "wspace": 0.24}
         grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25), **margins)
@@ -114,11 +120,11 @@ def _measured_track(data: _FlightData) -> Array | None:
         return None
     local = data.local[data.present]
     fused = samples["gnss_pos", 0].fused
-    if not fused.any() or local["timestamp_sample"].size < 2:
+    if not fused.any() or local["timestamp"].size < 2:
         return None
     from_first = np.arange(fused.size) >= np.argmax(fused)
     time = samples["gnss_pos", 0].timestamp_sample[from_first]
-    estimate = interpolate(local["timestamp_sample"], np.column_stack([local["x"], local["y"]]), time)
+    estimate = interpolate(local["timestamp"], np.column_stack([local["x"], local["y"]]), time)
     innovation = [samples["gnss_pos", axis].innovation[from_first] for axis in (0, 1)]
     return estimate - np.column_stack(innovation)
 
@@ -129,7 +135,7 @@ def _aligned_truth(data: _FlightData) -> Array | None:
     valid = local["xy_valid"].astype(bool)
     if data.truth is None or np.count_nonzero(valid) < 2:
         return None
-    time = local["timestamp_sample"][valid]
+    time = local["timestamp"][valid]
     truth = interpolate(data.truth.time, data.truth.position[:, :2], time)
     estimate = np.column_stack([local["x"][valid], local["y"][valid]])
     return truth + np.mean(estimate - truth, axis=0)
@@ -138,13 +144,13 @@ def _aligned_truth(data: _FlightData) -> Array | None:
 def _height(axes: Axes, data: _FlightData, colours: dict[str, str]) -> None:
     axes.set_title("Height above the origin")
     local = data.local[data.present]
-    time = data.seconds(local["timestamp_sample"])
+    time = data.seconds(local["timestamp"])
     for source, colour, label in (("baro_hgt", "#56B4E9", "barometer"), ("gnss_hgt", "#D55E00", "GNSS")):
         samples = data.samples[data.present].get((source, 0))
-        if samples is None or local["timestamp_sample"].size < 2 or not samples.fused.any():
+        if samples is None or local["timestamp"].size < 2 or not samples.fused.any():
             continue
         rows = np.arange(samples.fused.size) >= np.argmax(samples.fused)
-        down = np.interp(samples.timestamp_sample[rows], local["timestamp_sample"], local["z"])
+        down = np.interp(samples.timestamp_sample[rows], local["timestamp"], local["z"])
         height = -(down - samples.innovation[rows])
         axes.plot(data.seconds(samples.timestamp_sample[rows]), height, ".", color=colour, markersize=2.5, label=label)
     axes.plot(time, -local["z"], color=colours[data.present], label=data.present)

@@ -88,26 +88,43 @@ def innovations_section(results: Results, figures: Path) -> str:
 
 
 def truth_section(results: Results) -> str:
-    """Errors against the ground truth, where logs have one."""
-    columns = {}
-    for source, axis, metric, label in _TRUE_ERRORS:
-        rows = figure_values(results, source, axis, metric)
-        if len(rows):
-            values = rows.groupby("set", observed=True)["value"].mean()
-            columns[label] = values / 3.0 if metric == "nees" else values
-    if not columns:
+    """Errors against the ground truth, where logs have one: by set, and of the present set by flight."""
+    by_set, by_flight = _true_errors(results, "set"), _true_errors(results, "flight")
+    if by_set.empty:
         return ""
-    frame = pd.DataFrame(columns)
-    rows_out: list[list[Cell | str]] = []
-    for name in results.shown:
-        if name in frame.index:
-            rows_out.append([name, *(number(frame.loc[name, label], 3) for label in columns)])
-    flights = figure_values(results, "truth_velocity", "all", "rmse")["flight"].nunique()
+    flights = len(by_flight)
     text = (
         f"{flights} flight{'s have' if flights != 1 else ' has'} a known truth. The decision never looks at it; "
         "it shows here whether the decision deserves trust."
     )
-    return section("True errors (RMSE)", paragraph(text), table(("set", *columns), rows_out))
+    order = [name for name in results.shown if name in by_set.index]
+    return section(
+        "True errors (RMSE)",
+        paragraph(text),
+        _error_table("set", by_set.loc[order], "Mean over the flights"),
+        _error_table("flight", by_flight, f"Of the set “{results.present}” on each flight"),
+    )
+
+
+def _true_errors(results: Results, by: str) -> pd.DataFrame:
+    """True errors, a row per set (mean over flights) or per flight (of the present set)."""
+    columns = {}
+    for source, axis, metric, label in _TRUE_ERRORS:
+        rows = figure_values(results, source, axis, metric)
+        if by == "flight":
+            rows = rows[rows["set"] == results.present]
+        if len(rows):
+            values = rows.groupby(by, observed=True)["value"].mean()
+            columns[label] = values / 3.0 if metric == "nees" else values
+    return pd.DataFrame(columns)
+
+
+def _error_table(first: str, frame: pd.DataFrame, caption: str) -> str:
+    rows: list[list[Cell | str]] = [
+        [str(name), *(number(float(value)) for value in values)]
+        for name, values in zip(frame.index, frame.to_numpy(), strict=True)
+    ]
+    return table((first, *map(str, frame.columns)), rows, caption)
 
 
 def as_flown_section(results: Results) -> str:

@@ -66,7 +66,9 @@ def figure(path: Path, caption: str) -> str:
     data = base64.b64encode(path.read_bytes()).decode("ascii")
     source = f"data:{_MEDIA_TYPES[path.suffix]};base64,{data}"
     text = escape(caption)
-    return f'<figure><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
+    return (
+        f'<figure><div class="scroll"><img alt="{text}" src="{source}"></div><figcaption>{text}</figcaption></figure>'
+    )
 
 
 def section(title: str, *parts: str) -> str:

@@ -113,7 +113,7 @@ def differences(results: Results) -> Figure:
     label_sets(
         axes, [f"{n} (not eligible)" if s == "vetoed" else n for n, s in zip(names, others["status"], strict=True)]
     )
-    _limit_forest(axes, centre, low, high)
+    _limit_forest(axes, centre, low, high, (others["status"] == "candidate").to_numpy())
     confidence = results.decision["rule"]["confidence"]
     axes.set_xlabel(
         f"change of the {_score_label(results)} prediction error against the present set [%]; left is better"
@@ -122,10 +122,12 @@ def differences(results: Results) -> Figure:
     return figure
 
 
-def _limit_forest(axes: Axes, centre: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """One hopeless set must not squeeze all others: intervals may leave the plot, centres may not."""
-    reach = 1.15 * max(float(np.max(np.abs(centre))), float(np.median(np.abs(np.r_[low, high]))), 0.1)
-    axes.set_xlim(max(-reach, 1.1 * min(float(low.min()), -0.1)), min(reach, 1.1 * max(float(high.max()), 0.1)))
+def _limit_forest(axes: Axes, centre: np.ndarray, low: np.ndarray, high: np.ndarray, eligible: np.ndarray) -> None:
+    """Intervals of sets that are not eligible may leave the plot: one hopeless set must not squeeze all others."""
+    left = min(float(centre.min()), float(np.min(low[eligible], initial=0.0)), -1.0)
+    right = max(float(centre.max()), float(np.max(high[eligible], initial=0.0)), 1.0)
+    margin = 0.08 * (right - left)
+    axes.set_xlim(left - margin, right + margin)
 
 
 def flights_by_sets(results: Results) -> Figure:
