@@ -101,7 +101,7 @@ def test_flow_starts_after_ten_samples_and_resets_velocity_to_them() -> None:
     assert ekf["events"]["reset_vel_to_flow"]
     np.testing.assert_allclose(ekf["vel"][:2], [2.0, 0.0], atol=1e-9)
     # σ = EKF2_OF_N_MIN at full quality, times the distance to the ground
-    assert ekf["P"][VELOCITY, VELOCITY] == pytest.approx((0.15 * 10.0) ** 2, rel=1e-9)
+    assert ekf["P"][VELOCITY, VELOCITY] == pytest.approx((0.15 * 10.0) ** 2, rel=1e-6)
 
 
 def test_flow_continues_rejects_and_stops() -> None:
@@ -182,8 +182,8 @@ def test_airspeed_starts_with_the_wind_of_level_flight() -> None:
     np.testing.assert_allclose(ekf["wind_vel"], [5.0, 0.0], atol=1e-12)
     along = ekf["P"][VELOCITY, VELOCITY] + 1.4**2
     across = ekf["P"][VELOCITY + 1, VELOCITY + 1] + 15.0**2 * (0.01 + math.radians(15.0) ** 2)
-    assert ekf["P"][WIND, WIND] == pytest.approx(along, rel=1e-12)
-    assert ekf["P"][WIND + 1, WIND + 1] == pytest.approx(across, rel=1e-12)
+    assert ekf["P"][WIND, WIND] == pytest.approx(along, rel=1e-6)
+    assert ekf["P"][WIND + 1, WIND + 1] == pytest.approx(across, rel=1e-6)
 
     velocity = ekf["vel"].copy()
     _offer_airspeed(ekf, 15.5, START_US + 100_000)
