@@ -76,7 +76,9 @@ class ReplayFidelity:
 
 
 @dataclass(frozen=True)
-class _Innovations:
+class Innovations:
+    """Innovation rows of one replay or log as columns."""
+
     source: np.ndarray
     axis: np.ndarray
     timestamp: np.ndarray
@@ -85,8 +87,8 @@ class _Innovations:
     rejected: np.ndarray
     fused: np.ndarray
 
-    def rows(self, selected: np.ndarray) -> _Innovations:
-        return _Innovations(*(getattr(self, name)[selected] for name in self.__dataclass_fields__))
+    def rows(self, selected: np.ndarray) -> Innovations:
+        return Innovations(*(getattr(self, name)[selected] for name in self.__dataclass_fields__))
 
 
 def compare_folders(reference: Path, replay: Path) -> list[ReplayFidelity]:
@@ -119,7 +121,7 @@ def order_agreement(results: list[ReplayFidelity]) -> float:
 
 def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
     """Compare one set of two folders."""
-    ref, rep = _load(reference / f"{name}.innovations.parquet"), _load(replay / f"{name}.innovations.parquet")
+    ref, rep = (load_innovations(folder / f"{name}.innovations.parquet") for folder in (reference, replay))
     start = comparison_start(ref)
     ref = ref.rows((ref.timestamp >= start) & np.isin(ref.source, COMPARED_SOURCES) & (ref.variance > 0))
     ours, theirs, missing = _match(ref, rep)
@@ -146,13 +148,14 @@ def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
     )
 
 
-def _load(path: Path) -> _Innovations:
+def load_innovations(path: Path) -> Innovations:
+    """Read a `<set>.innovations.parquet`."""
     table = pq.read_table(path)
 
     def column(name: str, dtype: type) -> np.ndarray:
         return table.column(name).to_numpy().astype(dtype)
 
-    return _Innovations(
+    return Innovations(
         source=_names(table.column("source")),
         axis=column("axis", np.int64),
         timestamp=column("timestamp_sample", np.int64),
@@ -171,7 +174,7 @@ def _names(column: pa.ChunkedArray) -> np.ndarray:
     return np.array(coded.dictionary.to_pylist(), dtype=str)[coded.indices.to_numpy()]
 
 
-def comparison_start(rows: _Innovations) -> int:
+def comparison_start(rows: Innovations) -> int:
     """Time (µs) of the first fused GNSS sample, or of the first fused aid where GNSS is never fused."""
     candidates = rows.fused & np.isin(rows.source, ("gnss_vel", "gnss_pos"))
     if not candidates.any():
@@ -181,7 +184,7 @@ def comparison_start(rows: _Innovations) -> int:
     return int(rows.timestamp[candidates].min())
 
 
-def _match(ref: _Innovations, rep: _Innovations) -> tuple[_Innovations, _Innovations, float]:
+def _match(ref: Innovations, rep: Innovations) -> tuple[Innovations, Innovations, float]:
     """Rows of replay and reference with the same source, axis and sample time; and the share without partner."""
     ref_keys, ref_rows = np.unique(_keys(ref), return_index=True)
     rep_keys, rep_rows = np.unique(_keys(rep), return_index=True)
@@ -190,7 +193,7 @@ def _match(ref: _Innovations, rep: _Innovations) -> tuple[_Innovations, _Innovat
     return rep.rows(rep_rows[in_rep]), ref.rows(ref_rows[in_ref]), missing
 
 
-def _keys(rows: _Innovations) -> np.ndarray:
+def _keys(rows: Innovations) -> np.ndarray:
     """One number per source, axis and sample time; rows of other sources get one of their own."""
     key = -1 - np.arange(len(rows.axis), dtype=np.int64)
     for code, source in enumerate(COMPARED_SOURCES):
@@ -199,7 +202,7 @@ def _keys(rows: _Innovations) -> np.ndarray:
     return key
 
 
-def _axis_fidelity(source: str, axis: int, ours: _Innovations, theirs: _Innovations) -> AxisFidelity:
+def _axis_fidelity(source: str, axis: int, ours: Innovations, theirs: Innovations) -> AxisFidelity:
     rms = np.sqrt(np.mean(theirs.innovation**2))
     return AxisFidelity(
         source=source,
@@ -209,16 +212,21 @@ def _axis_fidelity(source: str, axis: int, ours: _Innovations, theirs: _Innovati
         variance_difference=float(np.median(np.abs(ours.variance / theirs.variance - 1.0))),
         fused_equal=float(np.mean(ours.fused == theirs.fused)),
         rejected_equal=float(np.mean(ours.rejected == theirs.rejected)),
-        nll_difference=float(abs(np.mean(_nll(ours)) - np.mean(_nll(theirs)))),
+        nll_difference=abs(mean_nll(ours) - mean_nll(theirs)),
     )
 
 
-def _nll(rows: _Innovations) -> np.ndarray:
+def _nll(rows: Innovations) -> np.ndarray:
     """Gaussian negative log-likelihood of each innovation."""
     return 0.5 * (rows.innovation**2 / rows.variance + np.log(2.0 * np.pi * rows.variance))
 
 
-def _total_nll(rows: _Innovations) -> float:
+def mean_nll(rows: Innovations) -> float:
+    """Mean negative log-likelihood per sample."""
+    return float(np.mean(_nll(rows)))
+
+
+def _total_nll(rows: Innovations) -> float:
     """Sum over sources and axes of the mean capped NLL."""
     nll = np.minimum(_nll(rows), NLL_CAP)
     total = 0.0
@@ -263,9 +271,7 @@ def _flags_fidelity(reference: Path, replay: Path, name: str, start: int) -> tup
     span = np.diff(times)
     ref_row = np.searchsorted(ref_t, times[:-1], side="right") - 1
     rep_row = np.searchsorted(rep_t, times[:-1], side="right") - 1
-    differs = np.column_stack(
-        [ref[column].to_numpy()[ref_row] != rep[column].to_numpy()[rep_row] for column in names]
-    )
+    differs = np.column_stack([ref[column].to_numpy()[ref_row] != rep[column].to_numpy()[rep_row] for column in names])
     share = (differs * span[:, None]).sum(axis=0) / span.sum()
     worst = np.argsort(-share)
     equal = 1.0 - float((differs.any(axis=1) * span).sum() / span.sum())

@@ -87,7 +87,8 @@ def update_aid_source_status(ekf, aid, n_axes, time_us, gate):
         variance = aid.innovation_variance[i]
         test_ratio = innovation * innovation / (gate * gate * variance)
         if has_history:
-            _filter_axis(aid, i, alpha, innovation, test_ratio, NORMALISED_INNOVATION_LIMIT * gate * math.sqrt(variance))
+            limit = NORMALISED_INNOVATION_LIMIT * gate * math.sqrt(variance)
+            _filter_axis(aid, i, alpha, innovation, test_ratio, limit)
         else:
             aid.test_ratio_filtered[i] = test_ratio
             aid.innovation_filtered[i] = innovation

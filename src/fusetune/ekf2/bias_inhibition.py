@@ -47,9 +47,7 @@ def update_imu_bias_inhibit(ekf, params):
     inhibit_accel = (imu_ctrl & IMU_CTRL_ACCEL_BIAS) == 0 or manoeuvring or ekf.fs.bad_acc_vertical
     for i in range(3):
         ekf.gyro_bias_inhibit[i] = inhibit_gyro
-        ekf.accel_bias_inhibit[i] = (
-            inhibit_accel or imu.delta_vel_clipping[i] or not _is_accel_bias_observable(ekf, i)
-        )
+        ekf.accel_bias_inhibit[i] = inhibit_accel or imu.delta_vel_clipping[i] or not _is_accel_bias_observable(ekf, i)
 
 
 @kernel

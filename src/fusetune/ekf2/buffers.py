@@ -160,9 +160,7 @@ def push_imu(ekf, time_latest_us):
     ekf.time_delayed_us = ekf.imu_delayed.time_us
     intervals = buffers.observation_length - 1
     # ARM divides by zero to zero, and PX4 relies on it when all delays are tiny.
-    buffers.min_observation_interval_us = (
-        (time_latest_us - ekf.time_delayed_us) // intervals if intervals > 0 else 0
-    )
+    buffers.min_observation_interval_us = (time_latest_us - ekf.time_delayed_us) // intervals if intervals > 0 else 0
 
 
 @kernel

@@ -21,12 +21,7 @@ def get_number_of_active_horizontal_position_aiding_sources(ekf):
 @kernel
 def get_number_of_active_horizontal_velocity_aiding_sources(ekf):
     """How many sources give horizontal velocity; airspeed and sideslip together count as one."""
-    return (
-        int(ekf.cs.gnss_vel)
-        + int(ekf.cs.opt_flow)
-        + int(ekf.cs.ev_vel)
-        + int(ekf.cs.fuse_aspd and ekf.cs.fuse_beta)
-    )
+    return int(ekf.cs.gnss_vel) + int(ekf.cs.opt_flow) + int(ekf.cs.ev_vel) + int(ekf.cs.fuse_aspd and ekf.cs.fuse_beta)
 
 
 @kernel

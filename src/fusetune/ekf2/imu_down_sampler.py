@@ -31,6 +31,7 @@ INITIAL_MEAN_DT = np.float32(0.005)
 
 @kernel
 def initialise_down_sampler(sampler, params):
+    """Start with PX4's guess of the gyro interval."""
     sampler.mean_dt = INITIAL_MEAN_DT
     reset_down_sampler(sampler, params)
 

@@ -151,9 +151,7 @@ def fuse(ekf, params, K, innovation):
         ekf.vel[i] = _limited(ekf.vel[i] - K[VELOCITY + i] * innovation, VELOCITY_LIMIT)
         ekf.gyro_bias[i] = _limited(ekf.gyro_bias[i] - K[GYRO_BIAS + i] * innovation, params.EKF2_GYR_B_LIM)
         ekf.accel_bias[i] = _limited(ekf.accel_bias[i] - K[ACCEL_BIAS + i] * innovation, params.EKF2_ABL_LIM)
-    add_to_global_position(
-        ekf, -K[POSITION] * innovation, -K[POSITION + 1] * innovation, -K[POSITION + 2] * innovation
-    )
+    add_to_global_position(ekf, -K[POSITION] * innovation, -K[POSITION + 1] * innovation, -K[POSITION + 2] * innovation)
     if ekf.cs.mag:
         for i in range(3):
             ekf.mag_I[i] = _limited(ekf.mag_I[i] - K[MAG_EARTH + i] * innovation, MAG_EARTH_LIMIT)

@@ -60,9 +60,9 @@ def imu_samples(table: TopicTable) -> np.ndarray:
     samples["delta_ang_dt"] = gyro_dt
     samples["delta_vel_dt"] = accel_dt
     samples["delta_ang"] = (stacked(table, "gyro_rad").astype(np.float32) * gyro_dt[:, None]).astype(np.float64)
-    samples["delta_vel"] = (
-        stacked(table, "accelerometer_m_s2").astype(np.float32) * accel_dt[:, None]
-    ).astype(np.float64)
+    samples["delta_vel"] = (stacked(table, "accelerometer_m_s2").astype(np.float32) * accel_dt[:, None]).astype(
+        np.float64
+    )
     clipping = column(table, "accelerometer_clipping", 0.0).astype(np.int64)
     for axis in range(3):
         samples["delta_vel_clipping"][:, axis] = (clipping >> axis) & 1

@@ -208,7 +208,7 @@ def _record_local_position(ekf, params, row, timestamp):
     )
     x, y = project_to_local(ekf, lat, lon)
     row.timestamp = timestamp
-    row.timestamp_sample = ekf.time_delayed_us
+    row.timestamp_sample = timestamp
     row.x = x
     row.y = y
     row.z = newest.pos[2] - offset_d - output.ref_alt + origin_altitude(ekf)

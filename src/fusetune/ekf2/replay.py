@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.aid_sources.drag.drag_accumulator import accumulate_drag
+from fusetune.ekf2.aid_sources.magnetometer.world_field import save_declination
 from fusetune.ekf2.buffers import initialise_buffers, push_drag, push_imu
 from fusetune.ekf2.commands import handle_command
 from fusetune.ekf2.compilation import ensure_compiled
@@ -156,7 +158,7 @@ def _stretches(inputs: EstimatorInputs, params: np.ndarray, overridden: frozense
     ]
     total = len(inputs.arrays.imu)
     cuts = sorted({*range(0, total, RUNS_PER_STRETCH), *(min(run, total) for run, _ in changes), total})
-    for start, stop in zip(cuts[:-1], cuts[1:], strict=True):
+    for start, stop in pairwise(cuts):
         for run, change in changes:
             if run == start:
                 params[change.name] = change.value
@@ -177,6 +179,7 @@ def run_estimator(ekf, params, inputs, views, recorder, records, start, stop):
         receive_imu(ekf, params, inputs.imu[run])
         receive_aiding(ekf, params, inputs, arrivals)
         if update(ekf, params, inputs):
+            save_declination(ekf, params)
             record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
 
 

@@ -13,6 +13,7 @@ from fusetune.ekf2.kernel import kernel
 
 @kernel
 def receive_gnss(ekf, params, inputs, slot):
+    """Buffer a GNSS sample; note when one with a heading came."""
     if offer(ekf, ekf.buffers.gnss, inputs.gnss[slot].time_us, params.EKF2_GPS_DELAY, slot):
         ekf.gnss_newest_time_us = ekf.time_latest_us
         if np.isfinite(inputs.gnss[slot].yaw):
@@ -22,6 +23,7 @@ def receive_gnss(ekf, params, inputs, slot):
 
 @kernel
 def receive_mag(ekf, params, inputs, slot):
+    """Buffer a magnetometer sample."""
     if offer(ekf, ekf.buffers.mag, inputs.mag[slot].time_us, params.EKF2_MAG_DELAY, slot):
         ekf.mag_newest_time_us = ekf.time_latest_us
     ekf.mag_buffer_exists = True
@@ -29,6 +31,7 @@ def receive_mag(ekf, params, inputs, slot):
 
 @kernel
 def receive_baro(ekf, params, inputs, slot):
+    """Buffer a barometer sample; its air density counts at once."""
     ekf.air_density = inputs.air_density[slot]
     if offer(ekf, ekf.buffers.baro, inputs.baro[slot].time_us, params.EKF2_BARO_DELAY, slot):
         ekf.baro_newest_time_us = ekf.time_latest_us
@@ -37,6 +40,7 @@ def receive_baro(ekf, params, inputs, slot):
 
 @kernel
 def receive_range(ekf, params, inputs, slot):
+    """Buffer a range sample; the sensor's limits count at once."""
     if offer(ekf, ekf.buffers.range, inputs.range[slot].time_us, params.EKF2_RNG_DELAY, slot):
         ekf.range_newest_time_us = ekf.time_latest_us
     ekf.range_buffer_exists = True
@@ -46,6 +50,7 @@ def receive_range(ekf, params, inputs, slot):
 
 @kernel
 def receive_flow(ekf, params, inputs, slot):
+    """Buffer an optical flow sample; the sensor's limits count at once."""
     ekf.flow.max_rate = inputs.flow_limits[slot, 0]
     ekf.flow.min_distance = inputs.flow_limits[slot, 1]
     ekf.flow.max_distance = inputs.flow_limits[slot, 2]
@@ -56,6 +61,7 @@ def receive_flow(ekf, params, inputs, slot):
 
 @kernel
 def receive_ev(ekf, params, inputs, slot):
+    """Buffer an external vision sample."""
     if offer(ekf, ekf.buffers.ev, inputs.ev[slot].time_us, params.EKF2_EV_DELAY, slot):
         ekf.ev_newest_time_us = ekf.time_latest_us
         ekf.ev.time_last_buffer_push_us = ekf.time_latest_us
@@ -65,6 +71,7 @@ def receive_ev(ekf, params, inputs, slot):
 
 @kernel
 def receive_airspeed(ekf, params, inputs, slot):
+    """Buffer an airspeed sample."""
     if offer(ekf, ekf.buffers.airspeed, inputs.airspeed[slot].time_us, params.EKF2_ASP_DELAY, slot):
         ekf.airspeed_newest_time_us = ekf.time_latest_us
     ekf.airspeed_buffer_exists = True
@@ -72,6 +79,7 @@ def receive_airspeed(ekf, params, inputs, slot):
 
 @kernel
 def receive_auxvel(ekf, params, inputs, slot):
+    """Buffer an auxiliary velocity sample."""
     if offer(ekf, ekf.buffers.auxvel, inputs.auxvel[slot].time_us, params.EKF2_AVEL_DELAY, slot):
         ekf.auxvel_newest_time_us = ekf.time_latest_us
     ekf.auxvel_buffer_exists = True
@@ -79,12 +87,14 @@ def receive_auxvel(ekf, params, inputs, slot):
 
 @kernel
 def receive_system_flags(ekf, inputs, slot):
+    """Buffer a change of the vehicle's state."""
     offer(ekf, ekf.buffers.system_flags, inputs.system_flags[slot].time_us, 0.0, slot)
     ekf.system_flags_buffer_exists = True
 
 
 @kernel
 def pop_gnss(ekf, params, inputs):
+    """Take the GNSS sample that is due."""
     ring = ekf.buffers.gnss
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.gnss_data_ready = index >= 0
@@ -107,6 +117,7 @@ def _apply_antenna_yaw_offset(sample, params):
 
 @kernel
 def pop_mag(ekf, inputs):
+    """Take the magnetometer sample that is due."""
     ring = ekf.buffers.mag
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.mag_data_ready = index >= 0
@@ -118,6 +129,7 @@ def pop_mag(ekf, inputs):
 
 @kernel
 def pop_baro(ekf, inputs):
+    """Take the barometer sample that is due."""
     ring = ekf.buffers.baro
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.baro_data_ready = index >= 0
@@ -129,6 +141,7 @@ def pop_baro(ekf, inputs):
 
 @kernel
 def pop_range(ekf, inputs):
+    """Take the range sample that is due."""
     ring = ekf.buffers.range
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.range_data_ready = index >= 0
@@ -140,6 +153,7 @@ def pop_range(ekf, inputs):
 
 @kernel
 def pop_flow(ekf, inputs):
+    """Take the optical flow sample that is due."""
     ring = ekf.buffers.flow
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.flow_data_ready = index >= 0
@@ -151,6 +165,7 @@ def pop_flow(ekf, inputs):
 
 @kernel
 def pop_ev(ekf, params, inputs):
+    """Take the external vision sample that is due."""
     ring = ekf.buffers.ev
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.ev_data_ready = index >= 0
@@ -179,6 +194,7 @@ def _floor_variance(variance, noise, use_reported):
 
 @kernel
 def pop_airspeed(ekf, inputs):
+    """Take the airspeed sample that is due."""
     ring = ekf.buffers.airspeed
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.airspeed_data_ready = index >= 0
@@ -190,6 +206,7 @@ def pop_airspeed(ekf, inputs):
 
 @kernel
 def pop_auxvel(ekf, inputs):
+    """Take the auxiliary velocity sample that is due."""
     ring = ekf.buffers.auxvel
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.auxvel_data_ready = index >= 0
@@ -201,6 +218,7 @@ def pop_auxvel(ekf, inputs):
 
 @kernel
 def pop_drag(ekf):
+    """Take the specific-force sample that is due."""
     drag = ekf.buffers.drag
     index = find_newest_due(drag.ring, ekf.time_delayed_us)
     ekf.drag_data_ready = index >= 0
@@ -211,6 +229,7 @@ def pop_drag(ekf):
 
 @kernel
 def pop_system_flags(ekf, inputs):
+    """Take the change of the vehicle's state that is due."""
     ring = ekf.buffers.system_flags
     index = find_newest_due(ring, ekf.time_delayed_us)
     ekf.system_flags_data_ready = index >= 0

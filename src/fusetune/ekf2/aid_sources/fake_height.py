@@ -24,9 +24,7 @@ def control_fake_hgt_fusion(ekf, params):
     if not is_timed_out(ekf, aid.time_last_fuse, UPDATE_INTERVAL_US):
         return
     variance = params.EKF2_NOAID_NOISE**2
-    update_vertical_position_aid_status(
-        ekf, aid, ekf.time_delayed_us, -ekf.last_known_alt, variance, INNOVATION_GATE
-    )
+    update_vertical_position_aid_status(ekf, aid, ekf.time_delayed_us, -ekf.last_known_alt, variance, INNOVATION_GATE)
     if ekf.cs.fake_hgt:
         _fuse(ekf, params, aid)
     elif ekf.vertical_velocity_deadreckon_time_exceeded and ekf.vertical_position_deadreckon_time_exceeded:

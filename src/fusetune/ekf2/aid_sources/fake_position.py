@@ -55,9 +55,7 @@ def _update_status(ekf, params, aid):
     else:
         sigma = SIGMA_OTHERWISE
     variance = sigma * sigma
-    north, east = lat_lon_difference(
-        ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, ekf.last_known_lat, ekf.last_known_lon
-    )
+    north, east = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, ekf.last_known_lat, ekf.last_known_lon)
     set_axis(aid, 0, math.degrees(ekf.gpos_lat), variance, north, ekf.P[POSITION, POSITION] + variance)
     set_axis(aid, 1, math.degrees(ekf.gpos_lon), variance, east, ekf.P[POSITION + 1, POSITION + 1] + variance)
     update_aid_source_status(ekf, aid, 2, ekf.time_delayed_us, INNOVATION_GATE)

@@ -19,6 +19,7 @@ MAG_MEMORY = np.dtype(
         ("wmm_strength", "f8"),
         ("wmm_earth_field", "f8", (3,)),
         ("wmm_time_last_checked", "i8"),
+        ("declination_saved", "?"),
         ("jacobians", "f8", (3, ERROR_STATE_SIZE)),
     ],
     align=True,
@@ -52,4 +53,5 @@ def initialise_mag_memory(mag):
     mag.wmm_strength = np.nan
     mag.wmm_earth_field[:] = 0.0
     mag.wmm_time_last_checked = 0
+    mag.declination_saved = False
     mag.jacobians[:, :] = 0.0

@@ -17,6 +17,7 @@ from fusetune.ekf2.world_magnetic_model import (
 WMM_CHECK_INTERVAL = 10_000_000
 WMM_ANGLE_CHANGE = math.radians(1.0)
 WMM_STRENGTH_CHANGE = 0.01
+SAVED_DECLINATION_CHANGE_DEG = 0.1
 
 
 @kernel
@@ -92,6 +93,18 @@ def has_saved_declination(params):
         and np.isfinite(params.EKF2_MAG_DECL)
         and abs(params.EKF2_MAG_DECL) > 0.0
     )
+
+
+@kernel
+def save_declination(ekf, params):
+    """Write the model's declination to EKF2_MAG_DECL, once, if EKF2_DECL_TYPE asks for it and it differs by 0.1°."""
+    if ekf.mag.declination_saved or (int(params.EKF2_DECL_TYPE) & DECLINATION_SAVED) == 0:
+        return
+    if np.isfinite(ekf.mag.wmm_declination):
+        declination_deg = math.degrees(ekf.mag.wmm_declination)
+        if abs(declination_deg - params.EKF2_MAG_DECL) > SAVED_DECLINATION_CHANGE_DEG:
+            params.EKF2_MAG_DECL = declination_deg
+        ekf.mag.declination_saved = True
 
 
 @kernel

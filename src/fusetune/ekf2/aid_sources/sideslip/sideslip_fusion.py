@@ -20,7 +20,6 @@ from fusetune.ekf2.timing import is_timed_out
 from fusetune.ekf2.wind import keep_only_wind_gains
 
 FUSION_INTERVAL_US = 150_000
-FORWARD_SPEED_EPSILON = 1e-3
 MIN_NOISE = 0.01
 FLT_EPSILON = float(np.finfo(np.float32).eps)
 
@@ -36,7 +35,7 @@ def _air_velocity_body(ekf, axis):
 def _forward_air_speed(ekf):
     """Kept from zero, where the angle is not defined."""
     forward = _air_velocity_body(ekf, 0)
-    return forward + math.copysign(FORWARD_SPEED_EPSILON, forward)
+    return forward + math.copysign(FLT_EPSILON, forward)
 
 
 @kernel

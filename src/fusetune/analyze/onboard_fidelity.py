@@ -1,0 +1,192 @@
+"""How close the replay of a flight's own parameters is to what the vehicle's estimator logged in that flight.
+
+This is what tells a pilot how far the replay can be trusted on this very log. Innovations are matched by their sample
+time; the vehicle logs them seldom (twice a second in the default profile), so each is set beside the replay's nearest.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fusetune.analyze.fidelity import Innovations, load_innovations, mean_nll
+from fusetune.files import atomic_path
+from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
+from fusetune.px4.flight import Flight
+
+AS_FLOWN = "as_flown"
+"""Name of the replay with the log's own parameters."""
+
+JUDGED_SOURCES = ("gnss_vel", "gnss_pos", "gnss_hgt", "baro_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt")
+MATCH_TOLERANCE_US = 30_000
+MIN_SAMPLES = 8
+WARM_UP_US = 10_000_000
+SAME_WITHIN, CLOSE_WITHIN, ROUGH_WITHIN = 0.1, 0.35, 0.8
+FULL_MAG_RATE_HZ, FULL_BARO_RATE_HZ, FULL_GNSS_RATE_HZ = 20.0, 10.0, 4.5
+FULL_COVERAGE = 0.995
+MID_AIR_START_S = 10.0
+
+
+@dataclass(frozen=True)
+class OnboardAxis:
+    """One axis of one aid source, replay against vehicle."""
+
+    source: str
+    axis: int
+    samples: int
+    relative_rms: float
+    """RMS of the innovation difference over RMS of the vehicle's innovation."""
+    rms_ratio: float
+    variance_ratio: float
+    """Median of replayed over logged innovation variance."""
+    fused_equal: float
+    rejected_equal: float
+    nll_difference: float
+
+
+@dataclass(frozen=True)
+class OnboardFidelity:
+    """What a pilot needs to know of the replay of one flight."""
+
+    flight: str
+    status: str
+    """"compared" or "not_compared"."""
+    level: str
+    """"same", "close", "rough" or "poor"; empty when not compared."""
+    median_relative_rms: float | None
+    axes: tuple[OnboardAxis, ...]
+    words: str
+    reasons: tuple[str, ...]
+    """Why the replay is not closer, most important first."""
+
+
+LEVEL_WORDS = {
+    "same": "The replay repeats what the vehicle's own filter did almost exactly. What it says about other parameters "
+    "can be taken at face value.",
+    "close": "The replay follows the vehicle's own filter closely. Differences between parameter sets can be trusted, "
+    "absolute figures to about a third.",
+    "rough": "The replay resembles the vehicle's own filter, but single innovations differ by about as much as they "
+    "are large. Trust clear differences between sets only.",
+    "poor": "The replay does not repeat the innovations that the vehicle logged. Use it to compare sets with each "
+    "other, never with the flight, and prefer flights with a better log.",
+}
+
+
+def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> OnboardFidelity:
+    """Compare the as-flown replay with the vehicle's own innovations.
+
+    Parameters
+    ----------
+    flight : Flight
+        Canonical flight, for the reasons.
+    replayed, onboard : Path
+        `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
+    """
+    ours, theirs = load_innovations(replayed), load_innovations(onboard)
+    theirs = theirs.rows(theirs.timestamp >= _warm(ours))
+    axes = tuple(
+        axis
+        for source in JUDGED_SOURCES
+        for number in range(3)
+        if (axis := _compare_axis(source, number, ours, theirs)) is not None
+    )
+    reasons = tuple(_reasons(flight))
+    if not axes:
+        words = "The vehicle logged no innovations of its own that the replay could be compared with."
+        return OnboardFidelity(flight.name, "not_compared", "", None, (), words, reasons)
+    median = float(np.median([axis.relative_rms for axis in axes]))
+    level = _level(median)
+    words = f"{LEVEL_WORDS[level]} The median difference is {median:.0%} of the logged innovations."
+    return OnboardFidelity(flight.name, "compared", level, median, axes, words, reasons if level != "same" else ())
+
+
+def write_onboard_fidelity(result: OnboardFidelity, target: Path) -> None:
+    """Write the figures as JSON."""
+    with atomic_path(target) as path:
+        path.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
+
+
+def _warm(ours: Innovations) -> int:
+    """Time (µs) from which the replay has settled: ten seconds after it first fuses an aid."""
+    fused = ours.timestamp[ours.fused & np.isin(ours.source, JUDGED_SOURCES)]
+    return int(fused.min()) + WARM_UP_US if len(fused) else int(ours.timestamp.max(initial=0)) + 1
+
+
+def _compare_axis(source: str, axis: int, ours: Innovations, theirs: Innovations) -> OnboardAxis | None:
+    left = ours.rows((ours.source == source) & (ours.axis == axis) & (ours.variance > 0))
+    right = theirs.rows((theirs.source == source) & (theirs.axis == axis) & (theirs.variance > 0))
+    if not len(left.axis) or not len(right.axis):
+        return None
+    left = left.rows(np.argsort(left.timestamp, kind="stable"))
+    after = np.clip(np.searchsorted(left.timestamp, right.timestamp), 1, max(len(left.axis) - 1, 1))
+    after = np.minimum(after, len(left.axis) - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.abs(left.timestamp[before] - right.timestamp) <= np.abs(left.timestamp[after] - right.timestamp)
+    partner = np.where(nearer, before, after)
+    matched = np.abs(left.timestamp[partner] - right.timestamp) <= MATCH_TOLERANCE_US
+    if matched.sum() < MIN_SAMPLES:
+        return None
+    left, right = left.rows(partner[matched]), right.rows(matched)
+    rms = max(float(np.sqrt(np.mean(right.innovation**2))), 1e-9)
+    return OnboardAxis(
+        source=source,
+        axis=axis,
+        samples=int(matched.sum()),
+        relative_rms=float(np.sqrt(np.mean((left.innovation - right.innovation) ** 2))) / rms,
+        rms_ratio=float(np.sqrt(np.mean(left.innovation**2))) / rms,
+        variance_ratio=float(np.median(left.variance / right.variance)),
+        fused_equal=float(np.mean(left.fused == right.fused)),
+        rejected_equal=float(np.mean(left.rejected == right.rejected)),
+        nll_difference=mean_nll(left) - mean_nll(right),
+    )
+
+
+def _level(median: float) -> str:
+    if median <= SAME_WITHIN:
+        return "same"
+    if median <= CLOSE_WITHIN:
+        return "close"
+    return "rough" if median <= ROUGH_WITHIN else "poor"
+
+
+def _reasons(flight: Flight) -> Sequence[str]:
+    """What keeps a replay of this log from repeating the flight, in the order in which it usually matters."""
+    reasons = []
+    imu = flight.topic("sensor_combined")
+    if imu is not None and len(imu["timestamp"]) > 1:
+        span_us = float(imu["timestamp"][-1] - imu["timestamp"][0])
+        coverage = float(imu["gyro_integral_dt"][1:].astype(np.float64).sum()) / max(span_us, 1.0)
+        if coverage < FULL_COVERAGE:
+            reasons.append(f"{1 - coverage:.1%} of the IMU data is missing from the log")
+    for topic, what, full in (
+        ("vehicle_magnetometer", "magnetometer", FULL_MAG_RATE_HZ),
+        ("vehicle_air_data", "barometer", FULL_BARO_RATE_HZ),
+        ("vehicle_gps_position", "GNSS", FULL_GNSS_RATE_HZ),
+    ):
+        rate = _rate(flight, topic)
+        if rate is not None and rate < full:
+            reasons.append(f"the log holds the {what} at only {rate:.1f} Hz (SDLOG_PROFILE bit 1 logs every sample)")
+    land = flight.topic("vehicle_land_detected")
+    if imu is not None and land is not None and "landed" in land and (land["landed"] == 0).any():
+        take_off = float(land["timestamp"][land["landed"] == 0][0]) - float(imu["timestamp"][0])
+        if take_off * 1e-6 < MID_AIR_START_S:
+            reasons.append(
+                f"the log starts {max(take_off, 0) * 1e-6:.0f} s before take-off, so the replayed filter has to align "
+                "in the air (SDLOG_MODE 1 logs from boot)"
+            )
+    if flight.release is not None and flight.release[:2] != BASELINE_RELEASE:
+        baseline = "v{}.{}".format(*BASELINE_RELEASE)
+        reasons.append(f"the vehicle flew {flight.release_name}, the replay behaves like {baseline}")
+    return reasons
+
+
+def _rate(flight: Flight, topic: str) -> float | None:
+    table = flight.topic(topic)
+    if table is None or len(table["timestamp"]) < 2:
+        return None
+    span_s = float(table["timestamp"][-1] - table["timestamp"][0]) * 1e-6
+    return (len(table["timestamp"]) - 1) / span_s if span_s > 0 else None
