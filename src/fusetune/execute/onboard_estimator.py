@@ -57,8 +57,8 @@ INNOVATION_TOPICS = {
     "estimator_innovation_variances": "innovation_variance",
     "estimator_innovation_test_ratios": "test_ratio",
 }
-WIDE_OBSERVATIONS = ("gnss_pos", "aux_global_position")
-"""Sources whose observation is a latitude and a longitude, published in double precision."""
+WIDE_AXES = 2
+"""Sources of two axes publish their observation in double precision: it may be a latitude and a longitude."""
 
 
 def estimator_topics(flight: Flight) -> dict[TopicKey, TopicTable]:
@@ -70,7 +70,7 @@ def estimator_topics(flight: Flight) -> dict[TopicKey, TopicTable]:
     sources = {name: _Source(result, index) for index, name in enumerate(AID_SOURCE_NAMES)}
     active = {name: source for name, source in sources.items() if len(source.rows)}
     topics: dict[TopicKey, TopicTable] = {
-        (f"estimator_aid_src_{name}", 0): source.table(name) for name, source in active.items()
+        (f"estimator_aid_src_{name}", 0): source.table() for name, source in active.items()
     }
     for topic, quantity in INNOVATION_TOPICS.items():
         topics[topic, 0] = _latest_values(result, active, quantity)
@@ -102,7 +102,7 @@ class _Source:
         """Publication time of the last fused sample up to each row; 0 before the first."""
         return np.maximum.accumulate(np.where(self.rows["fused"][:, 0], self.timestamp, 0)).astype(np.uint64)
 
-    def table(self, name: str) -> TopicTable:
+    def table(self) -> TopicTable:
         """The source as its topic."""
         first = self.rows[:, 0]
         table: TopicTable = {
@@ -113,7 +113,7 @@ class _Source:
             "device_id": np.zeros(len(first), np.uint32),
         }
         for quantity in ("observation", "observation_variance", "innovation", "innovation_variance", "test_ratio"):
-            wide = quantity == "observation" and name in WIDE_OBSERVATIONS
+            wide = quantity == "observation" and self.axes == WIDE_AXES
             for axis in range(self.axes):
                 column = quantity if self.axes == 1 else f"{quantity}[{axis}]"
                 table[column] = self.rows[quantity][:, axis].astype(np.float64 if wide else np.float32)
