@@ -1,0 +1,114 @@
+"""How fast the estimator is, as ratios within one run.
+
+    python benchmarks/estimator_speed.py LOG.ulg [REFERENCE_JSON]
+
+Prints CPU time per filter update and per IMU sample, flight seconds per CPU second, the shares of prediction, fusion
+and everything else, start-up of one replay process, and peak memory. With the JSON file of a reference replay of the
+same log, also the ratio to the CPU time per update of PX4's own estimator (another run of the same kind of machine).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from fusetune.ekf2.compilation import ensure_compiled
+from fusetune.ekf2.core_memory import CORE_MEMORY
+from fusetune.ekf2.inputs import build_inputs
+from fusetune.ekf2.measurement_update import measurement_update
+from fusetune.ekf2.parameters import complete, parameter_record
+from fusetune.ekf2.replay import replay
+from fusetune.px4.release_layouts import canonical
+from fusetune.px4.ulog_reader import read_ulog
+
+REPEATS = 9
+LOOPS = 20_000
+
+
+@njit
+def many_joseph_updates(ekf, params, K, H, loops):  # type: ignore[no-untyped-def]
+    """A three-axis observation of attitude and field moves the most states."""
+    for _ in range(loops):
+        measurement_update(ekf, params, K, H, 1.0, 0.0)
+
+
+def cpu_seconds(work: Callable[[], object]) -> float:
+    """Median CPU seconds of a piece of work."""
+    work()
+    samples = []
+    for _ in range(REPEATS):
+        start = time.process_time()
+        work()
+        samples.append(time.process_time() - start)
+    return statistics.median(samples)
+
+
+def fusion_cost() -> float:
+    """CPU seconds of one scalar measurement update."""
+    ekf, params = np.zeros(1, CORE_MEMORY), parameter_record(complete({}, {}, None))
+    ekf["P"][0] = np.eye(24)
+    ekf["q"][0, 0] = 1.0
+    K, H = np.full(24, 1e-9), np.zeros(24)
+    H[:9] = 1.0
+    return cpu_seconds(lambda: many_joseph_updates(ekf[0], params[0], K, H, LOOPS)) / LOOPS
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("log", type=Path)
+    parser.add_argument("reference", type=Path, nargs="?")
+    options = parser.parse_args()
+    ensure_compiled()
+    flight = read_ulog(options.log)
+    inputs = build_inputs(canonical(flight))
+    params = complete(flight.parameters.initial, {}, flight.release)
+    result = replay(inputs, params)
+    total = cpu_seconds(lambda: replay(inputs, params))
+    span_s = float(inputs.arrays.imu["time_us"][-1] - inputs.arrays.imu["time_us"][0]) * 1e-6
+    fused = int(result.innovations["fused"].sum())
+    fusion = fused * fusion_cost()
+    per_update = total / result.updates
+    print(f"{options.log.stem}: {result.updates} updates, {result.imu_samples} IMU samples, {span_s:.1f} s of flight")
+    print(f"  per update            {per_update * 1e6:8.2f} µs")
+    print(f"  per IMU sample        {total / result.imu_samples * 1e6:8.2f} µs")
+    print(f"  flight s per CPU s    {span_s / total:8.0f}")
+    print(
+        f"  scalar fusions        {fused} ({fused / result.updates:.2f} per update), {fusion / total:.0%} of the time"
+    )
+    if options.reference:
+        reference = json.loads(options.reference.read_text(encoding="utf-8"))
+        ratio = per_update / (reference["cpu_s"] / reference["n_updates"])
+        print(f"  ratio to PX4's C++    {ratio:8.2f}")
+    print(f"  one process, warm     {process_seconds(options.log):8.2f} s wall (start, imports, kernels, log, replay)")
+    print(f"  peak memory           {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:8.0f} MB")
+
+
+def process_seconds(log: Path) -> float:
+    """Wall seconds of a whole process that reads one log and replays it."""
+    code = (
+        "import sys; from pathlib import Path; from fusetune.px4.ulog_reader import read_ulog;"
+        "from fusetune.px4.release_layouts import canonical; from fusetune.ekf2.inputs import build_inputs;"
+        "from fusetune.ekf2.parameters import complete; from fusetune.ekf2.replay import replay;"
+        "f = read_ulog(Path(sys.argv[1])); i = build_inputs(canonical(f));"
+        "replay(i, complete(f.parameters.initial, {}, f.release))"
+    )
+    samples = []
+    for _ in range(3):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code, str(log)], check=True)
+        samples.append(time.perf_counter() - start)
+    return min(samples)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""Replay every reference flight with every reference set and print how close the replay is, as Markdown.
+
+    python benchmarks/fidelity_table.py LOGS_DIR REFERENCE_DIR > table.md
+
+REFERENCE_DIR holds one folder per log (its stem), with what PX4's own estimator computed, in the layout of
+`results/analyze/<flight>`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import statistics
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from fusetune.analyze.fidelity import ReplayFidelity, compare_folders, order_agreement
+from fusetune.analyze.replay_flight import replay_log
+
+HEADER = (
+    "| flight | sets | RMS diff., median | worst | worst axis | variance | decisions equal | flags equal | resets | "
+    "velocity mm/s | attitude ° | gyro bias rad/s | NLL | Kendall τ |"
+)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("logs", type=Path)
+    parser.add_argument("reference", type=Path)
+    options = parser.parse_args()
+    print(HEADER)
+    print("|---" * HEADER.count(" | ") + "|---|")
+    everything: list[ReplayFidelity] = []
+    for folder in sorted(path for path in options.reference.iterdir() if path.is_dir()):
+        with tempfile.TemporaryDirectory() as scratch:
+            replay_log(options.logs / f"{folder.name}.ulg", folder, Path(scratch))
+            results = compare_folders(folder, Path(scratch))
+        everything += results
+        print(row(folder.name, results), flush=True)
+    print(row("**all**", everything, with_order=False))
+
+
+def row(name: str, results: list[ReplayFidelity], *, with_order: bool = True) -> str:
+    """One line of the table: medians and worst cases over the sets of a flight."""
+    axes = [axis for result in results for axis in result.axes]
+    if not axes:
+        return f"| {name} | {len(results)} | no sample of a compared source " + "| – " * 11 + "|"
+    worst = max(axes, key=lambda axis: axis.relative_rms)
+    tau = order_agreement(results) if with_order else math.nan
+    cells = [
+        name,
+        str(len(results)),
+        f"{statistics.median(axis.relative_rms for axis in axes):.4%}",
+        f"{worst.relative_rms:.3%}",
+        f"{worst.source}[{worst.axis}]",
+        f"{max(axis.variance_difference for axis in axes):.4%}",
+        f"{min(min(axis.fused_equal, axis.rejected_equal) for axis in axes):.3%}",
+        f"{least(result.flags_equal for result in results):.3%}",
+        "equal" if all(result.resets_equal for result in results) else "differ",
+        f"{1e3 * largest(result.velocity_rms for result in results):.3f}",
+        f"{largest(result.attitude_rms_deg for result in results):.4f}",
+        f"{largest(result.gyro_bias_rms for result in results):.1e}",
+        f"{max(axis.nll_difference for axis in axes):.4f}",
+        f"{tau:.2f}" if math.isfinite(tau) else "–",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def least(values: Iterable[float]) -> float:
+    return min((value for value in values if math.isfinite(value)), default=math.nan)
+
+
+def largest(values: Iterable[float]) -> float:
+    return max((value for value in values if math.isfinite(value)), default=math.nan)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
