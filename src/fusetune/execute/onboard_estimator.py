@@ -75,9 +75,9 @@ def estimator_topics(flight: Flight) -> dict[TopicKey, TopicTable]:
     for topic, quantity in INNOVATION_TOPICS.items():
         topics[topic, 0] = _latest_values(result, active, quantity)
     topics["estimator_states", 0] = _states(result)
-    topics["estimator_status", 0] = _status(result, active)
+    topics["estimator_status", 0] = _status(result, active, _device_ids(flight))
     topics["estimator_status_flags", 0] = _status_flags(result)
-    topics["estimator_sensor_bias", 0] = _sensor_bias(result, flight, parameters)
+    topics["estimator_sensor_bias", 0] = _sensor_bias(result, _device_ids(flight), parameters)
     topics["vehicle_attitude", 0] = _attitude(result)
     topics["vehicle_local_position", 0] = _local_position(result, active.get("gnss_pos"))
     return topics
@@ -165,7 +165,7 @@ def _bits(flags: np.ndarray, prefix: str) -> np.ndarray:
     return np.asarray((flags[:, group].astype(np.uint64) << np.arange(len(group), dtype=np.uint64)).sum(axis=1))
 
 
-def _status(result: ReplayResult, sources: dict[str, _Source]) -> TopicTable:
+def _status(result: ReplayResult, sources: dict[str, _Source], devices: dict[str, int]) -> TopicTable:
     flags, position = _flag_rows(result), result.local_position
     table: TopicTable = {
         **_stamped(result.states),
@@ -176,7 +176,7 @@ def _status(result: ReplayResult, sources: dict[str, _Source]) -> TopicTable:
         "time_slip": np.zeros(len(flags), np.float32),
     }
     for field, names in {
-        "mag_test_ratio": ("mag",),
+        "hdg_test_ratio": ("mag",),
         "vel_test_ratio": ("gnss_vel",),
         "pos_test_ratio": ("gnss_pos",),
         "hgt_test_ratio": ("baro_hgt", "gnss_hgt"),
@@ -185,7 +185,19 @@ def _status(result: ReplayResult, sources: dict[str, _Source]) -> TopicTable:
     counters = {"vel_ne": "vxy", "vel_d": "vz", "pos_ne": "xy", "pod_d": "z", "quat": "heading"}
     for field, counter in counters.items():
         table[f"reset_count_{field}"] = position[f"{counter}_reset_counter"].astype(np.uint8)
-    return table
+    return table | {f"{sensor}_device_id": np.full(len(flags), number, np.uint32) for sensor, number in devices.items()}
+
+
+def _device_ids(flight: Flight) -> dict[str, int]:
+    """Identities of the sensors that the estimator used; 0 where there is none."""
+    fields = {
+        "accel": ("sensor_selection", "accel_device_id"),
+        "gyro": ("sensor_selection", "gyro_device_id"),
+        "baro": ("vehicle_air_data", "baro_device_id"),
+        "mag": ("vehicle_magnetometer", "device_id"),
+    }
+    tables = {sensor: (flight.topic(topic), field) for sensor, (topic, field) in fields.items()}
+    return {sensor: int(table[field][0]) if table else 0 for sensor, (table, field) in tables.items()}
 
 
 def _largest_test_ratio(timestamp: np.ndarray, sources: list[_Source]) -> np.ndarray:
@@ -206,18 +218,22 @@ def _status_flags(result: ReplayResult) -> TopicTable:
     return {
         "timestamp": timestamp,
         "timestamp_sample": horizon,
+        "control_status_changes": _changes(flags, "cs_"),
+        "fault_status_changes": _changes(flags, "fs_"),
+        "innovation_fault_status_changes": _changes(flags, "reject_"),
         **{name: np.ascontiguousarray(flags[:, index]) for index, name in enumerate(FLAG_COLUMNS)},
     }
 
 
-def _sensor_bias(result: ReplayResult, flight: Flight, parameters: dict[str, float]) -> TopicTable:
+def _changes(flags: np.ndarray, prefix: str) -> np.ndarray:
+    """How often any flag of a group has changed up to each row, (rows,) uint32."""
+    group = [index for index, name in enumerate(FLAG_COLUMNS) if name.startswith(prefix)]
+    before = np.vstack([np.zeros((1, len(group)), np.bool_), flags[:-1, group]])
+    return np.cumsum((flags[:, group] != before).any(axis=1)).astype(np.uint32)
+
+
+def _sensor_bias(result: ReplayResult, devices: dict[str, int], parameters: dict[str, float]) -> TopicTable:
     rows, updates = result.states, len(result.states)
-    selection, mag = flight.topic("sensor_selection"), flight.topic("vehicle_magnetometer")
-    devices = {
-        "gyro": int(selection["gyro_device_id"][0]) if selection else 0,
-        "accel": int(selection["accel_device_id"][0]) if selection else 0,
-        "mag": int(mag["device_id"][0]) if mag else 0,
-    }
     places = {
         "gyro": (S.PUBLISHED_GYRO_BIAS, S.GYRO_BIAS, parameters["EKF2_GYR_B_LIM"]),
         "accel": (S.PUBLISHED_ACCEL_BIAS, S.ACCEL_BIAS, parameters["EKF2_ABL_LIM"]),
@@ -258,7 +274,12 @@ def _local_position(result: ReplayResult, gnss_position: _Source | None) -> Topi
         table[name] = rows[name].astype(np.float32)
     for name in ("xy", "z", "vxy", "vz", "heading"):
         table[f"{name}_reset_counter"] = rows[f"{name}_reset_counter"].astype(np.uint8)
+    velocity_variance = result.states["covariances"][:, S.VELOCITY : S.VELOCITY + 3]
+    table["evh"] = np.sqrt(velocity_variance[:, 0] + velocity_variance[:, 1]).astype(np.float32)
+    table["evv"] = np.sqrt(velocity_variance[:, 2]).astype(np.float32)
+    dead_reckoning = FLAG_COLUMNS.index("cs_inertial_dead_reckoning")
     return table | {
+        "dead_reckoning": _flag_rows(result)[:, dead_reckoning].astype(np.bool_),
         "xy_valid": rows["xy_valid"].astype(np.bool_),
         "z_valid": rows["z_valid"].astype(np.bool_),
         "v_xy_valid": rows["xy_valid"].astype(np.bool_),

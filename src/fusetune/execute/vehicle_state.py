@@ -71,10 +71,13 @@ def vehicle_status(plan: FlightPlan, truth: Truth) -> TopicTable:
     fields: TopicTable = {
         "armed_time": np.where(armed, round(events.armed_s * 1e6), 0).astype(np.uint64),
         "takeoff_time": np.where(taken_off, round(events.takeoff_s * 1e6), 0).astype(np.uint64),
+        "nav_state_timestamp": np.where(was_armed, round(events.armed_s * 1e6), grid_us[0]).astype(np.uint64),
         "arming_state": np.where(armed, ARMED, STANDBY).astype(np.uint8),
         "latest_arming_reason": np.where(was_armed, ARMED_BY_MISSION, 0).astype(np.uint8),
         "latest_disarming_reason": np.where(was_disarmed, DISARMED_BY_LAND_DETECTOR, 0).astype(np.uint8),
         "nav_state": np.where(armed, AUTO_MISSION, AUTO_LOITER).astype(np.uint8),
+        "nav_state_user_intention": np.where(armed, AUTO_MISSION, AUTO_LOITER).astype(np.uint8),
+        "pre_flight_checks_pass": np.ones(len(grid_us), np.bool_),
         "vehicle_type": np.full(len(grid_us), ROTARY_WING, np.uint8),
         "failsafe": np.zeros(len(grid_us), np.bool_),
         "is_vtol": np.zeros(len(grid_us), np.bool_),
