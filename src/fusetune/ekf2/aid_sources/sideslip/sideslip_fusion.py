@@ -1,7 +1,7 @@
 """Synthetic sideslip of a fixed wing: it flies without slipping, so the air comes from ahead.
 
-With b = Rᵀ (v - w) the sideslip angle is h = b_y / b_x (small angles), observed as zero. ∂b/∂θ = Rᵀ [v - w]×,
-∂b/∂v = Rᵀ, ∂b/∂w = -Rᵀ. Unless the filter is dead reckoning by the wind, only the wind states move.
+With b = Rᵀ (v - w) the sideslip angle is h = atan2(b_y, b_x), observed as zero. ∂b/∂θ = Rᵀ [v - w]×, ∂b/∂v = Rᵀ,
+∂b/∂w = -Rᵀ. Unless the filter is dead reckoning by the wind, only the wind states move.
 
 Mirrors PX4 v1.16 `EKF/aid_sources/sideslip/sideslip_fusion.cpp`.
 """
@@ -20,6 +20,7 @@ from fusetune.ekf2.timing import is_timed_out
 from fusetune.ekf2.wind import keep_only_wind_gains
 
 FUSION_INTERVAL_US = 150_000
+FORWARD_SPEED_EPSILON = 1e-3
 MIN_NOISE = 0.01
 FLT_EPSILON = float(np.finfo(np.float32).eps)
 
@@ -33,15 +34,19 @@ def _air_velocity_body(ekf, axis):
 
 @kernel
 def _forward_air_speed(ekf):
-    """Kept from zero, where the angle is not defined."""
+    """Kept from zero the way SymForce does it for `atan2`: x + (sign x + ½) ε."""
     forward = _air_velocity_body(ekf, 0)
-    return forward + math.copysign(FLT_EPSILON, forward)
+    if forward > 0.0:
+        return forward + 1.5 * FORWARD_SPEED_EPSILON
+    if forward < 0.0:
+        return forward - 0.5 * FORWARD_SPEED_EPSILON
+    return 0.5 * FORWARD_SPEED_EPSILON
 
 
 @kernel
 def predict_sideslip(ekf):
     """Sideslip angle (rad)."""
-    return _air_velocity_body(ekf, 1) / _forward_air_speed(ekf)
+    return math.atan2(_air_velocity_body(ekf, 1), _forward_air_speed(ekf))
 
 
 @kernel
@@ -49,12 +54,12 @@ def compute_sideslip_jacobian(ekf, H):
     """Write the derivative of the sideslip angle into `H` (24,)."""
     R = ekf.R_to_earth
     x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
-    inverse = 1.0 / _forward_air_speed(ekf)
-    slope = -predict_sideslip(ekf)
-    # the derivative of a / b is (da - (a / b) db) / b: one earth vector takes both body axes
-    ex = (R[0, 1] + slope * R[0, 0]) * inverse
-    ey = (R[1, 1] + slope * R[1, 0]) * inverse
-    ez = (R[2, 1] + slope * R[2, 0]) * inverse
+    forward, sideways = _forward_air_speed(ekf), _air_velocity_body(ekf, 1)
+    inverse = 1.0 / (forward * forward + sideways * sideways)
+    # the derivative of atan2(a, b) is (b da - a db) / (a² + b²): one earth vector takes both body axes
+    ex = (forward * R[0, 1] - sideways * R[0, 0]) * inverse
+    ey = (forward * R[1, 1] - sideways * R[1, 0]) * inverse
+    ez = (forward * R[2, 1] - sideways * R[2, 0]) * inverse
     clear_jacobian(H)
     H[ATTITUDE] = ey * z - ez * y
     H[ATTITUDE + 1] = ez * x - ex * z
