@@ -50,9 +50,10 @@ def control_gnss_pos_fusion(ekf, params, force_reset):
         if not continuing:
             stop_gnss_pos_fusion(ekf)
             return
-        fuse_horizontal_position(ekf, params, aid)
         if force_reset:
             reset_horizontal_position_to_gnss(ekf, params)
+        else:
+            fuse_horizontal_position(ekf, params, aid)
     elif continuing and ekf.gnss.checks_passed:
         ekf.events.starting_gps_fusion = True
         reset_horizontal_position_to_gnss(ekf, params)

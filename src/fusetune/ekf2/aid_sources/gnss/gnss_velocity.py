@@ -69,10 +69,11 @@ def control_gnss_vel_fusion(ekf, params, force_reset):
         if not continuing:
             stop_gnss_vel_fusion(ekf)
             return
-        fuse_velocity(ekf, params, aid)
         if force_reset:
             reset_velocity_to_gnss(ekf, params)
-        elif is_height_reset_required(ekf):
+            return
+        fuse_velocity(ekf, params, aid)
+        if is_height_reset_required(ekf):
             reset_vertical_velocity_to(ekf, params, aid.observation[2], aid.observation_variance[2])
     elif continuing and ekf.gnss.checks_passed:
         ekf.events.starting_gps_fusion = True
