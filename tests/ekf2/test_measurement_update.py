@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.ekf2.height_and_field_records import make_estimator, make_parameters, rotated_by_error
 
 from fusetune.ekf2.measurement_update import constrain_state_variances, fuse, fuse_direct_state, measurement_update
-from tests.ekf2.height_and_field_records import make_estimator, make_parameters, rotated_by_error
 
 GYRO_Z, ACCEL_X = 11, 12
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from fusetune.ekf2.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_RANGE
-from fusetune.ekf2.prediction import GRAVITY, predict_covariance, predict_state, update_average_interval
 from tests.ekf2.height_and_field_records import (
     hamilton_product,
     make_estimator,
@@ -15,6 +12,9 @@ from tests.ekf2.height_and_field_records import (
     rotation_matrix,
     set_quaternion,
 )
+
+from fusetune.ekf2.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_RANGE
+from fusetune.ekf2.prediction import GRAVITY, predict_covariance, predict_state, update_average_interval
 
 DT = 0.01
 THETA, VEL, POS, B_GYRO, B_ACCEL = (slice(i, i + 3) for i in (0, 3, 6, 9, 12))

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.ekf2.height_and_field_records import hamilton_product, make_estimator, make_parameters, set_attitude
 
 from fusetune.ekf2.resets import (
     remember_reset_counters,
@@ -16,7 +17,6 @@ from fusetune.ekf2.resets import (
     reset_vertical_velocity_to,
 )
 from fusetune.ekf2.rotations import euler_yaw
-from tests.ekf2.height_and_field_records import hamilton_product, make_estimator, make_parameters, set_attitude
 
 
 def correlated_estimator():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.ekf2.height_and_field_records import at_time, make_estimator, make_parameters, set_attitude
 
 from fusetune.ekf2.aid_sources.fake_height import control_fake_hgt_fusion
 from fusetune.ekf2.aid_sources.fake_position import control_fake_pos_fusion
@@ -12,7 +13,6 @@ from fusetune.ekf2.aid_sources.zero_innovation_heading import control_zero_innov
 from fusetune.ekf2.aid_sources.zero_velocity import control_zero_velocity_update
 from fusetune.ekf2.bias_inhibition import update_imu_bias_inhibit
 from fusetune.ekf2.dead_reckoning import update_dead_reckoning_status
-from tests.ekf2.height_and_field_records import at_time, make_estimator, make_parameters, set_attitude
 
 
 def resting_estimator():
