@@ -17,10 +17,16 @@ from fusetune.analyze.fidelity import Innovations, load_innovations, mean_nll
 from fusetune.files import atomic_path
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.flight import Flight
+from fusetune.px4.release_layouts import canonical
+from fusetune.save.flight_folder import load_flight
 
 AS_FLOWN = "as_flown"
 """Name of the replay with the log's own parameters."""
 
+REASON_TOPICS = (
+    "sensor_combined", "vehicle_magnetometer", "vehicle_air_data", "vehicle_gps_position", "sensor_gps",
+    "vehicle_land_detected", "estimator_selector_status", "estimator_status",
+)  # fmt: skip
 JUDGED_SOURCES = ("gnss_vel", "gnss_pos", "gnss_hgt", "baro_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt")
 MATCH_TOLERANCE_US = 30_000
 MIN_SAMPLES = 8
@@ -76,6 +82,24 @@ LEVEL_WORDS = {
 }
 
 
+def write_flight_fidelity(flight_folder: Path, analyze_folder: Path) -> None:
+    """Compare the as-flown replay of a flight with its own log, and write `fidelity.json` beside it.
+
+    Parameters
+    ----------
+    flight_folder : Path
+        `results/save/<flight>`.
+    analyze_folder : Path
+        `results/analyze/<flight>`, with `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
+    """
+    flight = canonical(load_flight(flight_folder, topics=REASON_TOPICS))
+    result = judge_onboard_fidelity(
+        flight, analyze_folder / f"{AS_FLOWN}.innovations.parquet", analyze_folder / "onboard.innovations.parquet"
+    )
+    with atomic_path(analyze_folder / "fidelity.json") as path:
+        path.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
+
+
 def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> OnboardFidelity:
     """Compare the as-flown replay with the vehicle's own innovations.
 
@@ -102,12 +126,6 @@ def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> Onb
     level = _level(median)
     words = f"{LEVEL_WORDS[level]} The median difference is {median:.0%} of the logged innovations."
     return OnboardFidelity(flight.name, "compared", level, median, axes, words, reasons if level != "same" else ())
-
-
-def write_onboard_fidelity(result: OnboardFidelity, target: Path) -> None:
-    """Write the figures as JSON."""
-    with atomic_path(target) as path:
-        path.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
 
 
 def _warm(ours: Innovations) -> int:

@@ -16,7 +16,7 @@ from typing import Any
 from fusetune.design.config_file import load_schema, raise_problems, read_yaml, validate
 from fusetune.design.parameter_check import parameter_problem, typed_values
 
-RESERVED_SET_NAMES = ("present", "onboard", "sets")
+RESERVED_SET_NAMES = ("present", "as_flown", "onboard", "sets")
 """Names the product gives itself: the parameters as logged, the vehicle's own estimator, the table of sets."""
 
 LONGEST_SET_NAME = 120

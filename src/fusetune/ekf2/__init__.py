@@ -11,6 +11,6 @@ from fusetune.kernel_cache import use_kernel_cache
 if "NUMBA_CACHE_DIR" not in os.environ:
     _folder = use_kernel_cache()
     if "numba" in sys.modules:
-        import numba
+        from numba.core import config
 
-        numba.config.CACHE_DIR = str(_folder)
+        config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]

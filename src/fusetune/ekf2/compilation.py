@@ -15,12 +15,13 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-import numba
-from numba.core import codegen, compiler, types
+from numba.core import codegen, compiler, config, types
 
 LOCK_NAME = "compile.lock"
 ENTRY = "replay.run_estimator"
+ENTRY_SOURCE = "replay.py"
 CHILD_MARK = "FUSETUNE_COMPILING"
 
 
@@ -29,9 +30,9 @@ def ensure_compiled() -> None:
 
     Does nothing where Numba is switched off. If the child fails, the caller compiles the usual, slower way.
     """
-    if numba.config.DISABLE_JIT or CHILD_MARK in os.environ or _is_cached():
+    if _setting("DISABLE_JIT") or CHILD_MARK in os.environ or _is_cached():
         return
-    folder = Path(numba.config.CACHE_DIR)
+    folder = Path(_setting("CACHE_DIR"))
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / LOCK_NAME).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -40,9 +41,16 @@ def ensure_compiled() -> None:
             subprocess.run([sys.executable, "-m", __name__], env=environment, check=False)
 
 
+def _setting(name: str) -> Any:
+    """A setting of Numba, which makes them up as module attributes when it is imported."""
+    return getattr(config, name)
+
+
 def _is_cached() -> bool:
-    folder = Path(numba.config.CACHE_DIR or ".")
-    return any(folder.glob(f"*/{ENTRY}-*.nbi"))
+    """Whether the entry is in the cache; Numba takes an index for stale whose source file has another time stamp."""
+    folder = Path(_setting("CACHE_DIR") or ".")
+    written = Path(__file__).with_name(ENTRY_SOURCE).stat().st_mtime
+    return any(index.stat().st_mtime >= written for index in folder.glob(f"*/{ENTRY}-*.nbi"))
 
 
 @contextmanager
@@ -81,15 +89,21 @@ def joined_without_optimising() -> Iterator[None]:
         if self._engine.is_symbol_defined(name):
             set_env(self, name, env)
 
-    library.finalize, library.get_pointer_to_function = join, pointer_if_translated
-    native.set_env, compiler.CompilerBase.compile_extra = set_env_if_translated, count_depth
-    record_repr, types.Record.__repr__ = types.Record.__repr__, _short_repr
+    patches: tuple[tuple[type, str, Any], ...] = (
+        (library, "finalize", join),
+        (library, "get_pointer_to_function", pointer_if_translated),
+        (native, "set_env", set_env_if_translated),
+        (compiler.CompilerBase, "compile_extra", count_depth),
+        (types.Record, "__repr__", _short_repr),
+    )
+    originals = [getattr(owner, name) for owner, name, _ in patches]
     try:
+        for owner, name, replacement in patches:
+            setattr(owner, name, replacement)
         yield
     finally:
-        library.finalize, library.get_pointer_to_function = finalize, pointer
-        native.set_env, compiler.CompilerBase.compile_extra = set_env, compile_function
-        types.Record.__repr__ = record_repr
+        for (owner, name, _), original in zip(patches, originals, strict=True):
+            setattr(owner, name, original)
 
 
 def _short_repr(record: types.Record) -> str:

@@ -77,7 +77,10 @@ def _pop_due_samples(ekf, params, inputs):
     pop_system_flags(ekf, inputs)
     pop_mag(ekf, inputs)
     pop_flow(ekf, inputs)
-    pop_gnss(ekf, params, inputs)
+    if int(params.EKF2_GPS_CTRL) != 0:
+        pop_gnss(ekf, params, inputs)
+    else:
+        ekf.gnss_data_ready = False
     pop_airspeed(ekf, inputs)
     pop_drag(ekf)
     pop_baro(ekf, inputs)

@@ -36,7 +36,7 @@ STATE_RESET = np.dtype(
 """How often a state was reset (modulo 256, as published), and the sum of changes of the last update that did."""
 
 STATE_RESET_COUNTERS = np.dtype(
-    [(name, "i8") for name in STATE_RESET.names if name.endswith("_counter")],
+    [(name, "i8") for name in STATE_RESET.names or () if name.endswith("_counter")],
     align=True,
 )
 

@@ -131,12 +131,15 @@ def replay(
             )
         )
     dtypes = (INNOVATION_ROW, STATE_ROW, LOCAL_POSITION_ROW, FLAGS_ROW)
-    joined = [
+    innovations, states, local_position, flags = (
         np.concatenate([part[i] for part in kept]) if kept else np.zeros(0, dtype) for i, dtype in enumerate(dtypes)
-    ]
+    )
     return ReplayResult(
-        inputs.mode,
-        *joined,
+        mode=inputs.mode,
+        innovations=innovations,
+        states=states,
+        local_position=local_position,
+        flags=flags,
         imu_samples=len(inputs.arrays.imu),
         updates=int(recorder["updates"][0]),
         origin=_origin(ekf["origin"][0]),

@@ -15,6 +15,7 @@ from fusetune.report.flight_sections import (
     truth_section,
 )
 from fusetune.report.results import read_results
+from fusetune.report.trust_section import trust_section
 
 STYLE_SHEET = Path(__file__).with_name("page.css")
 
@@ -48,6 +49,7 @@ def build_report(
         evidence_section(results, figures),
         sets_section(results),
         flights_section(results, Path(flights_table)),
+        trust_section(analyze_folders),
         innovations_section(results, figures),
         truth_section(results),
         as_flown_section(results),
