@@ -15,10 +15,11 @@ def make_parameters(**overrides: float) -> np.void:
 
 
 def make_estimator(time_s: float = 100.0) -> np.void:
-    """A level estimator on the ground at `time_s`, aimed north, of unit covariance; nothing is aligned or fused."""
+    """A level estimator at `time_s`, aimed north, all heights 0, of unit covariance; nothing is aligned or fused."""
     ekf = np.zeros(1, EKF)[0]
     initialise_estimator(ekf, make_parameters())
     ekf["P"][...] = np.eye(24)
+    ekf["terrain"] = 0.0
     ekf["cs"]["in_air"] = False
     ekf["cs_prev"]["in_air"] = False
     ekf["buffers"]["observation_length"] = 20
