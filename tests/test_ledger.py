@@ -31,15 +31,21 @@ def test_other_inputs_other_files_and_unknown_entries_are_not_current(tmp_path: 
     assert not ledger.is_current("high", "key", files)
 
 
-def test_a_file_that_was_touched_or_removed_is_not_current(tmp_path: Path, files: list[Path]) -> None:
+def test_a_file_that_was_changed_or_removed_is_not_current(tmp_path: Path, files: list[Path]) -> None:
     ledger = Ledger(tmp_path / "ledger.json")
     ledger.record("low", "key", files)
-    status = files[0].stat()
-    os.utime(files[0], ns=(status.st_atime_ns, status.st_mtime_ns + 1_000_000))
+    files[0].write_text("harm")
     assert not ledger.is_current("low", "key", files)
     ledger.record("low", "key", files)
     files[1].unlink()
     assert not ledger.is_current("low", "key", files)
+
+
+def test_a_new_time_stamp_alone_changes_nothing(tmp_path: Path, files: list[Path]) -> None:
+    ledger = Ledger(tmp_path / "ledger.json")
+    ledger.record("low", "key", files)
+    os.utime(files[0], ns=(0, 0))
+    assert ledger.is_current("low", "key", files)
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"low": 3}', "\x00"])

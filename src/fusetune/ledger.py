@@ -1,8 +1,8 @@
 """What was made from what: lets a job that makes several files make only those that are missing or out of date.
 
 A job that handles many parameter sets spares the start of a process for each. The ledger in the folder of its outputs
-says, per set, from which inputs its files were made (a key) and which files these were, by size and time of change. A
-set whose key is the same and whose files are untouched needs no second computation.
+says, per set, from which inputs its files were made (a key) and what these files held (a digest, for Snakemake renews
+the time stamp of every output of a job). A set whose key and files are the same needs no second computation.
 """
 
 from __future__ import annotations
@@ -23,9 +23,12 @@ def key_of(inputs: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _fingerprint(file: Path) -> list[int]:
-    status = file.stat()
-    return [status.st_size, status.st_mtime_ns]
+def _digests(files: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
+    digests = {}
+    for file in files:
+        with open(file, "rb") as content:
+            digests[Path(file).name] = hashlib.file_digest(content, "blake2b").hexdigest()
+    return digests
 
 
 class Ledger:
@@ -53,13 +56,12 @@ class Ledger:
         if entry is None or entry.get("key") != key:
             return False
         try:
-            found = {Path(file).name: _fingerprint(Path(file)) for file in files}
+            return _digests(files) == entry.get("files")
         except OSError:
             return False
-        return found == entry.get("files")
 
     def record(self, name: str, key: str, files: Iterable[str | os.PathLike[str]]) -> None:
         """Enter files that have just been made, and save the record."""
-        self.entries[name] = {"key": key, "files": {Path(file).name: _fingerprint(Path(file)) for file in files}}
+        self.entries[name] = {"key": key, "files": _digests(files)}
         with atomic_path(self.path) as temporary:
             temporary.write_text(json.dumps(self.entries, indent=1, sort_keys=True), encoding="utf-8")

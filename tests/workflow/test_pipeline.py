@@ -76,14 +76,17 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     assert read_flights(flown)["second"]["status"] == "replayable"
     assert replay_times(flown, "first/*.json") == before
 
-    before = replay_times(flown, "*/low.*") | replay_times(flown, "*/high.*") | replay_times(flown, "*/present.*")
     flown.write(
         "small.yaml", STUDY | {"sets": [*STUDY["sets"], {"name": "new", "parameters": {"EKF2_ACC_NOISE": 0.5}}]}
     )
+    before = flown.results()
     flown.run_ok("--cores", "2")
-    after = replay_times(flown, "*/low.*") | replay_times(flown, "*/high.*") | replay_times(flown, "*/present.*")
-    assert after == before
-    assert len(replay_times(flown, "*/new.json")) == 2
+    for flight in ("first", "second"):
+        log = flown.folder / "results" / "logs" / "replay" / f"{flight}.1.log"
+        assert "replayed: new; up to date: 3" in log.read_text(encoding="utf-8")
+        for name in (f"analyze/{flight}/{pset}.states.parquet" for pset in ("present", "low", "high")):
+            assert flown.results()[name] == before[name]
+    assert len(list((flown.folder / "results" / "analyze").glob("*/new.json"))) == 2
 
 
 def test_only_broken_logs_still_end_with_a_report(workspace: Workspace) -> None:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any
 from fusetune.analyze.score_flight import score_flight
 from fusetune.analyze.settings import ScoringSettings
 
-from job import logged_job
+from job import keep_pandas_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
+keep_pandas_out()
 with logged_job(snakemake.log[0]):
     score_flight(
         Path(snakemake.input.flight),
