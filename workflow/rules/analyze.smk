@@ -1,5 +1,5 @@
-for number, first in enumerate(range(0, len(SETS), SETTINGS["sets_per_job"]), 1):
-    chunk = SETS[first : first + SETTINGS["sets_per_job"]]
+for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"]), 1):
+    chunk = REPLAYED[first : first + SETTINGS["sets_per_job"]]
 
     # One job replays several sets; each set keeps its own files. They are updated, not made anew, so that a job that is
     # started for a new set leaves the others' files as they are.
@@ -36,7 +36,7 @@ for number, first in enumerate(range(0, len(SETS), SETTINGS["sets_per_job"]), 1)
 rule score_flight:
     input:
         flight="results/save/{flight}",
-        replays=expand("results/analyze/{{flight}}/{pset}.{part}", pset=SETS, part=REPLAY_PARTS),
+        replays=expand("results/analyze/{{flight}}/{pset}.{part}", pset=REPLAYED, part=REPLAY_PARTS),
     output:
         expand("results/analyze/{{flight}}/{part}", part=SCORE_PARTS),
     log:

@@ -15,6 +15,7 @@ SCORE_PARTS = (
     "samples.parquet",
     "scoring.json",
     "onboard.innovations.parquet",
+    "fidelity.json",
 )
 
 
@@ -58,9 +59,16 @@ def present_overrides():
     return {name: values[name] for name in sorted(varied & values.keys())}
 
 
+def overrides_in(name):
+    """Values that a set gives to parameters; as flown means the log's own, without exception."""
+    if name == AS_FLOWN:
+        return {}
+    return present_overrides() if name == PRESENT else OVERRIDES[name]
+
+
 def overrides_of(names):
     """Params function: the values of some sets, so that only sets whose values change are replayed again."""
-    return lambda wildcards: {name: present_overrides() if name == PRESENT else OVERRIDES[name] for name in names}
+    return lambda wildcards: {name: overrides_in(name) for name in names}
 
 
 def closing_words():

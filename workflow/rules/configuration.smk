@@ -6,6 +6,7 @@ from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study
 
 PRESENT = "present"
+AS_FLOWN = "as_flown"
 CONFIG_FILE = str((workflow.configfiles or ["config/config.yaml"])[-1])
 
 
@@ -81,6 +82,8 @@ STUDY = told_in_one_line(load_study, SETTINGS["study"])
 MISSION = told_in_one_line(load_mission, SETTINGS["mission"])
 OVERRIDES = {pset.name: pset.overrides for pset in STUDY.sets}
 SETS = [PRESENT, *OVERRIDES]
+# The log's own parameters are replayed, too, to be compared with what the vehicle logged; they are not ranked.
+REPLAYED = [*SETS, AS_FLOWN]
 DEMONSTRATION = demonstration_flights()
 FAULTS = told_in_one_line(checked_faults)
 FLOWN_LOGS = told_in_one_line(discovered_logs)

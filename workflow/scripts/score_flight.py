@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fusetune.analyze.onboard_fidelity import write_flight_fidelity
 from fusetune.analyze.score_flight import score_flight
 from fusetune.analyze.settings import ScoringSettings
 
@@ -13,10 +14,12 @@ if TYPE_CHECKING:
 
 keep_pandas_out()
 with logged_job(snakemake.log[0]):
+    flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
     score_flight(
-        Path(snakemake.input.flight),
-        Path(snakemake.output[0]).parent,
+        flight,
+        folder,
         snakemake.params.sets,
         present=snakemake.params.present,
         settings=ScoringSettings.from_mapping(snakemake.params.scoring),
     )
+    write_flight_fidelity(flight, folder)
