@@ -96,6 +96,8 @@ def push(ring, time_us, slot):
 @kernel
 def find_newest_due(ring, horizon_us):
     """Index in the ring of the newest sample due at the horizon and at most 0.1 s old, or -1."""
+    if ring.time_us[ring.tail] > horizon_us:
+        return -1
     for age in range(ring.size):
         index = (ring.head - age) % ring.size
         if ring.time_us[index] <= horizon_us < ring.time_us[index] + MAX_SAMPLE_AGE_US:

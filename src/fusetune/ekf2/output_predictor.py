@@ -7,9 +7,9 @@ It feeds what the vehicle publishes (`vehicle_attitude`, `vehicle_local_position
 Behaviour of `output_predictor.cpp` in PX4 v1.16.
 
 Positions are metres north, east and down of a global reference, which is moved when the filter resets its position.
+A correction moves every stored velocity and position alike, so it is kept once, as an offset: the history holds
+velocities and positions less the offset at the time they were stored.
 """
-
-import math
 
 import numpy as np
 
@@ -22,32 +22,22 @@ from fusetune.ekf2.rotations import (
     quat_normalise,
     quat_to_dcm,
     rotate_by_body_increment,
-    wrap_pi,
 )
 
 GRAVITY_M_S2 = 9.80665
 MIN_DT_S, MAX_DT_S = 1e-4, 0.03
 MAX_TIME_CONSTANT_S = 10.0
 FAR_RESET_M = 1e5
-VERTICAL_DAMPING = 1.1
 INTEGRAL_GAIN = 0.1
 
-OUTPUT_SAMPLE = np.dtype(
-    [
-        ("q", "f8", (4,)),
-        ("vel", "f8", (3,)),
-        ("pos", "f8", (3,)),
-        ("vert_vel", "f8"),
-        ("vert_vel_integ", "f8"),
-        ("dt", "f8"),
-    ],
-    align=True,
-)
+OUTPUT_SAMPLE = np.dtype([("q", "f8", (4,)), ("vel", "f8", (3,)), ("pos", "f8", (3,))], align=True)
 
 OUTPUT_MEMORY = np.dtype(
     [
         ("history", OUTPUT_SAMPLE, (RING_CAPACITY,)),
         ("newest", OUTPUT_SAMPLE),
+        ("vel_offset", "f8", (3,)),
+        ("pos_offset", "f8", (3,)),
         ("head", "i8"),
         ("tail", "i8"),
         ("size", "i8"),
@@ -62,10 +52,7 @@ OUTPUT_MEMORY = np.dtype(
         ("vel_err_integ", "f8", (3,)),
         ("pos_err_integ", "f8", (3,)),
         ("vel_imu_rel_body", "f8", (3,)),
-        ("vel_deriv", "f8", (3,)),
-        ("tracking_error", "f8", (3,)),
         ("q_work", "f8", (4,)),
-        ("unaided_yaw", "f8"),
         ("dt_update_avg", "f8"),
         ("dt_correct_avg", "f8"),
         ("time_last_update_us", "i8"),
@@ -101,25 +88,17 @@ def predict_output(ekf, params, imu):
         dt = min(max((imu.time_us - output.time_last_update_us) * 1e-6, MIN_DT_S), MAX_DT_S)
         output.dt_update_avg = 0.8 * output.dt_update_avg + 0.2 * dt
     output.time_last_update_us = imu.time_us
-    unbiased = (
-        imu.delta_ang[0] - output.gyro_bias[0] * imu.delta_ang_dt,
-        imu.delta_ang[1] - output.gyro_bias[1] * imu.delta_ang_dt,
-        imu.delta_ang[2] - output.gyro_bias[2] * imu.delta_ang_dt,
-    )
     corrected = (
-        unbiased[0] + output.delta_angle_corr[0],
-        unbiased[1] + output.delta_angle_corr[1],
-        unbiased[2] + output.delta_angle_corr[2],
+        imu.delta_ang[0] - output.gyro_bias[0] * imu.delta_ang_dt + output.delta_angle_corr[0],
+        imu.delta_ang[1] - output.gyro_bias[1] * imu.delta_ang_dt + output.delta_angle_corr[1],
+        imu.delta_ang[2] - output.gyro_bias[2] * imu.delta_ang_dt + output.delta_angle_corr[2],
     )
     newest = output.newest
     rotate_by_body_increment(newest.q, corrected[0], corrected[1], corrected[2])
-    R = output.R_to_earth
-    quat_to_dcm(newest.q, R)
+    quat_to_dcm(newest.q, output.R_to_earth)
     _integrate_velocity(output, imu)
     if imu.delta_ang_dt > 0.001:
         _velocity_of_imu_offset(output, params, corrected, imu.delta_ang_dt)
-    spin = R[2, 0] * unbiased[0] + R[2, 1] * unbiased[1] + R[2, 2] * unbiased[2]
-    output.unaided_yaw = wrap_pi(output.unaided_yaw + spin)
 
 
 @kernel
@@ -134,15 +113,8 @@ def _integrate_velocity(output, imu):
             delta += R[axis, j] * (imu.delta_vel[j] - output.accel_bias[j] * dt)
         if axis == 2:
             delta += GRAVITY_M_S2 * dt
-        if dt > 0.001:
-            output.vel_deriv[axis] = delta / dt
-        step = (newest.vel[axis] + 0.5 * delta) * dt
+        newest.pos[axis] += (newest.vel[axis] + 0.5 * delta) * dt
         newest.vel[axis] += delta
-        newest.pos[axis] += step
-        if axis == 2:
-            newest.vert_vel += delta
-            newest.vert_vel_integ += step
-    newest.dt += dt
 
 
 @kernel
@@ -162,18 +134,20 @@ def align_output_predictor(ekf):
     output = ekf.output
     oldest = output.history[output.tail]
     quat_multiply_inverse(ekf.q, oldest.q, output.q_work)
-    vel_delta = (ekf.vel[0] - oldest.vel[0], ekf.vel[1] - oldest.vel[1], ekf.vel[2] - oldest.vel[2])
-    pos_delta = (-oldest.pos[0], -oldest.pos[1], -oldest.pos[2])
+    for axis in range(3):
+        output.vel_offset[axis] = ekf.vel[axis] - oldest.vel[axis]
+        output.pos_offset[axis] = -oldest.pos[axis]
     output.ref_lat = ekf.gpos_lat
     output.ref_lon = ekf.gpos_lon
     output.ref_alt = ekf.gpos_alt
     for i in range(output.size):
-        sample = output.history[i]
-        _turn(sample.q, output.q_work)
-        for axis in range(3):
-            sample.vel[axis] += vel_delta[axis]
-            sample.pos[axis] += pos_delta[axis]
-    output.newest = output.history[output.head]
+        _turn(output.history[i].q, output.q_work)
+    newest, stored = output.newest, output.history[output.head]
+    for i in range(4):
+        newest.q[i] = stored.q[i]
+    for axis in range(3):
+        newest.vel[axis] = stored.vel[axis] + output.vel_offset[axis]
+        newest.pos[axis] = stored.pos[axis] + output.pos_offset[axis]
 
 
 @kernel
@@ -184,88 +158,69 @@ def correct_output(ekf, params):
         dt = min(max((ekf.time_delayed_us - output.time_last_correct_us) * 1e-6, MIN_DT_S), MAX_DT_S)
         output.dt_correct_avg = 0.8 * output.dt_correct_avg + 0.2 * dt
     output.time_last_correct_us = ekf.time_delayed_us
-    output.gyro_bias[:] = ekf.gyro_bias
-    output.accel_bias[:] = ekf.accel_bias
+    for axis in range(3):
+        output.gyro_bias[axis] = ekf.gyro_bias[axis]
+        output.accel_bias[axis] = ekf.accel_bias[axis]
     _store_newest(output)
-    oldest = output.history[output.tail]
-    _correct_attitude(ekf, oldest)
-    vel_gain = output.dt_correct_avg / min(max(params.EKF2_TAU_VEL, output.dt_correct_avg), MAX_TIME_CONSTANT_S)
-    pos_gain = output.dt_correct_avg / min(max(params.EKF2_TAU_POS, output.dt_correct_avg), MAX_TIME_CONSTANT_S)
-    north, east = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, output.ref_lat, output.ref_lon)
-    pos = (north, east, output.ref_alt - ekf.gpos_alt)
-    vert_vel_err = ekf.vel[2] - oldest.vert_vel
-    vert_pos_err = pos[2] - oldest.vert_vel_integ
-    _correct_velocity_and_position(ekf, pos, vel_gain, pos_gain)
-    _correct_vertical(output, vert_pos_err * pos_gain + vert_vel_err * vel_gain * VERTICAL_DAMPING)
-    output.newest = output.history[output.head]
-    output.newest.dt = 0.0
+    _correct_attitude(ekf)
+    _correct_velocity_and_position(ekf, params)
 
 
 @kernel
 def _store_newest(output):
     head = output.head
     if not output.first_write:
-        head = (head + 1) % output.size
+        head += 1
+        if head >= output.size:
+            head = 0
     output.head = head
     if head == output.tail and not output.first_write:
-        output.tail = (output.tail + 1) % output.size
+        output.tail = output.tail + 1 if output.tail + 1 < output.size else 0
     else:
         output.first_write = False
-    output.history[head] = output.newest
+    stored, newest = output.history[head], output.newest
+    for i in range(4):
+        stored.q[i] = newest.q[i]
+    for axis in range(3):
+        stored.vel[axis] = newest.vel[axis] - output.vel_offset[axis]
+        stored.pos[axis] = newest.pos[axis] - output.pos_offset[axis]
 
 
 @kernel
-def _correct_attitude(ekf, oldest):
+def _correct_attitude(ekf):
     """Delta-angle correction that turns the predictor towards the filter's attitude at the horizon."""
     output = ekf.output
     q = ekf.q
     error = output.q_work
     error[0], error[1], error[2], error[3] = q[0], -q[1], -q[2], -q[3]
-    quat_multiply(error, oldest.q, error)
+    quat_multiply(error, output.history[output.tail].q, error)
     scale = -2.0 if error[0] >= 0.0 else 2.0
     delay = max((output.time_last_update_us - ekf.time_delayed_us) * 1e-6, output.dt_update_avg)
     gain = 0.5 * output.dt_update_avg / delay
-    norm = 0.0
     for axis in range(3):
-        angle = scale * error[axis + 1]
-        norm += angle * angle
-        output.delta_angle_corr[axis] = gain * angle
-    output.tracking_error[0] = math.sqrt(norm)
+        output.delta_angle_corr[axis] = gain * scale * error[axis + 1]
 
 
 @kernel
-def _correct_velocity_and_position(ekf, pos, vel_gain, pos_gain):
-    """Add a proportional-integral correction to every stored velocity and position."""
+def _correct_velocity_and_position(ekf, params):
+    """Move velocity and position, past and present, by a proportional-integral share of the error at the horizon."""
     output = ekf.output
-    oldest = output.history[output.tail]
-    vel_norm, pos_norm = 0.0, 0.0
+    vel_gain = output.dt_correct_avg / min(max(params.EKF2_TAU_VEL, output.dt_correct_avg), MAX_TIME_CONSTANT_S)
+    pos_gain = output.dt_correct_avg / min(max(params.EKF2_TAU_POS, output.dt_correct_avg), MAX_TIME_CONSTANT_S)
+    north, east = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, output.ref_lat, output.ref_lon)
+    pos = (north, east, output.ref_alt - ekf.gpos_alt)
+    oldest, newest = output.history[output.tail], output.newest
     for axis in range(3):
-        vel_err = ekf.vel[axis] - oldest.vel[axis]
-        pos_err = pos[axis] - oldest.pos[axis]
-        vel_norm += vel_err * vel_err
-        pos_norm += pos_err * pos_err
+        vel_err = ekf.vel[axis] - (oldest.vel[axis] + output.vel_offset[axis])
+        pos_err = pos[axis] - (oldest.pos[axis] + output.pos_offset[axis])
         output.vel_err_integ[axis] += vel_err
         output.pos_err_integ[axis] += pos_err
         vel_step = vel_err * vel_gain + output.vel_err_integ[axis] * vel_gain * vel_gain * INTEGRAL_GAIN
         pos_step = pos_err * pos_gain + output.pos_err_integ[axis] * pos_gain * pos_gain * INTEGRAL_GAIN
-        for i in range(output.size):
-            output.history[i].vel[axis] += vel_step
-            output.history[i].pos[axis] += pos_step
-    output.tracking_error[1] = math.sqrt(vel_norm)
-    output.tracking_error[2] = math.sqrt(pos_norm)
-
-
-@kernel
-def _correct_vertical(output, vel_step):
-    """Correct the vertical velocity history and integrate it anew from the horizon on."""
-    index = output.tail
-    output.history[index].vert_vel += vel_step
-    for _ in range(output.size - 1):
-        following = (index + 1) % output.size
-        current, after = output.history[index], output.history[following]
-        after.vert_vel += vel_step
-        after.vert_vel_integ = current.vert_vel_integ + 0.5 * (current.vert_vel + after.vert_vel) * after.dt
-        index = following
+        output.vel_offset[axis] += vel_step
+        output.pos_offset[axis] += pos_step
+        newest.vel[axis] += vel_step
+        newest.pos[axis] += pos_step
 
 
 @kernel
@@ -281,17 +236,10 @@ def apply_quaternion_reset(ekf, q_change):
 def apply_velocity_reset(ekf, delta_north, delta_east, delta_down):
     """Add a velocity reset (m/s) to the history."""
     output = ekf.output
-    for i in range(output.size):
-        _add_velocity(output.history[i], delta_north, delta_east, delta_down)
-    _add_velocity(output.newest, delta_north, delta_east, delta_down)
-
-
-@kernel
-def _add_velocity(sample, delta_north, delta_east, delta_down):
-    sample.vel[0] += delta_north
-    sample.vel[1] += delta_east
-    sample.vel[2] += delta_down
-    sample.vert_vel += delta_down
+    step = (delta_north, delta_east, delta_down)
+    for axis in range(3):
+        output.vel_offset[axis] += step[axis]
+        output.newest.vel[axis] += step[axis]
 
 
 @kernel
@@ -308,16 +256,14 @@ def apply_position_reset(ekf, delta_north, delta_east, delta_down):
             output.ref_lat = lat
             output.ref_lon = lon
     else:
-        oldest = output.history[output.tail]
-        lat, lon = add_to_lat_lon(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, -oldest.pos[0], -oldest.pos[1])
+        oldest, offset = output.history[output.tail].pos, output.pos_offset
+        lat, lon = add_to_lat_lon(
+            ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, -oldest[0] - offset[0], -oldest[1] - offset[1]
+        )
         output.ref_lat = lat
         output.ref_lon = lon
-    if delta_down != 0.0:
-        for i in range(output.size):
-            output.history[i].pos[2] += delta_down
-            output.history[i].vert_vel_integ += delta_down
-        output.newest.pos[2] += delta_down
-        output.newest.vert_vel_integ += delta_down
+    output.pos_offset[2] += delta_down
+    output.newest.pos[2] += delta_down
 
 
 @kernel

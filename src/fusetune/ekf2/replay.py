@@ -49,7 +49,7 @@ from fusetune.ekf2.sample_arrival import (
     receive_system_flags,
 )
 
-RUNS_PER_STRETCH = 2048
+RUNS_PER_STRETCH = 8192
 MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
 
 

@@ -11,6 +11,9 @@ from fusetune.ekf2.kernel import kernel
 
 ANGLE_EPSILON = 1e-10
 
+SMALL_ANGLE_SQUARED = 0.01
+"""Square (rad²) of the angle up to which five Taylor terms give sine and cosine of its half in full precision."""
+
 
 @kernel
 def wrap_pi(angle):
@@ -96,9 +99,13 @@ def quat_normalise(q):
 @kernel
 def rotation_vector_to_quat(x, y, z):
     """Unit quaternion (w, x, y, z) of a rotation vector (rad)."""
-    angle = math.sqrt(x * x + y * y + z * z)
-    if angle < ANGLE_EPSILON:
-        return 1.0, 0.0, 0.0, 0.0
+    squared = x * x + y * y + z * z
+    if squared < SMALL_ANGLE_SQUARED:
+        h = 0.25 * squared
+        scale = 0.5 + h * (-1.0 / 12.0 + h * (1.0 / 240.0 + h * (-1.0 / 10080.0 + h * (1.0 / 725760.0))))
+        w = 1.0 + h * (-1.0 / 2.0 + h * (1.0 / 24.0 + h * (-1.0 / 720.0 + h * (1.0 / 40320.0))))
+        return w, x * scale, y * scale, z * scale
+    angle = math.sqrt(squared)
     scale = math.sin(0.5 * angle) / angle
     return math.cos(0.5 * angle), x * scale, y * scale, z * scale
 

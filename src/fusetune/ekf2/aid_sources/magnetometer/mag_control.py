@@ -85,7 +85,8 @@ def _filter_sample(ekf, params):
     ekf.mag_B[:] = 0.0
     reset_mag_bias_cov(ekf, params)
     stop_mag_fusion(ekf, params)
-    mag.lpf[:] = sample
+    for axis in range(3):
+        mag.lpf[axis] = sample[axis]
     mag.counter = 1
     if not ekf.cs.in_air:
         ekf.cs.yaw_align = False

@@ -1,6 +1,6 @@
 """Can the range finder's sample be used: regular, of good quality, not tilted too far, in range, not stuck, no fog."""
 
-import numpy as np
+import math
 
 from fusetune.ekf2.aid_sources.range_finder.range_memory import FOG_MEDIAN_WINDOW, dist_bottom
 from fusetune.ekf2.kernel import kernel
@@ -80,10 +80,24 @@ def update_fog_check(rng, fog_distance):
         return
     rng.recent_distances[rng.next_recent] = dist_bottom(rng)
     rng.next_recent = (rng.next_recent + 1) % FOG_MEDIAN_WINDOW
-    median = np.median(rng.recent_distances)
+    median = _median(rng.recent_distances)
     if not rng.is_blocked:
         drop = rng.median_distance - median
         rng.is_blocked = median < fog_distance and drop > FOG_FACTOR * fog_distance
     elif median > FOG_FACTOR * fog_distance:
         rng.is_blocked = False
     rng.median_distance = median
+
+
+@kernel
+def _median(values):
+    """The value of an odd number of them that as many are below as above."""
+    half = len(values) // 2
+    for candidate in values:
+        below, equal = 0, 0
+        for value in values:
+            below += value < candidate
+            equal += value == candidate
+        if below <= half < below + equal:
+            return candidate
+    return math.nan
