@@ -140,6 +140,7 @@ def test_model_prediction_is_the_jacobian_form(gsf):
     Q = np.diag([(2.0 * DT) ** 2, (2.0 * DT) ** 2, (0.1 * DT) ** 2])
     np.testing.assert_allclose(gsf["P"][1], F @ P @ F.T + Q, rtol=1e-12)
     np.testing.assert_allclose(gsf["x"][1, :2], dv, rtol=1e-12)
+    vyf.look_up_yaw(gsf, 1)
     assert gsf["x"][1, 2] == pytest.approx(yaw)
 
 

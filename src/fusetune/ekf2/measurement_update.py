@@ -10,6 +10,7 @@ which is evaluated here in one pass that keeps P exactly symmetric.
 
 from fusetune.ekf2.global_position import add_to_global_position, single_precision
 from fusetune.ekf2.kernel import kernel
+from fusetune.ekf2.observation_gain import dot, multiply_covariance
 from fusetune.ekf2.rotations import quat_to_dcm, rotate_by_earth_increment
 from fusetune.ekf2.state import (
     ACCEL_BIAS,
@@ -178,19 +179,9 @@ def measurement_update(ekf, params, K, H, R, innovation):
     bool : True, as in v1.16 an update cannot fail
     """
     clear_inhibited_state_kalman_gains(ekf, params, K)
-    P = ekf.P
     PH = ekf.scratch.PH
-    for i in range(ERROR_STATE_SIZE):
-        PH[i] = 0.0
-    for k in range(ERROR_STATE_SIZE):
-        h = H[k]
-        if h != 0.0:
-            for i in range(ERROR_STATE_SIZE):
-                PH[i] += h * P[k, i]
-    S = R
-    for k in range(ERROR_STATE_SIZE):
-        S += H[k] * PH[k]
-    joseph_update(P, K, PH, S)
+    multiply_covariance(ekf.P, H, PH)
+    joseph_update(ekf.P, K, PH, dot(H, PH) + R)
     constrain_state_variances(ekf, params)
     fuse(ekf, params, K, innovation)
     return True

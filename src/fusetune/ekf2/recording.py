@@ -132,11 +132,23 @@ def views_of(ekf: np.ndarray) -> EstimatorViews:
 def allocate_records(updates: int) -> RecordArrays:
     """Room for as many updates, whatever they publish."""
     return RecordArrays(
-        np.zeros(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW),
-        np.zeros(updates, STATE_ROW),
-        np.zeros(updates, LOCAL_POSITION_ROW),
-        np.zeros(updates, FLAGS_ROW),
+        _zero_rows(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW),
+        _zero_rows(updates, STATE_ROW),
+        _zero_rows(updates, LOCAL_POSITION_ROW),
+        _zero_rows(updates, FLAGS_ROW),
     )
+
+
+def _zero_rows(count: int, dtype: np.dtype) -> np.ndarray:
+    """Rows of zeros by way of bytes, which the operating system provides on first use instead of NumPy at once."""
+    return np.zeros(count * dtype.itemsize, np.uint8).view(dtype)
+
+
+def joined_rows(parts: list[np.ndarray], dtype: np.dtype) -> np.ndarray:
+    """Rows of several parts in one array, copied as bytes and not field by field."""
+    whole = _zero_rows(sum(map(len, parts)), dtype)
+    np.concatenate([part.view(np.uint8) for part in parts] or [whole.view(np.uint8)], out=whole.view(np.uint8))
+    return whole
 
 
 @kernel
@@ -249,15 +261,18 @@ def _horizontal_accuracy(ekf):
 def _record_flags(views, recorder, rows, timestamp):
     """Keep the flags if any changed since they were last kept, or a second has passed."""
     last = recorder.last_flags
-    row = rows[recorder.flag_rows]
-    changed = timestamp >= last.timestamp + FLAGS_INTERVAL_US
+    differences, column = 0, 0
+    for group in (views.cs, views.fs, views.reject):
+        for i in range(len(group)):
+            differences += group[i] != last.flags[column + i]
+        column += len(group)
+    if differences == 0 and timestamp < last.timestamp + FLAGS_INTERVAL_US:
+        return
     column = 0
     for group in (views.cs, views.fs, views.reject):
-        for value in group:
-            row.flags[column] = value
-            changed = changed or value != last.flags[column]
-            column += 1
-    if changed:
-        row.timestamp = timestamp
-        recorder.last_flags = row
-        recorder.flag_rows += 1
+        for i in range(len(group)):
+            last.flags[column + i] = group[i]
+        column += len(group)
+    last.timestamp = timestamp
+    rows[recorder.flag_rows] = last
+    recorder.flag_rows += 1

@@ -34,6 +34,7 @@ from fusetune.ekf2.recording import (
     RECORDER_MEMORY,
     STATE_ROW,
     allocate_records,
+    joined_rows,
     record_update,
     views_of,
 )
@@ -122,17 +123,11 @@ def replay(
         recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
         run_estimator(ekf[0], params[0], inputs.arrays, views, recorder[0], records, start, stop)
         done = recorder[0]
-        kept.append(
-            (
-                records.innovations[: done["innovation_rows"]].copy(),
-                records.states[: done["update_rows"]].copy(),
-                records.local_position[: done["update_rows"]].copy(),
-                records.flags[: done["flag_rows"]].copy(),
-            )
-        )
+        counts = (done["innovation_rows"], done["update_rows"], done["update_rows"], done["flag_rows"])
+        kept.append(tuple(joined_rows([rows[:count]], rows.dtype) for rows, count in zip(records, counts, strict=True)))
     dtypes = (INNOVATION_ROW, STATE_ROW, LOCAL_POSITION_ROW, FLAGS_ROW)
     innovations, states, local_position, flags = (
-        np.concatenate([part[i] for part in kept]) if kept else np.zeros(0, dtype) for i, dtype in enumerate(dtypes)
+        joined_rows([part[i] for part in kept], dtype) for i, dtype in enumerate(dtypes)
     )
     return ReplayResult(
         mode=inputs.mode,

@@ -14,6 +14,9 @@ ANGLE_EPSILON = 1e-10
 SMALL_ANGLE_SQUARED = 0.01
 """Square (rad²) of the angle up to which five Taylor terms give sine and cosine of its half in full precision."""
 
+SMALL_LENGTH_EXCESS = 1e-6
+"""Up to which three terms of a series give the inverse square root in full precision."""
+
 
 @kernel
 def wrap_pi(angle):
@@ -88,8 +91,12 @@ def quat_multiply_inverse(a, b, out):
 
 @kernel
 def quat_normalise(q):
-    """Scale `q` to unit length."""
-    scale = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    """Scale `q` to unit length, by the first terms of a series where it is close to that already."""
+    excess = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0
+    if abs(excess) < SMALL_LENGTH_EXCESS:
+        scale = 1.0 - excess * (0.5 - 0.375 * excess)
+    else:
+        scale = 1.0 / math.sqrt(1.0 + excess)
     q[0] *= scale
     q[1] *= scale
     q[2] *= scale

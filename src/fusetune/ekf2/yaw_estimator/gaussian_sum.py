@@ -16,6 +16,7 @@ from fusetune.ekf2.yaw_estimator.gsf_memory import N_MODELS, reset_gsf
 from fusetune.ekf2.yaw_estimator.velocity_yaw_filter import (
     gaussian_density,
     initialise_models,
+    look_up_yaw,
     predict_model,
     update_model,
 )
@@ -47,6 +48,7 @@ def fuse_gsf_velocity(gsf, vel_n, vel_e, vel_accuracy, in_air):
         gsf.vel_fuse_started = in_air or vel_n * vel_n + vel_e * vel_e > vel_accuracy * vel_accuracy
         return
     for model in range(N_MODELS):
+        look_up_yaw(gsf, model)
         update_model(gsf, model, vel_n, vel_e, vel_accuracy)
     _update_weights(gsf)
     _combine_yaw(gsf)

@@ -37,13 +37,12 @@ def initialise_models(gsf, vel_n, vel_e, vel_accuracy):
 
 @kernel
 def predict_model(gsf, model, imu, in_air):
-    """Propagate velocity and covariance of one model by an IMU sample; the yaw is that of its attitude.
+    """Propagate velocity and covariance of one model by an IMU sample; for its yaw see `look_up_yaw`.
 
     With the velocity increment (Δn, Δe) in NED, F = I + [[0, 0, -Δe], [0, 0, Δn], [0, 0, 0]].
     """
     quat_to_dcm(gsf.q[model], gsf.R)
     R = gsf.R
-    gsf.x[model, 2] = euler_yaw(R)
     dv = imu.delta_vel
     dv_n = R[0, 0] * dv[0] + R[0, 1] * dv[1] + R[0, 2] * dv[2]
     dv_e = R[1, 0] * dv[0] + R[1, 1] * dv[1] + R[1, 2] * dv[2]
@@ -66,6 +65,13 @@ def predict_model(gsf, model, imu, in_air):
 
     gsf.x[model, 0] += dv_n
     gsf.x[model, 1] += dv_e
+
+
+@kernel
+def look_up_yaw(gsf, model):
+    """Take the yaw of one model from its attitude; only a velocity fusion needs it."""
+    quat_to_dcm(gsf.q[model], gsf.R)
+    gsf.x[model, 2] = euler_yaw(gsf.R)
 
 
 @kernel
