@@ -84,7 +84,8 @@ def test_rotation_of_a_coning_motion_is_the_product_of_its_parts():
 
 
 def test_interval_settles_on_the_samples_that_fill_the_period():
-    counts = [round(float(s["delta_ang_dt"] / DT)) for s in down_sampled(constant_motion(400, (0, 0, 0.1), (0, 0, 0)), 8000)]
+    samples = down_sampled(constant_motion(400, (0, 0, 0.1), (0, 0, 0)), 8000)
+    counts = [round(float(sample["delta_ang_dt"] / DT)) for sample in samples]
     assert set(counts[5:]) == {2}
 
 

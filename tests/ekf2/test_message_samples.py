@@ -53,8 +53,8 @@ def test_gnss_velocity_must_be_valid_and_dilution_combines_both_directions():
 def test_flow_turns_round_becomes_a_rate_and_is_stamped_mid_interval():
     rows = table(
         timestamp=[100_000], timestamp_sample=[90_000], pixel_flow__0=[0.02], pixel_flow__1=[-0.01],
-        delta_angle__0=[0.0], delta_angle__1=[0.1], delta_angle__2=[0.0], integration_timespan_us=[20_000], quality=[200],
-        max_flow_rate=[7.0], min_ground_distance=[0.1], max_ground_distance=[30.0],
+        delta_angle__0=[0.0], delta_angle__1=[0.1], delta_angle__2=[0.0], integration_timespan_us=[20_000],
+        quality=[200], max_flow_rate=[7.0], min_ground_distance=[0.1], max_ground_distance=[30.0],
     )  # fmt: skip
     samples, limits, usable = convert.flow_samples(rows)
     np.testing.assert_allclose(samples["flow_rate"][0], [-1.0, 0.5])
@@ -65,10 +65,10 @@ def test_flow_turns_round_becomes_a_rate_and_is_stamped_mid_interval():
 
 
 def vision(**changes):
-    base = dict(
-        timestamp=[10], timestamp_sample=[9], pose_frame=[1], velocity_frame=[3], quality=[50], reset_counter=[2],
-        q__0=[1.0], q__1=[0.0], q__2=[0.0], q__3=[0.0],
-    )  # fmt: skip
+    base = {
+        "timestamp": [10], "timestamp_sample": [9], "pose_frame": [1], "velocity_frame": [3], "quality": [50],
+        "reset_counter": [2], "q__0": [1.0], "q__1": [0.0], "q__2": [0.0], "q__3": [0.0],
+    }  # fmt: skip
     for name in ("position", "velocity", "position_variance", "velocity_variance", "orientation_variance"):
         base |= {f"{name}__{i}": [0.25] for i in range(3)}
     return table(**(base | changes))

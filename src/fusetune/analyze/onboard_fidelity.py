@@ -134,9 +134,12 @@ def _warm(ours: Innovations) -> int:
     return int(fused.min()) + WARM_UP_US if len(fused) else int(ours.timestamp.max(initial=0)) + 1
 
 
+def _usable(rows: Innovations, source: str, axis: int) -> Innovations:
+    return rows.rows((rows.source == source) & (rows.axis == axis) & (rows.variance > 0) & np.isfinite(rows.innovation))
+
+
 def _compare_axis(source: str, axis: int, ours: Innovations, theirs: Innovations) -> OnboardAxis | None:
-    left = ours.rows((ours.source == source) & (ours.axis == axis) & (ours.variance > 0))
-    right = theirs.rows((theirs.source == source) & (theirs.axis == axis) & (theirs.variance > 0))
+    left, right = (_usable(rows, source, axis) for rows in (ours, theirs))
     if not len(left.axis) or not len(right.axis):
         return None
     left = left.rows(np.argsort(left.timestamp, kind="stable"))

@@ -10,5 +10,5 @@ time; one that does allocate does not compile.
 
 from numba import njit
 
-kernel = njit(error_model="numpy", _nrt=False)
-entry_kernel = njit(error_model="numpy", cache=True, _nrt=False)
+kernel = njit(error_model="numpy", _nrt=False)  # type: ignore[call-overload]
+entry_kernel = njit(error_model="numpy", cache=True, _nrt=False)  # type: ignore[call-overload]
