@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from fusetune.errors import UserError
+from fusetune.parquet import read_table
 
 COMPARED_SOURCES = (
     "gnss_vel", "gnss_pos", "gnss_hgt", "gnss_yaw", "baro_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt", "ev_yaw",
@@ -150,7 +150,7 @@ def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
 
 def load_innovations(path: Path) -> Innovations:
     """Read a `<set>.innovations.parquet`."""
-    table = pq.read_table(path)
+    table = read_table(path)
 
     def column(name: str, dtype: type) -> np.ndarray:
         return table.column(name).to_numpy().astype(dtype)
@@ -241,7 +241,7 @@ def _state_fidelity(reference: Path, replay: Path, name: str, start: int) -> tup
     """RMS difference of velocity (m/s), attitude (deg) and gyro bias (rad/s) at common times."""
     columns = ["timestamp_sample"] + [f"states_{i}" for i in range(13)]
     ref, rep = (
-        np.column_stack([pq.read_table(folder / f"{name}.states.parquet", columns=[c])[c].to_numpy() for c in columns])
+        np.column_stack([read_table(folder / f"{name}.states.parquet", columns=[c])[c].to_numpy() for c in columns])
         for folder in (reference, replay)
     )
     _, i, j = np.intersect1d(ref[:, 0], rep[:, 0], return_indices=True)
@@ -259,7 +259,7 @@ def _state_fidelity(reference: Path, replay: Path, name: str, start: int) -> tup
 
 def _flags_fidelity(reference: Path, replay: Path, name: str, start: int) -> tuple[float, tuple[str, ...]]:
     """Share of time after `start` in which all control status flags agree, and the names of those that do not."""
-    ref, rep = (pq.read_table(folder / f"{name}.status_flags.parquet") for folder in (reference, replay))
+    ref, rep = (read_table(folder / f"{name}.status_flags.parquet") for folder in (reference, replay))
     names = [column for column in ref.column_names if column.startswith("cs_") and column in rep.column_names]
     ref_t, rep_t = ref["timestamp"].to_numpy(), rep["timestamp"].to_numpy()
     if not len(ref_t) or not len(rep_t):

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.errors import UserError
+from fusetune.parquet import read_table
 
 SourceAxis = tuple[str, int]
 
@@ -66,7 +66,7 @@ def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.
         If the file is missing or damaged.
     """
     try:
-        table = pq.read_table(path, columns=columns, memory_map=True)
+        table = read_table(path, columns)
     except (OSError, pa.ArrowInvalid) as error:
         raise UserError(path, f"cannot be read: {error}", "Delete it and run the pipeline again.") from error
     return {name: table[name].to_numpy() for name in table.column_names}
@@ -96,7 +96,7 @@ def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxi
     parameters : of this set; where the table has no test ratio, it follows from the source's gate
     """
     try:
-        table = pq.read_table(path, memory_map=True)
+        table = read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
         raise UserError(path, f"cannot be read: {error}", "Delete it and run the pipeline again.") from error
     if table.num_rows == 0:

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from fusetune.analyze.metrics_table import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
+from fusetune.parquet import read_table
 
 Criteria = dict[str, float]
 
@@ -35,7 +35,7 @@ _AIDING = ("gnss_pos", "gnss_vel", "gnss_hgt", "baro_hgt", "rng_hgt", "mag", "ev
 
 def read_metrics(folders: Sequence[Path]) -> pa.Table:
     """Metrics of all flights in one table, in the order of the folders."""
-    tables = [pq.read_table(folder / "metrics.parquet") for folder in folders]
+    tables = [read_table(folder / "metrics.parquet") for folder in folders]
     return pa.concat_tables(tables) if tables else METRICS_SCHEMA.empty_table()
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from fusetune.analyze.likelihood import profile_nll
+from fusetune.parquet import read_table
 
 Array = npt.NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def read_flight(folder: Path, source: str, present: str) -> AnalyzedFlight:
     name = summary["flight"]
     if summary["status"] != "scored":
         return AnalyzedFlight(name, folder, summary, None, summary["reason"])
-    table = pq.read_table(folder / "scores.parquet")
+    table = read_table(folder / "scores.parquet")
     table = table.filter(pc.equal(table["source"], source))
     evidence = _evidence(name, table)
     if evidence is None or present not in evidence.sets:

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
-
 import fusetune
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.errors import UserError
+from fusetune.parquet import read_table
 
 _FLIGHT_COLUMNS = ("flight", "status", "reason", "firmware", "checksum", "duration_s", "airborne_s")
 
@@ -32,7 +31,7 @@ def flight_rows(flights_table: Path, flights: Sequence[AnalyzedFlight]) -> list[
     """One row per log, refused ones too: verdict, firmware, checksum, and whether it entered the decision."""
     analyzed = {flight.name: flight for flight in flights}
     rows = []
-    for row in pq.read_table(flights_table).to_pylist():
+    for row in read_table(flights_table).to_pylist():
         flight = analyzed.get(row["flight"])
         entry = {name: row.get(name) for name in _FLIGHT_COLUMNS}
         entry["scored"] = flight is not None and flight.evidence is not None

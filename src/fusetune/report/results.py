@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-import pyarrow.parquet as pq
 
 from fusetune.analyze.onboard import ONBOARD
 from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.parquet import read_table
 
 MOST_SETS_SHOWN = 14
 """Box plots and tables of more sets than this are unreadable: the best and the present one are shown."""
@@ -103,7 +103,7 @@ def pooled_samples(results: Results) -> list[PooledSamples]:
     values: dict[tuple[str, int], dict[str, list[npt.NDArray[np.float64]]]] = {}
     normalised: dict[tuple[str, int], dict[str, list[npt.NDArray[np.float64]]]] = {}
     for flight in results.flights:
-        table = pq.read_table(results.folders[flight] / "samples.parquet")
+        table = read_table(results.folders[flight] / "samples.parquet")
         frame = table.select(["set", "source", "axis", "innovation", "innovation_variance"]).to_pandas()
         for (source, axis, name), part in frame.groupby(["source", "axis", "set"], observed=True, sort=False):
             if name in results.shown:

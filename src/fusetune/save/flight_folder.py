@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from fusetune.errors import UserError
+from fusetune.parquet import read_table
 from fusetune.px4.flight import (
     Dropout,
     Flight,
@@ -121,9 +122,7 @@ def _write_table(file: Path, table: TopicTable) -> None:
 
 def _read_table(file: Path) -> TopicTable:
     try:
-        # read_table would go through the data set machinery, twice as slow on so many small files
-        with pq.ParquetFile(file, memory_map=True) as parquet:
-            table = parquet.read(use_threads=False)
+        table = read_table(file)
     except (OSError, pa.ArrowException) as error:
         raise UserError(file, f"cannot be read ({error})", _RUN_AGAIN) from error
     return {
