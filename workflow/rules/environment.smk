@@ -63,7 +63,7 @@ def recover_from_interruption():
 recover_from_interruption()
 
 # Changed sources run again what depends on them.
-BASE = ("errors.py", "files.py", "px4")
+BASE = ("errors.py", "files.py", "parquet.py", "px4")
 REPLAY_SOURCES = ("ekf2", "save", "ledger.py", "analyze/replay_flight.py", "analyze/replay_files.py")
 DIGEST = {
     "design": source_digest(*BASE, "design"),
