@@ -27,6 +27,7 @@ from fusetune.ekf2.core_memory import CORE_MEMORY
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.measurement_update import measurement_update
 from fusetune.ekf2.parameters import complete, parameter_record
+from fusetune.ekf2.prediction import predict_covariance, predict_state
 from fusetune.ekf2.replay import replay
 from fusetune.px4.release_layouts import canonical
 from fusetune.px4.ulog_reader import read_ulog
@@ -40,6 +41,14 @@ def many_joseph_updates(ekf, params, K, H, loops):  # type: ignore[no-untyped-de
     """A three-axis observation of attitude and field moves the most states."""
     for _ in range(loops):
         measurement_update(ekf, params, K, H, 1.0, 0.0)
+
+
+@njit
+def many_predictions(ekf, params, loops):  # type: ignore[no-untyped-def]
+    """Covariance and state over one interval at rest."""
+    for _ in range(loops):
+        predict_covariance(ekf, params)
+        predict_state(ekf, params)
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
@@ -63,6 +72,18 @@ def fusion_cost() -> float:
     return cpu_seconds(lambda: many_joseph_updates(ekf[0], params[0], K, H, LOOPS)) / LOOPS
 
 
+def prediction_cost() -> float:
+    """CPU seconds of one prediction of covariance and state."""
+    ekf, params = np.zeros(1, CORE_MEMORY), parameter_record(complete({}, {}, None))
+    ekf["P"][0] = np.eye(24) * 1e-3
+    ekf["q"][0, 0] = 1.0
+    ekf["R_to_earth"][0] = np.eye(3)
+    ekf["dt_ekf_avg"] = 0.01
+    ekf["imu_delayed"]["delta_ang_dt"] = ekf["imu_delayed"]["delta_vel_dt"] = 0.01
+    ekf["imu_delayed"]["delta_vel"][0, 2] = -0.0980665
+    return cpu_seconds(lambda: many_predictions(ekf[0], params[0], LOOPS)) / LOOPS
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("log", type=Path)
@@ -75,16 +96,21 @@ def main() -> None:
     result = replay(inputs, params)
     total = cpu_seconds(lambda: replay(inputs, params))
     span_s = float(inputs.arrays.imu["time_us"][-1] - inputs.arrays.imu["time_us"][0]) * 1e-6
-    fused = int(result.innovations["fused"].sum())
+    # the gravity aid reports itself fused at every update, also where it was not
+    fused = int((result.innovations["fused"] & (result.source_names() != "gravity")).sum())
     fusion = fused * fusion_cost()
+    prediction = result.updates * prediction_cost()
     per_update = total / result.updates
     print(f"{options.log.stem}: {result.updates} updates, {result.imu_samples} IMU samples, {span_s:.1f} s of flight")
     print(f"  per update            {per_update * 1e6:8.2f} µs")
     print(f"  per IMU sample        {total / result.imu_samples * 1e6:8.2f} µs")
     print(f"  flight s per CPU s    {span_s / total:8.0f}")
+    rest = 1.0 - (prediction + fusion) / total
+    print(f"  prediction            {prediction / total:8.0%}")
     print(
-        f"  scalar fusions        {fused} ({fused / result.updates:.2f} per update), {fusion / total:.0%} of the time"
+        f"  fusion                {fusion / total:8.0%} ({fused / result.updates:.2f} scalar updates per filter update)"
     )
+    print(f"  control and the rest  {rest:8.0%}")
     if options.reference:
         reference = json.loads(options.reference.read_text(encoding="utf-8"))
         ratio = per_update / (reference["cpu_s"] / reference["n_updates"])
