@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
 
-from job import keep_pandas_out, logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
-keep_pandas_out()
+keep_out("pandas")
 with logged_job(snakemake.log[0]):
     decide(
         [Path(scores).parent for scores in snakemake.input.scores],

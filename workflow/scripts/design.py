@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.design import write_design
 
-from job import keep_pandas_out, logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
-keep_pandas_out()
+keep_out("pandas")
 with logged_job(snakemake.log[0]):
     write_design(snakemake.input.mission, snakemake.input.study, "results/design")

@@ -28,16 +28,22 @@ def logged_job(log: str) -> Iterator[None]:
             raise
 
 
-class _PandasAbsent:
-    """Finds no pandas, as if it were not installed."""
+class _Absent:
+    """Finds nothing of some packages, as if they were not installed."""
 
-    @staticmethod
-    def find_spec(name: str, path: object = None, target: object = None) -> None:
-        """Refuse pandas; leave all else to the other finders."""
-        if name == "pandas":
+    def __init__(self, packages: tuple[str, ...]) -> None:
+        self.packages = packages
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """Refuse the packages; leave all else to the other finders."""
+        if name.partition(".")[0] in self.packages:
             raise ModuleNotFoundError(f"{name} is kept out of this process", name=name)
 
 
-def keep_pandas_out() -> None:
-    """Spare a job the import of pandas, some 0.4 s, which pyarrow loads only to look whether it is given a Series."""
-    sys.meta_path.insert(0, _PandasAbsent)  # type: ignore[arg-type]
+def keep_out(*packages: str) -> None:
+    """Spare a job the import of packages that others load only to look whether they are there.
+
+    PyArrow does so with pandas, to see whether it is given a Series, and Numba with SciPy, for linear algebra that no
+    kernel uses; each takes some 0.4 s.
+    """
+    sys.meta_path.insert(0, _Absent(packages))  # type: ignore[arg-type]

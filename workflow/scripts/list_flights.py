@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.save import write_flights_table
 
-from job import keep_pandas_out, logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
-keep_pandas_out()
+keep_out("pandas")
 with logged_job(snakemake.log[0]):
     write_flights_table(snakemake.input.folders, snakemake.output.table, snakemake.output.csv)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 from fusetune.analyze.replay_flight import replay_saved_flight
 from fusetune.ledger import Ledger, key_of
 
-from job import keep_pandas_out, logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
-keep_pandas_out()
+keep_out("pandas", "scipy")
 
 
 def files_of(name: str) -> list[str]:

@@ -7,12 +7,12 @@ from fusetune.analyze.onboard_fidelity import write_flight_fidelity
 from fusetune.analyze.score_flight import score_flight
 from fusetune.analyze.settings import ScoringSettings
 
-from job import keep_pandas_out, logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
-keep_pandas_out()
+keep_out("pandas")
 with logged_job(snakemake.log[0]):
     flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
     score_flight(

@@ -50,7 +50,11 @@ def write_replay(folder: Path, identity: ReplayIdentity, result: ReplayResult) -
 def write_table(table: pa.Table, target: Path) -> None:
     """Write a Parquet file that is either whole or not there."""
     with atomic_path(target) as path:
-        pq.write_table(table, path, compression="zstd", compression_level=1)
+        # Figures hardly ever repeat: a dictionary of them, and their extremes, would only take time.
+        texts = [field.name for field in table.schema if pa.types.is_dictionary(field.type)]
+        pq.write_table(
+            table, path, compression="zstd", compression_level=1, use_dictionary=texts, write_statistics=False
+        )
 
 
 def _summary(identity: ReplayIdentity, result: ReplayResult) -> dict[str, object]:

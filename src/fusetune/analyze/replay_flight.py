@@ -12,7 +12,7 @@ from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import replay
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight
-from fusetune.px4.release_layouts import canonical
+from fusetune.px4.release_layouts import ESTIMATOR_TOPICS, canonical
 from fusetune.save.flight_folder import load_flight
 
 WRITTEN_BACK = "EKF2_MAG_DECL"
@@ -30,7 +30,7 @@ def replay_saved_flight(flight_folder: Path, sets: Mapping[str, Mapping[str, flo
     output_folder : Path
         Takes the files of `fusetune.analyze.replay_files` for each set.
     """
-    replay_flight(load_flight(flight_folder), sets, output_folder)
+    replay_flight(load_flight(flight_folder, topics=ESTIMATOR_TOPICS), sets, output_folder)
 
 
 def replay_flight(flight: Flight, sets: Mapping[str, Mapping[str, float]], output_folder: Path) -> None:
