@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.save import save_log
 
-from job import keep_pandas_out, logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
-keep_pandas_out()
+keep_out("pandas")
 with logged_job(snakemake.log[0]):
     verdict = save_log(snakemake.input.log, snakemake.output[0])
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")

@@ -7,12 +7,12 @@ from fusetune.execute import simulate
 from fusetune.execute.faults import parse_faults
 from fusetune.execute.vehicle import load_vehicle
 
-from job import keep_pandas_out, logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
-keep_pandas_out()
+keep_out("pandas")
 with logged_job(snakemake.log[0]):
     simulate(
         load_mission(snakemake.input.mission),
