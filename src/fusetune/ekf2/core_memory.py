@@ -10,6 +10,7 @@ from fusetune.ekf2.aid_source_status import AID_SOURCES
 from fusetune.ekf2.control_status import CONTROL_STATUS, FAULT_STATUS, INFORMATION_EVENTS, INNOVATION_REJECTION
 from fusetune.ekf2.sensor_samples import IMU_SAMPLE
 from fusetune.ekf2.state import ERROR_STATE_SIZE
+from fusetune.ekf2.withholding import WITHHELD
 
 HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_RANGE, HEIGHT_REF_EV, HEIGHT_REF_UNKNOWN = 0, 1, 2, 3, 4
 """Height reference: the values of `EKF2_HGT_REF`, and the unknown one at start."""
@@ -85,6 +86,7 @@ CORE_FIELDS = [
     ("reject", INNOVATION_REJECTION),
     ("events", INFORMATION_EVENTS),
     ("aid", AID_SOURCES),
+    ("withheld", WITHHELD),
     ("state_reset", STATE_RESET),
     ("state_reset_prev", STATE_RESET_COUNTERS),
     ("height_sensor_ref", "i8"),

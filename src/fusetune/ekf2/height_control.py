@@ -120,10 +120,13 @@ def estimate_inertial_nav_falling_likelihood(ekf):
     ground) exceeds 1 as well. Range is measured towards the ground, so its innovation counts with opposite sign.
     """
     cs, aid = ekf.cs, ekf.aid
-    pressure = _normalised(cs.baro_hgt, aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0])
+    knows_gnss = not ekf.withheld.gnss
+    pressure = _normalised(
+        cs.baro_hgt and not ekf.withheld.baro, aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0]
+    )
     gnss = max(
-        _normalised(cs.gps_hgt, aid.gnss_hgt.innovation[0], aid.gnss_hgt.innovation_variance[0]),
-        _normalised(cs.gnss_vel, aid.gnss_vel.innovation[2], aid.gnss_vel.innovation_variance[2]),
+        _normalised(cs.gps_hgt and knows_gnss, aid.gnss_hgt.innovation[0], aid.gnss_hgt.innovation_variance[0]),
+        _normalised(cs.gnss_vel and knows_gnss, aid.gnss_vel.innovation[2], aid.gnss_vel.innovation_variance[2]),
     )
     ground = max(
         _normalised(cs.rng_hgt, -aid.rng_hgt.innovation[0], aid.rng_hgt.innovation_variance[0]),

@@ -7,7 +7,8 @@ so that memory for results grows only with what is recorded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -49,9 +50,43 @@ from fusetune.ekf2.sample_arrival import (
     receive_range,
     receive_system_flags,
 )
+from fusetune.ekf2.withholding import WITHHOLDABLE
+from fusetune.px4.flight import ParameterChange
 
 RUNS_PER_STRETCH = 8192
 MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A time in which the measurements of one sensor are withheld from the filter.
+
+    Attributes
+    ----------
+    sensor : a key of `fusetune.ekf2.withholding.WITHHOLDABLE`
+    start, stop : IMU timestamps (µs)
+    """
+
+    sensor: str
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class GapResult:
+    """What the filter did in a gap.
+
+    Attributes
+    ----------
+    start : fusion time horizon when the withholding began (µs)
+    innovations : rows of the sensor's own aid sources: what it measured, against what was predicted without it
+    local_position : (2,) rows at the beginning and at the end
+    """
+
+    gap: Gap
+    start: int
+    innovations: np.ndarray
+    local_position: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -67,6 +102,7 @@ class ReplayResult:
     updates: int
     origin: tuple[float, float, float] | None
     """Latitude and longitude (deg) and altitude (m) of the local frame, None while never set."""
+    gaps: tuple[GapResult, ...] = ()
 
     @property
     def resets(self) -> dict[str, int]:
@@ -94,7 +130,11 @@ class ReplayResult:
 
 
 def replay(
-    inputs: EstimatorInputs, parameters: Mapping[str, float], *, overridden: frozenset[str] | None = None
+    inputs: EstimatorInputs,
+    parameters: Mapping[str, float],
+    *,
+    overridden: frozenset[str] | None = None,
+    gaps: Sequence[Gap] = (),
 ) -> ReplayResult:
     """Run the estimator over one flight.
 
@@ -106,6 +146,9 @@ def replay(
         A complete set, from `fusetune.ekf2.parameters.complete`.
     overridden : frozenset of str, optional
         Parameters that the set varies: changes that the log records for them in flight are not applied.
+    gaps : sequence of Gap
+        Gaps that the replay is continued into beside its normal course. Each starts from the state that the filter
+        has at that moment and ends without a trace, so gaps may overlap and cost nothing but their own length.
 
     Returns
     -------
@@ -113,22 +156,21 @@ def replay(
         The same inputs and parameters give the same bytes.
     """
     ensure_compiled()
-    ekf = np.zeros(1, EKF)
-    params = parameter_record(parameters)
-    recorder = np.zeros(1, RECORDER_MEMORY)
-    views = views_of(ekf)
-    records = allocate_records(RUNS_PER_STRETCH)
+    changes = [
+        (run, change)
+        for run, change in inputs.parameter_changes
+        if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
+    ]
+    ranges = [_runs_of(inputs, gap) for gap in gaps]
+    course = _Course(inputs, parameter_record(parameters), changes)
     kept: list[tuple[np.ndarray, ...]] = []
-    for start, stop in _stretches(inputs, params, overridden or frozenset()):
-        recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
-        run_estimator(ekf[0], params[0], inputs.arrays, views, recorder[0], records, start, stop)
-        done = recorder[0]
-        counts = (done["innovation_rows"], done["update_rows"], done["update_rows"], done["flag_rows"])
-        kept.append(tuple(joined_rows([rows[:count]], rows.dtype) for rows, count in zip(records, counts, strict=True)))
-    dtypes = (INNOVATION_ROW, STATE_ROW, LOCAL_POSITION_ROW, FLAGS_ROW)
-    innovations, states, local_position, flags = (
-        joined_rows([part[i] for part in kept], dtype) for i, dtype in enumerate(dtypes)
-    )
+    found: list[GapResult | None] = [None] * len(gaps)
+    for start, stop in course.stretches(0, len(inputs.arrays.imu), [first for first, _ in ranges]):
+        for number, (first, last) in enumerate(ranges):
+            if first == start:
+                found[number] = _continue_into_gap(course, gaps[number], first, last)
+        kept.append(course.run(start, stop))
+    innovations, states, local_position, flags = _joined(kept)
     return ReplayResult(
         mode=inputs.mode,
         innovations=innovations,
@@ -136,8 +178,75 @@ def replay(
         local_position=local_position,
         flags=flags,
         imu_samples=len(inputs.arrays.imu),
-        updates=int(recorder["updates"][0]),
-        origin=_origin(ekf["origin"][0]),
+        updates=int(course.recorder["updates"][0]),
+        origin=_origin(course.ekf["origin"][0]),
+        gaps=tuple(one for one in found if one is not None),
+    )
+
+
+class _Course:
+    """The estimator on its way through a flight: its memory, its parameters, and what it has recorded last."""
+
+    def __init__(self, inputs: EstimatorInputs, params: np.ndarray, changes: Sequence[tuple[int, ParameterChange]]):
+        self.inputs, self.params, self.changes = inputs, params, changes
+        self.ekf = np.zeros(1, EKF)
+        self.recorder = np.zeros(1, RECORDER_MEMORY)
+        self.records = allocate_records(RUNS_PER_STRETCH)
+
+    def branch(self) -> _Course:
+        """Another course that starts where this one is."""
+        other = copy(self)
+        other.ekf, other.params, other.recorder = self.ekf.copy(), self.params.copy(), self.recorder.copy()
+        return other
+
+    def stretches(self, first: int, last: int, cuts: Sequence[int] = ()) -> Iterator[tuple[int, int]]:
+        """Split the runs, and change parameters between the parts where the log says so."""
+        changed = {min(run, last) for run, _ in self.changes if run >= first}
+        edges = {*range(first, last, RUNS_PER_STRETCH), *changed, *(cut for cut in cuts if first <= cut < last), last}
+        for start, stop in pairwise(sorted(edges)):
+            for run, change in self.changes:
+                if run == start:
+                    self.params[change.name] = change.value
+            yield start, stop
+
+    def run(self, start: int, stop: int) -> tuple[np.ndarray, ...]:
+        """Process some runs; copies of what they recorded."""
+        self.recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
+        views = views_of(self.ekf)
+        run_estimator(
+            self.ekf[0], self.params[0], self.inputs.arrays, views, self.recorder[0], self.records, start, stop
+        )
+        done = self.recorder[0]
+        counts = (done["innovation_rows"], done["update_rows"], done["update_rows"], done["flag_rows"])
+        return tuple(joined_rows([rows[:count]], rows.dtype) for rows, count in zip(self.records, counts, strict=True))
+
+
+def _joined(kept: list[tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
+    dtypes = (INNOVATION_ROW, STATE_ROW, LOCAL_POSITION_ROW, FLAGS_ROW)
+    return tuple(joined_rows([part[i] for part in kept], dtype) for i, dtype in enumerate(dtypes))
+
+
+def _runs_of(inputs: EstimatorInputs, gap: Gap) -> tuple[int, int]:
+    first, last = np.searchsorted(inputs.arrays.imu["time_us"], (gap.start, gap.stop))
+    return int(first), int(last)
+
+
+def _continue_into_gap(course: _Course, gap: Gap, first: int, last: int) -> GapResult | None:
+    """Replay the gap on a copy of the filter; None where the filter has not started, or the flight has no such time."""
+    if not course.ekf["filter_initialised"][0]:
+        return None
+    branch = course.branch()
+    branch.ekf["withheld"][gap.sensor] = True
+    start = int(branch.ekf["time_delayed_us"][0])
+    innovations, _, local_position, _ = _joined([branch.run(*stretch) for stretch in branch.stretches(first, last)])
+    if not len(local_position):
+        return None
+    sources = [AID_SOURCE_NAMES.index(name) for name in WITHHOLDABLE[gap.sensor]]
+    return GapResult(
+        gap=gap,
+        start=start,
+        innovations=innovations[np.isin(innovations["source"], sources)],
+        local_position=local_position[[0, -1]],
     )
 
 
@@ -145,22 +254,6 @@ def _origin(origin: np.void) -> tuple[float, float, float] | None:
     if not origin["valid"]:
         return None
     return float(np.rad2deg(origin["lat_rad"])), float(np.rad2deg(origin["lon_rad"])), float(origin["alt"])
-
-
-def _stretches(inputs: EstimatorInputs, params: np.ndarray, overridden: frozenset[str]):  # type: ignore[no-untyped-def]
-    """Split the runs, and change parameters between the parts where the log says so."""
-    changes = [
-        (run, change)
-        for run, change in inputs.parameter_changes
-        if change.name in PARAMETER_NAMES and change.name not in overridden
-    ]
-    total = len(inputs.arrays.imu)
-    cuts = sorted({*range(0, total, RUNS_PER_STRETCH), *(min(run, total) for run, _ in changes), total})
-    for start, stop in pairwise(cuts):
-        for run, change in changes:
-            if run == start:
-                params[change.name] = change.value
-        yield start, stop
 
 
 @entry_kernel

@@ -26,6 +26,7 @@ from fusetune.ekf2.timing import (
     is_recent,
     is_timed_out,
 )
+from fusetune.ekf2.withholding import pretend_height_fused
 
 BARO_LPF_ALPHA = 0.1
 BARO_BIAS_NSD = 0.13
@@ -43,6 +44,9 @@ def control_baro_height_fusion(ekf, params):
         if valid:
             _filter_measurement(ekf, measurement)
         _update_baro_status(ekf, params, measurement, variance)
+        if ekf.withheld.baro:
+            pretend_height_fused(ekf, ekf.aid.baro_hgt, ekf.cs.baro_hgt)
+            return
         if valid:
             _update_bias(ekf, measurement, variance)
         _control_with_sample(ekf, params, measurement, variance, valid)

@@ -21,6 +21,7 @@ from fusetune.ekf2.aid_sources.gnss.yaw_emergency import (
 )
 from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.timing import GNSS_MAX_INTERVAL, RESET_TIMEOUT_MAX, is_newer_than_latest, is_recent, is_timed_out
+from fusetune.ekf2.withholding import pretend_gnss_fused
 from fusetune.ekf2.yaw_estimator.gaussian_sum import predict_gsf
 from fusetune.ekf2.yaw_estimator.gsf_memory import reset_gsf, set_gyro_bias
 
@@ -51,7 +52,9 @@ def control_gnss_fusion(ekf, params):
     elif _uses_gnss(ekf) and not is_newer_than_latest(ekf, ekf.gnss_newest_time_us, RESET_TIMEOUT_MAX):
         stop_gnss_fusion(ekf)
 
-    if ekf.gnss_data_ready:
+    if ekf.withheld.gnss:
+        pretend_gnss_fused(ekf)
+    elif ekf.gnss_data_ready:
         control_gnss_yaw_fusion(ekf, params, ekf.gnss_sample)
         control_gnss_yaw_estimator(ekf, params)
         force_reset = _is_reset_due(ekf, params)

@@ -20,6 +20,7 @@ from fusetune.ekf2.position_fusion import fuse_vertical_position, update_vertica
 from fusetune.ekf2.resets import reset_altitude_to
 from fusetune.ekf2.state import POSITION
 from fusetune.ekf2.timing import GNSS_MAX_INTERVAL, HGT_FUSION_TIMEOUT_MAX, is_newer_than_latest, is_timed_out
+from fusetune.ekf2.withholding import pretend_height_fused
 
 TYPICAL_VACC_PER_HACC = 1.5
 HEIGHT_BIAS_NOISE_DENSITY = 0.13
@@ -57,6 +58,9 @@ def _use_gnss_height(ekf, params, sample):
         variance + bias_est.bias_var,
         max(params.EKF2_GPS_P_GATE, 1.0),
     )
+    if ekf.withheld.gnss:
+        pretend_height_fused(ekf, aid, ekf.cs.gps_hgt)
+        return
     # the bias follows once the innovation has been formed with its old value, but before the filter is corrected
     if valid:
         set_max_state_noise(bias_est, noise)

@@ -45,6 +45,7 @@ from fusetune.ekf2.kernel import kernel
 from fusetune.ekf2.observation_gain import compute_innovation_variance
 from fusetune.ekf2.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.timing import MAG_MAX_INTERVAL, RESET_TIMEOUT_MAX, is_newer_than_latest, is_timed_out
+from fusetune.ekf2.withholding import pretend_mag_fused
 
 MAG_LPF_ALPHA = 0.1
 MIN_SAMPLES_TO_START = 3
@@ -103,6 +104,9 @@ def _control_with_sample(ekf, params, wmm_updated):
 
     R_mag = max(params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE, R_MAG_MIN)
     _update_mag_status(ekf, params, sample, R_mag)
+    if ekf.withheld.mag:
+        pretend_mag_fused(ekf)
+        return
 
     continuing = _continuing_conditions_passing(ekf, params, sample)
     # the field checks need a levelled attitude, and their timer starts with the first sample that has one
