@@ -41,6 +41,17 @@ class LoggedMessage(NamedTuple):
     text: str
 
 
+class LeftOut(NamedTuple):
+    """Rows of a topic that were left out because they cannot be true."""
+
+    topic: str
+    instance: int
+    rows: int
+    total: int
+    """Rows with those that were left out."""
+    reason: str
+
+
 @dataclass
 class ParameterHistory:
     """Parameters over the time of a log.
@@ -79,6 +90,9 @@ class Flight:
     size_bytes: int = 0
     corruption: tuple[str, ...] = ()
     """What was wrong with the file and could be passed over, in words; empty for a sound log."""
+    undefined_topics: tuple[str, ...] = ()
+    """Topics that were logged but whose definition the log lacks."""
+    left_out: tuple[LeftOut, ...] = ()
 
     def topic(self, name: str, instance: int = 0) -> TopicTable | None:
         """Columns of one topic instance, or `None` where the log has none."""

@@ -3,31 +3,52 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import os
-from contextlib import redirect_stdout
+import struct
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from pyulog import ULog
 
 from fusetune.errors import UserError
-from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory, TopicKey, TopicTable
-from fusetune.px4.guarded_stream import GuardedStream
+from fusetune.px4.flight import (
+    Dropout,
+    Flight,
+    LeftOut,
+    LoggedMessage,
+    ParameterChange,
+    ParameterHistory,
+    TopicKey,
+    TopicTable,
+)
+from fusetune.px4.ulog_definitions import is_padding
+from fusetune.px4.ulog_records import DATA_HEAD_BYTES, HEADER_BYTES, Scan, Scanner, Subscription
+from fusetune.px4.ulog_times import STORED_TOPICS, impossible_rows, newest_before
+from fusetune.px4.ulog_values import LoggedValues, logged_values
 
-_MAGIC = ULog.HEADER_BYTES
-_HEADER_BYTES = 16
-_SYSTEM_DEFAULT, _CURRENT_SETUP_DEFAULT = 0, 1
-_LEVELS = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "NOTICE", "INFO", "DEBUG")
+_MAGIC = b"ULog\x01\x12\x35"
+_NEWEST_VERSION = 1
+_FLAG_BITS = struct.Struct("<HB8s8s3Q")
+_DATA_APPENDED = 1
+_LATEST_START_US = 1 << 62
 _COPY_AGAIN = "Copy the log from the vehicle once more; what the logger did not write cannot be recovered"
+
+
+class _Messages(NamedTuple):
+    """The messages of one topic instance and where in the file they lie."""
+
+    table: TopicTable
+    places: np.ndarray
 
 
 def read_ulog(path: str | os.PathLike[str]) -> Flight:
     """Read a ULog file.
 
     Records that cannot be made sense of are passed over and noted in `Flight.corruption`; a topic whose definition is
-    damaged is missing. Topic columns have the dtypes of the log, except that `bool` fields are NumPy booleans and
-    64-bit time stamps (`timestamp*`) are int64.
+    damaged is missing, and noted in `Flight.undefined_topics`. Messages whose time stamps cannot be are left out, and
+    counted in `Flight.left_out`. Topic columns have the dtypes of the log, except that `bool` fields are NumPy
+    booleans and 64-bit time stamps (`timestamp*`) are int64.
 
     Raises
     ------
@@ -36,23 +57,32 @@ def read_ulog(path: str | os.PathLike[str]) -> Flight:
     """
     file = Path(path)
     content = _content(file)
-    log, printed = _parse(file, content)
-    topics = _topics(log)
-    if not topics:
+    scanner = Scanner(content)
+    notes = _scan_sections(file, content, scanner)
+    scan = scanner.finish()
+    values = logged_values(content, scan)
+    notes += _damage(scan, values, len(content))
+    messages = _messages(content, scan)
+    if not messages:
         raise UserError(file, "holds no message that can be read", _COPY_AGAIN)
+    left_out = _without_impossible_rows(messages)
+    times, places = _times(messages), _places(messages)
+    start, note = _start(content, times)
     return Flight(
         name=file.stem,
-        topics=topics,
-        parameters=_parameters(log),
-        info=dict(log.msg_info_dict),
-        multi_info=_multi_info(log),
-        dropouts=[Dropout(int(dropout.timestamp), int(dropout.duration)) for dropout in log.dropouts],
-        messages=_messages(log),
-        start_timestamp=int(log.start_timestamp),
-        last_timestamp=int(log.last_timestamp),
+        topics={key: one.table for key, one in messages.items()},
+        parameters=_parameters(values, times, places, start),
+        info=values.info,
+        multi_info=_multi_info(values),
+        dropouts=_dropouts(values, times, places, start),
+        messages=_texts(values),
+        start_timestamp=start,
+        last_timestamp=max(start, *(int(one.max()) for one in times.values())),
         checksum=hashlib.sha256(content).hexdigest(),
         size_bytes=len(content),
-        corruption=_corruption(log, printed),
+        corruption=(*notes, *note),
+        undefined_topics=tuple(sorted(set(scan.undefined_topics.values()))),
+        left_out=left_out,
     )
 
 
@@ -81,96 +111,159 @@ def _content(file: Path) -> bytes:
         raise UserError(file, "is empty", _COPY_AGAIN)
     if content[: len(_MAGIC)] != _MAGIC:
         raise UserError(file, "is not a ULog file", "Take the .ulg file that PX4 wrote to the SD card, unchanged")
-    if len(content) <= _HEADER_BYTES:
+    if len(content) <= HEADER_BYTES:
         raise UserError(file, "ends after its header", _COPY_AGAIN)
     return content
 
 
-def _parse(file: Path, content: bytes) -> tuple[ULog, list[str]]:
-    printed, stream = io.StringIO(), GuardedStream(content)
-    try:
-        with redirect_stdout(printed):
-            log = ULog(stream)
-    except Exception as error:  # pyulog raises whatever the damaged bytes happen to cause
-        reason = f"cannot be parsed ({type(error).__name__}: {error})"
-        raise UserError(file, reason, _COPY_AGAIN) from error
-    notes = [line.strip() for line in printed.getvalue().splitlines() if line.strip()]
-    if stream.gave_up_at is not None:
-        notes.append(f"everything after byte {stream.gave_up_at} is damaged and was left out")
-    return log, notes
+def _scan_sections(file: Path, content: bytes, scanner: Scanner) -> list[str]:
+    """Scan the file, its appended parts each on its own; what is odd about its header in words."""
+    notes = []
+    if content[7] > _NEWEST_VERSION:
+        notes.append(f"the file has version {content[7]} of the format, version {_NEWEST_VERSION} is known")
+    begin, offsets = HEADER_BYTES, []
+    if len(content) >= HEADER_BYTES + _FLAG_BITS.size:
+        size, kind, _, incompatible, *appended = _FLAG_BITS.unpack_from(content, HEADER_BYTES)
+        if kind == ord("B") and size >= _FLAG_BITS.size - 3:
+            begin += 3 + size
+            if incompatible[0] & ~_DATA_APPENDED or any(incompatible[1:]):
+                reason = f"says that it needs unknown features of the format (flags {incompatible.hex()})"
+                raise UserError(file, reason, "Use a log of PX4 v1.8 to v1.17, or copy it again")
+            offsets = [offset for offset in appended if offset] if incompatible[0] & _DATA_APPENDED else []
+    if any(not begin <= offset <= len(content) for offset in offsets) or offsets != sorted(set(offsets)):
+        notes.append("the places of appended data are damaged; they were looked for")
+        offsets = []
+    for stop in (*offsets, len(content)):
+        scanner.run(begin, stop)
+        begin = stop
+    return notes
 
 
-def _topics(log: ULog) -> dict[TopicKey, TopicTable]:
-    topics: dict[TopicKey, TopicTable] = {}
-    for data in log.data_list:
-        if "timestamp" not in data.data or not len(data.data["timestamp"]):
+def _damage(scan: Scan, values: LoggedValues, size: int) -> list[str]:
+    """What was passed over, in words."""
+    notes = []
+    if scan.damages:
+        lost = sum(damage.end - damage.begin for damage in scan.damages)
+        first = scan.damages[0].begin
+        places = "one place" if len(scan.damages) == 1 else f"{len(scan.damages)} places"
+        notes.append(f"{lost} bytes in {places} (the first at byte {first}) are no records and were left out")
+    if scan.cut_at is not None:
+        notes.append(f"the recording breaks off within a record, at byte {scan.cut_at} of {size}; all before is used")
+    if scan.strange_ids:
+        ids = ", ".join(str(message_id) for message_id in sorted(scan.strange_ids)[:8])
+        more = ", …" if len(scan.strange_ids) > 8 else ""
+        notes.append(f"data records of message ids that the log does not define ({ids}{more}) were passed over")
+    if scan.unknown_kinds:
+        count = sum(scan.unknown_kinds.values())
+        notes.append(f"{count} {'record' if count == 1 else 'records'} of unknown kind were passed over")
+    misfits = scan.misfits + values.misfits
+    if misfits:
+        notes.append(f"{misfits} damaged {'record was' if misfits == 1 else 'records were'} passed over")
+    return notes
+
+
+def _messages(content: bytes, scan: Scan) -> dict[TopicKey, _Messages]:
+    found: dict[TopicKey, _Messages] = {}
+    for subscription in scan.subscriptions.values():
+        if not len(subscription.places):
             continue
-        types = {field.field_name: field.type_str for field in data.field_data}
-        table = {
-            name: _column(name, types.get(name, ""), values)
-            for name, values in data.data.items()
-            if "_padding" not in name
-        }
-        key = (data.name, int(data.multi_id))
-        topics[key] = _appended(topics[key], table) if key in topics else table
-    return dict(sorted(topics.items()))
+        key = (subscription.topic, subscription.instance)
+        messages = _Messages(_table(content, subscription), subscription.places)
+        found[key] = _appended(found[key], messages) if key in found else messages
+    return dict(sorted(found.items()))
 
 
-def _column(name: str, type_name: str, values: np.ndarray) -> np.ndarray:
-    if type_name == "bool":
-        return values.astype(np.bool_)
+def _table(content: bytes, subscription: Subscription) -> TopicTable:
+    """Columns of all messages of a subscription."""
+    layout = subscription.layout
+    width = layout.dtype.itemsize
+    # every place of the file seen as the begin of a message: taking the right ones copies each message once
+    anywhere = np.ndarray((len(content) - width - DATA_HEAD_BYTES + 1,), f"V{width}", content, DATA_HEAD_BYTES, (1,))
+    rows = anywhere[subscription.places].view(layout.dtype)
+    return {
+        name: _column(name, rows[name], is_bool=name in layout.booleans)
+        for name in layout.dtype.names or ()
+        if not is_padding(name)
+    }
+
+
+def _column(name: str, values: np.ndarray, *, is_bool: bool) -> np.ndarray:
+    if is_bool:
+        return values != 0
     if values.dtype == np.uint64 and name.rsplit(".", 1)[-1].startswith("timestamp"):
         return values.astype(np.int64)
     return np.ascontiguousarray(values)
 
 
-def _appended(first: TopicTable, second: TopicTable) -> TopicTable:
-    """Both parts of a topic that was subscribed twice (data appended after a crash)."""
-    if first.keys() != second.keys():
-        return max(first, second, key=lambda table: len(table["timestamp"]))
-    return {name: np.concatenate([first[name], second[name]]) for name in first}
+def _appended(first: _Messages, second: _Messages) -> _Messages:
+    """Both parts of a topic that was subscribed twice (data appended after a crash), in the order of the file."""
+    if first.table.keys() != second.table.keys():
+        return max(first, second, key=lambda messages: len(messages.places))
+    places = np.concatenate([first.places, second.places])
+    order = np.argsort(places)
+    table = {name: np.concatenate([first.table[name], second.table[name]])[order] for name in first.table}
+    return _Messages(table, places[order])
 
 
-def _parameters(log: ULog) -> ParameterHistory:
+def _times(messages: Mapping[TopicKey, _Messages]) -> dict[TopicKey, np.ndarray]:
+    """Time stamps of all topics that live by the clock of this flight."""
+    return {key: one.table["timestamp"] for key, one in messages.items() if key[0] not in STORED_TOPICS}
+
+
+def _places(messages: Mapping[TopicKey, _Messages]) -> dict[TopicKey, np.ndarray]:
+    return {key: one.places for key, one in messages.items() if key[0] not in STORED_TOPICS}
+
+
+def _without_impossible_rows(messages: dict[TopicKey, _Messages]) -> tuple[LeftOut, ...]:
+    """Take messages out whose time cannot be; what was taken out."""
+    wrong = impossible_rows(_times(messages), _places(messages))
+    for key, rows in wrong.items():
+        table, places = messages[key]
+        messages[key] = _Messages({name: values[~rows] for name, values in table.items()}, places[~rows])
+        if rows.all():
+            del messages[key]
+    return tuple(LeftOut(*key, int(rows.sum()), len(rows), "impossible time stamp") for key, rows in wrong.items())
+
+
+def _start(content: bytes, times: Mapping[TopicKey, np.ndarray]) -> tuple[int, list[str]]:
+    """Start of the log, and a note where the header's is impossible and the first time of the data takes its place."""
+    (start,) = struct.unpack_from("<Q", content, 8)
+    newest = max((int(one.max()) for one in times.values()), default=0)
+    if start <= newest or (not times and start < _LATEST_START_US):
+        return start, []
+    fastest = max(times.values(), key=len, default=np.zeros(1, np.int64))
+    return int(fastest.min()), [f"the time at which the log began is damaged ({start} µs)"]
+
+
+def _parameters(
+    values: LoggedValues, times: Mapping[TopicKey, np.ndarray], places: Mapping[TopicKey, np.ndarray], start: int
+) -> ParameterHistory:
+    changes = values.changed_parameters
+    at = newest_before(np.array([place for place, _, _ in changes], np.int64), times, places, start)
     return ParameterHistory(
-        initial=dict(sorted(log.initial_parameters.items())),
-        changed=[ParameterChange(int(time), name, value) for time, name, value in log.changed_parameters],
-        default_system=dict(sorted(log.get_default_parameters(_SYSTEM_DEFAULT).items())),
-        default_current_setup=dict(sorted(log.get_default_parameters(_CURRENT_SETUP_DEFAULT).items())),
+        initial=dict(sorted(values.initial_parameters.items())),
+        changed=[ParameterChange(int(time), name, value) for time, (_, name, value) in zip(at, changes, strict=True)],
+        default_system=dict(sorted(values.default_system.items())),
+        default_current_setup=dict(sorted(values.default_current_setup.items())),
     )
 
 
-def _multi_info(log: ULog) -> dict[str, list[str]]:
+def _dropouts(
+    values: LoggedValues, times: Mapping[TopicKey, np.ndarray], places: Mapping[TopicKey, np.ndarray], start: int
+) -> list[Dropout]:
+    at = newest_before(np.array([place for place, _ in values.dropouts], np.int64), times, places, start)
+    return [Dropout(int(time), duration) for time, (_, duration) in zip(at, values.dropouts, strict=True)]
+
+
+def _multi_info(values: LoggedValues) -> dict[str, list[str]]:
     """Multi-line information whose parts are text, each entry joined."""
     return {
-        key: ["".join(parts) for parts in entries]
-        for key, entries in sorted(log.msg_info_multiple_dict.items())
+        key: ["".join(str(part) for part in parts) for parts in entries]
+        for key, entries in sorted(values.multi_info.items())
         if all(isinstance(part, str) for parts in entries for part in parts)
     }
 
 
-def _messages(log: ULog) -> list[LoggedMessage]:
-    tagged = [message for messages in log.logged_messages_tagged.values() for message in messages]
-    found = [
-        LoggedMessage(int(message.timestamp), _level_name(message.log_level), message.message)
-        for message in [*log.logged_messages, *tagged]
-    ]
+def _texts(values: LoggedValues) -> list[LoggedMessage]:
+    found = [LoggedMessage(text.timestamp, text.level, text.text) for text in values.texts]
     return sorted(found, key=lambda message: message.timestamp)
-
-
-def _level_name(level: int) -> str:
-    """Name of a syslog level, which ULog stores as its ASCII digit."""
-    number = level - ord("0")
-    return _LEVELS[number] if 0 <= number < len(_LEVELS) else "UNKNOWN"
-
-
-def _corruption(log: ULog, printed: list[str]) -> tuple[str, ...]:
-    notes = list(dict.fromkeys(printed))
-    missing = sorted(log._missing_message_ids)
-    if missing:
-        ids = ", ".join(str(message_id) for message_id in missing)
-        notes = [note for note in notes if "no subscription found" not in note]
-        notes.append(f"data records of message ids that the log does not define ({ids}) were passed over")
-    if log.file_corruption and not notes:
-        notes.append("damaged records were passed over")
-    return tuple(notes)

@@ -19,6 +19,7 @@ from fusetune.parquet import read_table
 from fusetune.px4.flight import (
     Dropout,
     Flight,
+    LeftOut,
     LoggedMessage,
     ParameterChange,
     ParameterHistory,
@@ -27,7 +28,7 @@ from fusetune.px4.flight import (
 )
 
 METADATA_FILE = "metadata.json"
-_FORMAT = 1
+_FORMAT = 2
 _BYTES_KEY = "base64"
 _RUN_AGAIN = "Delete the folder and run the pipeline again"
 
@@ -92,6 +93,8 @@ def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None =
         checksum=document["checksum"],
         size_bytes=document["size_bytes"],
         corruption=tuple(document["corruption"]),
+        undefined_topics=tuple(document["undefined_topics"]),
+        left_out=tuple(LeftOut(*entry) for entry in document["left_out"]),
     )
 
 
@@ -114,10 +117,10 @@ def read_metadata(folder: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _write_table(file: Path, table: TopicTable) -> None:
-    columns = {name: pa.array(values) for name, values in table.items()}
-    pq.write_table(
-        pa.table(columns), file, compression="zstd", compression_level=1, use_dictionary=False, write_statistics=False
-    )
+    arrays = pa.Table.from_arrays([pa.array(values) for values in table.values()], names=list(table))
+    # a log has some thousand columns, most of them short: what is done per column counts more than the bytes
+    with pa.OSFile(os.fspath(file), "wb") as sink:
+        pq.write_table(arrays, sink, compression="lz4", use_dictionary=False, write_statistics=False)
 
 
 def _read_table(file: Path) -> TopicTable:
@@ -141,6 +144,8 @@ def _metadata(flight: Flight) -> dict[str, Any]:
         "start_timestamp": flight.start_timestamp,
         "last_timestamp": flight.last_timestamp,
         "corruption": list(flight.corruption),
+        "undefined_topics": list(flight.undefined_topics),
+        "left_out": [list(entry) for entry in flight.left_out],
         "info": {key: _storable(value) for key, value in sorted(flight.info.items())},
         "multi_info": flight.multi_info,
         "parameters": {
