@@ -16,7 +16,7 @@ from fusetune.errors import UserError
 from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory
 from fusetune.px4.ulog_reader import read_ulog
 from fusetune.px4.ulog_writer import write_ulog
-from fusetune.save import load_flight, save_log, write_flights_table
+from fusetune.save import VerdictThresholds, load_flight, save_log, write_flights_table
 
 
 @pytest.fixture(scope="module")
@@ -167,3 +167,35 @@ def test_flights_table_names_a_folder_without_verdict(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"verdict\.json"):
         write_flights_table([tmp_path], tmp_path / "flights.parquet", tmp_path / "flights.csv")
     assert not (tmp_path / "flights.parquet").exists()
+
+
+def test_copies_of_a_log_are_refused_whatever_the_order(tmp_path: Path, log: Path) -> None:
+    (tmp_path / "other.ulg").write_bytes(log.read_bytes() + b"\0")
+    (tmp_path / "copy.ulg").write_bytes(log.read_bytes())
+    names = ("made", "copy", "other")
+    for name in names:
+        save_log(tmp_path / f"{name}.ulg", tmp_path / name)
+    for order in (names, names[::-1]):
+        folders = [tmp_path / name for name in order]
+        write_flights_table(folders, tmp_path / "flights.parquet", tmp_path / "flights.csv")
+        rows = {row["flight"]: row for row in pq.read_table(tmp_path / "flights.parquet").to_pylist()}
+        assert list(rows) == list(order)
+        assert [rows[name]["status"] for name in names] == ["refused", "replayable", "replayable"]
+        assert "is the same log as copy" in rows["made"]["reason"]
+        assert rows["made"]["checks"].endswith("duplicate fail")
+        assert rows["copy"]["checks"].endswith("duplicate pass")
+
+
+def test_all_checks_are_in_metadata_and_table(tmp_path: Path, log: Path) -> None:
+    verdict = save_log(log, tmp_path / "made")
+    metadata = json.loads((tmp_path / "made" / "metadata.json").read_text())
+    assert metadata["verdict"] == verdict.document()
+    write_flights_table([tmp_path / "made"], tmp_path / "flights.parquet", tmp_path / "flights.csv")
+    (row,) = pq.read_table(tmp_path / "flights.parquet").to_pylist()
+    for check in verdict.checks:
+        assert f"{check.name} {check.status}" in row["checks"]
+
+
+def test_thresholds_decide(tmp_path: Path, log: Path) -> None:
+    strict = VerdictThresholds.from_mapping({"min_imu_duration_s": 60})
+    assert "at least 60 s" in save_log(log, tmp_path / "made", strict).reasons[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +58,12 @@ def test_every_key_is_described_and_in_the_manual(schema: dict[str, Any], projec
 def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
     from fusetune.analyze.settings import ScoringSettings
     from fusetune.apply.settings import DecisionSettings
+    from fusetune.save import VerdictThresholds
 
     assert ScoringSettings.from_mapping(shipped["scoring"]) == ScoringSettings()
     assert DecisionSettings.from_mapping(shipped["decision"], seed=0) == DecisionSettings()
+    assert VerdictThresholds.from_mapping(shipped["verdict"]) == VerdictThresholds()
+    assert shipped["verdict"].keys() == asdict(VerdictThresholds()).keys()
 
 
 def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: dict[str, Any]) -> None:

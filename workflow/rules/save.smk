@@ -9,6 +9,7 @@ rule save_flight:
         "../envs/fusetune.yaml"
     params:
         code=DIGEST["save"],
+        thresholds=SETTINGS["verdict"],
     message:
         "Save: read {input.log}"
     script:

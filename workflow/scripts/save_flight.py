@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from fusetune.save import save_log
+from fusetune.save import VerdictThresholds, save_log
 
 from job import keep_out, logged_job
 
@@ -11,5 +11,6 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    verdict = save_log(snakemake.input.log, snakemake.output[0])
+    thresholds = VerdictThresholds.from_mapping(snakemake.params.thresholds)
+    verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds)
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")

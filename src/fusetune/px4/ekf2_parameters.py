@@ -144,9 +144,10 @@ def migrate(logged: Mapping[str, float | int], release: Release | None = None) -
     Returns
     -------
     dict
-        Only parameters that the log determines; values rounded to float32.
+        Only parameters that the log determines; values rounded to float32. Values that are no numbers count as missing.
     """
-    return {name: as_float32(float(value)) for name, value in migrate_names(logged).items() if name in PARAMETERS}
+    sound = {name: value for name, value in logged.items() if math.isfinite(value)}
+    return {name: as_float32(float(value)) for name, value in migrate_names(sound).items() if name in PARAMETERS}
 
 
 def complete(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fusetune.px4 import sensor_layouts as layouts
@@ -9,6 +11,7 @@ from fusetune.px4.estimator_instances import magnetometer_instance
 from fusetune.px4.estimator_layouts import estimator_tables
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
 from fusetune.px4.onboard_innovations import aid_source_tables
+from fusetune.px4.sensor_limits import without_impossible
 
 _FIX_3D = 3
 
@@ -45,7 +48,8 @@ def canonical(flight: Flight) -> Flight:
     holds several magnetometers, instance 0 becomes the one that the primary estimator used; where it holds several
     GNSS receivers (before v1.12), instance 0 becomes the first that ever has a 3D fix.
     `estimator_aid_src_*`, `estimator_status_flags` and `estimator_states` are made from the topics that came before
-    them (see `fusetune.px4.onboard_innovations` and `fusetune.px4.estimator_layouts`).
+    them (see `fusetune.px4.onboard_innovations` and `fusetune.px4.estimator_layouts`). Samples that cannot be, see
+    `fusetune.px4.sensor_limits`, are left out and counted in `Flight.left_out`.
     """
     topics = dict(flight.topics)
     for (name, instance), table in flight.topics.items():
@@ -54,11 +58,14 @@ def canonical(flight: Flight) -> Flight:
     topics |= _from_sensor_combined(flight)
     topics |= _optical_flow(flight)
     topics |= _vision(flight)
-    _put_first(topics, "vehicle_magnetometer", magnetometer_instance(flight))
-    _put_first(topics, "vehicle_gps_position", _gnss_instance(flight))
-    topics |= estimator_tables(flight)
-    topics |= aid_source_tables(flight)
-    return flight.with_topics(topics)
+    topics, left_out = without_impossible(topics)
+    sound = replace(flight, topics=topics, left_out=(*flight.left_out, *left_out))
+    topics = dict(topics)
+    _put_first(topics, "vehicle_magnetometer", magnetometer_instance(sound))
+    _put_first(topics, "vehicle_gps_position", _gnss_instance(sound))
+    topics |= estimator_tables(sound)
+    topics |= aid_source_tables(sound)
+    return sound.with_topics(topics)
 
 
 def _put_first(topics: dict[TopicKey, TopicTable], name: str, instance: int) -> None:

@@ -66,7 +66,7 @@ def logged_values(content: bytes, scan: Scan) -> LoggedValues:
     for record in scan.records:
         try:
             _interpret(values, chr(record.kind), content[record.begin : record.end], record, scan)
-        except (ValueError, struct.error):
+        except (ValueError, IndexError, struct.error):
             values.misfits += 1
     return values
 
@@ -117,10 +117,12 @@ def _key_value(payload: bytes) -> KeyValue:
 
 
 def _parameter(payload: bytes) -> tuple[str, ParameterValue]:
-    entry = _key_value(payload)
-    if not isinstance(entry.value, int | float):
-        raise ValueError(f"parameter {entry.key} is no number")
-    return entry.key, entry.value
+    type_name = payload[1 : 1 + payload[0]].split(b" ")[0]
+    if type_name not in (b"int32_t", b"float"):
+        raise ValueError("a parameter that is neither INT32 nor FLOAT")
+    key, value = _key_value(payload)
+    assert isinstance(value, int | float)
+    return key, value
 
 
 def _text(level: int, payload: bytes) -> Text:

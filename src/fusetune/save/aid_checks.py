@@ -1,4 +1,4 @@
-"""Checks of the sensors that aid the estimator, and of the flight itself."""
+"""Checks of the sensors that aid the estimator."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 
 from fusetune.px4.ekf2_parameters import complete
 from fusetune.px4.flight import Flight, TopicTable
-from fusetune.save.log_facts import flight_times
+from fusetune.save.log_facts import rate_hz
 from fusetune.save.verdict import Check, VerdictThresholds
 
 _FIX_3D = 3
 _MAG_TYPE_NONE = 5
 _GPS_CTRL_HORIZONTAL, _GPS_CTRL_ALTITUDE, _EV_CTRL_HORIZONTAL, _EV_CTRL_HEIGHT = 0b101, 0b010, 0b101, 0b010
 _LOG_MORE = "Log with SDLOG_PROFILE bit 1 (estimator replay) set"
+_BETTER_SKY = "Wait for a fix before take-off, with a free sky"
 _ONBOARD_AIDS = {
     "cs_gnss_pos": "GNSS",
     "cs_ev_pos": "external vision",
@@ -29,7 +30,7 @@ def magnetometer(flight: Flight, limits: VerdictThresholds) -> Check:
     """Whether the heading has its usual reference."""
     if _parameters(flight)["EKF2_MAG_TYPE"] == _MAG_TYPE_NONE:
         return Check("magnetometer", "does-not-apply", "EKF2_MAG_TYPE switches the magnetometer off")
-    rate = _rate_hz(flight.topic("vehicle_magnetometer"))
+    rate = rate_hz(flight.topic("vehicle_magnetometer"))
     threshold = limits.low_magnetometer_rate_hz
     if rate is None:
         reason = "no magnetometer samples: the heading comes from other sources only"
@@ -43,7 +44,7 @@ def magnetometer(flight: Flight, limits: VerdictThresholds) -> Check:
 def barometer(flight: Flight, limits: VerdictThresholds) -> Check:
     """Whether the height has a reference: the barometer, or another source that takes its place."""
     parameters = _parameters(flight)
-    rate = _rate_hz(flight.topic("vehicle_air_data"))
+    rate = rate_hz(flight.topic("vehicle_air_data"))
     threshold = limits.low_barometer_rate_hz
     if rate is not None and rate >= threshold:
         return Check("barometer", "pass", f"the barometer is logged at {rate:.1f} Hz", "", rate, threshold)
@@ -68,26 +69,62 @@ def barometer(flight: Flight, limits: VerdictThresholds) -> Check:
 
 
 def gnss(flight: Flight, limits: VerdictThresholds) -> Check:
-    """Rate and fix of GNSS."""
-    table = flight.topic("vehicle_gps_position")
+    """Presence and rate of GNSS."""
+    table, threshold = flight.topic("vehicle_gps_position"), limits.low_gnss_rate_hz
     if not int(_parameters(flight)["EKF2_GPS_CTRL"]):
         return Check("gnss", "does-not-apply", "EKF2_GPS_CTRL switches GNSS off")
-    if table is None:
+    rate = rate_hz(table)
+    if rate is None:
         return Check("gnss", "does-not-apply", "the log holds no GNSS samples")
-    share, rate = _fix_share(flight), _rate_hz(table) or 0.0
+    if rate < threshold:
+        return Check("gnss", "warning", f"GNSS is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
+    return Check("gnss", "pass", f"GNSS is logged at {rate:.1f} Hz", "", rate, threshold)
+
+
+def gnss_fix(flight: Flight, limits: VerdictThresholds) -> Check:
+    """Share of the GNSS samples that have a 3D fix."""
+    name, threshold = "gnss_fix", limits.low_gnss_fix_share
+    if not _uses_gnss(flight):
+        return Check(name, "does-not-apply", "GNSS is switched off or not logged")
+    share = _fix_share(flight)
     if share == 0.0:
         reason = "GNSS is logged but never has a 3D fix"
-        return Check(
-            "gnss", "warning", reason, "Fly where satellites can be received", share, limits.low_gnss_fix_share
-        )
-    if share < limits.low_gnss_fix_share:
-        reason = f"GNSS has a 3D fix only {share:.0%} of the time"
-        remedy = "Wait for a fix before take-off"
-        return Check("gnss", "warning", reason, remedy, share, limits.low_gnss_fix_share)
-    if rate < limits.low_gnss_rate_hz:
-        reason = f"GNSS is logged at only {rate:.1f} Hz"
-        return Check("gnss", "warning", reason, _LOG_MORE, rate, limits.low_gnss_rate_hz)
-    return Check("gnss", "pass", f"GNSS is logged at {rate:.1f} Hz with a fix", "", rate, limits.low_gnss_rate_hz)
+        return Check(name, "warning", reason, "Fly where satellites can be received", share, threshold)
+    if share < threshold:
+        return Check(name, "warning", f"GNSS has a 3D fix only {share:.0%} of the time", _BETTER_SKY, share, threshold)
+    return Check(name, "pass", f"GNSS has a 3D fix {share:.0%} of the time", "", share, threshold)
+
+
+def gnss_position_accuracy(flight: Flight, limits: VerdictThresholds) -> Check:
+    """Horizontal accuracy that the receiver reports, median over the samples with a fix."""
+    return _accuracy(flight, "gnss_position_accuracy", "eph", limits.high_gnss_eph_m, "m horizontally")
+
+
+def gnss_height_accuracy(flight: Flight, limits: VerdictThresholds) -> Check:
+    """Vertical accuracy that the receiver reports, median over the samples with a fix."""
+    return _accuracy(flight, "gnss_height_accuracy", "epv", limits.high_gnss_epv_m, "m vertically")
+
+
+def gnss_speed_accuracy(flight: Flight, limits: VerdictThresholds) -> Check:
+    """Accuracy of the velocity that the receiver reports, median over the samples with a fix."""
+    limit = limits.high_gnss_speed_error_m_s
+    return _accuracy(flight, "gnss_speed_accuracy", "s_variance_m_s", limit, "m/s")
+
+
+def _accuracy(flight: Flight, name: str, column: str, threshold: float, unit: str) -> Check:
+    table = flight.topic("vehicle_gps_position")
+    if table is None or not _uses_gnss(flight) or column not in table or not _fix_share(flight):
+        return Check(name, "does-not-apply", "no GNSS samples with a fix and an accuracy")
+    median = float(np.median(table[column][table["fix_type"] >= _FIX_3D]))
+    said = f"the GNSS receiver reports an accuracy of {median:.1f} {unit}"
+    if median > threshold:
+        return Check(name, "warning", f"{said} (more than {threshold:g})", _BETTER_SKY, median, threshold)
+    return Check(name, "pass", said, "", median, threshold)
+
+
+def _uses_gnss(flight: Flight) -> bool:
+    table = flight.topic("vehicle_gps_position")
+    return bool(int(_parameters(flight)["EKF2_GPS_CTRL"]) and table is not None and len(table["timestamp"]))
 
 
 def horizontal_aid(flight: Flight, limits: VerdictThresholds) -> Check:
@@ -112,28 +149,8 @@ def horizontal_aid(flight: Flight, limits: VerdictThresholds) -> Check:
     return Check(name, "warning", reason, "Log GNSS, optical flow or external vision", 0.0, 1.0)
 
 
-def airborne(flight: Flight, limits: VerdictThresholds) -> Check:
-    """Time in the air."""
-    seconds = flight_times(flight).airborne_s
-    if seconds is None:
-        return Check("airborne", "does-not-apply", "the log has no land detector")
-    if seconds < limits.low_airborne_s:
-        reason = f"airborne for {seconds:.0f} s only" if seconds > 0.0 else "never airborne"
-        remedy = "Log a flight; on the ground a filter shows little"
-        return Check("airborne", "warning", reason, remedy, seconds, limits.low_airborne_s)
-    return Check("airborne", "pass", f"airborne for {seconds:.0f} s", "", seconds, limits.low_airborne_s)
-
-
 def _parameters(flight: Flight) -> dict[str, float]:
     return complete(flight.parameters.initial, {}, flight.release)
-
-
-def _rate_hz(table: TopicTable | None) -> float | None:
-    """Mean rate of a topic; `None` where there are no samples."""
-    if table is None or not len(table["timestamp"]):
-        return None
-    span = float(table["timestamp"].max() - table["timestamp"].min()) * 1e-6
-    return (len(table["timestamp"]) - 1) / span if span > 0.0 else 0.0
 
 
 def _fix_share(flight: Flight) -> float:
@@ -161,7 +178,8 @@ def _has_vision(table: TopicTable | None) -> bool:
     """Whether any message holds a position or a velocity."""
     if table is None:
         return False
-    return any(bool(np.any(np.isfinite(table[f"{vector}[0]"]))) for vector in ("position", "velocity"))
+    columns = (table.get(f"{vector}[0]") for vector in ("position", "velocity"))
+    return any(column is not None and bool(np.any(np.isfinite(column))) for column in columns)
 
 
 def _onboard_aids(flight: Flight) -> list[str]:
@@ -176,6 +194,9 @@ CHECKS: tuple[Callable[[Flight, VerdictThresholds], Check], ...] = (
     magnetometer,
     barometer,
     gnss,
+    gnss_fix,
+    gnss_position_accuracy,
+    gnss_height_accuracy,
+    gnss_speed_accuracy,
     horizontal_aid,
-    airborne,
 )

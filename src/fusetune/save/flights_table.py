@@ -24,6 +24,7 @@ SCHEMA = pa.schema(
         ("reason", pa.string()),
         ("remedy", pa.string()),
         ("warnings", pa.string()),
+        ("checks", pa.string()),
         ("firmware", pa.string()),
         ("hardware", pa.string()),
         ("recorded", pa.string()),
@@ -33,7 +34,12 @@ SCHEMA = pa.schema(
         ("size_bytes", pa.int64()),
     ]
 )
-"""Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused."""
+"""Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused.
+
+`checks` holds name, status and figure of every check.
+"""
+
+_DUPLICATE = "duplicate"
 
 
 def write_flights_table(
@@ -41,12 +47,17 @@ def write_flights_table(
 ) -> None:
     """Put the verdicts of saved flights into one table, in the order given, as Parquet and as CSV.
 
+    Of flights whose logs have equal bytes the first by name stays; the others are refused, so that no flight counts
+    twice. Which is first depends on neither the order given nor that of the jobs.
+
     Raises
     ------
     UserError
         A folder lacks its verdict or its metadata.
     """
-    rows = pa.Table.from_pylist([_row(Path(folder)) for folder in folders], schema=SCHEMA)
+    found = [_row(Path(folder)) for folder in folders]
+    _refuse_duplicates(found)
+    rows = pa.Table.from_pylist(found, schema=SCHEMA)
     with atomic_path(table) as temporary:
         pq.write_table(rows, temporary)
     with atomic_path(csv) as temporary:
@@ -63,6 +74,7 @@ def _row(folder: Path) -> dict[str, Any]:
         "reason": "; ".join(check["reason"] for check in failed),
         "remedy": "; ".join(check["remedy"] for check in failed),
         "warnings": "; ".join(check["reason"] for check in warned),
+        "checks": "; ".join(_compact(check) for check in verdict["checks"]),
         "firmware": metadata.get("firmware", "unknown"),
         "hardware": metadata.get("hardware", {}).get("ver_hw", ""),
         "recorded": metadata.get("recorded", ""),
@@ -71,6 +83,25 @@ def _row(folder: Path) -> dict[str, Any]:
         "checksum": metadata["checksum"],
         "size_bytes": metadata["size_bytes"],
     }
+
+
+def _refuse_duplicates(rows: list[dict[str, Any]]) -> None:
+    first: dict[str, str] = {}
+    for row in sorted(rows, key=lambda row: str(row["flight"])):
+        if row["status"] != "replayable":
+            continue
+        original = first.setdefault(row["checksum"], row["flight"])
+        status = "pass" if original == row["flight"] else "fail"
+        row["checks"] += f"; {_DUPLICATE} {status}"
+        if status == "fail":
+            row["status"] = "refused"
+            row["reason"] = f"is the same log as {original}, which stands for both"
+            row["remedy"] = "Remove one of the two files"
+
+
+def _compact(check: dict[str, Any]) -> str:
+    figure = "" if check["figure"] is None else f" {check['figure']:.4g}"
+    return f"{check['name']} {check['status']}{figure}"
 
 
 def _read(file: Path) -> dict[str, Any]:

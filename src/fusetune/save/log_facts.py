@@ -38,22 +38,37 @@ class FlightTimes:
     """Time that the land detector calls airborne within that; `None` where the log has no land detector."""
 
 
+def airborne_intervals(flight: Flight) -> list[tuple[int, int]] | None:
+    """Times in the air while there are IMU samples, (begin, end) in µs; `None` where the log has no land detector."""
+    imu, land_detected = flight.topic("sensor_combined"), flight.topic("vehicle_land_detected")
+    if imu is None or not len(imu["timestamp"]) or land_detected is None or "landed" not in land_detected:
+        return None
+    first, last = int(imu["timestamp"].min()), int(imu["timestamp"].max())
+    order = np.argsort(land_detected["timestamp"], kind="stable")
+    landed = land_detected["landed"][order].astype(np.bool_)
+    changed = np.flatnonzero(np.diff(landed, prepend=not landed[0]))
+    edges = np.clip(np.append(land_detected["timestamp"][order][changed], last), first, last).tolist()
+    states = landed[changed].tolist()
+    return [(begin, end) for begin, end, on_ground in zip(edges, edges[1:], states, strict=False) if not on_ground]
+
+
+def rate_hz(table: TopicTable | None) -> float | None:
+    """Mean rate of a topic; `None` where there are no samples."""
+    if table is None or not len(table["timestamp"]):
+        return None
+    span = float(table["timestamp"].max() - table["timestamp"].min()) * 1e-6
+    return (len(table["timestamp"]) - 1) / span if span > 0.0 else 0.0
+
+
 def flight_times(flight: Flight) -> FlightTimes:
     """Times of a canonical or a raw flight."""
     imu = flight.topic("sensor_combined")
     if imu is None or not len(imu["timestamp"]):
         return FlightTimes(0.0, None)
-    first, last = int(imu["timestamp"].min()), int(imu["timestamp"].max())
-    return FlightTimes((last - first) * 1e-6, _airborne_s(flight.topic("vehicle_land_detected"), first, last))
-
-
-def _airborne_s(land_detected: TopicTable | None, first: int, last: int) -> float | None:
-    if land_detected is None or "landed" not in land_detected:
-        return None
-    order = np.argsort(land_detected["timestamp"], kind="stable")
-    edges = np.clip(np.append(land_detected["timestamp"][order], last), first, last)
-    in_air = ~land_detected["landed"][order].astype(np.bool_)
-    return float(np.sum(np.diff(edges)[in_air])) * 1e-6
+    duration = int(imu["timestamp"].max()) - int(imu["timestamp"].min())
+    intervals = airborne_intervals(flight)
+    airborne = None if intervals is None else sum(end - begin for begin, end in intervals) * 1e-6
+    return FlightTimes(duration * 1e-6, airborne)
 
 
 def recorded_at(flight: Flight) -> str:

@@ -23,7 +23,7 @@ VERDICT_FILE = "verdict.json"
 def save_log(
     log: str | os.PathLike[str], folder: str | os.PathLike[str], thresholds: VerdictThresholds | None = None
 ) -> Verdict:
-    """Save a log: tables, `metadata.json` and `verdict.json`.
+    """Save a log: tables, `metadata.json` and `verdict.json`, which `metadata.json` repeats.
 
     The folder appears as a whole or not at all; one of an earlier run is replaced. A log that cannot be read gets a
     folder that says why, and no error is raised.
@@ -60,10 +60,11 @@ def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
         flight = read_ulog(log)
     except UserError as error:
         verdict = unreadable(log.stem, error)
-        _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log))
+        _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
     else:
         verdict = _judge(flight, thresholds)
-        write_flight(folder, flight, {"file": log.name, "ekf2_parameters": _present_ekf2(flight)} | log_facts(flight))
+        extra = {"file": log.name, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
+        write_flight(folder, flight, extra | log_facts(flight))
     _write_json(folder / VERDICT_FILE, verdict.document())
     return verdict
 
@@ -71,7 +72,7 @@ def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
 def _judge(flight: Flight, thresholds: VerdictThresholds) -> Verdict:
     try:
         return judge(canonical(flight), thresholds)
-    except (LookupError, ValueError, TypeError) as error:
+    except (LookupError, ValueError, TypeError, ArithmeticError) as error:
         # damage can take any field away from any topic
         reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
         return unreadable(flight.name, UserError(flight.name, reason, "Copy the log from the vehicle again"))

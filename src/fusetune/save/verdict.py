@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 from fusetune.errors import UserError
@@ -13,7 +14,11 @@ Status = Literal["pass", "warning", "fail", "does-not-apply"]
 
 @dataclass(frozen=True)
 class VerdictThresholds:
-    """From where on a flight can be replayed, and from where on it is replayed with a warning."""
+    """From where on a flight can be replayed, and from where on it is replayed with a warning.
+
+    Section `verdict` of the configuration. Beyond what is called `min` or `max` a flight is refused, beyond `low` or
+    `high` it is replayed with a warning.
+    """
 
     min_imu_rate_hz: float = 50.0
     """Below it the attitude cannot be integrated (EKF2 itself predicts at 100 Hz)."""
@@ -23,13 +28,42 @@ class VerdictThresholds:
     min_imu_coverage: float = 0.5
     """Integrated share of the time between the first and the last IMU sample."""
     low_imu_coverage: float = 0.97
+    max_imu_gap_s: float = 30.0
+    """A gap so long parts the log into two flights."""
+    high_imu_gap_s: float = 0.1
     max_imu_step_back_s: float = 1.0
     """A step of the clock against time that means records are lost or out of order, not merely swapped."""
-    low_magnetometer_rate_hz: float = 1.0
-    low_barometer_rate_hz: float = 2.0
-    low_gnss_rate_hz: float = 1.0
+    max_left_out_share: float = 0.01
+    """Share of the IMU samples that are impossible: with more the damage is not one of single bits."""
+    high_clipping_share: float = 0.001
+    low_magnetometer_rate_hz: float = 10.0
+    low_barometer_rate_hz: float = 10.0
+    low_gnss_rate_hz: float = 4.0
     low_gnss_fix_share: float = 0.8
+    high_gnss_eph_m: float = 3.0
+    """Default of EKF2_REQ_EPH, as those of EKF2_REQ_EPV and EKF2_REQ_SACC below."""
+    high_gnss_epv_m: float = 5.0
+    high_gnss_speed_error_m_s: float = 0.5
     low_airborne_s: float = 10.0
+    low_lead_s: float = 10.0
+    """Time on the ground before take-off in which the filter aligns and the GNSS checks hold."""
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> VerdictThresholds:
+        """Thresholds from the section `verdict` of the configuration; keys left out have their defaults.
+
+        Raises
+        ------
+        UserError
+            A key is no threshold, or its value no number.
+        """
+        known = [field.name for field in fields(cls)]
+        for name, value in values.items():
+            if name not in known:
+                raise UserError("verdict", f"{name} is no threshold", f"Use one of {', '.join(known)}")
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise UserError("verdict", f"{name} is {value!r}, expected a number", "Mend the value")
+        return cls(**{name: float(value) for name, value in values.items()})
 
 
 @dataclass(frozen=True)
@@ -68,7 +102,7 @@ class Verdict:
         return tuple(check.reason for check in self.checks if check.status == "warning")
 
     def document(self) -> dict[str, Any]:
-        """The verdict as the JSON object of `verdict.json`."""
+        """The verdict as a JSON object, in `verdict.json` and in `metadata.json`."""
         return {
             "flight": self.flight,
             "status": self.status,
@@ -81,19 +115,21 @@ class Verdict:
 def judge(flight: Flight, thresholds: VerdictThresholds | None = None) -> Verdict:
     """Judge a flight that could be read, in the layout of `fusetune.px4.release_layouts.canonical`.
 
-    Of the checks of the IMU those after a failed one are left out, since they would only say the same again.
+    Of the checks of the IMU those after a failed one are left out, since they would only say the same again; without
+    IMU samples nothing but the log itself is judged.
     """
-    from fusetune.save import aid_checks, imu_checks
+    from fusetune.save import aid_checks, flight_checks, imu_checks, log_checks
 
     limits = thresholds or VerdictThresholds()
-    checks = [imu_checks.readable(flight), imu_checks.imu_present(flight)]
+    checks = [check(flight, limits) for check in log_checks.CHECKS]
+    checks.append(imu_checks.imu_present(flight))
     if checks[-1].status == "fail":
         return Verdict(flight.name, tuple(checks))
     for check in imu_checks.CHECKS:
         checks.append(check(flight, limits))
         if checks[-1].status == "fail":
             break
-    checks += [check(flight, limits) for check in aid_checks.CHECKS]
+    checks += [check(flight, limits) for check in (*aid_checks.CHECKS, *flight_checks.CHECKS)]
     return Verdict(flight.name, tuple(checks))
 
 

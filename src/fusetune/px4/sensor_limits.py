@@ -1,0 +1,124 @@
+"""What sensor messages can hold at all. ULog has no checksums: a flipped bit shows only as a value that cannot be.
+
+The limits are far outside of what the sensors on autopilots measure (gyroscopes to 4000 °/s, accelerometers to 32 g,
+magnetometers to 16 Gs), so a message beyond them is damaged, not unusual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from fusetune.px4.flight import LeftOut, TopicKey, TopicTable, row_count, select_rows
+
+_FIX_3D = 3
+_MOST_SAMPLE_AGE_US = 10_000_000
+_MOST_SAMPLE_LEAD_US = 1_000_000
+
+
+class _Limit(NamedTuple):
+    low: float
+    high: float
+    may_be_nan: bool = False
+
+
+def _vector(name: str, limit: _Limit, size: int = 3) -> dict[str, _Limit]:
+    return {f"{name}[{axis}]": limit for axis in range(size)}
+
+
+_INTEGRATION_TIME_US = _Limit(1.0, 1e6)
+_LIMITS: Mapping[str, Mapping[str, _Limit]] = {
+    "sensor_combined": {
+        **_vector("gyro_rad", _Limit(-100.0, 100.0)),
+        **_vector("accelerometer_m_s2", _Limit(-400.0, 400.0)),
+        "gyro_integral_dt": _INTEGRATION_TIME_US,
+        "accelerometer_integral_dt": _INTEGRATION_TIME_US,
+    },
+    "vehicle_magnetometer": _vector("magnetometer_ga", _Limit(-50.0, 50.0)),
+    "vehicle_air_data": {"baro_alt_meter": _Limit(-5e3, 1e5), "rho": _Limit(0.0, 10.0)},
+    "vehicle_gps_position": {
+        "latitude_deg": _Limit(-90.0, 90.0),
+        "longitude_deg": _Limit(-180.0, 180.0),
+        "altitude_msl_m": _Limit(-5e3, 1e5),
+        "vel_n_m_s": _Limit(-1e3, 1e3),
+        "vel_e_m_s": _Limit(-1e3, 1e3),
+        "vel_d_m_s": _Limit(-1e3, 1e3),
+        "s_variance_m_s": _Limit(0.0, 1e6),
+        "eph": _Limit(0.0, 1e7),
+        "epv": _Limit(0.0, 1e7),
+        "heading": _Limit(-7.0, 7.0, may_be_nan=True),
+    },
+    "distance_sensor": {"current_distance": _Limit(-1e4, 1e5, may_be_nan=True)},
+    "vehicle_optical_flow": {
+        **_vector("pixel_flow", _Limit(-1e3, 1e3, may_be_nan=True), 2),
+        **_vector("delta_angle", _Limit(-1e3, 1e3, may_be_nan=True)),
+    },
+    "vehicle_visual_odometry": {
+        **_vector("position", _Limit(-1e7, 1e7, may_be_nan=True)),
+        **_vector("velocity", _Limit(-1e3, 1e3, may_be_nan=True)),
+        **_vector("q", _Limit(-1.5, 1.5, may_be_nan=True), 4),
+    },
+    "airspeed": {"true_airspeed_m_s": _Limit(-1e3, 1e3, may_be_nan=True)},
+}
+_NEEDED: Mapping[str, tuple[str, ...]] = {
+    "vehicle_magnetometer": ("magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"),
+    "vehicle_air_data": ("baro_alt_meter",),
+    "vehicle_gps_position": ("fix_type",),
+    "vehicle_land_detected": ("landed",),
+    "vehicle_status": ("arming_state",),
+    "distance_sensor": ("current_distance",),
+    "vehicle_optical_flow": ("pixel_flow[0]", "pixel_flow[1]", "integration_timespan_us"),
+    "airspeed": ("true_airspeed_m_s",),
+    "estimator_selector_status": ("primary_instance",),
+}
+"""Fields without which a topic says nothing."""
+
+
+def impossible_samples(topic: str, table: TopicTable) -> np.ndarray:
+    """Rows of a sensor topic in v1.16's layout that hold what cannot be, (rows,) bool."""
+    wrong = np.zeros(row_count(table), np.bool_)
+    for name, limit in _LIMITS.get(topic, {}).items():
+        if name not in table:
+            continue
+        values = table[name]
+        # the comparison is false for NaN, which is so impossible unless it may be
+        outside = ~((values >= limit.low) & (values <= limit.high))
+        wrong |= outside & ~np.isnan(values) if limit.may_be_nan else outside
+    if topic == "vehicle_gps_position" and "fix_type" in table:
+        wrong &= table["fix_type"] >= _FIX_3D
+    return wrong | _impossible_sample_time(topic, table)
+
+
+def _impossible_sample_time(topic: str, table: TopicTable) -> np.ndarray:
+    sampled = table.get("timestamp_sample")
+    if topic not in _LIMITS or sampled is None:
+        return np.zeros(row_count(table), np.bool_)
+    age = table["timestamp"] - sampled
+    return (sampled != 0) & ((age > _MOST_SAMPLE_AGE_US) | (age < -_MOST_SAMPLE_LEAD_US))
+
+
+def without_impossible(topics: Mapping[TopicKey, TopicTable]) -> tuple[dict[TopicKey, TopicTable], tuple[LeftOut, ...]]:
+    """Topics in v1.16's layout without samples that cannot be and without topics that lack what they are for.
+
+    Returns
+    -------
+    tuple
+        The topics that remain, and what was left out of them.
+    """
+    kept: dict[TopicKey, TopicTable] = {}
+    left_out = []
+    for key, table in topics.items():
+        rows = row_count(table)
+        missing = [name for name in _NEEDED.get(key[0], ()) if name not in table]
+        if missing:
+            left_out.append(LeftOut(*key, rows, rows, f"lacks the field {missing[0]}"))
+            continue
+        wrong = impossible_samples(key[0], table) if key[0] in _LIMITS else np.zeros(0, np.bool_)
+        if wrong.any():
+            left_out.append(LeftOut(*key, int(wrong.sum()), rows, "impossible value"))
+            table = select_rows(table, ~wrong)
+        if row_count(table) or not wrong.any():
+            kept[key] = table
+    return kept, tuple(left_out)
