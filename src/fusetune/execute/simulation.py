@@ -23,7 +23,7 @@ from fusetune.execute.vehicle_state import sensor_selection, vehicle_land_detect
 from fusetune.px4.flight import Flight, LoggedMessage, ParameterHistory, TopicKey, TopicTable
 from fusetune.px4.ulog_writer import write_ulog
 
-LONGEST_FLIGHT_S = 1800.0
+LONGEST_FLIGHT_S = 4500.0
 RELEASE = (1 << 24) | (16 << 16) | 255
 """v1.16.0 as PX4 encodes it; the last byte marks a release."""
 
@@ -59,7 +59,7 @@ def simulate(
     Raises
     ------
     UserError
-        The mission takes longer than half an hour.
+        The mission takes longer than `LONGEST_FLIGHT_S`.
     ParameterError
         A parameter is unknown, of the wrong type or out of range.
     """

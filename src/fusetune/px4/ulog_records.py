@@ -103,6 +103,7 @@ class Scanner:
         self._content = content
         self._bytes = np.frombuffer(content, np.uint8)
         self._formats: dict[str, tuple[Field, ...]] = {}
+        self._layouts: dict[str, MessageLayout] = {}
         self._shortest = np.full(0x10000, _NO_LENGTH, np.int32)
         self._longest = np.zeros(0x10000, np.int32)
         self._block: _Block | None = None
@@ -294,10 +295,11 @@ class Scanner:
                 raise ValueError(f"message id {message_id} has two topics")
             return
         try:
-            layout = message_layout(topic, self._formats)
+            layout = self._layouts.get(topic) or message_layout(topic, self._formats)
         except ValueError:
             self._scan.undefined_topics[message_id] = topic
             raise
+        self._layouts[topic] = layout
         self._scan.undefined_topics.pop(message_id, None)
         subscription = Subscription(topic, instance, layout)
         self._scan.subscriptions[message_id] = subscription

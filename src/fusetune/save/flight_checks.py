@@ -9,7 +9,7 @@ import numpy as np
 from fusetune.px4.flight import Flight
 from fusetune.save.log_checks import ONE_ESTIMATOR
 from fusetune.save.log_facts import airborne_intervals
-from fusetune.save.verdict import Check, VerdictThresholds
+from fusetune.save.verdict import Check, Status, VerdictThresholds
 
 _FROM_BOOT = "Set SDLOG_MODE = 2, so that the log begins when the autopilot starts"
 _ONE_ESTIMATOR = f"Set {ONE_ESTIMATOR}, so that one estimator runs on one IMU"
@@ -67,7 +67,7 @@ def estimator_instances(flight: Flight, limits: VerdictThresholds) -> Check:
         if count == 0:
             return Check(name, "does-not-apply", "the log holds nothing of the vehicle's own estimator")
         words = "one estimator ran" if count == 1 else f"{count} estimators ran; the log does not say which was primary"
-        status = "pass" if count == 1 else "warning"
+        status: Status = "pass" if count == 1 else "warning"
         return Check(name, status, words, "" if count == 1 else _ONE_ESTIMATOR, 0.0, 0.0)
     primary = np.asarray(selector["primary_instance"], np.int64)
     changes = _changes(flight, selector["timestamp"], primary)

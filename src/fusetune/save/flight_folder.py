@@ -48,8 +48,9 @@ def write_flight(folder: str | os.PathLike[str], flight: Flight, extra: dict[str
         _write_table(target / file, table)
         entries.append({"topic": topic, "instance": instance, "rows": len(table["timestamp"]), "file": file})
     document = _metadata(flight) | (extra or {}) | {"topics": entries}
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    (target / METADATA_FILE).write_text(text + "\n", encoding="utf-8")
+    # one line per entry: readable, and without the indentation that the encoder is slow at
+    lines = (f"{json.dumps(key)}: {_json_text(value)}" for key, value in document.items())
+    (target / METADATA_FILE).write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 
 def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None = None) -> Flight:
@@ -98,6 +99,10 @@ def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None =
     )
 
 
+def _json_text(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
 def read_metadata(folder: str | os.PathLike[str]) -> dict[str, Any]:
     """`metadata.json` of a saved flight.
 
@@ -118,9 +123,11 @@ def read_metadata(folder: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _write_table(file: Path, table: TopicTable) -> None:
     arrays = pa.Table.from_arrays([pa.array(values) for values in table.values()], names=list(table))
-    # a log has some thousand columns, most of them short: what is done per column counts more than the bytes
-    with pa.OSFile(os.fspath(file), "wb") as sink:
-        pq.write_table(arrays, sink, compression="lz4", use_dictionary=False, write_statistics=False)
+    # hundreds of small files with thousands of short columns: what is done per file and column counts, not the bytes
+    sink = pa.BufferOutputStream()
+    pq.write_table(arrays, sink, compression="lz4", use_dictionary=False, write_statistics=False)
+    with open(file, "wb", buffering=0) as target:
+        target.write(sink.getvalue())
 
 
 def _read_table(file: Path) -> TopicTable:

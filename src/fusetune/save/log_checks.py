@@ -8,7 +8,7 @@ from collections.abc import Callable
 from fusetune.px4.ekf2_parameters import ALL_PARAMETERS, BASELINE_RELEASE, as_float32
 from fusetune.px4.flight import Flight
 from fusetune.save.log_facts import rate_hz
-from fusetune.save.verdict import Check, VerdictThresholds
+from fusetune.save.verdict import Check, Status, VerdictThresholds
 
 _COPY_AGAIN = "Copy the log from the vehicle again; check the SD card"
 _IMU, _REPLAY_PROFILE_BIT, _DEFAULT_PROFILE_BIT = "sensor_combined", 0b10, 0b01
@@ -44,7 +44,7 @@ def definitions(flight: Flight, limits: VerdictThresholds) -> Check:
     if not missing:
         return Check(name, "pass", "all messages are defined", "", 0.0, 0.0)
     reason = f"the log lacks the message definitions of {', '.join(missing[:8])}{' …' if len(missing) > 8 else ''}"
-    status = "fail" if _IMU in missing and not flight.has(_IMU) else "warning"
+    status: Status = "fail" if _IMU in missing and not flight.has(_IMU) else "warning"
     return Check(name, status, reason, _COPY_AGAIN, float(len(missing)), 0.0)
 
 
