@@ -14,6 +14,9 @@ import numpy as np
 from fusetune.px4.flight import LeftOut, TopicKey, TopicTable, row_count, select_rows
 
 _FIX_3D = 3
+_IMU = "sensor_combined"
+NO_ADVANCE = "time does not advance"
+_MOST_DISORDER_US = 1_000_000
 _MOST_SAMPLE_AGE_US = 10_000_000
 _MOST_SAMPLE_LEAD_US = 1_000_000
 
@@ -102,6 +105,8 @@ def _impossible_sample_time(topic: str, table: TopicTable) -> np.ndarray:
 def without_impossible(topics: Mapping[TopicKey, TopicTable]) -> tuple[dict[TopicKey, TopicTable], tuple[LeftOut, ...]]:
     """Topics in v1.16's layout without samples that cannot be and without topics that lack what they are for.
 
+    The rows of the estimator's topics are in order of time, whatever their order in the file.
+
     Returns
     -------
     tuple
@@ -115,10 +120,31 @@ def without_impossible(topics: Mapping[TopicKey, TopicTable]) -> tuple[dict[Topi
         if missing:
             left_out.append(LeftOut(*key, rows, rows, f"lacks the field {missing[0]}"))
             continue
-        wrong = impossible_samples(key[0], table) if key[0] in _LIMITS else np.zeros(0, np.bool_)
-        if wrong.any():
-            left_out.append(LeftOut(*key, int(wrong.sum()), rows, "impossible value"))
-            table = select_rows(table, ~wrong)
-        if row_count(table) or not wrong.any():
+        if key[0] in _LIMITS or key[0] in _NEEDED:
+            for reason, fault in (("impossible value", impossible_samples), (NO_ADVANCE, _stands_still)):
+                wrong = fault(key[0], table)
+                if wrong.any():
+                    left_out.append(LeftOut(*key, int(wrong.sum()), rows, reason))
+                    table = select_rows(table, ~wrong)
+            table = _in_order(key[0], table)
+        if row_count(table) or not rows:
             kept[key] = table
     return kept, tuple(left_out)
+
+
+def _stands_still(topic: str, table: TopicTable) -> np.ndarray:
+    """IMU samples no newer than one before them, unless the clock itself went back, (rows,) bool."""
+    timestamps = table["timestamp"]
+    if topic != _IMU or len(timestamps) < 2 or np.all(timestamps[1:] > timestamps[:-1]):
+        return np.zeros(len(timestamps), np.bool_)
+    newest_before = np.maximum.accumulate(timestamps)[:-1]
+    lag = newest_before - timestamps[1:]
+    return np.concatenate([[False], (lag >= 0) & (lag <= _MOST_DISORDER_US)])
+
+
+def _in_order(topic: str, table: TopicTable) -> TopicTable:
+    """Rows by time; those of the IMU stay as they are, since a clock that goes back is for the verdict to see."""
+    timestamps = table["timestamp"]
+    if topic == _IMU or np.all(timestamps[1:] >= timestamps[:-1]):
+        return table
+    return select_rows(table, np.argsort(timestamps, kind="stable"))

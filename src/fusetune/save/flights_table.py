@@ -76,7 +76,7 @@ def _row(folder: Path) -> dict[str, Any]:
         "warnings": "; ".join(check["reason"] for check in warned),
         "checks": "; ".join(_compact(check) for check in verdict["checks"]),
         "firmware": metadata.get("firmware", "unknown"),
-        "hardware": metadata.get("hardware", {}).get("ver_hw", ""),
+        "hardware": str(metadata.get("hardware", {}).get("ver_hw", "")),
         "recorded": metadata.get("recorded", ""),
         "duration_s": metadata.get("duration_s"),
         "airborne_s": metadata.get("airborne_s"),

@@ -7,12 +7,13 @@ from collections.abc import Callable
 
 from fusetune.px4.ekf2_parameters import ALL_PARAMETERS, BASELINE_RELEASE, as_float32
 from fusetune.px4.flight import Flight
+from fusetune.px4.sensor_limits import NO_ADVANCE
 from fusetune.save.log_facts import rate_hz
 from fusetune.save.verdict import Check, Status, VerdictThresholds
 
 _COPY_AGAIN = "Copy the log from the vehicle again; check the SD card"
 _IMU, _REPLAY_PROFILE_BIT, _DEFAULT_PROFILE_BIT = "sensor_combined", 0b10, 0b01
-_IMPOSSIBLE_TIME = "impossible time stamp"
+_TIME_REASONS = ("impossible time stamp", NO_ADVANCE)
 _VERBOSE_SINCE = (1, 16, 0)
 _MODES = {
     0: "while armed",
@@ -59,7 +60,7 @@ def sensor_values(flight: Flight, limits: VerdictThresholds) -> Check:
 
 
 def _left_out(flight: Flight, limits: VerdictThresholds, name: str, what: str, *, is_time: bool) -> Check:
-    entries = [entry for entry in flight.left_out if (entry.reason == _IMPOSSIBLE_TIME) == is_time]
+    entries = [entry for entry in flight.left_out if (entry.reason in _TIME_REASONS) == is_time]
     rows = sum(entry.rows for entry in entries)
     threshold = limits.max_left_out_share
     if not rows and not entries:

@@ -89,13 +89,19 @@ def recorded_at(flight: Flight) -> str:
     return ""
 
 
+def _readable_info(flight: Flight, keys: tuple[str, ...]) -> dict[str, str | int]:
+    """Texts and whole numbers among the information of a log; damage can make anything of it."""
+    found = {key: flight.info.get(key) for key in keys}
+    return {key: value for key, value in found.items() if isinstance(value, str | int)}
+
+
 def log_facts(flight: Flight) -> dict[str, Any]:
     """Versions, hardware and times as entries of `metadata.json`."""
     times = flight_times(flight)
     return {
         "firmware": flight.release_name,
-        "versions": {key: flight.info[key] for key in _VERSION_KEYS if key in flight.info},
-        "hardware": {key: flight.info[key] for key in _HARDWARE_KEYS if key in flight.info},
+        "versions": _readable_info(flight, _VERSION_KEYS),
+        "hardware": _readable_info(flight, _HARDWARE_KEYS),
         "recorded": recorded_at(flight),
         "duration_s": round(times.imu_s, 6),
         "airborne_s": None if times.airborne_s is None else round(times.airborne_s, 6),
