@@ -131,9 +131,10 @@ def test_vision_of_v1_8_takes_the_newest_attitude() -> None:
 
 
 def test_primary_estimator_instance_decides_on_the_magnetometer() -> None:
+    field = {f"magnetometer_ga[{axis}]": np.zeros(4, np.float32) for axis in range(3)}
     topics = {
-        ("vehicle_magnetometer", 0): {"timestamp": TIME, "device_id": np.full(4, 11, np.uint32)},
-        ("vehicle_magnetometer", 1): {"timestamp": TIME, "device_id": np.full(4, 22, np.uint32)},
+        ("vehicle_magnetometer", 0): {"timestamp": TIME, "device_id": np.full(4, 11, np.uint32), **field},
+        ("vehicle_magnetometer", 1): {"timestamp": TIME, "device_id": np.full(4, 22, np.uint32), **field},
         ("estimator_selector_status", 0): {"timestamp": TIME, "primary_instance": np.array([0, 2, 2, 2], np.uint8)},
         ("estimator_status", 0): {"timestamp": TIME, "mag_device_id": np.full(4, 11, np.uint32)},
         ("estimator_status", 2): {"timestamp": TIME, "mag_device_id": np.array([0, 22, 22, 22], np.uint32)},

@@ -68,9 +68,7 @@ _LIMITS: Mapping[str, Mapping[str, _Limit]] = {
 _NEEDED: Mapping[str, tuple[str, ...]] = {
     "vehicle_magnetometer": ("magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"),
     "vehicle_air_data": ("baro_alt_meter",),
-    "vehicle_gps_position": ("fix_type",),
     "vehicle_land_detected": ("landed",),
-    "vehicle_status": ("arming_state",),
     "distance_sensor": ("current_distance",),
     "vehicle_optical_flow": ("pixel_flow[0]", "pixel_flow[1]", "integration_timespan_us"),
     "airspeed": ("true_airspeed_m_s",),
@@ -137,9 +135,12 @@ def _stands_still(topic: str, table: TopicTable) -> np.ndarray:
     timestamps = table["timestamp"]
     if topic != _IMU or len(timestamps) < 2 or np.all(timestamps[1:] > timestamps[:-1]):
         return np.zeros(len(timestamps), np.bool_)
-    newest_before = np.maximum.accumulate(timestamps)[:-1]
-    lag = newest_before - timestamps[1:]
-    return np.concatenate([[False], (lag >= 0) & (lag <= _MOST_DISORDER_US)])
+    turns = np.flatnonzero(np.diff(timestamps) < -_MOST_DISORDER_US) + 1
+    wrong = np.zeros(len(timestamps), np.bool_)
+    for begin, end in zip([0, *turns], [*turns, len(timestamps)], strict=True):
+        part = timestamps[begin:end]
+        wrong[begin + 1 : end] = part[1:] <= np.maximum.accumulate(part)[:-1]
+    return wrong
 
 
 def _in_order(topic: str, table: TopicTable) -> TopicTable:
