@@ -27,7 +27,8 @@ _HEAD_BYTES = 3
 _DATA = ord("D")
 _LEVELS = range(ord("0"), ord("8"))
 _KEY = re.compile(rb"[A-Za-z]\w*(\[\d+\])? [^\x00-\x20]+")
-_FORMAT_BEGIN = re.compile(rb"[A-Za-z][^:]{0,120}:")
+_FORMAT_BEGIN = re.compile(rb"[A-Za-z]\w{0,99}:")
+_TOPIC = re.compile(rb"[A-Za-z]\w{0,99}")
 _MOST_PADDING = 64
 _MOST_STRANGE_RECORDS = 8
 _SMALLEST_SEARCH, _LARGEST_SEARCH = 256, 1 << 20
@@ -36,6 +37,9 @@ _NO_LENGTH = 1 << 20
 
 _KNOWN_KIND = np.zeros(256, np.bool_)
 _KNOWN_KIND[list(b"DSOLCARFIPMQ")] = True
+_TELLING_KIND = np.zeros(256, np.bool_)
+_TELLING_KIND[list(b"DSAFIPMQ")] = True
+"""Kinds whose content tells them from rubbish; a text, a dropout or a removal could lie anywhere."""
 
 
 class Record(NamedTuple):
@@ -203,7 +207,7 @@ class Scanner:
             case "C":
                 return size >= 11 and content[begin] in _LEVELS
             case "A":
-                return size >= 4 and content[begin + 3 : begin + 4].isalpha()
+                return _TOPIC.fullmatch(content, begin + 3, begin + size) is not None
             case "F":
                 return _FORMAT_BEGIN.match(content, begin, begin + size) is not None
             case "I" | "P":
@@ -250,21 +254,21 @@ class Scanner:
         return begin + size
 
     def _next_record(self, position: int, stop: int) -> int | None:
-        """The first place from `position` on where a record lies that leads on to another, or to the end."""
+        """The first place from `position` on where a record lies that another, or the end, follows."""
         for candidate in self._candidates(position, stop):
             if self._is_record(candidate, stop):
                 size, _ = _HEAD(self._content, candidate)
                 after = candidate + _HEAD_BYTES + size
-                if after == stop or self._is_record(after, stop) or self._leads_on(after, stop):
+                if after == stop or self._is_record(after, stop):
                     return candidate
         return None
 
     def _candidates(self, position: int, stop: int) -> Iterator[int]:
-        """Places whose third byte is the kind of a record."""
+        """Places whose third byte is the kind of a record that can be told from rubbish."""
         length = _SMALLEST_SEARCH
         while position < stop:
             kinds = self._bytes[position + 2 : min(position + 2 + length, stop)]
-            yield from (np.flatnonzero(_KNOWN_KIND[kinds]) + position).tolist()
+            yield from (np.flatnonzero(_TELLING_KIND[kinds]) + position).tolist()
             position += length
             length = min(2 * length, _LARGEST_SEARCH)
 

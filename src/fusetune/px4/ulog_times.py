@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 _MOST_OUT_OF_LINE_US = 1_000_000
+_LATEST_US = 1 << 62
 _MOST_AHEAD_US = 5_000_000
 _FEWEST_CLOCK_ROWS = 100
 """A topic with fewer messages is no clock for the others."""
@@ -31,7 +32,8 @@ def out_of_line(timestamps: np.ndarray) -> np.ndarray:
     timestamps
         (rows,) int64, µs, of one topic in the order of the file.
     """
-    wrong = timestamps < 0
+    wrong = (timestamps < 0) | (timestamps > _LATEST_US)
+    timestamps = np.clip(timestamps, 0, _LATEST_US)
     if len(timestamps) < 3:
         return wrong
     before, here, after = timestamps[:-2], timestamps[1:-1], timestamps[2:]
