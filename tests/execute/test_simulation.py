@@ -208,7 +208,7 @@ def test_unknown_parameter_is_refused(mission: Mission, vehicle: Vehicle) -> Non
 
 
 def test_endless_mission_is_refused(mission: Mission, vehicle: Vehicle) -> None:
-    slow = tuple(dataclasses.replace(waypoint, hold_s=600.0) for waypoint in mission.waypoints)
+    slow = tuple(dataclasses.replace(waypoint, hold_s=1600.0) for waypoint in mission.waypoints)
     with pytest.raises(UserError, match="minutes"):
         fly(dataclasses.replace(mission, waypoints=slow), vehicle, {}, SEED, with_estimator=False)
 
