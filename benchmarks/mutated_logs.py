@@ -336,12 +336,14 @@ def run_cases(seeds: range, folder: Path) -> tuple[Counter[str], dict[int, str],
     slowest = 0.0
     for seed in seeds:
         content, ways = mutator.mutated(seed)
-        forget_peak()
-        baseline, begin = peak_bytes(), time.perf_counter()
+        begin = time.perf_counter()
         try:
-            outcome = run_case(content, folder, sound)
-            taken = peak_bytes() - baseline
-            if taken > MOST_MEMORY * max(len(content), len(sound.content)) + ALLOCATOR_STEP_BYTES:
+            outcome, taken = _measured_case(content, folder, sound)
+            most = MOST_MEMORY * max(len(content), len(sound.content)) + ALLOCATOR_STEP_BYTES
+            if taken > most:
+                # an allocator grows now and then whatever the case is; one that needs the memory needs it again
+                outcome, taken = _measured_case(content, folder, sound)
+            if taken > most:
                 raise CaseError(f"takes {taken / 1e6:.1f} MB for {len(content) / 1e6:.2f} MB")
         except Exception as error:  # every way of failing is a finding
             outcome = "failed"
@@ -350,6 +352,14 @@ def run_cases(seeds: range, folder: Path) -> tuple[Counter[str], dict[int, str],
         slowest = max(slowest, time.perf_counter() - begin)
         tally[outcome] += 1
     return tally, failures, slowest
+
+
+def _measured_case(content: bytes, folder: Path, sound: Sound) -> tuple[str, int]:
+    """Outcome of a case, and the memory it took beyond what the process had."""
+    forget_peak()
+    before = peak_bytes()
+    outcome = run_case(content, folder, sound)
+    return outcome, peak_bytes() - before
 
 
 def main() -> int:
