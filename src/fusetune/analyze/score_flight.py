@@ -27,6 +27,13 @@ from fusetune.analyze.set_files import SetRecord, read_set
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.analyze.true_errors import read_truth, true_errors
+from fusetune.analyze.withheld_scores import (
+    WITHHELD_SCHEMA,
+    add_true_drift,
+    add_withheld_metrics,
+    paired_gaps,
+    withheld_rows,
+)
 from fusetune.files import atomic_path
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
@@ -75,7 +82,7 @@ def score_flight(
     settings: ScoringSettings | None = None,
 ) -> None:
     """Score every parameter set of one flight and write `metrics.parquet`, `scores.parquet`, `samples.parquet`,
-    `scoring.json` and `onboard.innovations.parquet` to `analyze_folder`.
+    `withheld.parquet`, `scoring.json` and `onboard.innovations.parquet` to `analyze_folder`.
 
     Parameters
     ----------
@@ -104,17 +111,22 @@ def score_flight(
     onboard = onboard_samples(flight)
     blocks: list[pa.Table] = []
     samples: list[pa.Table] = []
+    withheld = WITHHELD_SCHEMA.empty_table()
     if window.intervals:
         scored = [record for record in records if record.name not in window.excluded]
         blocks, samples = _score_samples(table, scored, present, window, settings)
+        gaps = paired_gaps(scored, Path(analyze_folder), present, window)
+        add_withheld_metrics(table, gaps)
+        withheld = withheld_rows(flight.name, gaps, window.block_edges(settings.block_s))
         _add_onboard(table, onboard, window, settings, records[0].parameters)
         truth = read_truth(flight)
         if truth is not None:
             for record in scored:
                 figures = true_errors(record, Path(analyze_folder), truth, window, settings.confidence)
                 add_true_errors(table, record.name, figures)
+            add_true_drift(table, scored, Path(analyze_folder), truth, window)
     summary = _summary(flight, records, present, window, events, settings)
-    _write(Path(analyze_folder), table, blocks, samples, summary)
+    _write(Path(analyze_folder), table, blocks, samples, withheld, summary)
     write_onboard(Path(analyze_folder) / f"{ONBOARD}.innovations.parquet", onboard)
 
 
@@ -234,12 +246,18 @@ def _set_summary(
 
 
 def _write(
-    folder: Path, table: MetricsTable, blocks: list[pa.Table], samples: list[pa.Table], summary: dict[str, Any]
+    folder: Path,
+    table: MetricsTable,
+    blocks: list[pa.Table],
+    samples: list[pa.Table],
+    withheld: pa.Table,
+    summary: dict[str, Any],
 ) -> None:
     tables = {
         "metrics.parquet": table.finished(),
         "scores.parquet": pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
         "samples.parquet": pa.concat_tables(samples).unify_dictionaries() if samples else SAMPLES_SCHEMA.empty_table(),
+        "withheld.parquet": withheld,
     }
     for name, content in tables.items():
         with atomic_path(folder / name) as temporary:
