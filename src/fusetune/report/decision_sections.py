@@ -51,7 +51,7 @@ def _change_row(change: dict[str, Any]) -> tuple[Cell, ...]:
 def evidence_section(results: Results, figures: Path) -> str:
     """Forest plot, heat map and ranking."""
     rule = results.decision["rule"]
-    label = AID_SOURCES[rule["source"]].label
+    label = AID_SOURCES[rule["main_source"]].label
     return section(
         "What the flights say",
         paragraph(
@@ -74,11 +74,10 @@ def evidence_section(results: Results, figures: Path) -> str:
 
 
 def _ranking_table(results: Results) -> str:
-    axes = AID_SOURCES[results.decision["rule"]["source"]].axes
     head = ("set", "", "score", "change %", "interval %", "p", "p (Holm)", "P(best)", "better on")
     rows = []
     for one in results.ranking.to_dict("records"):
-        percent = [_percent(one[name], axes) for name in ("difference", "lower", "upper")]
+        percent = [_percent(one[name]) for name in ("difference", "lower", "upper")]
         interval = "–" if one["name"] == results.present else f"{signed(percent[1]).text} … {signed(percent[2]).text}"
         equal = " (same results as now)" if one["equal_to_present"] else ""
         rows.append(
@@ -102,7 +101,7 @@ def _ranking_table(results: Results) -> str:
 
 
 def _criteria_table(results: Results) -> str:
-    source = results.decision["rule"]["source"]
+    source = results.decision["rule"]["main_source"]
     columns = {
         f"rms_{source}_horizontal": "RMS horizontal",
         f"rms_{source}_vertical": "RMS vertical",
@@ -133,8 +132,8 @@ def _name(name: str, results: Results) -> Cell:
     return Cell(name, "short best" if name == results.decision["chosen"] else "short")
 
 
-def _percent(difference: float, axes: int) -> float:
-    return float(percent_change(difference, axes))
+def _percent(difference: float) -> float:
+    return float(percent_change(difference))
 
 
 def _vetoes(results: Results) -> str:

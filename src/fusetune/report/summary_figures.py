@@ -80,17 +80,9 @@ def plot_summary(analyze_folders: Sequence[Path], apply_folder: Path, figure_fol
             save_svg(figure, Path(figure_folder) / name)
 
 
-def percent_change(difference: npt.ArrayLike, axes: int) -> npt.NDArray[np.float64]:
-    """Difference of the profiled score as a change of the prediction error, percent; below 0 is better."""
-    return 100.0 * np.expm1(np.asarray(difference, dtype=np.float64) / axes)
-
-
-def _score_axes(results: Results) -> int:
-    return AID_SOURCES[results.decision["rule"]["source"]].axes
-
-
-def _score_label(results: Results) -> str:
-    return AID_SOURCES[results.decision["rule"]["source"]].label
+def percent_change(difference: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Difference of the score as a change of the prediction error, percent; below 0 is better."""
+    return 100.0 * np.expm1(np.asarray(difference, dtype=np.float64))
 
 
 def differences(results: Results) -> Figure:
@@ -102,8 +94,7 @@ def differences(results: Results) -> Figure:
     names = list(others["name"])
     figure = new_figure(7.2, 1.1 + 0.3 * len(names))
     axes = figure.add_subplot()
-    count = _score_axes(results)
-    centre, low, high = (percent_change(others[column], count) for column in ("difference", "lower", "upper"))
+    centre, low, high = (percent_change(others[column]) for column in ("difference", "lower", "upper"))
     for row, (name, status) in enumerate(zip(names, others["status"], strict=True)):
         chosen = name == results.decision["chosen"]
         colour = VETOED_COLOUR if status == "vetoed" else CHOSEN_COLOUR if chosen else CANDIDATE_COLOUR
@@ -115,9 +106,7 @@ def differences(results: Results) -> Figure:
     )
     _limit_forest(axes, centre, low, high, (others["status"] == "candidate").to_numpy())
     confidence = results.decision["rule"]["confidence"]
-    axes.set_xlabel(
-        f"change of the {_score_label(results)} prediction error against the present set [%]; left is better"
-    )
+    axes.set_xlabel("change of the prediction error against the present set [%]; left is better")
     axes.set_title(f"Every set against the present one, mean over flights with {confidence:.0%} interval")
     return figure
 
@@ -136,7 +125,7 @@ def flights_by_sets(results: Results) -> Figure:
     names = [name for name in results.shown if name in scores.columns and name != results.present]
     if not names:
         return empty_figure("Only the present set was scored: there is nothing to compare.")
-    change = percent_change(scores[names].to_numpy() - scores[[results.present]].to_numpy(), _score_axes(results))
+    change = percent_change(scores[names].to_numpy() - scores[[results.present]].to_numpy())
     flights = [_short(str(flight)) for flight in scores.index]
     figure = new_figure(2.6 + 0.62 * len(names), 1.5 + 0.26 * len(flights))
     axes = figure.add_subplot()
