@@ -95,7 +95,8 @@ def _values(
     if source in HEADING_SOURCES:
         update = np.minimum(np.searchsorted(states.time, time), states.time.size - 1)
         after = heading(states.quaternion[update])[:, None]
-        return np.unwrap(_running_freely(innovation, wrap(after - (observation + innovation))), axis=0)
+        free = _running_freely(innovation, wrap(after - (observation + innovation)))
+        return None if free is None else np.unwrap(free, axis=0)
     if source == "mag":
         return _mag_errors(states, time, observation)
     travelled = _travelled(states, time)

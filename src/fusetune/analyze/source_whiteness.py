@@ -122,7 +122,7 @@ def series_whiteness(source: str, series: ErrorSeries, window: ScoringWindow) ->
     gamma = variogram(time, values, interval, lags)
     results: list[Whiteness | None] = []
     for axis in axes:
-        white, correlated, tau = fit_variogram(lags * step_s, gamma[:, axis], step_s)
+        white, correlated, tau = fit_variogram(np.asarray(lags * step_s, dtype=np.float64), gamma[:, axis], step_s)
         seen = correlated * -np.expm1(-horizon_s(source) / tau)
         results.append(Whiteness(source, axis, float(np.sqrt(white)), float(np.sqrt(seen)), tau, time.size))
     return results
