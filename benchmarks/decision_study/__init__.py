@@ -1,0 +1,1 @@
+"""Does the decision choose what the truth would have chosen? `python -m benchmarks.decision_study --help`."""
