@@ -102,28 +102,27 @@ def add_axis_metrics(table: MetricsTable, pairs: PairedSamples, settings: Scorin
         table.add_each(sets, source, axis, "lag1_correlation", correlation[:, 0], n)
         table.add_each(sets, source, axis, "ljung_box", statistic, n)
         table.add_each(sets, source, axis, "ljung_box_p", p_value, n)
-    _add_likelihoods(table, pairs, nis)
+    for metric, value in _likelihoods(pairs).items():
+        table.add_each(sets, source, axis, metric, value, n)
     for limit in (3, 5):
         broken = beyond_standard_deviations(innovation, variance, limit)
         table.add_bounds(sets, source, axis, f"break_rate_{limit}sd", break_rate(broken, settings.confidence), n)
     table.add_bounds(sets, source, axis, "break_rate_gate", break_rate(beyond_gate(pairs), settings.confidence), n)
 
 
-def _add_likelihoods(table: MetricsTable, pairs: PairedSamples, nis: Array) -> None:
-    source, axis, sets, n = pairs.source, AXES[pairs.axis], pairs.sets, pairs.time.size
+def _likelihoods(pairs: PairedSamples) -> dict[str, Array]:
     innovation, variance = pairs.innovation, pairs.innovation_variance
     clipped = likelihood.winsorised(innovation, likelihood.winsor_limit(innovation))
     log_variance = np.mean(np.log(variance), axis=-1)
+    nis = np.mean(np.square(innovation) / variance, axis=-1)
     clipped_nis = np.mean(np.square(clipped) / variance, axis=-1)
-    values = {
+    return {
         "nll": np.mean(likelihood.gaussian_nll(innovation, variance), axis=-1),
         "nll_student_t": np.mean(likelihood.student_t_nll(innovation, variance), axis=-1),
         "nll_winsorised": np.mean(likelihood.gaussian_nll(clipped, variance), axis=-1),
         "nll_profile": likelihood.profile_nll(nis, log_variance),
         "nll_profile_winsorised": likelihood.profile_nll(clipped_nis, log_variance),
     }
-    for metric, value in values.items():
-        table.add_each(sets, source, axis, metric, value, n)
 
 
 def add_group_metrics(table: MetricsTable, pairs: dict[int, PairedSamples], settings: ScoringSettings) -> None:
@@ -162,13 +161,25 @@ def _add_group(table: MetricsTable, group: str, members: list[PairedSamples], se
     table.add_bounds(sets, source, group, "mean_nis_effective", effective, independent)
     table.add_each(sets, source, group, "j_nis", j_nis(nis, dimension), n)
     table.add_each(sets, source, group, "c_nis", c_nis(innovation, variance), n)
-    profile = likelihood.profile_nll(
-        np.mean(np.square(innovation) / variance, axis=-1), np.mean(np.log(variance), axis=-1)
-    )
-    table.add_each(sets, source, group, "nll", likelihood.gaussian_nll(innovation, variance).mean(axis=-1).sum(0), n)
-    table.add_each(sets, source, group, "nll_profile", profile.sum(axis=0), n)
-    broken = np.logical_or.reduce([beyond_gate(one) for one in members])
-    table.add_bounds(sets, source, group, "break_rate_gate", break_rate(broken, settings.confidence), n)
+    _add_group_likelihoods(table, group, members)
+    for metric, broken in (
+        ("break_rate_3sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 3) for one in members]),
+        ("break_rate_5sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 5) for one in members]),
+        ("break_rate_gate", [beyond_gate(one) for one in members]),
+    ):
+        rate = break_rate(np.logical_or.reduce(broken), settings.confidence)
+        table.add_bounds(sets, source, group, metric, rate, n)
+
+
+def _add_group_likelihoods(table: MetricsTable, group: str, members: list[PairedSamples]) -> None:
+    """Likelihoods of several axes: the sums of theirs, each axis winsorised and scaled by itself."""
+    sums: dict[str, Array] = {}
+    for one in members:
+        for metric, value in _likelihoods(one).items():
+            sums[metric] = sums[metric] + value if metric in sums else value
+    first = members[0]
+    for metric, value in sums.items():
+        table.add_each(first.sets, first.source, group, metric, value, first.time.size)
 
 
 def add_events(table: MetricsTable, set_name: str, events: FilterEvents, flight_s: float) -> None:
