@@ -69,7 +69,9 @@ def collect(files: StudyFiles, flights: int, folder: Path, workers: int) -> dict
     flights : number of flights per world
     folder : takes `<world>/<flight>`
     """
-    jobs = {world: [folder / world / f"flight_{number:02}" for number in range(flights)] for world in files.worlds_by_name()}
+    jobs = {
+        world: [folder / world / f"flight_{number:02}" for number in range(flights)] for world in files.worlds_by_name()
+    }
     with ProcessPoolExecutor(workers) as pool:
         running = [
             pool.submit(_fly_and_score, files, world, FIRST_SEED + number, target)

@@ -64,7 +64,13 @@ def judge(world: World, study: str, sets: Sequence[int], rule: str, chosen: int)
     ]
     worst = tuple(name for name, row in zip(TRUTH, errors, strict=True) if row[place] == row.max() > row.min())
     return Verdict(
-        world.name, study, rule, world.sets[chosen], dict(zip(TRUTH, regret.tolist(), strict=True)), not any(beaten), worst
+        world.name,
+        study,
+        rule,
+        world.sets[chosen],
+        dict(zip(TRUTH, regret.tolist(), strict=True)),
+        not any(beaten),
+        worst,
     )
 
 

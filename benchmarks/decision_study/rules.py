@@ -33,12 +33,22 @@ DEFAULTS = {
 
 def rules(settings: DecisionSettings) -> dict[str, Rule]:
     """All rules by name."""
-    plain = ("minimum mean NIS", "paper mode", "J_NIS", "C_NIS", "RMS, GNSS velocity", "NLL, all sources", "NLL, GNSS velocity")
+    plain = (
+        "minimum mean NIS",
+        "paper mode",
+        "J_NIS",
+        "C_NIS",
+        "RMS, GNSS velocity",
+        "NLL, all sources",
+        "NLL, GNSS velocity",
+    )
     return {
         **{name: _lowest(name) for name in plain},
         "one-step predictions alone": _lowest_aim(AIDED),
         "withheld GNSS alone": _lowest_aim(UNAIDED),
-        SCORE_ONLY: lambda world, flights, sets: int(sets[np.argmin(scores(world)[np.ix_(flights, sets)].mean(axis=0))]),
+        SCORE_ONLY: lambda world, flights, sets: int(
+            sets[np.argmin(scores(world)[np.ix_(flights, sets)].mean(axis=0))]
+        ),
         OURS: lambda world, flights, sets: decide(world, flights, sets, settings)[0],
     }
 

@@ -61,7 +61,7 @@ def choose(
         return Choice("no_evidence", present, None, None, exploratory, None)
     names = [one.name for one in eligible if one.flights == len(evidence)]
     validated = leave_one_out(evidence, names, present, settings.confidence)
-    if best is None or not is_better(best) or not _holds(best, validated, settings):
+    if best is None or not is_better(best) or not _holds(best, settings):
         return Choice("keep", present, best, None, exploratory, validated)
     near = [one for one in eligible if is_better(one) and one.behind_best <= one.behind_best_error]
     pick = min([best, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
@@ -73,13 +73,12 @@ def is_better(candidate: RankedSet) -> bool:
     return candidate.upper < 0.0
 
 
-def _holds(best: RankedSet, validated: LeaveOneOut | None, settings: DecisionSettings) -> bool:
+def _holds(best: RankedSet, settings: DecisionSettings) -> bool:
     """Whether the choice holds although the best of many candidates looks better than it is."""
     if settings.multiplicity == "none":
         return True
-    if settings.multiplicity == "holm" or validated is None:
-        return best.p_holm <= 1.0 - settings.confidence
-    return validated.upper < 0.0
+    p_value = best.p_holm if settings.multiplicity == "holm" else best.p_family
+    return p_value <= 1.0 - settings.confidence
 
 
 def parameter_distance(values: Mapping[str, float], present: Mapping[str, float]) -> float:

@@ -1,7 +1,8 @@
 """Does the choice hold on a flight that it never saw?
 
 Each flight is left out in turn, the best set is chosen from the others, and the choice is judged on the flight that
-was left out. The flight that judges had no part in choosing, so the result owes nothing to how many sets there were.
+was left out. This shows how much the choice hangs on single flights and what it is worth on another one. As a proof it
+is too weak: where every choice is the same set, its mean is that set's own, lucky or not.
 """
 
 from collections.abc import Sequence

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from fusetune.apply.bootstrap import Redrawn, bootstrap_scores, expanded_interval, holm, p_value, probability_best
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.sign_flips import family_p_values
 
 Array = npt.NDArray[np.float64]
 
@@ -38,7 +39,8 @@ class RankedSet:
     status : "present", "candidate", "vetoed" or "not_scored"
     score : mean over the flights, nat; lower is better
     difference, lower, upper : score less that of the present set, and its interval; below 0 is better
-    p_value, p_holm : of the difference against 0, alone and corrected for all candidates
+    p_value, p_holm : of the difference against 0, alone and by Holm's correction for all candidates
+    p_family : that the best of the candidates is so much better by luck, see `fusetune.apply.sign_flips`
     p_best : share of bootstrap draws in which no eligible set scores lower
     flights, flights_better : flights behind the score, and on how many of them it beats the present set
     equal_to_present : same results on every flight
@@ -56,6 +58,7 @@ class RankedSet:
     upper: float
     p_value: float
     p_holm: float
+    p_family: float
     p_best: float
     flights: int
     flights_better: int
@@ -105,7 +108,7 @@ def rank(
         ranked = [
             _compared(name, present, evidence, complete, redrawn, vetoed, name in equal, settings) for name in complete
         ]
-        ranked = _with_family(ranked, complete, redrawn.total)
+        ranked = _with_family(ranked, present, evidence, complete, redrawn.total, settings)
     for name in partial:
         # A set that failed on some flights: its figures come from the others, for information.
         redrawn = bootstrap_scores(by_set[name], [name, present], settings.draws, settings.seed)
@@ -142,6 +145,7 @@ def _compared(
         upper=interval.upper,
         p_value=1.0 if name == present else p_value(difference, differences, len(evidence)),
         p_holm=1.0,
+        p_family=1.0,
         p_best=0.0,
         flights=len(evidence),
         flights_better=int(np.count_nonzero(own < base)),
@@ -185,10 +189,18 @@ def improvement_percent(difference: float) -> float:
     return 100.0 * (1.0 - math.exp(difference))
 
 
-def _with_family(ranked: list[RankedSet], complete: Sequence[str], scores: Array) -> list[RankedSet]:
-    """Add what depends on the other sets: Holm's correction over the candidates, P(best), the distance to the best."""
+def _with_family(
+    ranked: list[RankedSet],
+    present: str,
+    evidence: Sequence[FlightEvidence],
+    complete: Sequence[str],
+    scores: Array,
+    settings: DecisionSettings,
+) -> list[RankedSet]:
+    """Add what depends on the other sets: the corrections for their number, P(best), the distance to the best."""
     candidates = [one for one in ranked if one.status == "candidate" and not one.equal_to_present]
     adjusted = dict(zip((one.name for one in candidates), holm([one.p_value for one in candidates]), strict=True))
+    family = _family_p_values([one.name for one in candidates if one.is_eligible], present, evidence, settings)
     eligible = [one.name for one in ranked if one.status in ("present", "candidate")]
     if not eligible:
         return ranked
@@ -199,6 +211,7 @@ def _with_family(ranked: list[RankedSet], complete: Sequence[str], scores: Array
         replace(
             one,
             p_holm=adjusted.get(one.name, 1.0),
+            p_family=family.get(one.name, 1.0),
             p_best=float(shares.get(one.name, 0.0)),
             behind_best=one.score - lead.score,
             behind_best_error=float(np.std(_differences(scores, complete, one.name, lead.name))),
@@ -207,7 +220,19 @@ def _with_family(ranked: list[RankedSet], complete: Sequence[str], scores: Array
     ]
 
 
+def _family_p_values(
+    names: Sequence[str], present: str, evidence: Sequence[FlightEvidence], settings: DecisionSettings
+) -> dict[str, float]:
+    if not names:
+        return {}
+    rows = [one.scores[[one.sets.index(name) for name in (present, *names)]] for one in evidence]
+    differences = np.array([row[1:] - row[0] for row in rows])
+    return dict(zip(names, family_p_values(differences, settings.seed).tolist(), strict=True))
+
+
 def _never_scored(name: str, vetoed: Mapping[str, Sequence[str]]) -> RankedSet:
     nan = math.nan
     reasons = tuple(vetoed.get(name, ())) or ("scored on no flight",)
-    return RankedSet(name, "not_scored", reasons, nan, nan, nan, nan, 1.0, 1.0, 0.0, 0, 0, False, nan, nan, nan, {})
+    return RankedSet(
+        name, "not_scored", reasons, nan, nan, nan, nan, 1.0, 1.0, 1.0, 0.0, 0, 0, False, nan, nan, nan, {}
+    )

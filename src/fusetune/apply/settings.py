@@ -10,8 +10,8 @@ from fusetune.analyze.sources import AID_SOURCES
 from fusetune.ekf2.withholding import WITHHOLDABLE
 from fusetune.errors import UserError
 
-MULTIPLICITY = ("leave_one_out", "holm", "none")
-"""Ways to allow for the best of many candidates looking better than it is."""
+MULTIPLICITY = ("sign_flips", "holm", "none")
+"""Ways to allow for the best of many candidates looking better than it is, see `fusetune.apply.choice`."""
 
 _WITHHELD = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
 
@@ -32,7 +32,7 @@ class DecisionSettings:
     unaided_weight: float = setting(1.0, 0.0, 100.0, "", "weight of the predictions without the sensor")
     distrust_white_share: float = setting(0.6, 0.0, 1.0, "", "a source whose error is less white has no say")
     trust_white_share: float = setting(0.9, 0.0, 1.0, "", "a source whose error is whiter has its full weight")
-    multiplicity: str = setting("leave_one_out", None, None, "", "proof that the best of many is no chance")
+    multiplicity: str = setting("sign_flips", None, None, "", "allowance for the best of many sets being lucky")
     confidence: float = setting(0.95, 0.5, 0.999, "", "level of the intervals")
     draws: int = setting(4000, 200, 200_000, "", "number of bootstrap draws")
     minimum_flights: int = setting(5, 1, 1000, "", "with fewer scored flights the decision is called exploratory")

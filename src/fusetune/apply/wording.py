@@ -68,14 +68,10 @@ def _comparison(choice: Choice, settings: DecisionSettings) -> str:
             f"{found}but that interval includes no difference at all, so these flights do not show that a change "
             "would help."
         )
-    if settings.multiplicity == "holm" or choice.leave_one_out is None:
-        return (
-            f"{found}but the best of several candidates is favoured by chance, and after correcting for that (Holm, "
-            f"p = {best.p_holm:.2g}) the difference is not certain enough for a change."
-        )
+    p_value = best.p_holm if settings.multiplicity == "holm" else best.p_family
     return (
-        f"{found}but the best of several candidates is favoured by chance, and on flights that had no part in the "
-        "choice the gain is not certain enough for a change."
+        f"{found}but the best of several candidates is favoured by chance, and after allowing for that "
+        f"(p = {p_value:.2g}) the difference is not certain enough for a change."
     )
 
 
