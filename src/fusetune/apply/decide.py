@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, paper_entries, read_metrics
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
-from fusetune.apply.paper_mode import paper_ranking
+from fusetune.apply.paper_disagreement import is_same_set, why
+from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
 from fusetune.apply.provenance import flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
@@ -76,7 +77,9 @@ def decide(
     decision["provenance"] = provenance(configuration_files)
     decision["flights"] = flight_rows(flights_table, flights)
     decision["sets"] = _sets(sets, present, newest, descriptions or {}, flights)
-    decision["paper_mode"] = _paper_mode(sets, flights, metrics, values, choice)
+    decision["paper_mode"] = _paper_mode(
+        paper_entries(sets, flights, metrics, values), choice, ranked, flights, metrics, settings
+    )
 
     output = Path(output_folder)
     _write_ranking(output, ranked, values)
@@ -169,18 +172,20 @@ def _sets(
 
 
 def _paper_mode(
-    sets: Sequence[str],
+    entries: Sequence[PaperEntry],
+    choice: Choice,
+    ranked: Sequence[RankedSet],
     flights: Sequence[AnalyzedFlight],
     metrics: pa.Table,
-    values: dict[str, Criteria],
-    choice: Choice,
+    settings: DecisionSettings,
 ) -> dict[str, Any]:
-    order = paper_ranking(paper_entries(sets, flights, metrics, values))
+    order = paper_ranking(entries)
     first = order[0].name if order and not math.isnan(order[0].aggregate_rms) else None
     return {
         "rule": "lowest RMS of the GNSS position, height and velocity innovations together, inside the χ² bounds",
         "first": first,
-        "agrees": first == choice.chosen if first is not None else None,
+        "agrees": is_same_set(first, choice.chosen, ranked) if first is not None else None,
+        "why": why(first, order, choice.chosen, ranked, flights, metrics, settings) if first is not None else [],
         "ranking": [asdict(entry) for entry in order],
     }
 
