@@ -38,12 +38,12 @@ class WithholdingSettings:
     """How long each sensor is withheld, and how often; a length of 0 leaves a sensor alone."""
 
     gnss_s: float = setting(9.0, 0.0, 60.0, "s", "length of the gaps without GNSS")
-    gnss_every_s: float = setting(3.0, 0.5, 600.0, "s", "time from the start of one gap without GNSS to the next")
+    gnss_every_s: float = setting(4.5, 0.5, 600.0, "s", "time from the start of one gap without GNSS to the next")
     baro_s: float = setting(9.0, 0.0, 60.0, "s", "length of the gaps without barometer")
-    baro_every_s: float = setting(9.0, 0.5, 600.0, "s", "time from the start of one gap without barometer to the next")
+    baro_every_s: float = setting(18.0, 0.5, 600.0, "s", "time from the start of one gap without barometer to the next")
     mag_s: float = setting(9.0, 0.0, 60.0, "s", "length of the gaps without magnetometer")
     mag_every_s: float = setting(
-        9.0, 0.5, 600.0, "s", "time from the start of one gap without magnetometer to the next"
+        18.0, 0.5, 600.0, "s", "time from the start of one gap without magnetometer to the next"
     )
 
     @classmethod
