@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.attitude import heading, rotation_matrices, wrap
+from fusetune.analyze.attitude import rotation_matrices
 from fusetune.analyze.filter_states import FilterStates
 from fusetune.analyze.measurement_alignment import match, measurement_time
 from fusetune.analyze.set_files import AxisSamples, SetRecord
@@ -43,8 +43,10 @@ class ErrorSeries:
 def measurement_errors(record: SetRecord, states: FilterStates, flight: Flight, source: str) -> ErrorSeries | None:
     """Series of a source, unit of the source, from the first sample that was fused.
 
-    * Velocity and heading: y_k = −ν_k + Σ_{j<k} c_j, where c_j is how much the update at measurement j moved the
-      state. Adding the corrections back leaves the inertial solution running freely.
+    * Velocity: y_k = −ν_k + Σ_{j<k} c_j, where c_j is how much the update at measurement j moved the state. Adding
+      the corrections back leaves the inertial solution running freely.
+    * Heading: −ν_k. Gyros hold a heading for many seconds, and the other source of heading that most vehicles have
+      would answer the corrections that were taken out.
     * Position and height: the measurement less the integral of the estimated velocity.
     * Magnetometer: the measurement less Rᵀ(q) m + b, with the constant earth field m and body bias b that fit best.
 
@@ -93,10 +95,7 @@ def _values(
         after = states.velocity[update, : innovation.shape[1]]
         return _running_freely(innovation, after - (observation + innovation))
     if source in HEADING_SOURCES:
-        update = np.minimum(np.searchsorted(states.time, time), states.time.size - 1)
-        after = heading(states.quaternion[update])[:, None]
-        free = _running_freely(innovation, wrap(after - (observation + innovation)))
-        return None if free is None else np.unwrap(free, axis=0)
+        return -innovation
     if source == "mag":
         return _mag_errors(states, time, observation)
     travelled = _travelled(states, time)
