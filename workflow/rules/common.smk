@@ -16,6 +16,7 @@ SCORE_PARTS = (
     "scores.parquet",
     "samples.parquet",
     "withheld.parquet",
+    "windows.parquet",
     "scoring.json",
     "onboard.innovations.parquet",
     "fidelity.json",

@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.likelihood import profile_nll
+from fusetune.analyze.sources import AXES
 from fusetune.apply.settings import DecisionSettings
 from fusetune.parquet import read_table
 
@@ -124,8 +125,8 @@ def white_shares(metrics: pa.Table, present: str) -> dict[str, float]:
     """How white the error of each source is on this flight, 0 … 1: the mean over its axes."""
     rows = metrics.filter(pc.and_(pc.equal(metrics["metric"], "white_share"), pc.equal(metrics["set"], present)))
     found: dict[str, list[float]] = {}
-    for source, value in zip(rows["source"].to_pylist(), rows["value"].to_pylist(), strict=True):
-        if np.isfinite(value):
+    for source, axis, value in zip(*(rows[name].to_pylist() for name in ("source", "axis", "value")), strict=True):
+        if axis in AXES and np.isfinite(value):
             found.setdefault(source, []).append(value)
     return {source: float(np.mean(values)) for source, values in found.items()}
 
@@ -198,7 +199,7 @@ def _aided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
         "sum_nis": table["sum_nis_winsorised"].to_numpy(),
         "sum_log_variance": table["sum_log_variance"].to_numpy(),
     }
-    axis = np.array(["x", "y", "z"])[table["axis"].to_numpy()]
+    axis = np.array(AXES)[table["axis"].to_numpy()]
     source = np.asarray(table["source"].to_pylist())
     return _block_sums(np.asarray(table["set"].to_pylist()), source, axis, table["block"].to_numpy(), columns)
 
@@ -211,7 +212,7 @@ def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
         return None
     error = table["error_winsorised"].to_numpy()
     columns = {"n": np.ones(error.size), "sum_nis": np.square(error), "sum_log_variance": np.zeros(error.size)}
-    axis = np.array(["x", "y", "z"])[table["axis"].to_numpy()]
+    axis = np.array(AXES)[table["axis"].to_numpy()]
     horizon = table["horizon_s"].to_pylist()
     label = np.array([f"{name} after {seconds:g} s" for name, seconds in zip(axis, horizon, strict=True)])
     source = np.asarray(table["source"].to_pylist())
