@@ -9,8 +9,8 @@ import numpy as np
 
 from fusetune.apply.settings import DecisionSettings
 
-from .rules import OURS, Rule, decide, rules, scores
-from .world import TRUTH, World
+from .rules import OURS, Rule, decide, rules
+from .world import TRUTH, World, scores
 
 PROCESS = frozenset({"EKF2_ACC_NOISE", "EKF2_GYR_NOISE", "EKF2_ACC_B_NOISE", "EKF2_GYR_B_NOISE"})
 ALLOWED_REGRET = 0.05
@@ -127,7 +127,7 @@ def coverage(
     """
     shares = {}
     for world in worlds:
-        true = scores(world).mean(axis=0)
+        true = scores(world.flights, world.sets).mean(axis=0)
         true = true - true[0]
         inside = []
         for _ in range(draws):

@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from fusetune.apply.choice import choose, parameter_distance
-from fusetune.apply.evidence import AIDED, UNAIDED
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
 
-from .world import World
+from .world import World, scores
 
 Rule = Callable[[World, Sequence[int], Sequence[int]], int]
 """World, flights, sets of the study (the present one first) → the chosen one of these sets."""
@@ -41,13 +40,13 @@ def rules(settings: DecisionSettings) -> dict[str, Rule]:
         "RMS, GNSS velocity",
         "NLL, all sources",
         "NLL, GNSS velocity",
+        "one-step predictions alone",
+        "withheld GNSS alone",
     )
     return {
         **{name: _lowest(name) for name in plain},
-        "one-step predictions alone": _lowest_aim(AIDED),
-        "withheld GNSS alone": _lowest_aim(UNAIDED),
         SCORE_ONLY: lambda world, flights, sets: int(
-            sets[np.argmin(scores(world)[np.ix_(flights, sets)].mean(axis=0))]
+            sets[np.argmin(scores(world.flights, world.sets)[np.ix_(flights, sets)].mean(axis=0))]
         ),
         OURS: lambda world, flights, sets: decide(world, flights, sets, settings)[0],
     }
@@ -55,21 +54,6 @@ def rules(settings: DecisionSettings) -> dict[str, Rule]:
 
 def _lowest(name: str) -> Rule:
     return lambda world, flights, sets: int(sets[np.argmin(world.figures[name][np.ix_(flights, sets)].mean(axis=0))])
-
-
-def _lowest_aim(aim: str) -> Rule:
-    return lambda world, flights, sets: int(sets[np.argmin(scores(world, aim)[np.ix_(flights, sets)].mean(axis=0))])
-
-
-def scores(world: World, aim: str | None = None) -> np.ndarray:
-    """(F, S) scores of the sets on the flights, of the whole or of one aim (whatever weight it has)."""
-    rows = []
-    for flight in world.flights:
-        evidence = flight.evidence
-        assert evidence is not None
-        part = evidence if aim is None else next((one for one in evidence.aims if one.name == aim), evidence)
-        rows.append([part.scores[evidence.sets.index(name)] for name in world.sets])
-    return np.array(rows)
 
 
 def decide(

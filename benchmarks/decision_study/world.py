@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +35,7 @@ class World:
     overrides : parameters of each set
     flights : what the decision reads
     vetoed : reasons against a set, from all flights
-    figures : criteria of the innovations, lower is better
+    figures : criteria of the innovations and scores of single aims, lower is better
     truth : the judge's figures
     """
 
@@ -88,9 +88,26 @@ def read_world(
         overrides=overrides,
         flights=tuple(flights),
         vetoed={one: why for one, why in reasons.items() if why},
-        figures={rule: np.array(rows) for rule, rows in figures.items()},
+        figures={rule: np.array(rows) for rule, rows in figures.items()} | _aims_alone(folders, sets, settings),
         truth={quantity: np.array(rows) for quantity, rows in truth.items()},
     )
+
+
+def _aims_alone(folders: Sequence[Path], sets: Sequence[str], settings: DecisionSettings) -> dict[str, np.ndarray]:
+    """Scores of one kind of prediction alone, the aided one whether its source is white or not."""
+    blind = replace(settings, unaided_weight=0.0, distrust_white_share=0.0, trust_white_share=0.0)
+    alone = {"one-step predictions alone": blind, "withheld GNSS alone": replace(settings, aided_weight=0.0)}
+    return {name: scores(read_flights(folders, one, sets[0]), sets) for name, one in alone.items()}
+
+
+def scores(flights: Sequence[AnalyzedFlight], sets: Sequence[str]) -> np.ndarray:
+    """(F, S) scores of the sets on the flights."""
+    rows = []
+    for flight in flights:
+        evidence = flight.evidence
+        assert evidence is not None, flight.reason
+        rows.append([evidence.scores[evidence.sets.index(name)] for name in sets])
+    return np.array(rows)
 
 
 def _rms(values: Mapping[str, float]) -> float:

@@ -1,4 +1,4 @@
-"""Gaps in which a sensor is withheld: the filter learns nothing of it, and the replay around them nothing of the gap."""
+"""Gaps in which a sensor is withheld: the filter learns nothing of it, and the replay around them nothing of a gap."""
 
 from __future__ import annotations
 

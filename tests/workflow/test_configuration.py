@@ -56,16 +56,22 @@ def test_every_key_is_described_and_in_the_manual(schema: dict[str, Any], projec
 
 def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
     from fusetune.analyze.settings import ScoringSettings
+    from fusetune.analyze.withheld_gaps import WithholdingSettings
     from fusetune.apply.settings import DecisionSettings
 
     assert ScoringSettings.from_mapping(shipped["scoring"]) == ScoringSettings()
     assert DecisionSettings.from_mapping(shipped["decision"], seed=0) == DecisionSettings()
+    assert WithholdingSettings.from_mapping(shipped["withheld"]) == WithholdingSettings()
 
 
 def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: dict[str, Any]) -> None:
     from fusetune.analyze.sources import AID_SOURCES
+    from fusetune.ekf2.withholding import WITHHOLDABLE
 
-    assert schema["properties"]["decision"]["properties"]["source"]["enum"] == sorted(AID_SOURCES)
+    decision = schema["properties"]["decision"]["properties"]
+    assert decision["sources"]["propertyNames"]["enum"] == sorted(AID_SOURCES)
+    withheld = {source for sources in WITHHOLDABLE.values() for source in sources}
+    assert set(decision["withheld_sources"]["propertyNames"]["enum"]) == withheld
 
 
 def test_the_conda_environment_has_the_locked_versions(project_root: Path) -> None:
