@@ -7,6 +7,8 @@ from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight
 from fusetune.apply.ranking import RankedSet, improvement_percent
 from fusetune.apply.settings import DecisionSettings
 
+_MOST_NAMES = 4
+
 
 def paragraph(
     choice: Choice, ranked: Sequence[RankedSet], flights: Sequence[AnalyzedFlight], settings: DecisionSettings
@@ -25,10 +27,10 @@ def paragraph(
     ]
     worse = [one.name for one in ranked if one.status == "candidate" and one.worse_aims]
     if worse:
-        sentences.append(f"Worse than now in one of the two ways, and so not eligible: {', '.join(worse)}.")
+        sentences.append(f"Worse than now beyond doubt in one of these ways, and so not eligible: {_names(worse)}.")
     vetoed = [one.name for one in ranked if one.status == "vetoed"]
     if vetoed:
-        sentences.append(f"Not eligible: {', '.join(vetoed)} (the table says why).")
+        sentences.append(f"Ruled out: {_names(vetoed)} (the table says why).")
     left_out = [flight.name for flight in flights if flight.evidence is None]
     if left_out:
         sentences.append(f"{_count(len(left_out), 'replayed flight')} could not be scored.")
@@ -40,13 +42,18 @@ def paragraph(
     return " ".join(filter(None, sentences))
 
 
+def _names(names: Sequence[str]) -> str:
+    more = len(names) - _MOST_NAMES
+    return f"{', '.join(names[:_MOST_NAMES])} and {more} more" if more > 1 else ", ".join(names)
+
+
 def _basis(flights: Sequence[AnalyzedFlight]) -> str:
     aims = {aim.name for flight in flights if flight.evidence is not None for aim in flight.evidence.aims}
     ways = []
     if AIDED in aims:
         ways.append("how well the estimator predicted each measurement before it saw it")
     if UNAIDED in aims:
-        ways.append("how far its velocity and position had drifted after seconds without GNSS")
+        ways.append("how far the estimated velocity and position had drifted after seconds without GNSS")
     return " and ".join(ways)
 
 
@@ -93,9 +100,11 @@ def _left_out(choice: Choice) -> str:
         return ""
     gain = improvement_percent(validated.difference)
     better = "smaller" if gain >= 0.0 else "larger"
+    count = len(validated.chosen)
+    same = "whichever flight was left out" if validated.stays == count else f"in {validated.stays} of {count} cases"
     return (
-        f"Chosen from all flights but one and judged on that one, the errors were {abs(gain):.1f} % {better} than now, "
-        f"and the choice stayed the same without any one of {validated.stays} of {len(validated.chosen)} flights."
+        f"With each flight left out in turn, the best set of the others had errors {abs(gain):.1f} % {better} than now "
+        f"on the one left out; it was the same set {same}."
     )
 
 
