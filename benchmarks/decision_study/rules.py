@@ -11,7 +11,7 @@ from fusetune.apply.choice import choose, parameter_distance
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
 
-from .world import World, scores
+from .world import PAPER_AGGREGATE, World, scores
 
 Rule = Callable[[World, Sequence[int], Sequence[int]], int]
 """World, flights, sets of the study (the present one first) → the chosen one of these sets."""
@@ -45,6 +45,7 @@ def rules(settings: DecisionSettings) -> dict[str, Rule]:
     )
     return {
         **{name: _lowest(name) for name in plain},
+        "paper's design, a flight per set": _flight_per_set,
         SCORE_ONLY: lambda world, flights, sets: int(
             sets[np.argmin(scores(world.flights, world.sets)[np.ix_(flights, sets)].mean(axis=0))]
         ),
@@ -54,6 +55,13 @@ def rules(settings: DecisionSettings) -> dict[str, Rule]:
 
 def _lowest(name: str) -> Rule:
     return lambda world, flights, sets: int(sets[np.argmin(world.figures[name][np.ix_(flights, sets)].mean(axis=0))])
+
+
+def _flight_per_set(world: World, flights: Sequence[int], sets: Sequence[int]) -> int:
+    """Each set is judged on another flight, as in the paper's experiment."""
+    aggregate = world.figures[PAPER_AGGREGATE]
+    own = [aggregate[flights[place % len(flights)], index] for place, index in enumerate(sets)]
+    return int(sets[int(np.argmin(own))])
 
 
 def decide(

@@ -25,6 +25,9 @@ TRUTH = {
 horizontal position error grew in 9 s without GNSS (m)."""
 
 
+PAPER_AGGREGATE = "paper, aggregate RMS"
+
+
 @dataclass(frozen=True)
 class World:
     """All flights of one world; arrays (F, S), the flights first.
@@ -77,6 +80,7 @@ def read_world(
         rows = {rule: [values[one][column] for one in sets] for rule, column in columns.items()}
         rows["RMS, GNSS velocity"] = [_rms(values[one]) for one in sets]
         rows["paper mode"] = [float(order.index(one)) for one in sets]
+        rows[PAPER_AGGREGATE] = [values[one]["paper_aggregate_rms"] for one in sets]
         for rule, row in rows.items():
             figures.setdefault(rule, []).append(row)
         indexed = _indexed(table, sets)

@@ -51,8 +51,9 @@ def choose(
     -----
     Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. The best
     of them must have an interval wholly below 0, and the choice must hold in spite of the number of candidates
-    (`DecisionSettings.multiplicity`). Of the sets that are better than the present one and within one standard error
-    of the best, the one nearest to the present parameters is chosen.
+    (`DecisionSettings.multiplicity`). Of the sets that are better than the present one, within one standard error of
+    the best and hardly worse than it (`DecisionSettings.equivalence_percent`), the one nearest to the present
+    parameters is chosen.
     """
     exploratory = len(evidence) < settings.minimum_flights
     eligible = [one for one in ranked if one.is_eligible]
@@ -63,7 +64,8 @@ def choose(
     validated = leave_one_out(evidence, names, present, settings.confidence)
     if best is None or not is_better(best) or not _holds(best, settings):
         return Choice("keep", present, best, None, exploratory, validated)
-    near = [one for one in eligible if is_better(one) and one.behind_best <= one.behind_best_error]
+    hardly = math.log1p(0.01 * settings.equivalence_percent)
+    near = [one for one in eligible if is_better(one) and one.behind_best <= min(one.behind_best_error, hardly)]
     pick = min([best, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
     return Choice("change", pick.name, best, pick, exploratory, validated)
 

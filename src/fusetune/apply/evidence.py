@@ -100,25 +100,36 @@ class _Sums:
     sum_log_variance: Array
 
 
-def read_flight(folder: Path, settings: DecisionSettings, present: str) -> AnalyzedFlight:
-    """Read the scores of one flight from `results/analyze/<flight>`."""
+def read_flights(folders: Sequence[Path], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
+    """Read `results/analyze/<flight>` of all flights, ordered by name so that the order of arguments does not matter.
+
+    A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
+    """
+    folders = [Path(folder) for folder in folders]
+    shares = {folder: white_shares(read_table(folder / "metrics.parquet"), present) for folder in folders}
+    known: dict[str, list[float]] = {}
+    for one in shares.values():
+        for source, share in one.items():
+            known.setdefault(source, []).append(share)
+    usual = {source: float(np.mean(sorted(found))) for source, found in known.items()}
+    flights = (_read_flight(folder, settings, present, usual | shares[folder]) for folder in folders)
+    return sorted(flights, key=lambda one: one.name)
+
+
+def _read_flight(
+    folder: Path, settings: DecisionSettings, present: str, whiteness: Mapping[str, float]
+) -> AnalyzedFlight:
     summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
     name = summary["flight"]
     if summary["status"] != "scored":
         return AnalyzedFlight(name, folder, summary, None, summary["reason"])
     aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
     unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
-    whiteness = white_shares(read_table(folder / "metrics.parquet"), present)
     evidence = flight_evidence(name, aided, unaided, whiteness, settings)
     if evidence is None or present not in evidence.sets:
         sources = ", ".join(settings.sources)
         return AnalyzedFlight(name, folder, summary, None, f"the flight has no samples of {sources} to score")
     return AnalyzedFlight(name, folder, summary, evidence, "")
-
-
-def read_flights(folders: Sequence[Path], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
-    """Read all flights, ordered by name so that the order of the arguments does not matter."""
-    return sorted((read_flight(Path(folder), settings, present) for folder in folders), key=lambda one: one.name)
 
 
 def white_shares(metrics: pa.Table, present: str) -> dict[str, float]:
@@ -157,7 +168,7 @@ def flight_evidence(
             parts[AIDED] = (aided, _weights(aided, trusted), settings.aided_weight * share)
         elif UNAIDED not in parts and full:
             parts[AIDED] = (aided, _weights(aided, settings.sources), 1.0)
-    parts = {name: part for name, part in parts.items() if part[2] > 0.0}
+    parts = {name: part for name, part in parts.items() if part[2] > 0.0 and part[1].any()}
     if not parts:
         return None
     total = sum(weight for _, _, weight in parts.values())
@@ -167,9 +178,12 @@ def flight_evidence(
 
 
 def _weights(sums: _Sums, weight_of: Mapping[str, float]) -> Array:
-    """A source's weight is shared by its columns."""
-    sources = [source for source, _ in sums.columns]
-    weights = np.array([weight_of[source] / sources.count(source) for source in sources])
+    """Weights of the columns; a key of `weight_of`, a source or one axis of it, shares its weight among its columns."""
+    weights = np.zeros(len(sums.columns))
+    for key, weight in weight_of.items():
+        source, _, axis = key.partition(".")
+        matching = [one == source and (not axis or label.split()[1] == axis) for one, label in sums.columns]
+        weights += np.array(matching) * weight / max(sum(matching), 1)
     total = weights.sum()
     return np.asarray(weights / total if total > 0.0 else weights)
 
@@ -220,7 +234,8 @@ def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
 
 
 def _weighted(weights: Mapping[str, float]) -> list[str]:
-    return [source for source, weight in weights.items() if weight > 0.0]
+    """Sources that have a weight, whole or in one axis."""
+    return sorted({key.partition(".")[0] for key, weight in weights.items() if weight > 0.0})
 
 
 def _block_sums(

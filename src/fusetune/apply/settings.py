@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.settings import setting, settings_from_mapping
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.ekf2.withholding import WITHHOLDABLE
 from fusetune.errors import UserError
 
@@ -14,6 +14,7 @@ MULTIPLICITY = ("sign_flips", "holm", "none")
 """Ways to allow for the best of many candidates looking better than it is, see `fusetune.apply.choice`."""
 
 _WITHHELD = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
+_WITHHELD_AXES = tuple(f"{source}.{axis}" for source in _WITHHELD for axis in AXES[: AID_SOURCES[source].axes])
 
 
 @dataclass(frozen=True)
@@ -21,18 +22,19 @@ class DecisionSettings:
     """Rules of the decision.
 
     `sources` are the aid sources whose one-step predictions count, `withheld_sources` those that are predicted while
-    their sensor is withheld, each with its weight.
+    their sensor is withheld, whole ("gnss_pos") or one axis of them ("gnss_vel.z"), each with its weight.
     """
 
     sources: Mapping[str, float] = field(
         default_factory=lambda: {"gnss_vel": 1.0, "ev_vel": 1.0, "ev_pos": 1.0, "optical_flow": 1.0}
     )
-    withheld_sources: Mapping[str, float] = field(default_factory=lambda: {"gnss_vel": 1.0, "gnss_pos": 1.0})
+    withheld_sources: Mapping[str, float] = field(default_factory=lambda: {"gnss_pos": 3.0, "gnss_vel.z": 1.0})
     aided_weight: float = setting(1.0, 0.0, 100.0, "", "weight of the predictions one step ahead")
     unaided_weight: float = setting(1.0, 0.0, 100.0, "", "weight of the predictions without the sensor")
     distrust_white_share: float = setting(0.6, 0.0, 1.0, "", "a source whose error is less white has no say")
     trust_white_share: float = setting(0.9, 0.0, 1.0, "", "a source whose error is whiter has its full weight")
     multiplicity: str = setting("sign_flips", None, None, "", "allowance for the best of many sets being lucky")
+    equivalence_percent: float = setting(1.0, 0.0, 100.0, "%", "errors so much larger may be traded for nearness")
     confidence: float = setting(0.95, 0.5, 0.999, "", "level of the intervals")
     draws: int = setting(4000, 200, 200_000, "", "number of bootstrap draws")
     minimum_flights: int = setting(5, 1, 1000, "", "with fewer scored flights the decision is called exploratory")
@@ -66,7 +68,7 @@ class DecisionSettings:
             values.setdefault("seed", seed)
         weights = {
             key: _weights(values.pop(key), key, allowed, file)
-            for key, allowed in (("sources", tuple(AID_SOURCES)), ("withheld_sources", _WITHHELD))
+            for key, allowed in (("sources", tuple(AID_SOURCES)), ("withheld_sources", (*_WITHHELD, *_WITHHELD_AXES)))
             if key in values
         }
         settings = settings_from_mapping(cls, values, "decision", file)
