@@ -49,11 +49,11 @@ def choose(
 
     Notes
     -----
-    Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. The best
-    of them must have an interval wholly below 0, and the choice must hold in spite of the number of candidates
-    (`DecisionSettings.multiplicity`). Of the sets that are better than the present one, within one standard error of
-    the best and hardly worse than it (`DecisionSettings.equivalence_percent`), the one nearest to the present
-    parameters is chosen.
+    Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. It is
+    proved better where its interval lies wholly below 0 and the difference holds in spite of the number of
+    candidates (`DecisionSettings.multiplicity`). The proved set with the lowest score is chosen, or one that is proved,
+    within one standard error of it, hardly worse (`DecisionSettings.equivalence_percent`) and nearer to the present
+    parameters.
     """
     exploratory = len(evidence) < settings.minimum_flights
     eligible = [one for one in ranked if one.is_eligible]
@@ -62,25 +62,20 @@ def choose(
         return Choice("no_evidence", present, None, None, exploratory, None)
     names = [one.name for one in eligible if one.flights == len(evidence)]
     validated = leave_one_out(evidence, names, present, settings.confidence)
-    if best is None or not is_better(best) or not _holds(best, settings):
+    proved = [one for one in eligible if is_proved(one, settings)]
+    if not proved:
         return Choice("keep", present, best, None, exploratory, validated)
+    first = min(proved, key=lambda one: (one.score, one.name))
     hardly = math.log1p(0.01 * settings.equivalence_percent)
-    near = [one for one in eligible if is_better(one) and one.behind_best <= min(one.behind_best_error, hardly)]
-    pick = min([best, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
+    near = [one for one in proved if one.score - first.score <= min(one.behind_best_error, hardly)]
+    pick = min([first, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
     return Choice("change", pick.name, best, pick, exploratory, validated)
 
 
-def is_better(candidate: RankedSet) -> bool:
-    """Better than the present set beyond doubt, taken by itself."""
-    return candidate.upper < 0.0
-
-
-def _holds(best: RankedSet, settings: DecisionSettings) -> bool:
-    """Whether the choice holds although the best of many candidates looks better than it is."""
-    if settings.multiplicity == "none":
-        return True
-    p_value = best.p_holm if settings.multiplicity == "holm" else best.p_family
-    return p_value <= 1.0 - settings.confidence
+def is_proved(candidate: RankedSet, settings: DecisionSettings) -> bool:
+    """Better than the present set beyond doubt, by itself and as one of many candidates."""
+    p_value = {"holm": candidate.p_holm, "sign_flips": candidate.p_family, "none": 0.0}[settings.multiplicity]
+    return candidate.upper < 0.0 and p_value <= 1.0 - settings.confidence
 
 
 def parameter_distance(values: Mapping[str, float], present: Mapping[str, float]) -> float:

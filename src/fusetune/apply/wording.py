@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from fusetune.apply.choice import Choice
+from fusetune.apply.choice import Choice, is_proved
 from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight
 from fusetune.apply.ranking import RankedSet, improvement_percent
 from fusetune.apply.settings import DecisionSettings
@@ -86,11 +86,13 @@ def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) 
     span = _span(improvement_percent(pick.upper), improvement_percent(pick.lower), settings.confidence)
     wins = f"better on {pick.flights_better} of {pick.flights} flights"
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
-    if pick.name != best.name:
+    if pick.name != best.name and is_proved(best, settings):
         text += (
             f" “{best.name}” did no better beyond its standard error ({best.improvement_percent:.1f} %) and lies "
             "further from what flies now."
         )
+    elif pick.name != best.name:
+        text += f" Those of “{best.name}” are {best.improvement_percent:.1f} % smaller, but not beyond chance."
     return text
 
 
