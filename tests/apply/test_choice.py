@@ -3,12 +3,12 @@
 import math
 
 import pytest
+from tests.apply.test_leave_one_out import flight
 
 from fusetune.apply.choice import choose, is_proved, parameter_distance
 from fusetune.apply.ranking import AimComparison, RankedSet
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.wording import _for_the_pick
-from tests.apply.test_leave_one_out import flight
 
 
 def one(name: str, difference: float, upper: float, p_family: float = 0.01, **changes) -> RankedSet:
