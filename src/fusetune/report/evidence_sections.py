@@ -137,7 +137,8 @@ def holds_section(results: Results) -> str:
         table(("flight left out", "best set of the others", "change of the error there %"), rows),
         paragraph(
             "Each flight was left out in turn, the best eligible set chosen from the others and judged on the flight "
-            "that had no part in choosing it. Below 0 is better than the present set.",
+            "that had no part in choosing it. Below 0 is better than the present set. This shows how much hangs on "
+            "single flights; whether a set is proved better is told by its interval and by p, all sets.",
             "note",
         ),
     )
@@ -162,9 +163,7 @@ def _holds(results: Results) -> str:
         same = "the same set is best whichever flight is left out"
     else:
         same = f"the best set is the same without any one of {stays} of the {count} flights, another without the rest"
-    certain = {True: "beyond chance", False: "which may be chance"}
-    verdict = certain[validated["upper"] < 0.0 or validated["lower"] > 0.0]
-    return f"On a flight that had no part in the choice the errors are {size} on average ({span}), {verdict}; {same}."
+    return f"On a flight that had no part in the choice the errors are {size} on average ({span}); {same}."
 
 
 def weights_section(results: Results) -> str:
@@ -191,7 +190,7 @@ def weights_section(results: Results) -> str:
         "Where a flight has only one kind of prediction to tell of, that one decides there."
     )
     unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
-    note = paragraph("Where the whiteness is not known, for want of samples, the source is trusted.", "note")
+    note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")
     return section("What counts how much", paragraph(text), table(head, rows), note if unknown else "")
 
 
