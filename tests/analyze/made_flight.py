@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from tests.analyze.made_gaps import UNITS, gap_starts, write_gaps
 
 from fusetune.ekf2 import state
 from fusetune.px4.flight import Flight, ParameterHistory
@@ -46,7 +47,8 @@ class MadeSet:
     """A parameter set's replay.
 
     `error` is the standard deviation of its GNSS velocity innovations, `claimed` the one that it claims; `own` the
-    share of the innovations that is its own noise, the rest being common to all sets of the flight.
+    share of the innovations that is its own noise, the rest being common to all sets of the flight. `drift` is the
+    standard deviation of its velocity error after 9 s without GNSS, m/s, ten times `error` where not given.
     """
 
     error: float = 0.1
@@ -58,6 +60,7 @@ class MadeSet:
     status: str = "ok"
     fault_flags: int = 0
     lost_gnss_s: float | None = None
+    drift: float | None = None
 
 
 def at(seconds: float) -> int:
@@ -81,10 +84,17 @@ def make_flight(
     generator = np.random.default_rng(seed)
     time = START_US + np.arange(round(END_S / GNSS_PERIOD_S), dtype=np.int64) * round(GNSS_PERIOD_S * 1e6)
     common = generator.standard_normal((6, time.size))
+    gap_generator = np.random.default_rng([seed, 1])
+    gap_shape = (UNITS, gap_starts("gnss").size)
+    common_gaps = gap_generator.standard_normal(gap_shape)
     for set_name, made in sets.items():
         own = generator.standard_normal((6, time.size))
         unit = np.sqrt(1.0 - made.own**2) * common + made.own * own
         write_set(analyze, set_name, made, time, unit)
+        share = np.sqrt(1.0 - made.own**2)
+        gap_unit = share * common_gaps + made.own * gap_generator.standard_normal(gap_shape)
+        drift = 10.0 * made.error if made.drift is None else made.drift
+        write_gaps(analyze, set_name, drift, gap_unit, START_US, true_position)
     return save, analyze
 
 
@@ -92,7 +102,7 @@ def write_set(folder: Path, name: str, made: MadeSet, time: np.ndarray, unit: np
     """Write the replay of one set; `unit` (6, N) are standard normal values for its innovations."""
     parameters = PARAMETERS | made.overrides
     columns: dict[str, list] = {
-        key: [] for key in ("source", "axis", "timestamp_sample", "innovation", "variance", "fused")
+        key: [] for key in ("source", "axis", "timestamp_sample", "observation", "innovation", "variance", "fused")
     }
     for row, (source, axis, scale) in enumerate(_AXES):
         delay = parameters["EKF2_BARO_DELAY"] if source == "baro_hgt" else parameters["EKF2_GPS_DELAY"]
@@ -100,6 +110,9 @@ def write_set(folder: Path, name: str, made: MadeSet, time: np.ndarray, unit: np
         columns["axis"] += [axis] * time.size
         columns["timestamp_sample"].append(time - round(delay * 1e3))
         columns["innovation"].append(scale * made.error * unit[row])
+        # The state stays what the prediction was: no correction, so the errors are as white as the innovations.
+        predicted = 2.0 if (source, axis) == ("gnss_vel", 0) else 0.0
+        columns["observation"].append(predicted - columns["innovation"][-1])
         columns["variance"].append(np.full(time.size, (scale * made.claimed) ** 2))
         columns["fused"].append(time >= at(made.aiding_s))
     innovation, variance = np.concatenate(columns["innovation"]), np.concatenate(columns["variance"])
@@ -109,7 +122,7 @@ def write_set(folder: Path, name: str, made: MadeSet, time: np.ndarray, unit: np
             "source": pa.array(columns["source"]).dictionary_encode(),
             "axis": pa.array(columns["axis"], pa.int32()),
             "timestamp_sample": np.concatenate(columns["timestamp_sample"]),
-            "observation": np.zeros(innovation.size),
+            "observation": np.concatenate(columns["observation"]),
             "observation_variance": variance,
             "innovation": innovation,
             "innovation_variance": variance,

@@ -47,3 +47,21 @@ def test_a_counter_that_wraps_or_jumps_counts_every_step(tmp_path: Path) -> None
     counter[:300], counter[300:400], counter[400:] = 255, 0, 3
     one.local_position["xy_reset_counter"] = counter
     assert reset_times(one)["horizontal_position"].size == 1 + 3
+
+
+def test_how_a_source_served_is_told_by_its_fused_samples(tmp_path: Path) -> None:
+    # One sample every 0.2 s, stamped 0.11 s before it: of 300 in flight, those of 20 s to 30 s are not fused.
+    one = record(tmp_path, MadeSet())
+    samples = one.samples["gnss_vel", 0]
+    lost = (samples.timestamp_sample >= at(20.0)) & (samples.timestamp_sample < at(30.0))
+    samples.fused[lost] = False
+    aid = filter_events(one, FLIGHT).aid["gnss_vel"]
+    assert aid.samples == 300
+    assert aid.fused_share == pytest.approx(250 / 300)
+    assert aid.longest_without_s == pytest.approx(10.2)
+
+
+def test_a_source_that_was_never_fused_served_nothing(tmp_path: Path) -> None:
+    one = record(tmp_path, MadeSet())
+    one.samples["gnss_vel", 0].fused[:] = False
+    assert "gnss_vel" not in filter_events(one, FLIGHT).aid

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fusetune.analyze.innovation_metrics import mean_innovation, rms_innovation, rms_norm, worst_window
+from fusetune.analyze.innovation_metrics import mean_innovation, rms_innovation, rms_norm
 
 
 def test_rms_of_one_component() -> None:
@@ -26,15 +26,3 @@ def test_vertical_aggregate_is_the_one_dimensional_form() -> None:
 
 def test_mean_keeps_the_sign() -> None:
     assert mean_innovation(np.array([1.0, -3.0])) == -1.0
-
-
-def test_worst_window_is_the_largest_mean_of_a_window() -> None:
-    values = np.array([1.0, 1.0, 5.0, 7.0, 2.0, 2.0])
-    window = np.array([0, 0, 1, 1, 2, 2])
-    assert worst_window(values, window) == 6.0
-
-
-def test_worst_window_ignores_a_nearly_empty_one() -> None:
-    values = np.array([1.0, 1.0, 1.0, 1.0, 100.0])
-    window = np.array([0, 0, 0, 0, 1])
-    assert worst_window(values, window) == 1.0

@@ -12,7 +12,14 @@ from tests.analyze.made_flight import MadeSet, make_flight
 from fusetune.analyze.score_flight import score_flight
 from fusetune.save.log_folder import save_log
 
-OUTPUTS = ("metrics.parquet", "scores.parquet", "samples.parquet", "scoring.json", "onboard.innovations.parquet")
+OUTPUTS = (
+    "metrics.parquet",
+    "scores.parquet",
+    "samples.parquet",
+    "windows.parquet",
+    "scoring.json",
+    "onboard.innovations.parquet",
+)
 
 
 def value(metrics: pd.DataFrame, *key: str) -> float:

@@ -116,8 +116,9 @@ def test_a_set_that_fails_on_one_flight_is_not_eligible_but_shown(tmp_path: Path
     summary = json.loads((folders[2] / "scoring.json").read_text())
     summary["sets"]["tempting"] |= {"status": "excluded", "reason": "starts aiding 28.0 s later than the present set"}
     (folders[2] / "scoring.json").write_text(json.dumps(summary))
-    scores = pd.read_parquet(folders[2] / "scores.parquet")
-    scores[scores["set"] != "tempting"].to_parquet(folders[2] / "scores.parquet")
+    for name in ("scores.parquet", "withheld.parquet"):
+        scores = pd.read_parquet(folders[2] / name)
+        scores[scores["set"] != "tempting"].to_parquet(folders[2] / name)
     decide(folders, table, tmp_path / "apply", sets=list(sets))
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
     one = ranked(decision, "tempting")
@@ -184,25 +185,40 @@ def test_an_unknown_newest_flight_is_an_error(tmp_path: Path) -> None:
         run(tmp_path, {"present": MadeSet()}, flights=1, newest_flight="nowhere")
 
 
-def test_holm_guards_the_best_of_many(tmp_path: Path) -> None:
+@pytest.mark.parametrize("multiplicity", ["sign_flips", "holm", "none"])
+def test_the_number_of_candidates_is_allowed_for(tmp_path: Path, multiplicity: str) -> None:
     sets = {"present": MadeSet(error=0.1)} | {f"s{i}": MadeSet(error=0.1, own=0.6) for i in range(8)}
     sets["s3"] = MadeSet(error=0.096, own=0.6)
     folders, table = make_study(tmp_path, sets)
-    decisions = []
-    for corrected in (True, False):
-        output = tmp_path / f"apply_{corrected}"
-        decide(folders, table, output, sets=list(sets), settings=DecisionSettings(correct_for_candidates=corrected))
-        decisions.append(json.loads((output / "decision.json").read_text()))
-    best = ranked(decisions[0], decisions[0]["best_candidate"])
+    settings = DecisionSettings(multiplicity=multiplicity)
+    decide(folders, table, tmp_path / "apply", sets=list(sets), settings=settings)
+    decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
+    best = ranked(decision, decision["best_candidate"])
     assert best["p_holm"] > best["p_value"]
-    significant = best["upper"] < 0.0
-    assert (decisions[1]["status"] == "change") == significant
-    assert (decisions[0]["status"] == "change") == (significant and best["p_holm"] <= 0.05)
+    p_value = {"sign_flips": best["p_family"], "holm": best["p_holm"], "none": 0.0}[multiplicity]
+    assert (decision["status"] == "change") == (best["upper"] < 0.0 and p_value <= 0.05)
 
 
-def test_settings_refuse_an_unknown_source() -> None:
+def test_leaving_out_flights_is_reported(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
+    validated = run(tmp_path, sets)["leave_one_out"]
+    assert set(validated["chosen"].values()) == {"better"}
+    assert (validated["stays"], len(validated["chosen"])) == (6, 6)
+    assert validated["upper"] < 0.0
+
+
+def test_settings_refuse_an_unknown_source_and_a_weight_below_zero() -> None:
     with pytest.raises(UserError, match="no aid source"):
-        DecisionSettings.from_mapping({"source": "sonar"})
+        DecisionSettings.from_mapping({"sources": {"sonar": 1.0}})
+    with pytest.raises(UserError, match=r"decision\.sources\.gnss_vel is -1"):
+        DecisionSettings.from_mapping({"sources": {"gnss_vel": -1}})
+    with pytest.raises(UserError, match="multiplicity"):
+        DecisionSettings.from_mapping({"multiplicity": "bonferroni"})
+
+
+def test_a_source_is_trusted_as_far_as_its_error_is_white() -> None:
+    settings = DecisionSettings(distrust_white_share=0.6, trust_white_share=0.9)
+    assert [settings.trust(share) for share in (0.2, 0.6, 0.75, 0.9, 1.0)] == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
 
 
 def test_the_seed_of_the_configuration_counts_unless_the_section_has_its_own() -> None:

@@ -3,39 +3,12 @@
 import re
 from pathlib import Path
 
-import pytest
 from PIL import Image
 from tests.analyze.made_flight import MadeSet
-from tests.apply.study import make_study
+from tests.report.made_report import SETS, make_report
 
-from fusetune.apply.decide import decide
 from fusetune.report.flight_figures import plot_flight
-from fusetune.report.page import build_report
 from fusetune.report.summary_figures import SUMMARY_FIGURES, plot_summary
-
-SETS = {
-    "present": MadeSet(error=0.13, overrides={"EKF2_ACC_NOISE": 0.35}),
-    "better": MadeSet(error=0.1, overrides={"EKF2_ACC_NOISE": 0.2}),
-    "<restless>": MadeSet(resets_s=(40.0,)),
-}
-
-
-def report(root: Path, sets: dict[str, MadeSet], flights: int, landing_s: float = 70.0) -> str:
-    folders, table = make_study(root, sets, flights, refused=("bad",), landing_s=landing_s)
-    decide(folders, table, root / "apply", sets=list(sets))
-    pictures = []
-    for folder in folders:
-        pictures.append(root / "report" / "flights" / f"{folder.name}.png")
-        plot_flight(root / "save" / folder.name, folder, list(sets), pictures[-1])
-    plot_summary(folders, root / "apply", root / "report")
-    build_report(table, folders, pictures, root / "apply", root / "report", root / "report.html")
-    return (root / "report.html").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    root = tmp_path_factory.mktemp("report")
-    return root, report(root, SETS, flights=5)
 
 
 def test_the_page_needs_no_network(made: tuple[Path, str]) -> None:
@@ -58,6 +31,10 @@ def test_the_page_says_what_was_decided_and_why(made: tuple[Path, str]) -> None:
     assert "IMU at 20 Hz" in page
     assert "ab" * 32 in page
     for heading in (
+        "What the flights say",
+        "Without a sensor",
+        "Does the choice hold?",
+        "What counts how much",
         "The flights",
         "The parameter sets",
         "The innovations",
@@ -95,20 +72,20 @@ def test_figures_are_the_same_bytes_twice(made: tuple[Path, str], tmp_path: Path
 
 
 def test_no_flights_still_make_a_page(tmp_path: Path) -> None:
-    page = report(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=0)
+    page = make_report(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=0)
     assert "no flight could be replayed" in page
 
 
 def test_flights_that_cannot_be_scored_still_make_a_page(tmp_path: Path) -> None:
-    page = report(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=1, landing_s=12.0)
+    page = make_report(tmp_path, {"present": MadeSet(), "b": MadeSet()}, flights=1, landing_s=12.0)
     assert "s of flight remain after the warm-up" in page
 
 
 def test_a_set_that_diverged_is_drawn_around(tmp_path: Path) -> None:
-    page = report(tmp_path, {"present": MadeSet(), "b": MadeSet(status="diverged")}, flights=1)
+    page = make_report(tmp_path, {"present": MadeSet(), "b": MadeSet(status="diverged")}, flights=1)
     assert "diverged: the covariance is not finite" in page
 
 
 def test_a_present_set_that_diverged_leaves_the_flight_unscored(tmp_path: Path) -> None:
-    page = report(tmp_path, {"present": MadeSet(status="diverged"), "b": MadeSet()}, flights=1)
+    page = make_report(tmp_path, {"present": MadeSet(status="diverged"), "b": MadeSet()}, flights=1)
     assert "the present set: diverged: the covariance is not finite" in page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -57,6 +58,7 @@ def test_every_key_is_described_and_in_the_manual(schema: dict[str, Any], projec
 
 def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
     from fusetune.analyze.settings import ScoringSettings
+    from fusetune.analyze.withheld_gaps import WithholdingSettings
     from fusetune.apply.settings import DecisionSettings
     from fusetune.save import VerdictThresholds
 
@@ -64,12 +66,20 @@ def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
     assert DecisionSettings.from_mapping(shipped["decision"], seed=0) == DecisionSettings()
     assert VerdictThresholds.from_mapping(shipped["verdict"]) == VerdictThresholds()
     assert shipped["verdict"].keys() == asdict(VerdictThresholds()).keys()
+    assert WithholdingSettings.from_mapping(shipped["withheld"]) == WithholdingSettings()
 
 
 def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: dict[str, Any]) -> None:
     from fusetune.analyze.sources import AID_SOURCES
+    from fusetune.ekf2.withholding import WITHHOLDABLE
 
-    assert schema["properties"]["decision"]["properties"]["source"]["enum"] == sorted(AID_SOURCES)
+    decision = schema["properties"]["decision"]["properties"]
+    assert decision["sources"]["propertyNames"]["enum"] == sorted(AID_SOURCES)
+    pattern = re.compile(decision["withheld_sources"]["propertyNames"]["pattern"])
+    for source in (source for sources in WITHHOLDABLE.values() for source in sources):
+        axes = "xyz"[: AID_SOURCES[source].axes]
+        assert pattern.match(source)
+        assert [axis for axis in "xyz" if pattern.match(f"{source}.{axis}")] == list(axes)
 
 
 def test_the_conda_environment_has_the_locked_versions(project_root: Path) -> None:

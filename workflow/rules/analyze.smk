@@ -25,6 +25,7 @@ for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"])
             "../envs/fusetune.yaml"
         params:
             sets=overrides_of(chunk),
+            withheld=SETTINGS["withheld"],
             ledger=f"results/analyze/{{flight}}/.replay_{number}.json",
             code=DIGEST["replay"],
         message:

@@ -7,12 +7,16 @@ REPLAY_PARTS = (
     "states.parquet",
     "local_position.parquet",
     "status_flags.parquet",
+    "withheld.parquet",
+    "gaps.parquet",
     "json",
 )
 SCORE_PARTS = (
     "metrics.parquet",
     "scores.parquet",
     "samples.parquet",
+    "withheld.parquet",
+    "windows.parquet",
     "scoring.json",
     "onboard.innovations.parquet",
     "fidelity.json",

@@ -13,7 +13,7 @@ CONFIG_FILE = str((workflow.configfiles or ["config/config.yaml"])[-1])
 def with_defaults(values, schema):
     """Complete a checked configuration with the defaults of its schema."""
     for key, part in schema.get("properties", {}).items():
-        if part.get("type") == "object":
+        if "properties" in part:
             values[key] = with_defaults(dict(values.get(key, {})), part)
         elif "default" in part:
             values.setdefault(key, part["default"])

@@ -64,7 +64,8 @@ recover_from_interruption()
 
 # Changed sources run again what depends on them.
 BASE = ("errors.py", "files.py", "parquet.py", "px4")
-REPLAY_SOURCES = ("ekf2", "save", "ledger.py", "analyze/replay_flight.py", "analyze/replay_files.py")
+REPLAY_FILES = ("replay_flight.py", "replay_files.py", "withheld_gaps.py", "flight_phases.py")
+REPLAY_SOURCES = ("ekf2", "save", "ledger.py", *(f"analyze/{file}" for file in REPLAY_FILES))
 DIGEST = {
     "design": source_digest(*BASE, "design"),
     "execute": source_digest(*BASE, "ekf2", "design", "execute"),

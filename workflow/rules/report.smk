@@ -1,6 +1,8 @@
 SUMMARY_FIGURES = {
     "differences.svg": "scores against the present set",
     "flights_by_sets.svg": "flights and sets",
+    "pareto.svg": "two aims",
+    "drift.svg": "drift without GNSS",
     "rms.svg": "RMS of innovations",
     "innovations.svg": "innovations",
     "normalised_innovations.svg": "normalised innovations",

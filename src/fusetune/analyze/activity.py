@@ -1,44 +1,27 @@
 """Which parameters of a set can act on a flight at all; the others are named "inactive on this flight".
 
-GNSS noise parameters are floors below the receiver's own accuracy, and a source that the vehicle lacks makes its
-parameters idle: a sweep of such a parameter changes nothing, and must not look like a finding.
+GNSS noise parameters are floors below the receiver's own accuracy, a source that the vehicle lacks makes its
+parameters idle, and a gate that no sample reaches might as well be another: a sweep of such a parameter changes
+nothing, and must not look like a finding.
 """
 
 from collections.abc import Callable
 
 import numpy as np
 
+from fusetune.analyze.parameter_sources import OBSERVATION_NOISE, required_sources, switched_off
 from fusetune.analyze.set_files import SetRecord
+from fusetune.analyze.sources import AID_SOURCES
 from fusetune.px4.flight import Flight
 
-_REQUIRED_SOURCES: dict[str, tuple[str, ...]] = {
-    "EKF2_GPS_": ("gnss_pos", "gnss_vel", "gnss_hgt"),
-    "EKF2_BARO_": ("baro_hgt",),
-    "EKF2_GND_EFF_DZ": ("baro_hgt",),
-    "EKF2_RNG_": ("rng_hgt",),
-    "EKF2_MAG_": ("mag",),
-    "EKF2_HEAD_NOISE": ("mag", "gnss_yaw"),
-    "EKF2_EVP_": ("ev_pos", "ev_hgt"),
-    "EKF2_EVV_": ("ev_vel",),
-    "EKF2_EVA_": ("ev_yaw",),
-    "EKF2_EV_": ("ev_pos", "ev_vel", "ev_hgt", "ev_yaw"),
-    "EKF2_OF_": ("optical_flow",),
-    "EKF2_TAS_GATE": ("airspeed",),
-    "EKF2_EAS_NOISE": ("airspeed",),
-    "EKF2_ASP_DELAY": ("airspeed",),
-    "EKF2_BETA_": ("sideslip",),
-    "EKF2_DRAG_": ("drag",),
-    "EKF2_BCOEF_": ("drag",),
-    "EKF2_MCOEF": ("drag",),
-    "EKF2_GRAV_NOISE": ("gravity",),
-    "EKF2_AGP_": ("aux_global_position",),
-    "EKF2_AVEL_DELAY": ("aux_vel",),
+_NOISE_FLOORS: dict[str, tuple[tuple[str, float, str], ...]] = {
+    "EKF2_GPS_P_NOISE": (("eph", 1.0, "gnss_pos"), ("epv", 1.5, "gnss_hgt")),
+    "EKF2_GPS_V_NOISE": (("s_variance_m_s", 1.0, "gnss_vel"),),
 }
-"""Start of a parameter's name → sources of which at least one must be there for it to act."""
+"""Parameter → the receiver's accuracies in `vehicle_gps_position`, each with the factor by which the floor of the
+source that it serves exceeds the parameter; below its floor the parameter acts."""
 
-_NOISE_FLOORS = {"EKF2_GPS_P_NOISE": ("eph", "m"), "EKF2_GPS_V_NOISE": ("s_variance_m_s", "m/s")}
-"""Parameter → the receiver's accuracy in `vehicle_gps_position` below which it has no effect, and its unit."""
-
+_UNITS = {"EKF2_GPS_P_NOISE": "m", "EKF2_GPS_V_NOISE": "m/s"}
 _NEGLIGIBLE_SHARE = 0.02
 
 
@@ -50,10 +33,14 @@ def inactive_parameters(record: SetRecord, present: SetRecord, flight: Flight) -
     record, present : replays of this flight with the set and with the present set
     flight : needs `vehicle_gps_position` for the receiver's accuracy
     """
+    unchanged = same_results(record, present)
     checks: tuple[Callable[[str], str], ...] = (
         lambda name: _same_value(name, record, present),
         lambda name: _absent_source(name, record, present),
         lambda name: _below_receiver_accuracy(name, record, present, flight),
+        lambda name: _same_observation_variance(name, record, present),
+        lambda name: _idle_gate(name, record, present),
+        lambda name: "every innovation is the same as with the present value" if unchanged else "",
     )
     reasons: dict[str, str] = {}
     for name in sorted(record.overrides):
@@ -84,16 +71,14 @@ def _same_value(name: str, record: SetRecord, present: SetRecord) -> str:
 
 
 def _absent_source(name: str, record: SetRecord, present: SetRecord) -> str:
-    for prefix in sorted(_REQUIRED_SOURCES, key=len, reverse=True):
-        if not name.startswith(prefix):
-            continue
-        sources = _REQUIRED_SOURCES[prefix]
-        return (
-            ""
-            if (_fused_sources(record) | _fused_sources(present)).intersection(sources)
-            else f"no {' or '.join(sources)} was fused on this flight"
-        )
-    return ""
+    sources = required_sources(name)
+    if not sources or (_fused_sources(record) | _fused_sources(present)).intersection(sources):
+        return ""
+    causes = [{switched_off(source, one.parameters) for source in sources} for one in (record, present)]
+    # Only what keeps every one of the sources out, in both replays, is the cause.
+    switches = sorted(set.union(*causes)) if all(cause and "" not in cause for cause in causes) else []
+    why = f" ({', '.join(switches)})" if switches else ""
+    return f"no {' or '.join(sources)} was fused on this flight{why}"
 
 
 def _fused_sources(record: SetRecord) -> set[str]:
@@ -101,17 +86,58 @@ def _fused_sources(record: SetRecord) -> set[str]:
 
 
 def _below_receiver_accuracy(name: str, record: SetRecord, present: SetRecord, flight: Flight) -> str:
-    if name not in _NOISE_FLOORS:
-        return ""
-    field, unit = _NOISE_FLOORS[name]
     table = flight.topic("vehicle_gps_position")
-    if table is None or field not in table or table[field].size == 0:
+    if name not in _NOISE_FLOORS or table is None:
         return ""
     largest_floor = max(record.parameters[name], present.parameters.get(name, 0.0))
-    accuracy = table[field].astype(np.float64)
-    if np.mean(accuracy < largest_floor) > _NEGLIGIBLE_SHARE:
+    fused = _fused_sources(record) | _fused_sources(present)
+    reported = []
+    for field, factor, source in _NOISE_FLOORS[name]:
+        if source not in fused:
+            continue
+        if field not in table or table[field].size == 0:
+            return ""
+        accuracy = table[field].astype(np.float64)
+        if np.mean(accuracy < factor * largest_floor) > _NEGLIGIBLE_SHARE:
+            return ""
+        reported.append(float(np.median(accuracy)))
+    if not reported:
         return ""
+    unit = _UNITS[name]
     return (
         f"is a floor of {record.parameters[name]:g} {unit}, and the receiver reports "
-        f"{np.median(accuracy):.2g} {unit} (median), so it has no effect"
+        f"{' and '.join(f'{value:.2g}' for value in reported)} {unit} (median), so it has no effect"
     )
+
+
+def _same_observation_variance(name: str, record: SetRecord, present: SetRecord) -> str:
+    """A noise that is a floor, or that another figure overrides, leaves the observation variances as they were."""
+    keys = [key for key in record.samples if key[0] in OBSERVATION_NOISE.get(name, ())]
+    keys = [key for key in keys if key in present.samples and present.samples[key].fused.any()]
+    if not keys:
+        return ""
+    for key in keys:
+        one, other = record.samples[key], present.samples[key]
+        if not np.array_equal(one.observation_variance, other.observation_variance, equal_nan=True):
+            return ""
+    return "leaves every observation variance as it is: what the sensor reports is larger"
+
+
+def _idle_gate(name: str, record: SetRecord, present: SetRecord) -> str:
+    if not name.endswith("_GATE"):
+        return ""
+    largest = 0.0
+    for one in (record, present):
+        for (source, _), samples in one.samples.items():
+            if AID_SOURCES[source].gate_parameter != name or not samples.fused.any():
+                continue
+            started = np.cumsum(samples.fused) > 0
+            if samples.rejected[started].any():
+                return ""
+            with np.errstate(invalid="ignore", divide="ignore"):
+                beyond = np.abs(samples.innovation) / np.sqrt(samples.innovation_variance)
+            largest = max(largest, float(np.nanmax(beyond[started])))
+    gates = [max(one.parameters.get(name, 0.0), 1.0) for one in (record, present)]
+    if not 0.0 < largest < min(gates):
+        return ""
+    return f"no sample lies further out than {largest:.1f} standard deviations, so the gate never binds"

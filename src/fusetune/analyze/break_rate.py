@@ -5,6 +5,7 @@ import numpy.typing as npt
 from scipy.special import betaincinv
 
 from fusetune.analyze.consistency import Bounds
+from fusetune.analyze.measurement_alignment import PairedSamples
 
 Array = npt.NDArray[np.float64]
 
@@ -12,6 +13,11 @@ Array = npt.NDArray[np.float64]
 def beyond_standard_deviations(innovation: Array, innovation_variance: Array, limit: float) -> npt.NDArray[np.bool_]:
     """True where |ν| > limit · √S; shapes of the inputs."""
     return np.square(innovation) > limit * limit * innovation_variance
+
+
+def beyond_gate(pairs: PairedSamples) -> npt.NDArray[np.bool_]:
+    """True where the axis is beyond its gate; where its gate is unknown, where the source was rejected."""
+    return np.where(np.isfinite(pairs.test_ratio), pairs.test_ratio > 1.0, pairs.rejected)
 
 
 def clopper_pearson(breaks: npt.ArrayLike, samples: int, confidence: float) -> Bounds:

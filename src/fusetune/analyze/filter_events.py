@@ -32,6 +32,15 @@ _HEADING_BY_MAGNETOMETER = ("cs_mag_hdg", "cs_mag_3d", "cs_mag")
 
 
 @dataclass(frozen=True)
+class SourceAid:
+    """How an aid source served: samples, share of them fused, and the longest time without one fused, s."""
+
+    samples: int
+    fused_share: float
+    longest_without_s: float
+
+
+@dataclass(frozen=True)
 class FilterEvents:
     """Counts and times inside the flight after the warm-up.
 
@@ -42,6 +51,7 @@ class FilterEvents:
     faults : names of the fault flags (`fs_*`) that were ever set
     fault_flags : largest value of `filter_fault_flags`
     dead_reckoning_s : time without any horizontal aiding
+    aid : by source that was ever fused
     """
 
     resets: dict[str, int]
@@ -49,6 +59,7 @@ class FilterEvents:
     faults: tuple[str, ...]
     fault_flags: int
     dead_reckoning_s: float
+    aid: dict[str, SourceAid]
 
     @property
     def total_resets(self) -> int:
@@ -84,7 +95,26 @@ def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEven
         faults=faults,
         fault_flags=int(record.summary.get("filter_fault_flags_max", 0)),
         dead_reckoning_s=_time_true(time, record.flags.get("cs_inertial_dead_reckoning"), flight),
+        aid=_source_aid(record, flight),
     )
+
+
+def _source_aid(record: SetRecord, intervals: tuple[Interval, ...]) -> dict[str, SourceAid]:
+    """Axis 0 speaks for its source: PX4 fuses or rejects all axes of a sample but for rare faults."""
+    found = {}
+    for (source, axis), samples in record.samples.items():
+        if axis or not samples.fused.any():
+            continue
+        time = samples.timestamp_sample
+        inside = _inside(time, intervals)
+        if not inside.any():
+            continue
+        longest = 0
+        for start, stop in intervals:
+            fused = time[samples.fused & (time >= start) & (time < stop)]
+            longest = max(longest, int(np.max(np.diff(np.r_[start, fused, stop]))))
+        found[source] = SourceAid(int(inside.sum()), float(np.mean(samples.fused[inside])), longest * 1e-6)
+    return found
 
 
 def _inside(times: npt.NDArray[np.int64], intervals: tuple[Interval, ...]) -> npt.NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Size of the innovations: root mean square per component, horizontal and vertical, and the worst window."""
+"""Size of the innovations: root mean square per component, horizontal and vertical."""
 
 import numpy as np
 import numpy.typing as npt
@@ -41,21 +41,3 @@ def rms_norm(innovation: Array) -> Array:
 def mean_innovation(innovation: Array) -> Array:
     """Mean of the innovations, (..., N) → (...); an unbiased model has 0."""
     return np.mean(innovation, axis=-1)
-
-
-def worst_window(values: Array, window: npt.NDArray[np.int64]) -> Array:
-    """Largest mean of `values` over any window.
-
-    Parameters
-    ----------
-    values : (..., N) array, e.g. squared innovations
-    window : (N,) ascending index of the window of each sample
-
-    Returns
-    -------
-    (...) array; windows with less than half the samples of the fullest one do not count
-    """
-    starts = np.flatnonzero(np.r_[True, np.diff(window) != 0])
-    counts = np.diff(np.r_[starts, window.size])
-    means = np.add.reduceat(values, starts, axis=-1) / counts
-    return np.max(means[..., counts >= 0.5 * counts.max()], axis=-1)

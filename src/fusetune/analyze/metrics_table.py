@@ -1,20 +1,23 @@
 """The long table of figures: one row per flight, set, source, axis and metric."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze import likelihood
-from fusetune.analyze.break_rate import beyond_standard_deviations, break_rate
+from fusetune.analyze.break_rate import beyond_gate, beyond_standard_deviations, break_rate
 from fusetune.analyze.consistency import Bounds, c_nis, effective_bounds, j_nis, mean_nis, paper_bounds
+from fusetune.analyze.error_figures import ErrorFigure
 from fusetune.analyze.filter_events import FilterEvents
-from fusetune.analyze.innovation_metrics import mean_innovation, rms_innovation, rms_norm, worst_window
+from fusetune.analyze.innovation_metrics import mean_innovation, rms_innovation, rms_norm
 from fusetune.analyze.measurement_alignment import PairedSamples
 from fusetune.analyze.settings import ScoringSettings
+from fusetune.analyze.source_whiteness import Whiteness
 from fusetune.analyze.sources import AID_SOURCES, AXES
-from fusetune.analyze.true_errors import ErrorFigure
 from fusetune.analyze.whiteness import autocorrelation, effective_samples, lag_limit, ljung_box
 
 Array = npt.NDArray[np.float64]
@@ -99,37 +102,27 @@ def add_axis_metrics(table: MetricsTable, pairs: PairedSamples, settings: Scorin
         table.add_each(sets, source, axis, "lag1_correlation", correlation[:, 0], n)
         table.add_each(sets, source, axis, "ljung_box", statistic, n)
         table.add_each(sets, source, axis, "ljung_box_p", p_value, n)
-    _add_likelihoods(table, pairs, nis)
+    for metric, value in _likelihoods(pairs).items():
+        table.add_each(sets, source, axis, metric, value, n)
     for limit in (3, 5):
         broken = beyond_standard_deviations(innovation, variance, limit)
         table.add_bounds(sets, source, axis, f"break_rate_{limit}sd", break_rate(broken, settings.confidence), n)
     table.add_bounds(sets, source, axis, "break_rate_gate", break_rate(beyond_gate(pairs), settings.confidence), n)
-    window = (pairs.time - pairs.time[0]) // round(settings.window_s * 1e6)
-    squared = np.square(innovation)
-    table.add_each(sets, source, axis, "worst_window_rms", np.sqrt(worst_window(squared, window)), n)
-    table.add_each(sets, source, axis, "worst_window_nis", worst_window(squared / variance, window), n)
 
 
-def beyond_gate(pairs: PairedSamples) -> npt.NDArray[np.bool_]:
-    """True where the axis is beyond its gate; where its gate is unknown, where the source was rejected."""
-    return np.where(np.isfinite(pairs.test_ratio), pairs.test_ratio > 1.0, pairs.rejected)
-
-
-def _add_likelihoods(table: MetricsTable, pairs: PairedSamples, nis: Array) -> None:
-    source, axis, sets, n = pairs.source, AXES[pairs.axis], pairs.sets, pairs.time.size
+def _likelihoods(pairs: PairedSamples) -> dict[str, Array]:
     innovation, variance = pairs.innovation, pairs.innovation_variance
     clipped = likelihood.winsorised(innovation, likelihood.winsor_limit(innovation))
     log_variance = np.mean(np.log(variance), axis=-1)
+    nis = np.mean(np.square(innovation) / variance, axis=-1)
     clipped_nis = np.mean(np.square(clipped) / variance, axis=-1)
-    values = {
+    return {
         "nll": np.mean(likelihood.gaussian_nll(innovation, variance), axis=-1),
         "nll_student_t": np.mean(likelihood.student_t_nll(innovation, variance), axis=-1),
         "nll_winsorised": np.mean(likelihood.gaussian_nll(clipped, variance), axis=-1),
         "nll_profile": likelihood.profile_nll(nis, log_variance),
         "nll_profile_winsorised": likelihood.profile_nll(clipped_nis, log_variance),
     }
-    for metric, value in values.items():
-        table.add_each(sets, source, axis, metric, value, n)
 
 
 def add_group_metrics(table: MetricsTable, pairs: dict[int, PairedSamples], settings: ScoringSettings) -> None:
@@ -139,13 +132,20 @@ def add_group_metrics(table: MetricsTable, pairs: dict[int, PairedSamples], sett
     ----------
     pairs : by axis
     """
-    any_axis = next(iter(pairs.values()))
-    for group, axes in AID_SOURCES[any_axis.source].groups:
-        members = [pairs[axis] for axis in axes if axis in pairs]
-        same = all(np.array_equal(one.time, members[0].time) and one.sets == members[0].sets for one in members)
-        if len(members) != len(axes) or not same or members[0].time.size < FEWEST_SAMPLES:
-            continue
+    for group, members in groups_of(pairs):
         _add_group(table, group, members, settings)
+
+
+def groups_of(pairs: dict[int, PairedSamples]) -> Iterator[tuple[str, list[PairedSamples]]]:
+    """Groups of axes of one source (horizontal, vertical, all) that share their samples and sets, with their axes."""
+    if not pairs:
+        return
+    for group, axes in AID_SOURCES[next(iter(pairs.values())).source].groups:
+        members = [pairs[axis] for axis in axes if axis in pairs]
+        if len(members) != len(axes) or members[0].time.size < FEWEST_SAMPLES:
+            continue
+        if all(np.array_equal(one.time, members[0].time) and one.sets == members[0].sets for one in members):
+            yield group, members
 
 
 def _add_group(table: MetricsTable, group: str, members: list[PairedSamples], settings: ScoringSettings) -> None:
@@ -161,13 +161,25 @@ def _add_group(table: MetricsTable, group: str, members: list[PairedSamples], se
     table.add_bounds(sets, source, group, "mean_nis_effective", effective, independent)
     table.add_each(sets, source, group, "j_nis", j_nis(nis, dimension), n)
     table.add_each(sets, source, group, "c_nis", c_nis(innovation, variance), n)
-    profile = likelihood.profile_nll(
-        np.mean(np.square(innovation) / variance, axis=-1), np.mean(np.log(variance), axis=-1)
-    )
-    table.add_each(sets, source, group, "nll", likelihood.gaussian_nll(innovation, variance).mean(axis=-1).sum(0), n)
-    table.add_each(sets, source, group, "nll_profile", profile.sum(axis=0), n)
-    broken = np.logical_or.reduce([beyond_gate(one) for one in members])
-    table.add_bounds(sets, source, group, "break_rate_gate", break_rate(broken, settings.confidence), n)
+    _add_group_likelihoods(table, group, members)
+    for metric, broken in (
+        ("break_rate_3sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 3) for one in members]),
+        ("break_rate_5sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 5) for one in members]),
+        ("break_rate_gate", [beyond_gate(one) for one in members]),
+    ):
+        rate = break_rate(np.logical_or.reduce(broken), settings.confidence)
+        table.add_bounds(sets, source, group, metric, rate, n)
+
+
+def _add_group_likelihoods(table: MetricsTable, group: str, members: list[PairedSamples]) -> None:
+    """Likelihoods of several axes: the sums of theirs, each axis winsorised and scaled by itself."""
+    sums: dict[str, Array] = {}
+    for one in members:
+        for metric, value in _likelihoods(one).items():
+            sums[metric] = sums[metric] + value if metric in sums else value
+    first = members[0]
+    for metric, value in sums.items():
+        table.add_each(first.sets, first.source, group, metric, value, first.time.size)
 
 
 def add_events(table: MetricsTable, set_name: str, events: FilterEvents, flight_s: float) -> None:
@@ -181,10 +193,31 @@ def add_events(table: MetricsTable, set_name: str, events: FilterEvents, flight_
     table.add(set_name, "filter", "all", "timeouts", events.total_timeouts, flight_s)
     table.add(set_name, "filter", "all", "fault_flags", events.fault_flags, flight_s)
     table.add(set_name, "filter", "horizontal", "dead_reckoning_s", events.dead_reckoning_s, flight_s)
+    for source, aid in events.aid.items():
+        table.add(set_name, source, "all", "fused_share", aid.fused_share, aid.samples)
+        table.add(set_name, source, "all", "longest_without_fusion_s", aid.longest_without_s, aid.samples)
 
 
-def add_true_errors(table: MetricsTable, set_name: str, figures: list[ErrorFigure]) -> None:
-    """Append errors against the truth, source `truth_<quantity>`."""
+def add_whiteness(table: MetricsTable, set_name: str, found: dict[tuple[str, int], Whiteness]) -> None:
+    """Append what is white of each source's error, by axis and by group (the share of the summed variances)."""
+    for (source, axis), one in found.items():
+        add_one = partial(table.add, set_name, source, AXES[axis], n=one.samples)
+        add_one("white_share", one.white_share)
+        add_one("white_noise", one.white_noise)
+        add_one("correlated_noise", one.correlated_noise)
+        add_one("error_correlation_s", one.correlation_time_s)
+    for source in dict.fromkeys(source for source, _ in found):
+        for group, axes in AID_SOURCES[source].groups:
+            members = [found[source, axis] for axis in axes if (source, axis) in found]
+            if len(members) == len(axes):
+                white = sum(one.white_noise**2 for one in members)
+                total = white + sum(one.correlated_noise**2 for one in members)
+                share = white / total if total > 0.0 else np.nan
+                table.add(set_name, source, group, "white_share", share, members[0].samples)
+
+
+def add_true_errors(table: MetricsTable, set_name: str, figures: list[ErrorFigure], kind: str = "truth") -> None:
+    """Append errors against a reference of some kind, source `<kind>_<quantity>`."""
     for one in figures:
-        source = f"truth_{one.quantity}"
+        source = f"{kind}_{one.quantity}"
         table.add(set_name, source, one.axis, one.metric, one.value, one.n, one.lower, one.upper)

@@ -73,21 +73,23 @@ def _axis_samples(table: TopicTable, column: str) -> AxisSamples:
 def write_onboard(path: Path, samples: dict[SourceAxis, AxisSamples]) -> None:
     """Write the vehicle's own innovations in the layout of `<set>.innovations.parquet`."""
     columns: dict[str, list[npt.NDArray]] = {name: [] for name in ("timestamp_sample", *_FIELDS, "rejected", "fused")}
-    sources: list[str] = []
-    axes: list[int] = []
-    for (source, axis), one in sorted(samples.items()):
-        sources += [source] * one.timestamp_sample.size
-        axes += [axis] * one.timestamp_sample.size
+    keys = sorted(samples)
+    counts = [samples[key].timestamp_sample.size for key in keys]
+    names = list(dict.fromkeys(source for source, _ in keys))
+    for key in keys:
         for name, parts in columns.items():
-            parts.append(getattr(one, name))
+            parts.append(getattr(samples[key], name))
+    index = np.repeat(np.array([names.index(source) for source, _ in keys], dtype=np.int32), counts)
+    source = pa.DictionaryArray.from_arrays(pa.array(index), pa.array(names, pa.string()))
+    axes = np.repeat(np.array([axis for _, axis in keys], dtype=np.int32), counts)
 
     def joined(name: str, dtype: type) -> pa.Array:
         return pa.array(np.concatenate([np.zeros(0, dtype=dtype), *columns[name]]).astype(dtype))
 
     table = pa.table(
         {
-            "source": pa.array(sources, pa.string()).dictionary_encode(),
-            "axis": pa.array(axes, pa.int32()),
+            "source": source,
+            "axis": pa.array(axes),
             "timestamp_sample": joined("timestamp_sample", np.int64),
             **{name: joined(name, np.float64) for name in _FIELDS},
             "innovation_rejected": joined("rejected", np.bool_),

@@ -1,4 +1,7 @@
-"""Files that hold one replay: `<set>.innovations.parquet`, `.states`, `.local_position`, `.status_flags`, `.json`."""
+"""Files that hold one replay: `<set>.innovations.parquet`, `.states`, `.local_position`, `.status_flags`, `.json`.
+
+Beside them `.withheld` and `.gaps` hold what the filter predicted while a sensor was withheld from it.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from fusetune.analyze.withheld_gaps import gap_table, prediction_table
 from fusetune.ekf2.replay import ReplayResult
 from fusetune.ekf2.replay_tables import flags_table, innovation_table, local_position_table, state_table
 from fusetune.files import atomic_path
@@ -19,6 +23,8 @@ TABLES = {
     "states": state_table,
     "local_position": local_position_table,
     "status_flags": flags_table,
+    "withheld": lambda result: prediction_table(result.gaps),
+    "gaps": lambda result: gap_table(result.gaps),
 }
 
 BASELINE = "v1.16"

@@ -6,7 +6,9 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from fusetune.analyze.flight_phases import airborne_intervals
 from fusetune.analyze.replay_files import ReplayIdentity, write_replay
+from fusetune.analyze.withheld_gaps import WithholdingSettings, plan_gaps
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import replay
@@ -18,7 +20,12 @@ from fusetune.save.flight_folder import load_flight
 WRITTEN_BACK = "EKF2_MAG_DECL"
 
 
-def replay_saved_flight(flight_folder: Path, sets: Mapping[str, Mapping[str, float]], output_folder: Path) -> None:
+def replay_saved_flight(
+    flight_folder: Path,
+    sets: Mapping[str, Mapping[str, float]],
+    output_folder: Path,
+    withholding: WithholdingSettings | None = None,
+) -> None:
     """Replay sets on a saved flight.
 
     Parameters
@@ -29,16 +36,25 @@ def replay_saved_flight(flight_folder: Path, sets: Mapping[str, Mapping[str, flo
         Name of each set → its overrides of the log's own parameters.
     output_folder : Path
         Takes the files of `fusetune.analyze.replay_files` for each set.
+    withholding : WithholdingSettings, optional
+        Gaps to be made in the sensors; the default ones if None.
     """
-    replay_flight(load_flight(flight_folder, topics=ESTIMATOR_TOPICS), sets, output_folder)
+    replay_flight(load_flight(flight_folder, topics=ESTIMATOR_TOPICS), sets, output_folder, withholding)
 
 
-def replay_flight(flight: Flight, sets: Mapping[str, Mapping[str, float]], output_folder: Path) -> None:
+def replay_flight(
+    flight: Flight,
+    sets: Mapping[str, Mapping[str, float]],
+    output_folder: Path,
+    withholding: WithholdingSettings | None = None,
+) -> None:
     """Replay sets on a flight in memory; each set gives overrides of the log's own parameters."""
-    inputs = build_inputs(canonical(flight))
+    flight = canonical(flight)
+    inputs = build_inputs(flight)
+    gaps = plan_gaps(flight, airborne_intervals(flight, {}), withholding or WithholdingSettings())
     for name, overrides in sets.items():
         params = complete(flight.parameters.initial, overrides, flight.release)
-        result = replay(inputs, params, overridden=frozenset(overrides))
+        result = replay(inputs, params, overridden=frozenset(overrides), gaps=gaps)
         write_replay(output_folder, ReplayIdentity(name, overrides, params), result)
 
 

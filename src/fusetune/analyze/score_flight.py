@@ -12,21 +12,42 @@ import pyarrow.parquet as pq
 from fusetune.analyze.activity import inactive_parameters, same_results
 from fusetune.analyze.block_scores import BLOCK_SCHEMA, block_rows
 from fusetune.analyze.filter_events import FilterEvents, filter_events
+from fusetune.analyze.filter_states import read_states
 from fusetune.analyze.flight_phases import airborne_intervals, imu_gaps
+from fusetune.analyze.ground_metrics import add_ground_events, add_ground_metrics, ground_window
 from fusetune.analyze.measurement_alignment import PairedSamples, paired_samples
 from fusetune.analyze.metrics_table import (
+    FEWEST_SAMPLES,
     MetricsTable,
     add_axis_metrics,
     add_events,
     add_group_metrics,
     add_true_errors,
+    add_whiteness,
+    groups_of,
 )
 from fusetune.analyze.onboard import ONBOARD, onboard_samples, write_onboard
+from fusetune.analyze.reference_truth import TRUTH_TOPICS, Truth, read_references
 from fusetune.analyze.scoring_window import Cut, Interval, ScoringWindow, scoring_window, subtract
 from fusetune.analyze.set_files import SetRecord, read_set
 from fusetune.analyze.settings import ScoringSettings
-from fusetune.analyze.sources import AID_SOURCES
-from fusetune.analyze.true_errors import read_truth, true_errors
+from fusetune.analyze.source_whiteness import Whiteness, source_whiteness
+from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.analyze.true_errors import true_errors
+from fusetune.analyze.window_scores import (
+    WINDOW_SCHEMA,
+    add_worst_windows,
+    window_edges,
+    window_figures,
+    window_rows,
+)
+from fusetune.analyze.withheld_scores import (
+    WITHHELD_SCHEMA,
+    add_true_drift,
+    add_withheld_metrics,
+    paired_gaps,
+    withheld_rows,
+)
 from fusetune.files import atomic_path
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
@@ -51,10 +72,7 @@ TOPICS = (
     "vehicle_land_detected",
     "sensor_combined",
     "vehicle_imu",
-    "vehicle_gps_position",
-    "sensor_gps",
-    "vehicle_local_position_groundtruth",
-    "vehicle_attitude_groundtruth",
+    *TRUTH_TOPICS,
     "estimator_selector_status",
     "estimator_innovations",
     "estimator_innovation_variances",
@@ -75,7 +93,7 @@ def score_flight(
     settings: ScoringSettings | None = None,
 ) -> None:
     """Score every parameter set of one flight and write `metrics.parquet`, `scores.parquet`, `samples.parquet`,
-    `scoring.json` and `onboard.innovations.parquet` to `analyze_folder`.
+    `windows.parquet`, `withheld.parquet`, `scoring.json` and `onboard.innovations.parquet` to `analyze_folder`.
 
     Parameters
     ----------
@@ -93,7 +111,8 @@ def score_flight(
     flight = canonical(load_flight(Path(flight_folder), topics=TOPICS))
     records = [read_set(Path(analyze_folder), name) for name in dict.fromkeys((present, *sets))]
     airborne = airborne_intervals(flight, records[0].flags)
-    window = scoring_window(records, present, airborne, imu_gaps(flight, settings.log_gap_s), settings)
+    log_gaps = imu_gaps(flight, settings.log_gap_s)
+    window = scoring_window(records, present, airborne, log_gaps, settings)
     phase = _flight_after_warm_up(airborne, window)
     events = {record.name: filter_events(record, phase) for record in records}
 
@@ -101,20 +120,38 @@ def score_flight(
     flight_s = sum(stop - start for start, stop in phase) * 1e-6
     for name, event in events.items():
         add_events(table, name, event, flight_s)
+    log = flight.start_timestamp, flight.last_timestamp
+    ground = ground_window(records, present, airborne, log, log_gaps, window, settings)
+    add_ground_metrics(table, records, present, ground, settings.confidence)
+    for record in records:
+        add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
     onboard = onboard_samples(flight)
     blocks: list[pa.Table] = []
     samples: list[pa.Table] = []
+    windows: list[pa.Table] = []
+    whiteness: dict[tuple[str, int], Whiteness] = {}
+    withheld = WITHHELD_SCHEMA.empty_table()
     if window.intervals:
         scored = [record for record in records if record.name not in window.excluded]
-        blocks, samples = _score_samples(table, scored, present, window, settings)
+        blocks, samples, windows = _score_samples(table, scored, present, window, settings)
+        # Replays from elsewhere, such as PX4's own estimator, come without gaps.
+        has_gaps = all((Path(analyze_folder) / f"{record.name}.withheld.parquet").exists() for record in scored)
+        gaps = paired_gaps(scored, Path(analyze_folder), present, window) if has_gaps else []
+        add_withheld_metrics(table, gaps)
+        withheld = withheld_rows(flight.name, gaps, window.block_edges(settings.block_s))
         _add_onboard(table, onboard, window, settings, records[0].parameters)
-        truth = read_truth(flight)
-        if truth is not None:
-            for record in scored:
-                figures = true_errors(record, Path(analyze_folder), truth, window, settings.confidence)
-                add_true_errors(table, record.name, figures)
+        references = read_references(flight, _fused_sources(records), records[0].parameters)
+        whiteness = _add_state_figures(table, scored, Path(analyze_folder), flight, references, window, settings)
+        for truth in references:
+            if truth.kind == "truth" and has_gaps:
+                add_true_drift(table, scored, Path(analyze_folder), truth, window)
     summary = _summary(flight, records, present, window, events, settings)
-    _write(Path(analyze_folder), table, blocks, samples, summary)
+    summary["white_share"] = {
+        f"{source}.{AXES[axis]}": round(one.white_share, 4)
+        for (source, axis), one in whiteness.items()
+        if np.isfinite(one.white_share)
+    }
+    _write(Path(analyze_folder), table, blocks, samples, windows, withheld, summary)
     write_onboard(Path(analyze_folder) / f"{ONBOARD}.innovations.parquet", onboard)
 
 
@@ -124,11 +161,42 @@ def _flight_after_warm_up(airborne: Sequence[Interval], window: ScoringWindow) -
     return subtract(airborne, [Cut(-(2**62), window.warm_up_end, "warm-up")])
 
 
+def _fused_sources(records: Sequence[SetRecord]) -> set[str]:
+    return {source for record in records for (source, _), one in record.samples.items() if one.fused.any()}
+
+
+def _add_state_figures(
+    table: MetricsTable,
+    records: list[SetRecord],
+    folder: Path,
+    flight: Flight,
+    references: Sequence[Truth],
+    window: ScoringWindow,
+    settings: ScoringSettings,
+) -> dict[tuple[str, int], Whiteness]:
+    """Append what takes the states of each replay: whiteness of the sources, errors against the references.
+
+    Returns
+    -------
+    The whiteness as the first of the records, the present set, sees it
+    """
+    present: dict[tuple[str, int], Whiteness] = {}
+    for number, record in enumerate(records):
+        states = read_states(folder, record.name)
+        found = source_whiteness(record, states, flight, window)
+        add_whiteness(table, record.name, found)
+        present = present if number else found
+        for truth in references:
+            figures = true_errors(record, states, truth, window, settings.confidence)
+            add_true_errors(table, record.name, figures, truth.kind)
+    return present
+
+
 def _score_samples(
     table: MetricsTable, records: list[SetRecord], present: str, window: ScoringWindow, settings: ScoringSettings
-) -> tuple[list[pa.Table], list[pa.Table]]:
-    edges = window.block_edges(settings.block_s)
-    blocks, samples = [], []
+) -> tuple[list[pa.Table], list[pa.Table], list[pa.Table]]:
+    edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
+    blocks, samples, windows = [], [], []
     for source in AID_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         for axis in range(source.axes):
@@ -142,7 +210,12 @@ def _score_samples(
                 samples.append(_sample_rows(one))
         if pairs:
             add_group_metrics(table, pairs, settings)
-    return blocks, samples
+        single = [(AXES[axis], [one]) for axis, one in pairs.items() if one.time.size >= FEWEST_SAMPLES]
+        for axis_name, members in (*single, *groups_of(pairs)):
+            figures = window_figures(members, axis_name, wide_edges)
+            add_worst_windows(table, figures)
+            windows.append(window_rows(table.flight, figures, wide_edges))
+    return blocks, samples, windows
 
 
 def _sample_rows(pairs: PairedSamples) -> pa.Table:
@@ -234,12 +307,20 @@ def _set_summary(
 
 
 def _write(
-    folder: Path, table: MetricsTable, blocks: list[pa.Table], samples: list[pa.Table], summary: dict[str, Any]
+    folder: Path,
+    table: MetricsTable,
+    blocks: list[pa.Table],
+    samples: list[pa.Table],
+    windows: list[pa.Table],
+    withheld: pa.Table,
+    summary: dict[str, Any],
 ) -> None:
     tables = {
         "metrics.parquet": table.finished(),
         "scores.parquet": pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
         "samples.parquet": pa.concat_tables(samples).unify_dictionaries() if samples else SAMPLES_SCHEMA.empty_table(),
+        "windows.parquet": pa.concat_tables(windows) if windows else WINDOW_SCHEMA.empty_table(),
+        "withheld.parquet": withheld,
     }
     for name, content in tables.items():
         with atomic_path(folder / name) as temporary:

@@ -129,7 +129,7 @@ def scoring_window(
             starts[record.name] = start
     warm_up_end = max(starts.values()) + round(settings.settle_s * 1e6)
     flying = subtract(airborne, [Cut(-(2**62), warm_up_end, "warm-up")])
-    cuts = _cuts(records, excluded, flying, present, gaps, settings)
+    cuts = cuts_within(records, excluded, flying, present, gaps, settings)
     intervals = subtract(flying, cuts)
     window = ScoringWindow(intervals, cuts, excluded, warm_up_end)
     if window.duration_s < settings.minimum_scored_s:
@@ -149,7 +149,7 @@ def _failure(record: SetRecord) -> str:
     return ""
 
 
-def _cuts(
+def cuts_within(
     records: Sequence[SetRecord],
     excluded: dict[str, str],
     flying: Sequence[Interval],
@@ -157,6 +157,10 @@ def _cuts(
     gaps: Sequence[Interval],
     settings: ScoringSettings,
 ) -> tuple[Cut, ...]:
+    """Cuts around the resets of all sets and the gaps of the log inside `flying`.
+
+    `excluded` takes sets whose own resets would cost the others too much.
+    """
     after = round(settings.reset_cut_s * 1e6)
     cuts = [Cut(start, stop + after, "gap in the log") for start, stop in gaps]
     total = sum(stop - start for start, stop in flying)

@@ -1,7 +1,7 @@
 """Reads what the replay of one (flight, parameter set) wrote: innovations, status flags, local position, summary."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,8 @@ RESET_COUNTERS = {
 class AxisSamples:
     """All samples of one axis of one aid source in order of time, arrays of shape (N,).
 
-    `timestamp_sample` is the delayed time at which the estimator used the measurement, µs.
+    `timestamp_sample` is the delayed time at which the estimator used the measurement, µs. `observation` is the
+    measurement as the estimator used it, empty where only innovations are known.
     """
 
     timestamp_sample: npt.NDArray[np.int64]
@@ -38,6 +39,7 @@ class AxisSamples:
     test_ratio: npt.NDArray[np.float64]
     rejected: npt.NDArray[np.bool_]
     fused: npt.NDArray[np.bool_]
+    observation: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -108,11 +110,7 @@ def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxi
     key = source.indices.to_numpy().astype(np.int64) * 8 + table["axis"].to_numpy()
     order = np.argsort(key, kind="stable")
     key = key[order]
-    columns = {
-        name: table[name].to_numpy()[order]
-        for name in table.column_names
-        if name not in ("source", "axis", "observation")
-    }
+    columns = {name: table[name].to_numpy()[order] for name in table.column_names if name not in ("source", "axis")}
     starts = np.flatnonzero(np.r_[True, np.diff(key) != 0])
     stops = np.r_[starts[1:], key.size]
     samples: dict[SourceAxis, AxisSamples] = {}
@@ -146,6 +144,7 @@ def _axis_samples(columns: dict[str, npt.NDArray[Any]], rows: slice, gate: float
         test_ratio=test_ratio,
         rejected=columns["innovation_rejected"][rows].astype(bool),
         fused=columns["fused"][rows].astype(bool),
+        observation=columns["observation"][rows].astype(np.float64) if "observation" in columns else np.zeros(0),
     )
 
 

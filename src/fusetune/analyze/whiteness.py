@@ -2,6 +2,7 @@
 
 import numpy as np
 import numpy.typing as npt
+from scipy.fft import next_fast_len
 from scipy.special import chdtrc
 
 Array = npt.NDArray[np.float64]
@@ -24,9 +25,11 @@ def autocorrelation(values: Array, lags: int) -> Array:
     """
     centred = values - np.mean(values, axis=-1, keepdims=True)
     power = np.sum(np.square(centred), axis=-1)
-    products = [np.sum(centred[..., lag:] * centred[..., :-lag], axis=-1) for lag in range(1, lags + 1)]
-    stacked = np.stack(products, axis=-1) if products else np.zeros((*power.shape, 0))
-    return np.divide(stacked, power[..., None], out=np.zeros_like(stacked), where=power[..., None] > 0.0)
+    # Sums of products at all lags at once: the transform of the power spectrum, padded so that nothing wraps around.
+    length = next_fast_len(values.shape[-1] + lags, real=True)
+    spectrum = np.fft.rfft(centred, length, axis=-1)
+    products = np.fft.irfft(np.square(np.abs(spectrum)), length, axis=-1)[..., 1 : lags + 1]
+    return np.divide(products, power[..., None], out=np.zeros_like(products), where=power[..., None] > 0.0)
 
 
 def lag_limit(samples: int) -> int:

@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtr, stdtr, stdtrit
 
-from fusetune.apply.evidence import FlightEvidence, score_of_sums
+from fusetune.analyze.likelihood import profile_nll
+from fusetune.apply.evidence import AIMS, AimEvidence, FlightEvidence
 
 Array = npt.NDArray[np.float64]
 
@@ -24,7 +25,15 @@ class Interval:
         return self.lower > 0.0 or self.upper < 0.0
 
 
-def bootstrap_scores(flights: Sequence[FlightEvidence], sets: Sequence[str], draws: int, seed: int) -> Array:
+@dataclass(frozen=True)
+class Redrawn:
+    """Redrawn mean scores, (D, S) each: of the whole score, and of each aim alone where any flight speaks of it."""
+
+    total: Array
+    aims: dict[str, Array]
+
+
+def bootstrap_scores(flights: Sequence[FlightEvidence], sets: Sequence[str], draws: int, seed: int) -> Redrawn:
     """Redraw the mean score of every set.
 
     Parameters
@@ -36,25 +45,30 @@ def bootstrap_scores(flights: Sequence[FlightEvidence], sets: Sequence[str], dra
 
     Returns
     -------
-    (D, S) array of mean scores. In one draw all sets see the same flights and blocks, so differences are paired.
+    Mean scores. In one draw all sets see the same flights and blocks, so differences are paired. An aim's mean is
+    over the drawn flights that have it, and NaN where none has.
     """
     generator = np.random.Generator(np.random.PCG64(seed))
     count = len(flights)
     drawn = generator.integers(0, count, size=(draws, count))
     total = np.zeros((draws, len(sets)))
+    aims = {name: (np.zeros_like(total), np.zeros((draws, 1))) for name in AIMS}
     for index, flight in enumerate(flights):
         draw_of_slot = np.nonzero(drawn == index)[0]
-        columns = [flight.sets.index(name) for name in sets]
-        scores = _redrawn_flight(flight, np.array(columns), draw_of_slot.size, generator)
-        np.add.at(total, draw_of_slot, scores)
-    return total / count
+        columns = np.array([flight.sets.index(name) for name in sets])
+        for aim in flight.aims:
+            scores = _redrawn_aim(aim, columns, draw_of_slot.size, generator)
+            np.add.at(total, draw_of_slot, aim.weight * scores)
+            np.add.at(aims[aim.name][0], draw_of_slot, scores)
+            np.add.at(aims[aim.name][1], draw_of_slot, 1.0)
+    with np.errstate(invalid="ignore"):
+        means = {name: scores / number for name, (scores, number) in aims.items() if number.any()}
+    return Redrawn(total / count, means)
 
 
-def _redrawn_flight(
-    flight: FlightEvidence, columns: npt.NDArray[np.int64], slots: int, generator: np.random.Generator
-) -> Array:
-    """(slots, S) scores of a flight whose blocks are drawn anew for each slot."""
-    blocks, axes = flight.n.shape
+def _redrawn_aim(aim: AimEvidence, columns: npt.NDArray[np.int64], slots: int, generator: np.random.Generator) -> Array:
+    """(slots, S) scores of one aim of a flight whose blocks are drawn anew for each slot."""
+    blocks, axes = aim.n.shape
     picks = generator.integers(0, blocks, size=(slots, blocks))
     cells = (np.arange(slots)[:, None] * blocks + picks).ravel()
     weights = np.bincount(cells, minlength=slots * blocks).reshape(slots, blocks).astype(np.float64)
@@ -64,10 +78,15 @@ def _redrawn_flight(
     # Summed block by block, not by a matrix product: its order of summation could change with the number of cores.
     for block in range(blocks):
         weight = weights[:, block, None, None]
-        n += weight * flight.n[block]
-        nis += weight * flight.sum_nis[columns, block]
-        log_variance += weight * flight.sum_log_variance[columns, block]
-    return score_of_sums(n, nis, log_variance)
+        n += weight * aim.n[block]
+        nis += weight * aim.sum_nis[columns, block]
+        if aim.sum_log_variance.any():
+            log_variance += weight * aim.sum_log_variance[columns, block]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scores = profile_nll(nis / n, log_variance / n)
+    # A draw may hold none of the blocks in which a column has samples: then the column says what it says on the whole.
+    scores = np.where(n > 0.0, scores, aim.column_scores[columns])
+    return np.asarray((scores * aim.column_weights).sum(axis=-1))
 
 
 def expanded_interval(differences: Array, flights: int, confidence: float) -> Interval:

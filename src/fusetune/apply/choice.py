@@ -1,8 +1,11 @@
-"""The rule: the best set that nothing speaks against, if it is better than the present one beyond doubt."""
+"""The rule: a set that nothing speaks against, if it is better than the present one beyond doubt."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from fusetune.apply.evidence import FlightEvidence
+from fusetune.apply.leave_one_out import LeaveOneOut, leave_one_out
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
 
@@ -15,41 +18,74 @@ class Choice:
     ----------
     status : "change", "keep" or "no_evidence"
     chosen : name of the set to fly
-    best : the best eligible candidate, whether chosen or not; None where there is none
+    best : the eligible candidate with the lowest score, whether chosen or not; None where there is none
+    pick : the candidate that is chosen instead of the present set; None if that is kept
     exploratory : too few flights for a firm statement
+    leave_one_out : what choices from all flights but one were worth on that one; None with too few flights
     """
 
     status: str
     chosen: str
     best: RankedSet | None
+    pick: RankedSet | None
     exploratory: bool
+    leave_one_out: LeaveOneOut | None
 
 
-def choose(ranked: Sequence[RankedSet], present: str, flights: int, settings: DecisionSettings) -> Choice:
-    """Keep the present set unless the best candidate's interval lies wholly below 0.
+def choose(
+    ranked: Sequence[RankedSet],
+    present: str,
+    evidence: Sequence[FlightEvidence],
+    distances: Mapping[str, float],
+    settings: DecisionSettings,
+) -> Choice:
+    """Keep the present set unless the best candidate is better beyond doubt.
 
     Parameters
     ----------
     ranked : from `rank`
-    flights : number of scored flights
+    evidence : of the scored flights
+    distances : how far each set's parameters are from the present ones, from `parameter_distance`
 
     Notes
     -----
-    With `correct_for_candidates` its p-value must also survive Holm's correction: the best of many candidates
-    looks better than it is.
+    Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. It is
+    proved better where its interval lies wholly below 0 and the difference holds in spite of the number of
+    candidates (`DecisionSettings.multiplicity`). The proved set with the lowest score is chosen, or one that is proved,
+    within one standard error of it, hardly worse (`DecisionSettings.equivalence_percent`) and nearer to the present
+    parameters.
     """
-    exploratory = flights < settings.minimum_flights
-    candidates = [one for one in ranked if one.status == "candidate" and not one.equal_to_present]
-    best = min(candidates, key=lambda one: (one.score, one.name), default=None)
-    if flights == 0:
-        return Choice("no_evidence", present, None, exploratory)
-    if best is not None and is_better(best, settings):
-        return Choice("change", best.name, best, exploratory)
-    return Choice("keep", present, best, exploratory)
+    exploratory = len(evidence) < settings.minimum_flights
+    eligible = [one for one in ranked if one.is_eligible]
+    best = min(eligible, key=lambda one: (one.score, one.name), default=None)
+    if not evidence:
+        return Choice("no_evidence", present, None, None, exploratory, None)
+    names = [one.name for one in eligible if one.flights == len(evidence)]
+    validated = leave_one_out(evidence, names, present, settings.confidence)
+    proved = [one for one in eligible if is_proved(one, settings)]
+    if not proved:
+        return Choice("keep", present, best, None, exploratory, validated)
+    first = min(proved, key=lambda one: (one.score, one.name))
+    hardly = math.log1p(0.01 * settings.equivalence_percent)
+    near = [one for one in proved if one.score - first.score <= min(one.behind_best_error, hardly)]
+    pick = min([first, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
+    return Choice("change", pick.name, best, pick, exploratory, validated)
 
 
-def is_better(candidate: RankedSet, settings: DecisionSettings) -> bool:
-    """True where a candidate is better than the present set by the rule of the settings."""
-    if not candidate.upper < 0.0:
-        return False
-    return not settings.correct_for_candidates or candidate.p_holm <= 1.0 - settings.confidence
+def is_proved(candidate: RankedSet, settings: DecisionSettings) -> bool:
+    """Better than the present set beyond doubt, by itself and as one of many candidates."""
+    p_value = {"holm": candidate.p_holm, "sign_flips": candidate.p_family, "none": 0.0}[settings.multiplicity]
+    return candidate.upper < 0.0 and p_value <= 1.0 - settings.confidence
+
+
+def parameter_distance(values: Mapping[str, float], present: Mapping[str, float]) -> float:
+    """Root of the summed squared logarithms of the ratios of a set's values to the present ones.
+
+    A value that has no such ratio, as for switches and zeros, counts as 1 if it differs.
+    """
+    total = 0.0
+    for name, value in values.items():
+        now = present.get(name, math.nan)
+        if value != now:
+            total += math.log(value / now) ** 2 if value > 0.0 and now > 0.0 else 1.0
+    return math.sqrt(total)

@@ -11,10 +11,11 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from fusetune.apply.choice import Choice, choose
+from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, paper_entries, read_metrics
-from fusetune.apply.evidence import AnalyzedFlight, read_flights
-from fusetune.apply.paper_mode import paper_ranking
+from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
+from fusetune.apply.paper_disagreement import is_same_set, why
+from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
 from fusetune.apply.provenance import flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
@@ -61,14 +62,14 @@ def decide(
     """
     settings = settings or DecisionSettings()
     sets = list(dict.fromkeys((present, *sets)))
-    flights = read_flights(analyze_folders, settings.source, present)
+    flights = read_flights(analyze_folders, settings, present)
     newest = _newest(flights, newest_flight, flights_table)
     metrics = read_metrics([flight.folder for flight in flights])
     vetoed = {name: vetoes(name, present, flights, metrics) for name in sets if name != present}
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
-    scored = sum(flight.evidence is not None for flight in flights)
-    choice = choose(ranked, present, scored, settings)
-    values = criteria(sets, settings.source, flights, metrics)
+    evidence = [flight.evidence for flight in flights if flight.evidence is not None]
+    choice = choose(ranked, present, evidence, _distances(newest, present), settings)
+    values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present)
     text = paragraph(choice, ranked, flights, settings)
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
@@ -76,7 +77,9 @@ def decide(
     decision["provenance"] = provenance(configuration_files)
     decision["flights"] = flight_rows(flights_table, flights)
     decision["sets"] = _sets(sets, present, newest, descriptions or {}, flights)
-    decision["paper_mode"] = _paper_mode(sets, flights, metrics, values, choice)
+    decision["paper_mode"] = _paper_mode(
+        paper_entries(sets, flights, metrics, values), choice, ranked, flights, metrics, settings
+    )
 
     output = Path(output_folder)
     _write_ranking(output, ranked, values)
@@ -97,6 +100,12 @@ def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: 
         if flight.name == name:
             return flight
     raise UserError(flights_table, f"the newest flight {name!r} was not replayed", "Name one of the replayed flights")
+
+
+def _distances(newest: AnalyzedFlight | None, present: str) -> dict[str, float]:
+    sets = newest.summary["sets"] if newest is not None else {}
+    now = sets.get(present, {}).get("parameters", {})
+    return {name: parameter_distance(one["overrides"], now) for name, one in sets.items()}
 
 
 def _changes(choice: Choice, newest: AnalyzedFlight | None, present: str) -> tuple[ParameterChange, ...]:
@@ -124,8 +133,19 @@ def _decision(
         "flights_scored": sum(flight.evidence is not None for flight in flights),
         "newest_flight": newest.name if newest else None,
         "changes": [asdict(change) for change in changes],
-        "rule": asdict(settings),
+        "rule": asdict(settings) | {"main_source": settings.main_source},
+        "leave_one_out": asdict(choice.leave_one_out) if choice.leave_one_out else None,
+        "weights": _weights(flights),
         "ranking": [asdict(one) for one in ranked],
+    }
+
+
+def _weights(flights: Sequence[AnalyzedFlight]) -> dict[str, dict[str, float]]:
+    """Weight of every kind of prediction on every flight."""
+    return {
+        flight.name: {aim.name: aim.weight for aim in flight.evidence.aims}
+        for flight in flights
+        if flight.evidence is not None
     }
 
 
@@ -152,18 +172,20 @@ def _sets(
 
 
 def _paper_mode(
-    sets: Sequence[str],
+    entries: Sequence[PaperEntry],
+    choice: Choice,
+    ranked: Sequence[RankedSet],
     flights: Sequence[AnalyzedFlight],
     metrics: pa.Table,
-    values: dict[str, Criteria],
-    choice: Choice,
+    settings: DecisionSettings,
 ) -> dict[str, Any]:
-    order = paper_ranking(paper_entries(sets, flights, metrics, values))
+    order = paper_ranking(entries)
     first = order[0].name if order and not math.isnan(order[0].aggregate_rms) else None
     return {
         "rule": "lowest RMS of the GNSS position, height and velocity innovations together, inside the χ² bounds",
         "first": first,
-        "agrees": first == choice.chosen if first is not None else None,
+        "agrees": is_same_set(first, choice.chosen, ranked) if first is not None else None,
+        "why": why(first, order, choice.chosen, ranked, flights, metrics, settings) if first is not None else [],
         "ranking": [asdict(entry) for entry in order],
     }
 
@@ -171,7 +193,8 @@ def _paper_mode(
 def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, Criteria]) -> None:
     rows = []
     for position, one in enumerate(ranked, start=1):
-        row: dict[str, Any] = {"rank": position, **asdict(one), **values[one.name]}
+        row: dict[str, Any] = {"rank": position, **asdict(one), **_flat_aims(one), **values[one.name]}
+        del row["aims"]
         row["reasons"] = "; ".join(one.reasons)
         rows.append(row)
     table = pa.Table.from_pylist([_rounded(row, keep_nan=True) for row in rows])
@@ -181,21 +204,34 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
         pa.csv.write_csv(table, temporary)
 
 
+def _flat_aims(one: RankedSet) -> dict[str, float]:
+    return {
+        f"{aim}_{figure}": getattr(one.aims[aim], figure) if aim in one.aims else math.nan
+        for aim in AIMS
+        for figure in ("difference", "lower", "upper")
+    }
+
+
 def _write_per_flight(folder: Path, flights: Sequence[AnalyzedFlight]) -> None:
     rows: list[dict[str, Any]] = []
     for flight in flights:
         if flight.evidence is not None:
-            for name, score in zip(flight.evidence.sets, flight.evidence.scores, strict=True):
-                rows.append({"flight": flight.name, "set": name, "score": float(score)})
-    schema = pa.schema([("flight", pa.string()), ("set", pa.string()), ("score", pa.float64())])
+            parts = {aim: flight.evidence.aim(aim) for aim in AIMS}
+            for index, name in enumerate(flight.evidence.sets):
+                row = {"flight": flight.name, "set": name, "score": float(flight.evidence.scores[index])}
+                for aim, part in parts.items():
+                    row[f"{aim}_score"] = float(part.scores[index]) if part is not None else math.nan
+                rows.append(row)
+    figures = ["score", *(f"{aim}_score" for aim in AIMS)]
+    schema = pa.schema([("flight", pa.string()), ("set", pa.string()), *((name, pa.float64()) for name in figures)])
     with atomic_path(folder / "per_flight.parquet") as temporary:
         pq.write_table(pa.Table.from_pylist(rows, schema=schema), temporary)
 
 
 def _reason(choice: Choice) -> str:
-    if choice.status != "change" or choice.best is None:
+    if choice.pick is None:
         return ""
-    best = choice.best
+    best = choice.pick
     note = ", exploratory" if choice.exploratory else ""
     return (
         f"set {best.name}: prediction errors {best.improvement_percent:.1f} % smaller, "

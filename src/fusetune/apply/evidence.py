@@ -1,42 +1,81 @@
-"""The evidence of each flight: the sums over blocks that every parameter set reached on the same samples."""
+"""The evidence of each flight: block sums of the errors that every parameter set made on the same measurements.
+
+Two kinds of prediction are judged, the aims. *Aided*: one step ahead, all sensors in use. *Unaided*: seconds ahead,
+without GNSS. Each has columns (source, axis and, unaided, horizon), and each column a scale-profiled NLL.
+"""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.likelihood import profile_nll
+from fusetune.analyze.sources import AXES
+from fusetune.apply.settings import DecisionSettings
 from fusetune.parquet import read_table
 
 Array = npt.NDArray[np.float64]
 
+AIDED, UNAIDED = "aided", "unaided"
+AIMS = (AIDED, UNAIDED)
+
 
 @dataclass(frozen=True)
-class FlightEvidence:
-    """Block sums of the deciding source on one flight.
+class AimEvidence:
+    """Block sums of one kind of prediction on one flight.
 
     Attributes
     ----------
-    sets : (S,) names of the sets scored on this flight
-    n : (B, A) samples per block and axis, the same for all sets
-    sum_nis, sum_log_variance : (S, B, A) sums of ν²/S and ln S
+    name : one of `AIMS`
+    weight : of this aim in the flight's score
+    columns : (A,) what each column is, e.g. "gnss_vel x" or "gnss_vel x after 9 s"
+    column_weights : (A,) sum to 1
+    n : (B, A) samples per block and column, the same for all sets
+    sum_nis, sum_log_variance : (S, B, A) sums of ν²/S, winsorised alike for all sets, and ln S
     """
 
-    flight: str
-    sets: tuple[str, ...]
+    name: str
+    weight: float
+    columns: tuple[str, ...]
+    column_weights: Array
     n: Array
     sum_nis: Array
     sum_log_variance: Array
 
     @property
+    def column_scores(self) -> Array:
+        """(S, A) scale-profiled NLL of every column, nat."""
+        n = self.n.sum(axis=0)
+        return profile_nll(self.sum_nis.sum(axis=1) / n, self.sum_log_variance.sum(axis=1) / n)
+
+    @property
     def scores(self) -> Array:
-        """(S,) scale-profiled NLL of the flight, summed over the axes, nat."""
-        return score_of_sums(self.n.sum(axis=0), self.sum_nis.sum(axis=1), self.sum_log_variance.sum(axis=1))
+        """(S,) weighted mean over the columns."""
+        return np.asarray(self.column_scores @ self.column_weights)
+
+
+@dataclass(frozen=True)
+class FlightEvidence:
+    """What one flight says about the sets that were scored on it; the weights of its aims sum to 1."""
+
+    flight: str
+    sets: tuple[str, ...]
+    aims: tuple[AimEvidence, ...]
+
+    @property
+    def scores(self) -> Array:
+        """(S,) score of the flight: the logarithm of a typical prediction error, nat; lower is better."""
+        return np.asarray(sum(aim.weight * aim.scores for aim in self.aims))
+
+    def aim(self, name: str) -> AimEvidence | None:
+        """One of the aims, None where this flight has no evidence of it or gives it no weight."""
+        return next((aim for aim in self.aims if aim.name == name and aim.weight > 0.0), None)
 
 
 @dataclass(frozen=True)
@@ -50,50 +89,179 @@ class AnalyzedFlight:
     reason: str
 
 
-def score_of_sums(n: Array, sum_nis: Array, sum_log_variance: Array) -> Array:
-    """Scale-profiled NLL, summed over the last axis (the axes of the source), from its additive parts.
+@dataclass(frozen=True)
+class _Sums:
+    """Block sums of one aim before the sets of all aims are brought together; axes as in `AimEvidence`."""
 
-    One free scale per flight and axis; see `fusetune.analyze.likelihood.profile_nll`.
+    sets: tuple[str, ...]
+    columns: tuple[tuple[str, str], ...]
+    n: Array
+    sum_nis: Array
+    sum_log_variance: Array
+
+
+def read_flights(folders: Sequence[Path], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
+    """Read `results/analyze/<flight>` of all flights, ordered by name so that the order of arguments does not matter.
+
+    A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
     """
-    return profile_nll(sum_nis / n, sum_log_variance / n).sum(axis=-1)
+    folders = [Path(folder) for folder in folders]
+    shares = {folder: white_shares(read_table(folder / "metrics.parquet"), present) for folder in folders}
+    known: dict[str, list[float]] = {}
+    for one in shares.values():
+        for source, share in one.items():
+            known.setdefault(source, []).append(share)
+    usual = {source: float(np.mean(sorted(found))) for source, found in known.items()}
+    flights = (_read_flight(folder, settings, present, usual | shares[folder]) for folder in folders)
+    return sorted(flights, key=lambda one: one.name)
 
 
-def read_flight(folder: Path, source: str, present: str) -> AnalyzedFlight:
-    """Read the scores of one flight from `results/analyze/<flight>`."""
+def _read_flight(
+    folder: Path, settings: DecisionSettings, present: str, whiteness: Mapping[str, float]
+) -> AnalyzedFlight:
     summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
     name = summary["flight"]
     if summary["status"] != "scored":
         return AnalyzedFlight(name, folder, summary, None, summary["reason"])
-    table = read_table(folder / "scores.parquet")
-    table = table.filter(pc.equal(table["source"], source))
-    evidence = _evidence(name, table)
+    aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
+    unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
+    evidence = flight_evidence(name, aided, unaided, whiteness, settings)
     if evidence is None or present not in evidence.sets:
-        return AnalyzedFlight(name, folder, summary, None, f"the flight has no {source} samples to score")
+        sources = ", ".join(settings.sources)
+        return AnalyzedFlight(name, folder, summary, None, f"the flight has no samples of {sources} to score")
     return AnalyzedFlight(name, folder, summary, evidence, "")
 
 
-def read_flights(folders: Sequence[Path], source: str, present: str) -> list[AnalyzedFlight]:
-    """Read all flights, ordered by name so that the order of the arguments does not matter."""
-    return sorted((read_flight(Path(folder), source, present) for folder in folders), key=lambda one: one.name)
+def white_shares(metrics: pa.Table, present: str) -> dict[str, float]:
+    """How white the error of each source is on this flight, 0 … 1: the mean over its axes."""
+    rows = metrics.filter(pc.and_(pc.equal(metrics["metric"], "white_share"), pc.equal(metrics["set"], present)))
+    found: dict[str, list[float]] = {}
+    for source, axis, value in zip(*(rows[name].to_pylist() for name in ("source", "axis", "value")), strict=True):
+        if axis in AXES and np.isfinite(value):
+            found.setdefault(source, []).append(value)
+    return {source: float(np.mean(values)) for source, values in found.items()}
 
 
-def _evidence(flight: str, table: Any) -> FlightEvidence | None:
+def flight_evidence(
+    flight: str,
+    aided: _Sums | None,
+    unaided: _Sums | None,
+    whiteness: Mapping[str, float],
+    settings: DecisionSettings,
+) -> FlightEvidence | None:
+    """Weigh the columns and aims of a flight.
+
+    A source is a witness of the aided prediction only as far as its errors are white: a filter that follows a
+    wandering error predicts it well. Where no source is white enough and nothing was withheld, the aided predictions
+    are all there is, and count.
+    """
+    parts = {}
+    if unaided is not None:
+        parts[UNAIDED] = (unaided, _weights(unaided, settings.withheld_sources), settings.unaided_weight)
+    if aided is not None:
+        trust = {source: settings.trust(whiteness.get(source, 1.0)) for source in settings.sources}
+        trusted = {source: weight * trust[source] for source, weight in settings.sources.items()}
+        present = {source for source, _ in aided.columns}
+        full = sum(settings.sources[source] for source in present)
+        share = sum(trusted[source] for source in present) / full if full else 0.0
+        if share > 0.0 and settings.aided_weight > 0.0:
+            parts[AIDED] = (aided, _weights(aided, trusted), settings.aided_weight * share)
+        elif UNAIDED not in parts and full:
+            parts[AIDED] = (aided, _weights(aided, settings.sources), 1.0)
+    parts = {name: part for name, part in parts.items() if part[2] > 0.0 and part[1].any()}
+    if not parts:
+        return None
+    total = sum(weight for _, _, weight in parts.values())
+    sets = [name for name in next(iter(parts.values()))[0].sets if all(name in part[0].sets for part in parts.values())]
+    aims = tuple(_aim(name, *parts[name], sets, total) for name in AIMS if name in parts)
+    return FlightEvidence(flight, tuple(sets), aims)
+
+
+def _weights(sums: _Sums, weight_of: Mapping[str, float]) -> Array:
+    """Weights of the columns; a key of `weight_of`, a source or one axis of it, shares its weight among its columns."""
+    weights = np.zeros(len(sums.columns))
+    for key, weight in weight_of.items():
+        source, _, axis = key.partition(".")
+        matching = [one == source and (not axis or label.split()[1] == axis) for one, label in sums.columns]
+        weights += np.array(matching) * weight / max(sum(matching), 1)
+    total = weights.sum()
+    return np.asarray(weights / total if total > 0.0 else weights)
+
+
+def _aim(
+    name: str, sums: _Sums, column_weights: Array, weight: float, sets: Sequence[str], total: float
+) -> AimEvidence:
+    used = column_weights > 0.0
+    rows = [sums.sets.index(one) for one in sets]
+    return AimEvidence(
+        name=name,
+        weight=weight / total,
+        columns=tuple(label for (_, label), use in zip(sums.columns, used, strict=True) if use),
+        column_weights=column_weights[used],
+        n=sums.n[:, used],
+        sum_nis=sums.sum_nis[rows][:, :, used],
+        sum_log_variance=sums.sum_log_variance[rows][:, :, used],
+    )
+
+
+def _aided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
+    table = table.filter(pc.is_in(table["source"], value_set=pa.array(_weighted(weights))))
     if table.num_rows == 0:
         return None
-    names, set_index = np.unique(np.asarray(table["set"].to_pylist()), return_inverse=True)
-    blocks, block_index = np.unique(table["block"].to_numpy(), return_inverse=True)
-    axes, axis_index = np.unique(table["axis"].to_numpy(), return_inverse=True)
-    shape = (names.size, blocks.size, axes.size)
-    filled = {}
-    for column in ("n", "sum_nis", "sum_log_variance"):
-        filled[column] = np.zeros(shape)
-        filled[column][set_index, block_index, axis_index] = table[column].to_numpy()
+    columns = {
+        "n": table["n"].to_numpy(),
+        "sum_nis": table["sum_nis_winsorised"].to_numpy(),
+        "sum_log_variance": table["sum_log_variance"].to_numpy(),
+    }
+    axis = np.array(AXES)[table["axis"].to_numpy()]
+    source = np.asarray(table["source"].to_pylist())
+    return _block_sums(np.asarray(table["set"].to_pylist()), source, axis, table["block"].to_numpy(), columns)
+
+
+def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
+    """Sums over the gaps that begin in a block. Of the error alone: the variance that a filter claims after seconds
+    follows from its noise settings, and profiling would leave only how it varies between gaps."""
+    table = table.filter(pc.is_in(table["source"], value_set=pa.array(_weighted(weights))))
+    if table.num_rows == 0:
+        return None
+    error = table["error_winsorised"].to_numpy()
+    columns = {"n": np.ones(error.size), "sum_nis": np.square(error), "sum_log_variance": np.zeros(error.size)}
+    axis = np.array(AXES)[table["axis"].to_numpy()]
+    horizon = table["horizon_s"].to_pylist()
+    label = np.array([f"{name} after {seconds:g} s" for name, seconds in zip(axis, horizon, strict=True)])
+    source = np.asarray(table["source"].to_pylist())
+    return _block_sums(np.asarray(table["set"].to_pylist()), source, label, table["block"].to_numpy(), columns)
+
+
+def _weighted(weights: Mapping[str, float]) -> list[str]:
+    """Sources that have a weight, whole or in one axis."""
+    return sorted({key.partition(".")[0] for key, weight in weights.items() if weight > 0.0})
+
+
+def _block_sums(
+    sets: npt.NDArray[Any],
+    source: npt.NDArray[Any],
+    label: npt.NDArray[Any],
+    block: npt.NDArray[Any],
+    values: Mapping[str, npt.NDArray[Any]],
+) -> _Sums | None:
+    """Add up rows by set, block and column."""
+    names, set_index = np.unique(sets, return_inverse=True)
+    blocks, block_index = np.unique(block, return_inverse=True)
+    pairs = list(zip(source.tolist(), label.tolist(), strict=True))
+    columns = sorted(set(pairs))
+    position = {pair: index for index, pair in enumerate(columns)}
+    column_index = np.array([position[pair] for pair in pairs])
+    sums = {name: np.zeros((names.size, blocks.size, len(columns))) for name in values}
+    for name, value in values.items():
+        np.add.at(sums[name], (set_index, block_index, column_index), value)
     # A set with another number of samples did not share the source with the others; it has no paired score.
-    complete = filled["n"].sum(axis=(1, 2)) == filled["n"].sum(axis=(1, 2)).max()
-    return FlightEvidence(
-        flight=flight,
+    count = sums["n"].sum(axis=(1, 2))
+    complete = count == count.max()
+    return _Sums(
         sets=tuple(str(name) for name in names[complete]),
-        n=filled["n"][complete][0],
-        sum_nis=filled["sum_nis"][complete],
-        sum_log_variance=filled["sum_log_variance"][complete],
+        columns=tuple((one, f"{one} {text}") for one, text in columns),
+        n=sums["n"][complete][0],
+        sum_nis=sums["sum_nis"][complete],
+        sum_log_variance=sums["sum_log_variance"][complete],
     )

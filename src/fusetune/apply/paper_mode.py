@@ -21,7 +21,9 @@ PAPER_VARIABLES = {
 }
 """Variable of the paper's table 12 → the source and axis that show it, the first that a flight has."""
 
-_AGGREGATED = ("pos_x", "pos_y", "pos_z", "vel_x", "vel_y", "vel_z")
+POSITION_VARIABLES = ("pos_x", "pos_y", "pos_z")
+VELOCITY_VARIABLES = ("vel_x", "vel_y", "vel_z")
+AGGREGATED_VARIABLES = (*POSITION_VARIABLES, *VELOCITY_VARIABLES)
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,12 @@ def aggregate_rms(rms: Mapping[str, float]) -> float:
     The paper's own aggregate row follows from its other rows by no rule that it states; where a table brings that
     row, take it as it is.
     """
-    return math.sqrt(sum(rms.get(name, math.nan) ** 2 for name in _AGGREGATED))
+    return root_sum(rms, AGGREGATED_VARIABLES)
+
+
+def root_sum(rms: Mapping[str, float], names: Sequence[str]) -> float:
+    """Root of the summed squares of some of the variables; NaN where one is missing."""
+    return math.sqrt(sum(rms.get(name, math.nan) ** 2 for name in names))
 
 
 def paper_ranking(entries: Sequence[PaperEntry]) -> list[PaperEntry]:

@@ -7,9 +7,9 @@ from typing import Any
 import pandas as pd
 
 from fusetune.analyze.sources import AID_SOURCES
+from fusetune.report.innovation_figures import rms_table
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
 from fusetune.report.results import Results, as_flown, figure_values
-from fusetune.report.summary_figures import rms_table
 
 _TRUE_ERRORS = (
     ("truth_velocity", "all", "rmse", "velocity m/s"),
@@ -17,6 +17,8 @@ _TRUE_ERRORS = (
     ("truth_position_mean_removed", "all", "rmse", "position, mean removed m"),
     ("truth_attitude_deg", "tilt", "rmse", "tilt °"),
     ("truth_attitude_deg", "heading", "rmse", "heading °"),
+    ("truth_withheld_position", "horizontal", "rmse", "drift of position without GNSS m"),
+    ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity without GNSS m/s"),
     ("truth_velocity", "all", "nees", "velocity NEES / 3"),
 )
 _AS_FLOWN_GROUPS = (
@@ -79,8 +81,9 @@ def innovations_section(results: Results, figures: Path) -> str:
         "innovations.svg": "What each source surprised the filter by. North, east and down are x, y and z.",
         "normalised_innovations.svg": "In units of the uncertainty that the filter claimed: narrower boxes mean that "
         "it claims more noise than there is. Dashed: where the whiskers of a consistent filter end.",
-        "consistency.svg": "Band: χ² bounds with the effective number of samples; dotted: the paper's, which take "
-        "samples as independent.",
+        "consistency.svg": "Dotted: the paper's χ² bounds, which take samples as independent; band: those with the "
+        "effective number of samples (the median flight's). A filled dot lies inside its own flight's bounds of the "
+        "second kind. Left of the bounds the filter claims more noise than there is, right of them less.",
         "breaks.svg": "Share of samples beyond 3 σ, 5 σ and the gate, on the scored part of all flights.",
     }
     parts += [figure(figures / name, caption) for name, caption in captions.items()]

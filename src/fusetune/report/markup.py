@@ -79,7 +79,17 @@ def section(title: str, *parts: str) -> str:
 def paragraph(text: str, kind: str = "") -> str:
     """A paragraph of plain text."""
     attribute = f' class="{escape(kind)}"' if kind else ""
-    return f"<p{attribute}>{escape(text)}</p>"
+    return f"<p{attribute}>{_prose(text)}</p>"
+
+
+def _prose(text: str) -> str:
+    """Escaped, no line break between a figure and its percent sign."""
+    return escape(text).replace(" %", "&nbsp;%")
+
+
+def bullets(sentences: Sequence[str]) -> str:
+    """A list of plain sentences."""
+    return "<ul>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
 
 
 def details(summary: str, *parts: str, kind: str = "") -> str:

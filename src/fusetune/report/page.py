@@ -4,7 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fusetune.files import atomic_path
-from fusetune.report.decision_sections import decision_section, evidence_section, paper_section, sets_section
+from fusetune.report.decision_sections import decision_section, sets_section
+from fusetune.report.evidence_sections import (
+    evidence_section,
+    holds_section,
+    paper_section,
+    weights_section,
+    withheld_section,
+)
 from fusetune.report.flight_sections import (
     as_flown_section,
     flight_figure_paths,
@@ -47,13 +54,16 @@ def build_report(
     sections = (
         decision_section(results),
         evidence_section(results, figures),
+        withheld_section(results, figures),
+        holds_section(results),
+        weights_section(results),
+        paper_section(results),
         sets_section(results),
         flights_section(results, Path(flights_table)),
         trust_section(analyze_folders),
         innovations_section(results, figures),
         truth_section(results),
         as_flown_section(results),
-        paper_section(results),
         single_flights_section(results, pictures),
         provenance_section(results),
     )

@@ -1,7 +1,7 @@
 """What the report reads: the decision, and the figures and samples of all flights."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import pandas as pd
 
 from fusetune.analyze.onboard import ONBOARD
 from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.apply.evidence import AIMS
 from fusetune.parquet import read_table
 
 MOST_SETS_SHOWN = 14
@@ -43,6 +44,20 @@ class Results:
     def flights(self) -> tuple[str, ...]:
         """Scored flights by name."""
         return tuple(name for name, summary in self.scoring.items() if summary["status"] == "scored")
+
+    def status(self, name: str) -> str:
+        """Part of a set in the decision: "present", "candidate", "vetoed" or "not_scored"."""
+        return str(self.ranking.loc[self.ranking["name"] == name, "status"].iloc[0])
+
+    def is_ruled_out(self, name: str) -> bool:
+        """Whether a set cannot be chosen: vetoed, not scored, or worse than the present one in a kind of prediction."""
+        row = self.ranking.loc[self.ranking["name"] == name].to_dict("records")[0]
+        return name != self.present and (row["status"] != "candidate" or bool(worse_aims(row)))
+
+
+def worse_aims(row: Mapping[Hashable, Any]) -> list[str]:
+    """Kinds of prediction in which a set is worse than the present one beyond doubt, from its row of the ranking."""
+    return [aim for aim in AIMS if row.get(f"{aim}_lower", 0.0) > 0.0]
 
 
 def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results:

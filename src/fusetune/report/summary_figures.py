@@ -1,35 +1,21 @@
-"""Figures over all flights: differences with intervals, flights by sets, innovations, consistency, breaks."""
+"""All figures that compare the sets over all flights, and the files they are kept in."""
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fusetune.analyze.break_rate import clopper_pearson
-from fusetune.analyze.sources import AID_SOURCES
-from fusetune.apply.paper_mode import PAPER_VARIABLES
-from fusetune.report.figures import (
-    CANDIDATE_COLOUR,
-    CHOSEN_COLOUR,
-    PRESENT_COLOUR,
-    VETOED_COLOUR,
-    empty_figure,
-    figure_style,
-    label_sets,
-    new_figure,
-    panel_grid,
-    save_svg,
-)
-from fusetune.report.results import PooledSamples, Results, figure_values, pooled_samples, read_results
+from fusetune.report.difference_figures import differences, flights_by_sets, pareto
+from fusetune.report.figures import empty_figure, figure_style, save_svg
+from fusetune.report.innovation_figures import boxes, breaks, consistency, rms_by_variable
+from fusetune.report.results import pooled_samples, read_results
+from fusetune.report.unaided_figures import drift_figure
 
 SUMMARY_FIGURES = (
     "differences.svg",
     "flights_by_sets.svg",
+    "pareto.svg",
+    "drift.svg",
     "rms.svg",
     "innovations.svg",
     "normalised_innovations.svg",
@@ -37,22 +23,6 @@ SUMMARY_FIGURES = (
     "breaks.svg",
 )
 """Files that `plot_summary` writes."""
-
-_CONSISTENCY_GROUPS = (
-    ("gnss_vel", "all"),
-    ("gnss_pos", "horizontal"),
-    ("gnss_hgt", "vertical"),
-    ("baro_hgt", "vertical"),
-    ("mag", "all"),
-    ("ev_pos", "horizontal"),
-    ("ev_vel", "all"),
-    ("ev_hgt", "vertical"),
-    ("rng_hgt", "vertical"),
-    ("optical_flow", "all"),
-)
-_BREAK_METRICS = {"break_rate_3sd": "3 σ", "break_rate_5sd": "5 σ", "break_rate_gate": "gate"}
-_WHISKERS = (5.0, 25.0, 50.0, 75.0, 95.0)
-_ANNOTATED_CELLS = 240
 
 
 def plot_summary(analyze_folders: Sequence[Path], apply_folder: Path, figure_folder: Path) -> None:
@@ -68,6 +38,8 @@ def plot_summary(analyze_folders: Sequence[Path], apply_folder: Path, figure_fol
     drawings: dict[str, Callable[[], Figure]] = {
         "differences.svg": lambda: differences(results),
         "flights_by_sets.svg": lambda: flights_by_sets(results),
+        "pareto.svg": lambda: pareto(results),
+        "drift.svg": lambda: drift_figure(results),
         "rms.svg": lambda: rms_by_variable(results),
         "innovations.svg": lambda: boxes(results, pooled, normalised=False),
         "normalised_innovations.svg": lambda: boxes(results, pooled, normalised=True),
@@ -78,261 +50,3 @@ def plot_summary(analyze_folders: Sequence[Path], apply_folder: Path, figure_fol
         for name in SUMMARY_FIGURES:
             figure = drawings[name]() if results.flights else empty_figure("No flight could be scored.")
             save_svg(figure, Path(figure_folder) / name)
-
-
-def percent_change(difference: npt.ArrayLike, axes: int) -> npt.NDArray[np.float64]:
-    """Difference of the profiled score as a change of the prediction error, percent; below 0 is better."""
-    return 100.0 * np.expm1(np.asarray(difference, dtype=np.float64) / axes)
-
-
-def _score_axes(results: Results) -> int:
-    return AID_SOURCES[results.decision["rule"]["source"]].axes
-
-
-def _score_label(results: Results) -> str:
-    return AID_SOURCES[results.decision["rule"]["source"]].label
-
-
-def differences(results: Results) -> Figure:
-    """Forest plot: every set's prediction error against the present set's, with its interval."""
-    rows = results.ranking[results.ranking["score"].notna()]
-    others = rows[rows["name"] != results.present]
-    if others.empty:
-        return empty_figure("Only the present set was scored: there is nothing to compare.")
-    names = list(others["name"])
-    figure = new_figure(7.2, 1.1 + 0.3 * len(names))
-    axes = figure.add_subplot()
-    count = _score_axes(results)
-    centre, low, high = (percent_change(others[column], count) for column in ("difference", "lower", "upper"))
-    for row, (name, status) in enumerate(zip(names, others["status"], strict=True)):
-        chosen = name == results.decision["chosen"]
-        colour = VETOED_COLOUR if status == "vetoed" else CHOSEN_COLOUR if chosen else CANDIDATE_COLOUR
-        axes.plot([low[row], high[row]], [row, row], color=colour, linewidth=2.0, solid_capstyle="butt")
-        axes.plot(centre[row], row, "o", color=colour, markersize=5, fillstyle="none" if status == "vetoed" else "full")
-    axes.axvline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
-    label_sets(
-        axes, [f"{n} (not eligible)" if s == "vetoed" else n for n, s in zip(names, others["status"], strict=True)]
-    )
-    _limit_forest(axes, centre, low, high, (others["status"] == "candidate").to_numpy())
-    confidence = results.decision["rule"]["confidence"]
-    axes.set_xlabel(
-        f"change of the {_score_label(results)} prediction error against the present set [%]; left is better"
-    )
-    axes.set_title(f"Every set against the present one, mean over flights with {confidence:.0%} interval")
-    return figure
-
-
-def _limit_forest(axes: Axes, centre: np.ndarray, low: np.ndarray, high: np.ndarray, eligible: np.ndarray) -> None:
-    """Intervals of sets that are not eligible may leave the plot: one hopeless set must not squeeze all others."""
-    left = min(float(centre.min()), float(np.min(low[eligible], initial=0.0)), -1.0)
-    right = max(float(centre.max()), float(np.max(high[eligible], initial=0.0)), 1.0)
-    margin = 0.08 * (right - left)
-    axes.set_xlim(left - margin, right + margin)
-
-
-def flights_by_sets(results: Results) -> Figure:
-    """Heat map: on each flight, how much larger or smaller the prediction error is than the present set's."""
-    scores = results.per_flight.pivot(index="flight", columns="set", values="score")
-    names = [name for name in results.shown if name in scores.columns and name != results.present]
-    if not names:
-        return empty_figure("Only the present set was scored: there is nothing to compare.")
-    change = percent_change(scores[names].to_numpy() - scores[[results.present]].to_numpy(), _score_axes(results))
-    flights = [_short(str(flight)) for flight in scores.index]
-    figure = new_figure(2.6 + 0.62 * len(names), 1.5 + 0.26 * len(flights))
-    axes = figure.add_subplot()
-    limit = max(float(np.nanquantile(np.abs(change), 0.9)), 1.0)
-    image = axes.imshow(change, cmap="PuOr_r", vmin=-limit, vmax=limit, aspect="auto")
-    axes.set_xticks(range(len(names)), names, rotation=35, ha="right", rotation_mode="anchor")
-    axes.set_yticks(range(len(flights)), flights)
-    axes.grid(visible=False)
-    if change.size <= _ANNOTATED_CELLS:
-        for (row, column), value in np.ndenumerate(change):
-            colour = "white" if abs(value) > 0.7 * limit else "black"
-            axes.text(column, row, _percent_text(value), ha="center", va="center", fontsize=7, color=colour)
-    figure.colorbar(image, ax=axes, label="change of the prediction error [%]", shrink=0.9)
-    axes.set_title("Per flight against the present set; below 0 is better")
-    return figure
-
-
-def _percent_text(value: float) -> str:
-    if math.isnan(value):
-        return "–"
-    if value == 0.0:
-        return "="
-    return f"{value:+.0f}" if abs(value) >= 9.5 else f"{value:+.1f}"
-
-
-def _short(name: str, longest: int = 34) -> str:
-    return name if len(name) <= longest else f"{name[: longest - 1]}…"
-
-
-def rms_by_variable(results: Results) -> Figure:
-    """Dot plot of the paper's table 12: RMS innovation of each variable relative to the present set's."""
-    table = rms_table(results)
-    base = table[results.present]
-    shown = [variable for variable in table.index if np.isfinite(base[variable]) and base[variable] > 0.0]
-    if not shown:
-        return empty_figure("No GNSS, height or magnetometer innovations were scored.")
-    figure = new_figure(7.2, 0.9 + 0.36 * len(shown) + 0.14 * (len(results.shown) // 4))
-    axes = figure.add_subplot()
-    markers = "osD^vP*Xd<>hp"
-    others = [name for name in table.columns if name != results.present]
-    offsets = np.linspace(-0.25, 0.25, max(len(others), 1))
-    for i, name in enumerate(others):
-        ratio = 100.0 * (table.loc[shown, name] / base[shown] - 1.0)
-        rows = np.arange(len(shown)) + offsets[i]
-        axes.plot(ratio, rows, markers[i % len(markers)], markersize=4, label=name, alpha=0.9)
-    axes.axvline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
-    label_sets(axes, shown)
-    axes.set_xscale("symlog", linthresh=20.0)
-    axes.xaxis.set_major_formatter("{x:+.0f}")
-    axes.minorticks_off()
-    axes.set_xlabel("RMS innovation against the present set [%]")
-    axes.set_title("RMS of the innovations, mean over flights")
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return figure
-
-
-def rms_table(results: Results) -> pd.DataFrame:
-    """RMS innovation by variable (rows, names of the paper's table 12) and set (columns), mean over flights."""
-    columns = {}
-    for name in results.shown:
-        column = {}
-        for variable, places in PAPER_VARIABLES.items():
-            values = [figure_values(results, *place, "rms_innovation") for place in places]
-            found = [rows.loc[rows["set"] == name, "value"] for rows in values]
-            known = next((rows for rows in found if len(rows)), None)
-            column[variable] = math.nan if known is None else float(known.mean())
-        columns[name] = column
-    return pd.DataFrame(columns, index=list(PAPER_VARIABLES))
-
-
-def boxes(results: Results, pooled: Sequence[PooledSamples], *, normalised: bool) -> Figure:
-    """Box plots of the innovations, or of ν/√S, per set, all flights together."""
-    if not pooled:
-        return empty_figure("No innovations were scored.")
-    what = "Innovations divided by their standard deviation" if normalised else "Innovations"
-    title = f"{what}, all scored flights: box 25–75 %, whiskers 5–95 %"
-    figure, panels = panel_grid(len(pooled), results.shown, 0.17, title)
-    for axes, samples in zip(panels, pooled, strict=True):
-        _boxes(axes, samples, results, normalised)
-    return figure
-
-
-def _boxes(axes: Axes, samples: PooledSamples, results: Results, normalised: bool) -> None:
-    values = samples.normalised if normalised else samples.innovation
-    vetoed = set(results.ranking.loc[results.ranking["status"] == "vetoed", "name"])
-    reach = 0.0
-    for row, name in enumerate(results.shown):
-        if name not in values:
-            continue
-        low, q1, median, q3, high = np.percentile(values[name], _WHISKERS)
-        # A set that is not eligible may leave the plot; it must not squeeze the others.
-        reach = max(reach, 0.0 if name in vetoed else -low, 0.0 if name in vetoed else high, q3, -q1)
-        colour = PRESENT_COLOUR if name == results.present else _set_colour(results, name)
-        axes.plot([low, high], [row, row], color=colour, linewidth=1.0)
-        axes.barh(row, q3 - q1, left=q1, height=0.6, color=colour, alpha=0.45, edgecolor=colour, linewidth=0.8)
-        axes.plot([median, median], [row - 0.3, row + 0.3], color=colour, linewidth=1.4)
-    axes.axvline(0.0, color="#888888", linewidth=0.6)
-    if normalised:
-        for limit in (-1.64, 1.64):
-            axes.axvline(limit, color="#009E73", linewidth=0.8, linestyle="--")
-        reach = max(reach, 1.64)
-        axes.set_xlabel("ν / √S [–]")
-    else:
-        axes.set_xlabel(f"innovation [{AID_SOURCES[samples.source].unit}]")
-    axes.set_xlim(-1.15 * reach, 1.15 * reach)
-    axes.set_title(samples.label)
-
-
-def _set_colour(results: Results, name: str) -> str:
-    status = dict(zip(results.ranking["name"], results.ranking["status"], strict=True)).get(name)
-    if name == results.decision["chosen"]:
-        return CHOSEN_COLOUR
-    return VETOED_COLOUR if status == "vetoed" else CANDIDATE_COLOUR
-
-
-def consistency(results: Results) -> Figure:
-    """Mean NIS per flight and set, divided by its expectation, with the χ² bounds of both kinds."""
-    groups = []
-    for source, axis in _CONSISTENCY_GROUPS:
-        rows = figure_values(results, source, axis, "mean_nis_effective")
-        if len(rows):
-            groups.append((source, axis, rows))
-    if not groups:
-        return empty_figure("No aid source has enough samples for a consistency check.")
-    title = "Mean NIS / expectation, a dot per flight: left of the band too cautious, right of it too sure"
-    figure, panels = panel_grid(len(groups), results.shown, 0.17, title)
-    for axes, (source, axis, rows) in zip(panels, groups, strict=True):
-        _consistency_panel(axes, results, source, axis, rows)
-    return figure
-
-
-def _consistency_panel(axes: Axes, results: Results, source: str, axis: str, rows: pd.DataFrame) -> None:
-    dimension = dict(AID_SOURCES[source].groups)[axis]
-    expected = float(len(dimension))
-    axes.axvspan(
-        rows["lower"].median() / expected, rows["upper"].median() / expected, color="#009E73", alpha=0.18, lw=0
-    )
-    paper = figure_values(results, source, axis, "mean_nis")
-    for column in ("lower", "upper"):
-        axes.axvline(paper[column].median() / expected, color="#009E73", linewidth=0.9, linestyle=":")
-    for row, name in enumerate(results.shown):
-        values = rows.loc[rows["set"] == name, "value"] / expected
-        colour = PRESENT_COLOUR if name == results.present else _set_colour(results, name)
-        axes.plot(values, np.full(len(values), row), "o", color=colour, markersize=3.5, alpha=0.7)
-    axes.set_xscale("log")
-    axes.minorticks_off()
-    axes.axvline(1.0, color="#009E73", linewidth=1.0)
-    axes.set_title(AID_SOURCES[source].label)
-    axes.set_xlabel("mean NIS / dim [–]")
-
-
-def breaks(results: Results) -> Figure:
-    """Fusion break rates at 3 σ, 5 σ and the gate per source and set, all flights together, with intervals."""
-    sources = [name for name, _ in _CONSISTENCY_GROUPS if len(figure_values(results, name, "x", "break_rate_gate"))]
-    if not sources:
-        return empty_figure("No fusion breaks could be counted.")
-    confidence = results.decision["rule"]["confidence"]
-    title = f"Fusion break rate of any axis, {confidence:.0%} Clopper–Pearson interval"
-    figure, panels = panel_grid(len(sources), results.shown, 0.2, title)
-    for axes, source in zip(panels, sources, strict=True):
-        _break_panel(axes, results, source)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper right", ncols=3, borderaxespad=0.1)
-    return figure
-
-
-def _break_panel(axes: Axes, results: Results, source: str) -> None:
-    confidence = results.decision["rule"]["confidence"]
-    styles = {
-        "break_rate_3sd": ("#56B4E9", -0.22),
-        "break_rate_5sd": ("#E69F00", 0.0),
-        "break_rate_gate": ("#D55E00", 0.22),
-    }
-    for metric, label in _BREAK_METRICS.items():
-        colour, offset = styles[metric]
-        pooled = _pooled_breaks(results, source, metric)
-        for row, name in enumerate(results.shown):
-            if name not in pooled:
-                continue
-            bounds = clopper_pearson(*pooled[name], confidence)
-            low, high = 100.0 * float(bounds.lower), 100.0 * float(bounds.upper)
-            axes.plot([low, high], [row + offset] * 2, color=colour, linewidth=1.6)
-            axes.plot(100.0 * float(bounds.value), row + offset, "o", color=colour, markersize=3, label="_")
-        axes.plot([], [], "o-", color=colour, markersize=3, label=label)
-    axes.set_xscale("symlog", linthresh=1.0)
-    axes.set_xlim(0.0, 110.0)
-    axes.set_xticks([0, 1, 10, 100], ["0", "1", "10", "100"])
-    axes.minorticks_off()
-    axes.set_title(AID_SOURCES[source].label)
-    axes.set_xlabel("samples beyond the limit [%]")
-
-
-def _pooled_breaks(results: Results, source: str, metric: str) -> dict[str, tuple[int, int]]:
-    """Breaks and samples by set over all axes and flights."""
-    axes = ("x", "y", "z")[: AID_SOURCES[source].axes]
-    rows = pd.concat([figure_values(results, source, axis, metric) for axis in axes])
-    counts = (rows["value"] * rows["n"]).groupby(rows["set"], observed=True).sum()
-    samples = rows["n"].groupby(rows["set"], observed=True).sum()
-    return {str(name): (round(counts[name]), round(samples[name])) for name in samples.index}

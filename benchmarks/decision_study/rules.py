@@ -1,0 +1,78 @@
+"""The rules that are compared: each chooses one set of a study from some flights, without the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fusetune.apply.choice import choose, parameter_distance
+from fusetune.apply.ranking import RankedSet, rank
+from fusetune.apply.settings import DecisionSettings
+
+from .world import PAPER_AGGREGATE, World, scores
+
+Rule = Callable[[World, Sequence[int], Sequence[int]], int]
+"""World, flights, sets of the study (the present one first) → the chosen one of these sets."""
+
+OURS, SCORE_ONLY = "fusetune", "fusetune, lowest score"
+
+DEFAULTS = {
+    "EKF2_ACC_NOISE": 0.35,
+    "EKF2_GYR_NOISE": 0.015,
+    "EKF2_ACC_B_NOISE": 0.003,
+    "EKF2_GYR_B_NOISE": 0.001,
+    "EKF2_GPS_V_NOISE": 0.3,
+    "EKF2_GPS_P_NOISE": 0.5,
+    "EKF2_BARO_NOISE": 3.5,
+    "EKF2_MAG_NOISE": 0.05,
+}
+
+
+def rules(settings: DecisionSettings) -> dict[str, Rule]:
+    """All rules by name."""
+    plain = (
+        "minimum mean NIS",
+        "paper mode",
+        "J_NIS",
+        "C_NIS",
+        "RMS, GNSS velocity",
+        "NLL, all sources",
+        "NLL, GNSS velocity",
+        "one-step predictions alone",
+        "withheld GNSS alone",
+    )
+    return {
+        **{name: _lowest(name) for name in plain},
+        "paper's design, a flight per set": _flight_per_set,
+        SCORE_ONLY: lambda world, flights, sets: int(
+            sets[np.argmin(scores(world.flights, world.sets)[np.ix_(flights, sets)].mean(axis=0))]
+        ),
+        OURS: lambda world, flights, sets: decide(world, flights, sets, settings)[0],
+    }
+
+
+def _lowest(name: str) -> Rule:
+    return lambda world, flights, sets: int(sets[np.argmin(world.figures[name][np.ix_(flights, sets)].mean(axis=0))])
+
+
+def _flight_per_set(world: World, flights: Sequence[int], sets: Sequence[int]) -> int:
+    """Each set is judged on another flight, as in the paper's experiment."""
+    aggregate = world.figures[PAPER_AGGREGATE]
+    own = [aggregate[flights[place % len(flights)], index] for place, index in enumerate(sets)]
+    return int(sets[int(np.argmin(own))])
+
+
+def decide(
+    world: World, flights: Sequence[int], sets: Sequence[int], settings: DecisionSettings
+) -> tuple[int, list[RankedSet]]:
+    """The product's own decision on some flights: the chosen set, and the ranking."""
+    names = [world.sets[index] for index in sets]
+    # A flight that was drawn twice counts as two.
+    chosen = [replace(world.flights[index], name=f"{number}") for number, index in enumerate(flights)]
+    chosen = [replace(one, evidence=replace(one.evidence, flight=one.name)) for one in chosen]
+    ranked = rank(names, names[0], chosen, world.vetoed, settings)
+    distances = {name: parameter_distance(world.overrides[name], DEFAULTS) for name in names}
+    choice = choose(ranked, names[0], [one.evidence for one in chosen], distances, settings)
+    return world.sets.index(choice.chosen), ranked

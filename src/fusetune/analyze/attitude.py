@@ -1,0 +1,76 @@
+"""Small tools for arrays of unit quaternions (w, x, y, z), body → NED."""
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def interpolate(time: npt.NDArray[np.int64], values: Array, at: npt.NDArray[np.int64]) -> Array:
+    """Linear interpolation of (N, D) values at times (M,), µs → (M, D)."""
+    return np.column_stack([np.interp(at, time, column) for column in values.T])
+
+
+def interpolate_quaternion(time: npt.NDArray[np.int64], quaternion: Array, at: npt.NDArray[np.int64]) -> Array:
+    """Normalised linear interpolation of unit quaternions (N, 4), fit for the small steps of a log → (M, 4)."""
+    flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0, -1.0, 1.0))
+    continuous = quaternion * np.r_[1.0, flips][:, None]
+    result = interpolate(time, continuous, at)
+    return result / np.linalg.norm(result, axis=1, keepdims=True)
+
+
+def heading(q: Array) -> Array:
+    """Heading of (N, 4) quaternions, rad."""
+    w, x, y, z = q.T
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def down_in_body(q: Array) -> Array:
+    """The down axis of NED seen from the body, (N, 3)."""
+    w, x, y, z = q.T
+    return np.column_stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def wrap(angle: Array) -> Array:
+    """Angles in [−π, π)."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def rotation_matrices(q: Array) -> Array:
+    """(N, 3, 3) matrices that turn body into NED vectors."""
+    w, x, y, z = q.T
+    return np.moveaxis(
+        np.array(
+            [
+                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+                [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+            ]
+        ),
+        -1,
+        0,
+    )
+
+
+def product(a: Array, b: Array) -> Array:
+    """Hamilton product of (N, 4) quaternions: the rotation b, then a."""
+    aw, ax, ay, az = a.T
+    bw, bx, by, bz = b.T
+    return np.column_stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ]
+    )
+
+
+def error_in_ned(quaternion: Array, true_quaternion: Array) -> Array:
+    """Rotation vectors (N, 3), rad, in NED that turn the true attitude into the estimated one."""
+    error = product(quaternion, true_quaternion * np.array([1.0, -1.0, -1.0, -1.0]))
+    error = np.where(error[:, :1] < 0.0, -error, error)
+    sine = np.linalg.norm(error[:, 1:], axis=1)
+    angle = 2.0 * np.arctan2(sine, error[:, 0])
+    scale = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-12)
+    return error[:, 1:] * scale[:, None]

@@ -1,0 +1,153 @@
+"""Tables of the ranking: figures of each set, signs per flight, reasons against sets, all other criteria."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+from fusetune.analyze.sources import AID_SOURCES
+from fusetune.report.comparison import AIM_WORDS, flight_changes, percent_change, sign_counts, told_aims
+from fusetune.report.markup import Cell, number, paragraph, signed, table
+from fusetune.report.results import Results, worse_aims
+
+_MOST_REASONS = 4
+_OUT = ("vetoed", "not_scored")
+_STATUS_WORDS = {"present": "flies now", "candidate": "eligible", "vetoed": "not eligible", "not_scored": "not scored"}
+
+
+def set_name(name: str, results: Results) -> Cell:
+    """A set's name, marked if it is the one to fly."""
+    return Cell(name, "short best" if name == results.decision["chosen"] else "short")
+
+
+def ranking_table(results: Results) -> str:
+    """Score, differences and intervals, probabilities."""
+    aims = told_aims(results)
+    corrected = "p_holm" if results.decision["rule"]["multiplicity"] == "holm" else "p_family"
+    if corrected not in results.ranking:
+        corrected = "p_holm"
+    titles = {"aided": "aided %", "unaided": "unaided %"}
+    head = ("set", "", "change %", "interval %", *(titles[aim] for aim in aims), "p", "p, all sets", "P(best)", "score")
+    rows = []
+    for one in results.ranking.to_dict("records"):
+        is_present = one["name"] == results.present
+        rows.append(
+            (
+                set_name(one["name"], results),
+                _status(one),
+                signed(None if is_present else _percent(one["difference"])),
+                Cell("–" if is_present else interval_text(one["lower"], one["upper"]), "number"),
+                *(signed(None if is_present else _percent(one[f"{aim}_difference"])) for aim in aims),
+                number(None if is_present else one["p_value"], 2),
+                number(None if is_present else one[corrected], 2),
+                Cell(f"{100.0 * one['p_best']:.0f} %", "number"),
+                number(one["score"], 4),
+            )
+        )
+    note = (
+        "change: of the prediction error against the present set, by the score that decides and in each way of "
+        "predicting. p: probability of such a difference by chance, alone and with all sets in the running. P(best): "
+        "share of redrawn studies in which no eligible set does better. score: scale-profiled NLL, lower is better."
+    )
+    return table(head, rows, "Ranking, best first") + paragraph(note, "note")
+
+
+def interval_text(lower: float, upper: float) -> str:
+    """Ends of an interval of score differences, in percent."""
+    return f"{signed(_percent(lower)).text} … {signed(_percent(upper)).text}"
+
+
+def _status(one: Mapping[Hashable, Any]) -> Cell:
+    words = _STATUS_WORDS[one["status"]]
+    if one["status"] == "candidate" and worse_aims(one):
+        words = _STATUS_WORDS["vetoed"]
+    equal = " (same results as now)" if one["equal_to_present"] else ""
+    return Cell(words + equal, "short bad" if words.startswith("not") else "short")
+
+
+def sign_table(results: Results) -> str:
+    """On which flights each set beats the present one."""
+    changes = flight_changes(results)
+    if changes.empty or not len(changes.columns):
+        return ""
+    flights = range(1, len(changes.index) + 1)
+    rows: list[tuple[Cell, ...]] = []
+    for name in changes.columns:
+        better, worse, equal, p_value = sign_counts(changes[name].to_list())
+        marks = (_mark(value) for value in changes[name])
+        rows.append(
+            (
+                set_name(str(name), results),
+                Cell(f"{better} of {better + worse + equal}", "number"),
+                number(p_value, 2),
+                *marks,
+            )
+        )
+    numbered = "; ".join(f"{i}: {name}" for i, name in zip(flights, changes.index, strict=True))
+    note = (
+        "✓ smaller error than the present set, ✗ larger, = the same, – not scored. p: of the sign test. Flights: "
+        f"{numbered}."
+    )
+    head = ("set", "better on", "p", *map(str, flights))
+    return table(head, rows, "Better or worse on each flight") + paragraph(note, "note")
+
+
+def _mark(change: float) -> Cell:
+    if change != change:
+        return Cell("–", "mark quiet")
+    if change == 0.0:
+        return Cell("=", "mark quiet")
+    return Cell("✓", "mark good") if change < 0.0 else Cell("✗", "mark bad")
+
+
+def objections_table(results: Results) -> str:
+    """Why sets are not eligible: vetoes, and kinds of prediction in which they are worse beyond doubt."""
+    rows = []
+    vetoes = {one["name"]: one["reasons"] for one in results.decision["ranking"]}
+    for one in results.ranking.to_dict("records"):
+        reasons = _first_few(vetoes[one["name"]]) if one["status"] in _OUT else []
+        if one["name"] != results.present:
+            reasons += [
+                f"{AIM_WORDS[aim]} its errors are {_percent(one[f'{aim}_difference']):.1f} % larger than now (interval "
+                f"{interval_text(one[f'{aim}_lower'], one[f'{aim}_upper'])} %)"
+                for aim in worse_aims(one)
+            ]
+        if reasons:
+            rows.append((Cell(one["name"], "short"), "; ".join(reasons)))
+    return table(("set", "because"), rows, "Not eligible") if rows else ""
+
+
+def _first_few(reasons: Sequence[str]) -> list[str]:
+    more = len(reasons) - _MOST_REASONS
+    return [*reasons[:_MOST_REASONS], f"and {more} more of this kind"] if more > 1 else list(reasons)
+
+
+def criteria_table(results: Results) -> str:
+    """All criteria that stand beside the score."""
+    source = results.decision["rule"]["main_source"]
+    columns = {
+        f"rms_{source}_horizontal": "RMS horizontal",
+        f"rms_{source}_vertical": "RMS vertical",
+        f"nll_{source}": "NLL",
+        "nll_all_sources": "NLL, all sources",
+        f"mean_nis_{source}": "mean NIS",
+        f"j_nis_{source}": "J_NIS",
+        f"c_nis_{source}": "C_NIS",
+        f"lag1_{source}": "lag-1",
+        "break_rate_gate": "break rate",
+        "resets": "resets",
+        "timeouts": "lost sources",
+        "faults": "flights with faults",
+    }
+    rows = [
+        (set_name(one["name"], results), *(number(one[column]) for column in columns))
+        for one in results.ranking.to_dict("records")
+    ]
+    source_label, unit = AID_SOURCES[source].label, AID_SOURCES[source].unit
+    note = (
+        f"Of the {source_label} ({unit}), mean over flights, unless said otherwise; shown, not ranked by. The mean NIS "
+        f"should be {AID_SOURCES[source].axes}: far below means that the noise is set larger than it is."
+    )
+    return table(("set", *columns.values()), rows, "All criteria") + paragraph(note, "note")
+
+
+def _percent(difference: float) -> float:
+    return float(percent_change(difference))

@@ -1,0 +1,75 @@
+"""Which set is chosen, from rankings made by hand."""
+
+import math
+
+import pytest
+from tests.apply.test_leave_one_out import flight
+
+from fusetune.apply.choice import choose, is_proved, parameter_distance
+from fusetune.apply.ranking import AimComparison, RankedSet
+from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.wording import _for_the_pick
+
+
+def one(name: str, difference: float, upper: float, p_family: float = 0.01, **changes) -> RankedSet:
+    values = {
+        "name": name, "status": "candidate", "reasons": (), "score": difference, "difference": difference,
+        "lower": 2 * difference - upper, "upper": upper, "p_value": 0.01, "p_holm": 0.2, "p_family": p_family,
+        "p_best": 0.5, "flights": 6, "flights_better": 6, "equal_to_present": False,
+        "improvement_percent": 100.0 * (1.0 - math.exp(difference)), "behind_best": 0.0, "behind_best_error": 0.05,
+        "aims": {},
+    }  # fmt: skip
+    return RankedSet(**(values | changes))
+
+
+PRESENT = one("a", 0.0, 0.0, status="present")
+FLIGHTS = [flight(str(number), [0.0, -0.2, -0.1]) for number in range(6)]
+
+
+def chosen(*candidates: RankedSet, distances: dict[str, float] | None = None, **settings) -> str:
+    return choose([PRESENT, *candidates], "a", FLIGHTS, distances or {}, DecisionSettings(**settings)).chosen
+
+
+def test_the_proved_set_with_the_lowest_score_is_chosen() -> None:
+    assert chosen(one("b", -0.2, -0.1), one("c", -0.1, -0.05)) == "b"
+
+
+def test_a_better_score_that_may_be_luck_does_not_stand_before_a_proved_one() -> None:
+    assert chosen(one("b", -0.2, -0.1, p_family=0.07), one("c", -0.1, -0.05)) == "c"
+    assert chosen(one("b", -0.2, 0.01), one("c", -0.1, -0.05)) == "c"
+    assert chosen(one("b", -0.2, 0.01), one("c", -0.1, 0.01)) == "a"
+
+
+def test_a_set_that_is_worse_in_one_kind_of_prediction_is_not_eligible() -> None:
+    worse = {"aided": AimComparison(0.02, 0.01, 0.03, 6)}
+    assert chosen(one("b", -0.2, -0.1, aims=worse), one("c", -0.1, -0.05)) == "c"
+
+
+def test_of_two_sets_that_predict_alike_the_nearer_one_is_chosen() -> None:
+    near, far = one("c", -0.195, -0.1, behind_best_error=0.02), one("b", -0.2, -0.1)
+    assert chosen(far, near, distances={"b": 3.0, "c": 1.0}) == "c"
+    # More than a standard error or one percent behind is not alike.
+    assert chosen(far, one("c", -0.195, -0.1, behind_best_error=0.004), distances={"b": 3.0, "c": 1.0}) == "b"
+    assert chosen(far, one("c", -0.18, -0.1, behind_best_error=0.04), distances={"b": 3.0, "c": 1.0}) == "b"
+
+
+def test_holm_decides_where_it_is_asked_to() -> None:
+    assert chosen(one("b", -0.2, -0.1, p_holm=0.2), multiplicity="holm") == "a"
+    assert chosen(one("b", -0.2, -0.1, p_holm=0.02, p_family=0.3), multiplicity="holm") == "b"
+    assert is_proved(one("b", -0.2, -0.1, p_family=0.9), DecisionSettings(multiplicity="none"))
+
+
+def test_the_words_say_why_a_better_score_was_passed_over() -> None:
+    settings = DecisionSettings()
+    luck = _for_the_pick(one("c", -0.1, -0.05), one("b", -0.2, -0.1, p_family=0.2), settings)
+    assert "“b” are 18.1 % smaller, but not beyond chance" in luck
+    far = _for_the_pick(one("c", -0.195, -0.05), one("b", -0.2, -0.1), settings)
+    assert "further from what flies now" in far
+
+
+def test_distance_is_the_size_of_the_logarithms_of_the_ratios() -> None:
+    present = {"EKF2_ACC_NOISE": 0.35, "EKF2_GYR_NOISE": 0.015, "EKF2_GPS_CTRL": 0.0}
+    assert parameter_distance({"EKF2_ACC_NOISE": 0.35 * math.e**3, "EKF2_GYR_NOISE": 0.015 / math.e**4}, present) == (
+        pytest.approx(5.0)
+    )
+    assert parameter_distance({"EKF2_GPS_CTRL": 7.0, "EKF2_ACC_NOISE": 0.35}, present) == pytest.approx(1.0)

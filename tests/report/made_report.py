@@ -1,0 +1,32 @@
+"""The whole report of a made study."""
+
+from pathlib import Path
+
+from tests.analyze.made_flight import MadeSet
+from tests.apply.study import make_study
+
+from fusetune.apply.decide import decide
+from fusetune.report.flight_figures import plot_flight
+from fusetune.report.page import build_report
+from fusetune.report.summary_figures import plot_summary
+
+SETS = {
+    "present": MadeSet(error=0.13, overrides={"EKF2_ACC_NOISE": 0.35}),
+    "better": MadeSet(error=0.1, overrides={"EKF2_ACC_NOISE": 0.2}),
+    "drifting": MadeSet(error=0.11, drift=5.0, overrides={"EKF2_ACC_NOISE": 0.9}),
+    "<restless>": MadeSet(resets_s=(40.0,)),
+}
+"""One set to choose, one that is better one step ahead and worse without GNSS, one that is vetoed."""
+
+
+def make_report(root: Path, sets: dict[str, MadeSet], flights: int, landing_s: float = 70.0) -> str:
+    """Make and score flights, decide, and return the page; all files lie below `root`."""
+    folders, table = make_study(root, sets, flights, refused=("bad",), landing_s=landing_s)
+    decide(folders, table, root / "apply", sets=list(sets))
+    pictures = []
+    for folder in folders:
+        pictures.append(root / "report" / "flights" / f"{folder.name}.png")
+        plot_flight(root / "save" / folder.name, folder, list(sets), pictures[-1])
+    plot_summary(folders, root / "apply", root / "report")
+    build_report(table, folders, pictures, root / "apply", root / "report", root / "report.html")
+    return (root / "report.html").read_text(encoding="utf-8")
