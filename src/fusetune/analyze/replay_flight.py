@@ -4,21 +4,82 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from fusetune.analyze.reconstruction import (
+    RECONSTRUCTION_TOPICS,
+    ReconstructedFlight,
+    ReconstructionSettings,
+    as_logged,
+    measured_rows,
+    reconstruct,
+)
 from fusetune.analyze.replay_files import ReplayIdentity, write_replay
-from fusetune.ekf2.inputs import build_inputs
+from fusetune.analyze.start_choice import COLD, START_TOPICS, WARM, Start, StartSettings, choose_start
+from fusetune.ekf2.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.parameters import complete
-from fusetune.ekf2.replay import replay
+from fusetune.ekf2.replay import ReplayResult, replay
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight
-from fusetune.px4.release_layouts import ESTIMATOR_TOPICS, canonical
+from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
 
 WRITTEN_BACK = "EKF2_MAG_DECL"
 
 
-def replay_saved_flight(flight_folder: Path, sets: Mapping[str, Mapping[str, float]], output_folder: Path) -> None:
+REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
+"""What a replay reads of a saved flight."""
+
+
+@dataclass(frozen=True)
+class PreparedFlight:
+    """What the replays of all sets on one flight share: samples, start, and which samples were measured."""
+
+    inputs: EstimatorInputs
+    reconstructed: ReconstructedFlight
+    start: Start
+
+    def replay(
+        self, params: Mapping[str, float], overridden: frozenset[str] = frozenset()
+    ) -> tuple[ReplayResult, np.ndarray]:
+        """Replay a complete set; the result, and for each innovation whether its sample was measured."""
+        result = replay(self.inputs, params, overridden=overridden, start=self.start.state)
+        time = result.states["timestamp_sample"]
+        interval_us = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+        return result, measured_rows(result.innovations, self.reconstructed, params, interval_us)
+
+    def description(self, result: ReplayResult) -> dict[str, Any]:
+        """For the JSON file of a replay: how it started and what was reconstructed."""
+        warm = result.warm_start_us is not None
+        return {
+            "start": {"mode": WARM if warm else COLD, "why": self.start.why, "time_us": result.warm_start_us},
+            "reconstruction": [asdict(step) for step in self.reconstructed.steps],
+        }
+
+
+def prepare(
+    flight: Flight, reconstruction: ReconstructionSettings | None = None, start: StartSettings | None = None
+) -> PreparedFlight:
+    """Reconstruct the sensor stream of a canonical flight and choose how its replays start.
+
+    `None` leaves the stream as it was logged, and starts cold.
+    """
+    reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction)
+    chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
+    return PreparedFlight(build_inputs(reconstructed.flight), reconstructed, chosen)
+
+
+def replay_saved_flight(
+    flight_folder: Path,
+    sets: Mapping[str, Mapping[str, float]],
+    output_folder: Path,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+) -> None:
     """Replay sets on a saved flight.
 
     Parameters
@@ -29,23 +90,44 @@ def replay_saved_flight(flight_folder: Path, sets: Mapping[str, Mapping[str, flo
         Name of each set → its overrides of the log's own parameters.
     output_folder : Path
         Takes the files of `fusetune.analyze.replay_files` for each set.
+    reconstruction, start : settings
+        What is done about a thinned log, and how the filter starts; `None`: nothing, and cold.
     """
-    replay_flight(load_flight(flight_folder, topics=ESTIMATOR_TOPICS), sets, output_folder)
+    replay_flight(load_flight(flight_folder, topics=REPLAY_TOPICS), sets, output_folder, reconstruction, start)
 
 
-def replay_flight(flight: Flight, sets: Mapping[str, Mapping[str, float]], output_folder: Path) -> None:
+def replay_flight(
+    flight: Flight,
+    sets: Mapping[str, Mapping[str, float]],
+    output_folder: Path,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+) -> None:
     """Replay sets on a flight in memory; each set gives overrides of the log's own parameters."""
-    inputs = build_inputs(canonical(flight))
+    prepared = prepare(canonical(flight, follow_primary=reconstruction is not None), reconstruction, start)
     for name, overrides in sets.items():
         params = complete(flight.parameters.initial, overrides, flight.release)
-        result = replay(inputs, params, overridden=frozenset(overrides))
-        write_replay(output_folder, ReplayIdentity(name, overrides, params), result)
+        _replay_and_write(prepared, name, overrides, params, output_folder)
 
 
-def replay_log(log: Path, sets_folder: Path, output_folder: Path) -> list[str]:
+def _replay_and_write(
+    prepared: PreparedFlight, name: str, overrides: Mapping[str, float], params: Mapping[str, float], folder: Path
+) -> None:
+    result, measured = prepared.replay(params, frozenset(overrides))
+    write_replay(folder, ReplayIdentity(name, overrides, params, prepared.description(result)), result, measured)
+
+
+def replay_log(
+    log: Path,
+    sets_folder: Path,
+    output_folder: Path,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+) -> list[str]:
     """Replay every set that a folder holds as `SET.json` on one ULog file.
 
-    `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log.
+    `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log. Unless settings
+    are given, the samples are used as they were logged and the filter starts from nothing.
 
     Returns
     -------
@@ -63,14 +145,13 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path) -> list[str]:
     if not set_files:
         raise UserError(sets_folder, "holds no parameter set", "Put one SET.json with a params object per set there")
     flight = read_ulog(log)
-    inputs = build_inputs(canonical(flight))
+    prepared = prepare(canonical(flight, follow_primary=reconstruction is not None), reconstruction, start)
     for file in set_files:
         params, overrides = _read_set(file)
         # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.
         params.pop(WRITTEN_BACK, None)
         values = complete(flight.parameters.initial, params | overrides, flight.release)
-        result = replay(inputs, values, overridden=frozenset(overrides))
-        write_replay(output_folder, ReplayIdentity(file.stem, overrides, values), result)
+        _replay_and_write(prepared, file.stem, overrides, values, output_folder)
     return [file.stem for file in set_files]
 
 

@@ -91,6 +91,8 @@ def read_set(folder: Path, name: str) -> SetRecord:
 def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxis, AxisSamples]:
     """Read an innovations table, split by source and axis; sources that measure nothing are left out.
 
+    Innovations of reconstructed samples are left out, too: they are no witnesses.
+
     Parameters
     ----------
     parameters : of this set; where the table has no test ratio, it follows from the source's gate
@@ -99,6 +101,8 @@ def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxi
         table = read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
         raise UserError(path, f"cannot be read: {error}", "Delete it and run the pipeline again.") from error
+    if "measured" in table.column_names:
+        table = table.filter(table["measured"]).drop_columns("measured")
     if table.num_rows == 0:
         return {}
     source = table["source"].combine_chunks()

@@ -91,7 +91,9 @@ def logged_attitude(attitude: TopicTable, imu_time: np.ndarray) -> tuple[np.ndar
 
 def integrated_gyro(imu: TopicTable) -> np.ndarray:
     """Rotation (N, 4) from before the first row to the end of each."""
-    steps = from_rotation_vector(stacked(imu, "gyro_rad") * (imu["gyro_integral_dt"].astype(np.float64) * 1e-6)[:, None])
+    steps = from_rotation_vector(
+        stacked(imu, "gyro_rad") * (imu["gyro_integral_dt"].astype(np.float64) * 1e-6)[:, None]
+    )
     turned = np.empty_like(steps)
     w, x, y, z = 1.0, 0.0, 0.0, 0.0
     for i, (a, b, c, d) in enumerate(steps.tolist()):

@@ -1,8 +1,8 @@
 """How the vehicle turned while IMU rows are missing, as the logged attitude tells.
 
 The vehicle's own attitude is integrated from every IMU sample, those that the log lacks among them. From one logged
-attitude to the next it turns by the integral of the gyro, less the bias, and by the filter's small corrections. What the
-two differ by in an interval with a gap, beyond what they differ by in intervals without, was turned in the gap.
+attitude to the next it turns by the integral of the gyro, less the bias, and by the filter's small corrections. What
+the two differ by in an interval with a gap, beyond what they differ by in intervals without, was turned in the gap.
 """
 
 from __future__ import annotations

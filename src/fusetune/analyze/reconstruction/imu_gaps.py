@@ -101,5 +101,3 @@ def _estimated(signal: np.ndarray, present: np.ndarray) -> np.ndarray:
     edges = np.diff(np.concatenate([[True], present, [True]]).astype(np.int8))
     first, stop = np.flatnonzero(edges == -1), np.flatnonzero(edges == 1)
     return fill_missing(signal, present, first, stop - first)
-
-

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.analyze.reconstruction.attitude import AttitudeHistory, to_body, to_earth
-from fusetune.analyze.reconstruction.between_samples import insertion_times, insert_rows
+from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
 from fusetune.px4.flight import TopicTable, row_count, stacked
 
 MIN_SPREAD = 0.05
