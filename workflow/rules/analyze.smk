@@ -25,6 +25,8 @@ for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"])
             "../envs/fusetune.yaml"
         params:
             sets=overrides_of(chunk),
+            reconstruction=SETTINGS["reconstruction"],
+            start=SETTINGS["start"],
             ledger=f"results/analyze/{{flight}}/.replay_{number}.json",
             code=DIGEST["replay"],
         message:
@@ -47,6 +49,9 @@ rule score_flight:
         sets=SETS,
         present=PRESENT,
         scoring=SETTINGS["scoring"],
+        reconstruction=SETTINGS["reconstruction"],
+        start=SETTINGS["start"],
+        trust=SETTINGS["trust"],
         code=DIGEST["score"],
     message:
         "Analyze: score {wildcards.flight}"

@@ -64,13 +64,22 @@ recover_from_interruption()
 
 # Changed sources run again what depends on them.
 BASE = ("errors.py", "files.py", "parquet.py", "px4")
-REPLAY_SOURCES = ("ekf2", "save", "ledger.py", "analyze/replay_flight.py", "analyze/replay_files.py")
+REPLAY_SOURCES = (
+    "ekf2",
+    "save",
+    "ledger.py",
+    "analyze/reconstruction",
+    "analyze/replay_files.py",
+    "analyze/replay_flight.py",
+    "analyze/settings.py",
+    "analyze/start_choice.py",
+)
 DIGEST = {
     "design": source_digest(*BASE, "design"),
     "execute": source_digest(*BASE, "ekf2", "design", "execute"),
     "save": source_digest(*BASE, "save"),
     "replay": source_digest(*BASE, *REPLAY_SOURCES),
-    "score": source_digest(*BASE, "save", "analyze"),
+    "score": source_digest(*BASE, "ekf2", "save", "analyze"),
     "apply": source_digest(*BASE, "apply"),
     "report": source_digest(*BASE, "apply", "report"),
 }

@@ -4,7 +4,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fusetune.analyze.reconstruction import ReconstructionSettings
 from fusetune.analyze.replay_flight import replay_saved_flight
+from fusetune.analyze.start_choice import StartSettings
 from fusetune.ledger import Ledger, key_of
 
 from job import keep_out, logged_job
@@ -21,12 +23,19 @@ def files_of(name: str) -> list[str]:
 
 with logged_job(snakemake.log[0]):
     flight = Path(snakemake.input.flight)
-    source = [json.loads((flight / "metadata.json").read_text(encoding="utf-8"))["checksum"], snakemake.params.code]
+    checksum = json.loads((flight / "metadata.json").read_text(encoding="utf-8"))["checksum"]
+    source = [checksum, snakemake.params.code, snakemake.params.reconstruction, snakemake.params.start]
     ledger = Ledger(snakemake.params.ledger)
     keys = {name: key_of([*source, overrides]) for name, overrides in snakemake.params.sets.items()}
     outdated = [name for name, key in keys.items() if not ledger.is_current(name, key, files_of(name))]
     values = {name: snakemake.params.sets[name] for name in outdated}
-    replay_saved_flight(flight, values, Path(snakemake.output[0]).parent)
+    replay_saved_flight(
+        flight,
+        values,
+        Path(snakemake.output[0]).parent,
+        ReconstructionSettings.from_mapping(snakemake.params.reconstruction),
+        StartSettings.from_mapping(snakemake.params.start),
+    )
     for name in outdated:
         ledger.record(name, keys[name], files_of(name))
     print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(keys) - len(outdated)}")

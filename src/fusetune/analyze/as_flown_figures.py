@@ -141,14 +141,10 @@ def _heading_innovations(result: ReplayResult, measured: np.ndarray) -> tuple[np
     field -= states[:, S.PUBLISHED_MAG_BODY : S.PUBLISHED_MAG_BODY + 3]
     w, x, y, z = (states[:, S.PUBLISHED_QUATERNION + i] for i in range(4))
     north = (
-        (1 - 2 * (y * y + z * z)) * field[:, 0]
-        + 2 * (x * y - w * z) * field[:, 1]
-        + 2 * (x * z + w * y) * field[:, 2]
+        (1 - 2 * (y * y + z * z)) * field[:, 0] + 2 * (x * y - w * z) * field[:, 1] + 2 * (x * z + w * y) * field[:, 2]
     )
     east = (
-        2 * (x * y + w * z) * field[:, 0]
-        + (1 - 2 * (x * x + z * z)) * field[:, 1]
-        + 2 * (y * z - w * x) * field[:, 2]
+        2 * (x * y + w * z) * field[:, 0] + (1 - 2 * (x * x + z * z)) * field[:, 1] + 2 * (y * z - w * x) * field[:, 2]
     )
     earth = states[:, S.PUBLISHED_MAG_EARTH : S.PUBLISHED_MAG_EARTH + 2]
     known = np.linalg.norm(earth, axis=1) > 0.0

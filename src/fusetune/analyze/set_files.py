@@ -56,6 +56,11 @@ class SetRecord:
     def status(self) -> str:
         return str(self.summary.get("status", "ok"))
 
+    @property
+    def is_warm_started(self) -> bool:
+        """Whether the replay started from the vehicle's own state."""
+        return bool(self.summary.get("start", {}).get("mode") == "warm")
+
 
 def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.NDArray[Any]]:
     """Read a Parquet table of plain columns as NumPy arrays.

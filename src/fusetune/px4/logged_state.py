@@ -17,6 +17,7 @@ LOGGED_STATE_TOPICS = (
     "estimator_sensor_bias",
     "estimator_selector_status",
     "vehicle_local_position",
+    "vehicle_gps_position",
 )
 """What `logged_states` reads of a flight."""
 
@@ -31,6 +32,10 @@ HORIZON_LAG_US = 20_000
 """A sample time nearer than this to the time of publication is that of the newest IMU sample, not of the horizon."""
 
 ERROR_STATES = 24
+MIN_FIX_TYPE = 3
+MAX_ORIGIN_DISTANCE_DEG = 1.0
+METRES_PER_DEGREE = 111_195.0
+"""Of a great circle on a sphere with the mean radius of the Earth, 6371 km."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +140,7 @@ def _state(flight: Flight, instance: int, row: int, time: int) -> LoggedState | 
         return None
     q = q / norm
     position, origin = _position(local, states, time, layout)
+    origin = _checked_origin(origin, position, flight.topic("vehicle_gps_position"), time)
     gyro_bias, accel_bias = _biases(flight, instance, states, time, layout)
     state = LoggedState(
         time_us=time,
@@ -177,6 +183,23 @@ def _position(
     xy = [float(np.interp(time, sampled, local[name])) for name in ("x", "y")]
     down = states[9] + (origin[2] if origin else 0.0)
     return np.array([*xy, down]), origin
+
+
+def _checked_origin(
+    origin: tuple[float, float, float] | None, position: np.ndarray, gnss: TopicTable | None, time: int
+) -> tuple[float, float, float] | None:
+    """The origin, put where GNSS says the vehicle is if the two are degrees apart (logs whose place was disguised)."""
+    if origin is None or gnss is None or "latitude_deg" not in gnss or not row_count(gnss):
+        return origin
+    row = int(np.argmin(np.abs(gnss["timestamp"].astype(np.int64) - time)))
+    latitude, longitude = float(gnss["latitude_deg"][row]), float(gnss["longitude_deg"][row])
+    has_fix = int(gnss["fix_type"][row]) >= MIN_FIX_TYPE if "fix_type" in gnss else True
+    apart = max(abs(latitude - origin[0]), abs(longitude - origin[1]))
+    if not has_fix or not MAX_ORIGIN_DISTANCE_DEG < apart < np.inf:
+        return origin
+    north_deg = float(position[0]) / METRES_PER_DEGREE
+    east_deg = float(position[1]) / (METRES_PER_DEGREE * float(np.cos(np.radians(latitude))))
+    return latitude - north_deg, longitude - east_deg, origin[2]
 
 
 def _biases(flight: Flight, instance: int, states: np.ndarray, time: int, layout: str) -> tuple[np.ndarray, np.ndarray]:

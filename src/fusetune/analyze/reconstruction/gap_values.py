@@ -118,10 +118,16 @@ def _conditional_mean(
     position = np.clip(position, 0, len(deviation) - 1)
     known = inside & present[position]
     between = covariance[np.abs(offset[:, None] - offset[None, :])]
-    noise = RIDGE * covariance[0]
-    matrix = np.where(known[:, :, None] & known[:, None, :], between, 0.0)
-    diagonal = np.arange(len(offset))
-    matrix[:, diagonal, diagonal] = covariance[0] + noise
-    weights = np.linalg.solve(matrix, np.where(known, deviation[position], 0.0)[:, :, None])[:, :, 0]
+    values = np.where(known, deviation[position], 0.0)
     towards = covariance[np.abs(np.arange(length)[:, None] - offset[None, :])]
+    noise = RIDGE * covariance[0] * np.eye(len(offset))
+    weights = np.empty_like(values)
+    whole = known.all(axis=1)
+    weights[whole] = np.linalg.solve(between + noise, values[whole].T).T
+    if not whole.all():
+        part = known[~whole]
+        matrix = np.where(part[:, :, None] & part[:, None, :], between, 0.0)
+        diagonal = np.arange(len(offset))
+        matrix[:, diagonal, diagonal] = covariance[0] * (1.0 + RIDGE)
+        weights[~whole] = np.linalg.solve(matrix, values[~whole][:, :, None])[:, :, 0]
     return np.where(known, weights, 0.0) @ towards.T

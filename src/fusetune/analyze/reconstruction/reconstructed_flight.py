@@ -115,6 +115,10 @@ def _fill_imu(flight: Flight, settings: ReconstructionSettings, topics: dict, me
     gaps = find_imu_gaps(table)
     too_long = int((gaps.length_us > settings.imu_max_gap_s * 1e6).sum())
     left = f"; {too_long} gaps longer than {settings.imu_max_gap_s:g} s left open" if too_long else ""
+    missing = int(gaps.missing.sum())
+    share = missing / max(missing + row_count(table), 1)
+    if share > settings.imu_max_missing:
+        return _unchanged(IMU, topics, f"{share:.0%} of the rows are missing, too many to be filled")
     filled, mask = fill_imu_gaps(table, settings.imu_max_gap_s)
     if mask.all():
         return _unchanged(IMU, topics, "no row is missing" + left)

@@ -19,6 +19,7 @@ class ReconstructionSettings:
 
     imu: bool = setting(True, None, None, "", "fill gaps in the IMU rows")
     imu_max_gap_s: float = setting(0.2, 0.0, 1.0, "s", "a longer gap in the IMU rows is left as it is")
+    imu_max_missing: float = setting(0.3, 0.0, 0.9, "", "with a larger share missing the IMU is left as it is")
     imu_by_attitude: bool = setting(True, None, None, "", "let the logged attitude tell the rotation over a gap")
     magnetometer: bool = setting(True, None, None, "", "interpolate the magnetometer in the earth frame")
     magnetometer_below_hz: float = setting(10.0, 0.0, 100.0, "Hz", "a log with fewer samples is thinned")
