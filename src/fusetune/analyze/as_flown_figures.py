@@ -112,7 +112,10 @@ def rms(parts: list[np.ndarray]) -> float:
 def replayed_innovations(
     result: ReplayResult, measured: np.ndarray, source: str, axis: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times and innovations of measured samples; `mag_heading` is made from the magnetometer's."""
+    """Times and innovations of measured samples from the first that was fused on, for before it they mean nothing.
+
+    `mag_heading` is made from the magnetometer's.
+    """
     if source == "mag_heading":
         return _heading_innovations(result, measured)
     rows = result.innovations[
@@ -121,6 +124,7 @@ def replayed_innovations(
         & measured
     ]
     rows = rows[rows["innovation_variance"] > 0]
+    rows = rows[int(np.argmax(rows["fused"])) :] if rows["fused"].any() else rows[:0]
     return rows["timestamp_sample"], rows["innovation"].astype(np.float64)
 
 

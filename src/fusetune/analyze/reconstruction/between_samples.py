@@ -6,6 +6,9 @@ import numpy as np
 
 from fusetune.px4.flight import TopicTable, row_count
 
+RATE_SEARCH, RATE_STEPS = 0.2, 401
+MIN_AGREEMENT, SAME_AGREEMENT, MIN_PHASES, MAX_PHASE_S = 0.9, 0.005, 16, 1.0
+
 
 def logged_rate_hz(table: TopicTable | None) -> float | None:
     """Mean rate at which a topic was logged, None with fewer than two rows."""
@@ -13,6 +16,25 @@ def logged_rate_hz(table: TopicTable | None) -> float | None:
         return None
     span_s = float(table["timestamp"][-1] - table["timestamp"][0]) * 1e-6
     return (row_count(table) - 1) / span_s if span_s > 0.0 else None
+
+
+def sensor_rate_hz(table: TopicTable, nominal_hz: float) -> float:
+    """Rate at which a sensor was sampled, of which a thinned log holds some samples.
+
+    The times between logged samples are multiples of the sensor's interval: of the rates within a fifth of the nominal
+    one in which their phases agree best, the nearest to it is taken. Where they do not agree well in any, it is the
+    nominal rate.
+    """
+    between_s = np.diff(table["timestamp_sample"].astype(np.int64)) * 1e-6
+    between_s = between_s[(between_s > 1.5 / nominal_hz) & (between_s < MAX_PHASE_S)]
+    if len(between_s) < MIN_PHASES:
+        return nominal_hz
+    rates = np.linspace((1.0 - RATE_SEARCH) * nominal_hz, (1.0 + RATE_SEARCH) * nominal_hz, RATE_STEPS)
+    agreement = np.abs(np.exp(2j * np.pi * rates[:, None] * between_s).mean(axis=1))
+    if agreement.max() < MIN_AGREEMENT:
+        return nominal_hz
+    best = rates[agreement >= agreement.max() - SAME_AGREEMENT]
+    return float(best[np.argmin(np.abs(best - nominal_hz))])
 
 
 def insertion_times(table: TopicTable, rate_hz: float, max_bridge_s: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,8 +13,8 @@ import numpy as np
 NEIGHBOURS = 16
 """Values on each side of a gap that are looked at."""
 
-RIDGE = 1e-4
-"""Share of the variance that is taken for noise; keeps the equations solvable for signals that are nearly periodic."""
+RIDGE = 1e-3
+"""Least variance, as a share of the signal's, in any direction; keeps the equations solvable for periodic signals."""
 
 MIN_PAIRS = 64
 TRIAL_DISTANCE = 5
@@ -85,8 +85,7 @@ def _conditional_means(
 def autocovariance(deviation: np.ndarray, present: np.ndarray, lags: int) -> np.ndarray | None:
     """Autocovariance (lags + 1,) from all pairs of present values; None where there are too few.
 
-    Lags without pairs, and those beyond the end of the signal, count as uncorrelated. A triangular taper makes it a
-    covariance that a signal can have.
+    Lags without pairs, and those beyond the end of the signal, count as uncorrelated.
     """
     weight = present.astype(np.float64)
     result = np.zeros(lags + 1)
@@ -97,7 +96,7 @@ def autocovariance(deviation: np.ndarray, present: np.ndarray, lags: int) -> np.
             result[lag] = float(deviation[:stop] @ deviation[lag:]) / pairs
     if not result[0] > 0.0:
         return None
-    return result * (1.0 - np.arange(lags + 1) / (8.0 * (lags + 1)))
+    return result
 
 
 def _on_the_line(signal: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
@@ -117,17 +116,24 @@ def _conditional_mean(
     inside = (position >= 0) & (position < len(deviation))
     position = np.clip(position, 0, len(deviation) - 1)
     known = inside & present[position]
-    between = covariance[np.abs(offset[:, None] - offset[None, :])]
+    span = np.arange(-NEIGHBOURS, length + NEIGHBOURS)
+    joint = _possible(covariance[np.abs(span[:, None] - span[None, :])])
+    outside = (span < 0) | (span >= length)
+    between, towards = joint[np.ix_(outside, outside)], joint[np.ix_(~outside, outside)]
     values = np.where(known, deviation[position], 0.0)
-    towards = covariance[np.abs(np.arange(length)[:, None] - offset[None, :])]
-    noise = RIDGE * covariance[0] * np.eye(len(offset))
     weights = np.empty_like(values)
     whole = known.all(axis=1)
-    weights[whole] = np.linalg.solve(between + noise, values[whole].T).T
+    weights[whole] = np.linalg.solve(between, values[whole].T).T
     if not whole.all():
         part = known[~whole]
         matrix = np.where(part[:, :, None] & part[:, None, :], between, 0.0)
         diagonal = np.arange(len(offset))
-        matrix[:, diagonal, diagonal] = covariance[0] * (1.0 + RIDGE)
+        matrix[:, diagonal, diagonal] = np.diag(between)
         weights[~whole] = np.linalg.solve(matrix, values[~whole][:, :, None])[:, :, 0]
     return np.where(known, weights, 0.0) @ towards.T
+
+
+def _possible(matrix: np.ndarray) -> np.ndarray:
+    """The nearest matrix that can be a covariance: estimated from pairs, it need not be one."""
+    values, vectors = np.linalg.eigh(matrix)
+    return (vectors * np.maximum(values, RIDGE * matrix[0, 0])) @ vectors.T

@@ -1,7 +1,7 @@
 """Magnetometer samples between those that a thinned log holds.
 
 The field hardly changes over the ground, the attitude does: between two samples it is the field in the earth frame
-that is interpolated. What turns with the vehicle (hard iron that the calibration left) is taken off before and put
+that is smoothed and interpolated. What turns with the vehicle (hard iron that the calibration left) is taken off before and put
 back after, as the field at rest in the body is no part of the earth's.
 """
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from fusetune.analyze.reconstruction.attitude import AttitudeHistory, to_body, to_earth
 from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
+from fusetune.analyze.reconstruction.smoothing import smoothed_random_walk
 from fusetune.px4.flight import TopicTable, row_count, stacked
 
 MIN_SPREAD = 0.05
@@ -45,7 +46,8 @@ def interpolate_magnetometer(
     usable = known_new & known[place - 1] & known[place]
     time, place, q_new = time[usable], place[usable], q_new[usable]
     body = body_field(q[known], measured[known])
-    earth = to_earth(q, measured - body)
+    earth = np.zeros_like(measured)
+    earth[known] = smoothed_random_walk(sampled[known], to_earth(q[known], measured[known] - body))
     share = ((time - sampled[place - 1]) / (sampled[place] - sampled[place - 1]))[:, None]
     between = earth[place - 1] + share * (earth[place] - earth[place - 1])
     field = to_body(q_new, between) + body

@@ -9,7 +9,8 @@ import numpy as np
 
 from fusetune.analyze.reconstruction.attitude import attitude_history
 from fusetune.analyze.reconstruction.barometer import interpolate_barometer
-from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
+from fusetune.analyze.reconstruction.between_samples import logged_rate_hz, sensor_rate_hz
+from fusetune.analyze.reconstruction.force_by_velocity import correct_force
 from fusetune.analyze.reconstruction.gyro_by_attitude import correct_gyro
 from fusetune.analyze.reconstruction.imu_gaps import fill_imu_gaps, find_imu_gaps
 from fusetune.analyze.reconstruction.magnetometer import interpolate_magnetometer
@@ -17,7 +18,7 @@ from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.px4.flight import Flight, TopicTable, row_count
 from fusetune.px4.release_layouts import ESTIMATOR_TOPICS
 
-RECONSTRUCTION_TOPICS = (*ESTIMATOR_TOPICS, "vehicle_attitude", "vehicle_imu")
+RECONSTRUCTION_TOPICS = (*ESTIMATOR_TOPICS, "vehicle_attitude", "vehicle_imu", "vehicle_local_position")
 """What a reconstruction reads of a flight."""
 
 FULL_MAG_RATE_HZ, FULL_BARO_RATE_HZ = 50.0, 20.0
@@ -84,8 +85,8 @@ def reconstruct(flight: Flight, settings: ReconstructionSettings | None = None) 
     def barometer(table: TopicTable, rate_hz: float) -> tuple[TopicTable, np.ndarray]:
         return interpolate_barometer(table, rate_hz, settings.max_bridge_s)
 
-    mag_rate = settings.magnetometer_rate_hz or _own_rate(flight, "SENS_MAG_RATE", FULL_MAG_RATE_HZ)
-    baro_rate = settings.barometer_rate_hz or _own_rate(flight, "SENS_BARO_RATE", FULL_BARO_RATE_HZ)
+    mag_rate = settings.magnetometer_rate_hz or _own_rate(flight, MAG, "SENS_MAG_RATE", FULL_MAG_RATE_HZ)
+    baro_rate = settings.barometer_rate_hz or _own_rate(flight, BARO, "SENS_BARO_RATE", FULL_BARO_RATE_HZ)
     for topic, wanted, below_hz, rate_hz, function in (
         (MAG, settings.magnetometer, settings.magnetometer_below_hz, mag_rate, magnetometer),
         (BARO, settings.barometer, settings.barometer_below_hz, baro_rate, barometer),
@@ -97,10 +98,12 @@ def reconstruct(flight: Flight, settings: ReconstructionSettings | None = None) 
     return ReconstructedFlight(flight.with_topics(topics), measured, tuple(steps))
 
 
-def _own_rate(flight: Flight, parameter: str, default_hz: float) -> float:
-    """Rate at which the vehicle published a sensor."""
-    rate = float(flight.parameters.initial.get(parameter, 0.0))
-    return rate if rate > 0.0 else default_hz
+def _own_rate(flight: Flight, topic: str, parameter: str, default_hz: float) -> float:
+    """Rate at which the vehicle sampled a sensor."""
+    nominal = float(flight.parameters.initial.get(parameter, 0.0))
+    nominal = nominal if nominal > 0.0 else default_hz
+    table = flight.topic(topic)
+    return nominal if table is None else sensor_rate_hz(table, nominal)
 
 
 def _unchanged(topic: str, topics: dict, why: str) -> Step:
@@ -124,6 +127,9 @@ def _fill_imu(flight: Flight, settings: ReconstructionSettings, topics: dict, me
         return _unchanged(IMU, topics, "no row is missing" + left)
     if settings.imu_by_attitude:
         filled = correct_gyro(filled, mask, flight.topic("vehicle_attitude"))
+    if settings.imu_by_velocity:
+        velocity = flight.topic("vehicle_local_position")
+        filled = correct_force(filled, mask, flight.topic("vehicle_attitude"), velocity)
     topics[IMU, 0], measured[IMU] = filled, mask
     added = int((~mask).sum())
     share = added / len(mask)
@@ -152,4 +158,4 @@ def _interpolate(
         return _unchanged(topic, topics, f"logged at {rate:.1f} Hz; nothing could be interpolated")
     topics[topic, 0], measured[topic] = filled, mask
     added = int((~mask).sum())
-    return Step(topic, True, len(mask) - added, added, f"interpolated from {rate:.1f} Hz to {rate_hz:g} Hz")
+    return Step(topic, True, len(mask) - added, added, f"interpolated from {rate:.1f} Hz to {rate_hz:.1f} Hz")

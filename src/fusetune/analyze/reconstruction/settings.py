@@ -21,6 +21,7 @@ class ReconstructionSettings:
     imu_max_gap_s: float = setting(0.2, 0.0, 1.0, "s", "a longer gap in the IMU rows is left as it is")
     imu_max_missing: float = setting(0.3, 0.0, 0.9, "", "with a larger share missing the IMU is left as it is")
     imu_by_attitude: bool = setting(True, None, None, "", "let the logged attitude tell the rotation over a gap")
+    imu_by_velocity: bool = setting(True, None, None, "", "let the logged velocity tell the acceleration over a gap")
     magnetometer: bool = setting(True, None, None, "", "interpolate the magnetometer in the earth frame")
     magnetometer_below_hz: float = setting(10.0, 0.0, 100.0, "Hz", "a log with fewer samples is thinned")
     magnetometer_rate_hz: float = setting(0.0, 0.0, 200.0, "Hz", "rate to interpolate to; 0: the vehicle's own")
