@@ -25,12 +25,12 @@ def sensor_rate_hz(table: TopicTable, nominal_hz: float) -> float:
     one in which their phases agree best, the nearest to it is taken. Where they do not agree well in any, it is the
     nominal rate.
     """
-    between_s = np.diff(table["timestamp_sample"].astype(np.int64)) * 1e-6
+    between_s = np.diff(table["timestamp_sample"].astype(np.float64)) * 1e-6
     between_s = between_s[(between_s > 1.5 / nominal_hz) & (between_s < MAX_PHASE_S)]
     if len(between_s) < MIN_PHASES:
         return nominal_hz
     rates = np.linspace((1.0 - RATE_SEARCH) * nominal_hz, (1.0 + RATE_SEARCH) * nominal_hz, RATE_STEPS)
-    agreement = np.abs(np.exp(2j * np.pi * rates[:, None] * between_s).mean(axis=1))
+    agreement = np.cos(2.0 * np.pi * rates[:, None] * between_s).mean(axis=1)
     if agreement.max() < MIN_AGREEMENT:
         return nominal_hz
     best = rates[agreement >= agreement.max() - SAME_AGREEMENT]

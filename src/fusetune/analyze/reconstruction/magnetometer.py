@@ -1,8 +1,8 @@
 """Magnetometer samples between those that a thinned log holds.
 
 The field hardly changes over the ground, the attitude does: between two samples it is the field in the earth frame
-that is smoothed and interpolated. What turns with the vehicle (hard iron that the calibration left) is taken off before and put
-back after, as the field at rest in the body is no part of the earth's.
+that is smoothed and interpolated. What turns with the vehicle (hard iron that the calibration left) is taken off before
+and put back after, as the field at rest in the body is no part of the earth's.
 """
 
 from __future__ import annotations
