@@ -99,7 +99,7 @@ def _fly_and_score(files: StudyFiles, world: str, seed: int, target: Path) -> st
         simulate(load_mission(files.mission), vehicle, {}, seed, (), log)
         save_log(log, saved)
         # Only gaps without GNSS decide; the others would cost as much again.
-        replay_saved_flight(saved, sets, analyzed, WithholdingSettings(baro_s=0.0, mag_s=0.0))
+        replay_saved_flight(saved, sets, analyzed, withholding=WithholdingSettings(baro_s=0.0, mag_s=0.0))
         score_flight(saved, analyzed, list(sets), present=PRESENT)
         for name in KEPT:
             shutil.copy(analyzed / name, target / name)

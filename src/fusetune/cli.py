@@ -135,13 +135,26 @@ def _add_replay(commands: Commands) -> None:
         help='folder with one SET.json per set: {"params": {NAME: value}, "overrides": {NAME: value}}',
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    parser.add_argument(
+        "--reconstruct", action="store_true", help="give the filter back what the logger left out (docs/any_log.md)"
+    )
+    parser.add_argument(
+        "--start",
+        choices=("auto", "warm", "cold"),
+        default="cold",
+        help="from the vehicle's own logged state (warm), from nothing (cold, the default), or what suits the log",
+    )
     parser.set_defaults(run=_replay)
 
 
 def _replay(options: argparse.Namespace) -> None:
+    from fusetune.analyze.reconstruction import ReconstructionSettings
     from fusetune.analyze.replay_flight import replay_log
+    from fusetune.analyze.start_choice import StartSettings
 
-    print("replayed:", *replay_log(options.log, options.sets, options.out))
+    reconstruction = ReconstructionSettings() if options.reconstruct else None
+    start = StartSettings(mode=options.start)
+    print("replayed:", *replay_log(options.log, options.sets, options.out, reconstruction, start))
 
 
 def _add_fidelity(commands: Commands) -> None:

@@ -26,6 +26,8 @@ for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"])
         params:
             sets=overrides_of(chunk),
             withheld=SETTINGS["withheld"],
+            reconstruction=SETTINGS["reconstruction"],
+            start=SETTINGS["start"],
             ledger=f"results/analyze/{{flight}}/.replay_{number}.json",
             code=DIGEST["replay"],
         message:
@@ -48,6 +50,9 @@ rule score_flight:
         sets=SETS,
         present=PRESENT,
         scoring=SETTINGS["scoring"],
+        reconstruction=SETTINGS["reconstruction"],
+        start=SETTINGS["start"],
+        trust=SETTINGS["trust"],
         code=DIGEST["score"],
     message:
         "Analyze: score {wildcards.flight}"

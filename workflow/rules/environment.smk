@@ -64,14 +64,24 @@ recover_from_interruption()
 
 # Changed sources run again what depends on them.
 BASE = ("errors.py", "files.py", "parquet.py", "px4")
-REPLAY_FILES = ("replay_flight.py", "replay_files.py", "withheld_gaps.py", "flight_phases.py")
-REPLAY_SOURCES = ("ekf2", "save", "ledger.py", *(f"analyze/{file}" for file in REPLAY_FILES))
+REPLAY_SOURCES = (
+    "ekf2",
+    "save",
+    "ledger.py",
+    "analyze/flight_phases.py",
+    "analyze/reconstruction",
+    "analyze/replay_files.py",
+    "analyze/replay_flight.py",
+    "analyze/settings.py",
+    "analyze/start_choice.py",
+    "analyze/withheld_gaps.py",
+)
 DIGEST = {
     "design": source_digest(*BASE, "design"),
     "execute": source_digest(*BASE, "ekf2", "design", "execute"),
     "save": source_digest(*BASE, "save"),
     "replay": source_digest(*BASE, *REPLAY_SOURCES),
-    "score": source_digest(*BASE, "save", "analyze"),
+    "score": source_digest(*BASE, "ekf2", "save", "analyze"),
     "apply": source_digest(*BASE, "apply"),
     "report": source_digest(*BASE, "apply", "report"),
 }

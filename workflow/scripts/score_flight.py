@@ -4,8 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.onboard_fidelity import write_flight_fidelity
+from fusetune.analyze.reconstruction import ReconstructionSettings
 from fusetune.analyze.score_flight import score_flight
 from fusetune.analyze.settings import ScoringSettings
+from fusetune.analyze.start_choice import StartSettings
+from fusetune.analyze.trust_settings import TrustSettings
 
 from job import keep_out, logged_job
 
@@ -22,4 +25,10 @@ with logged_job(snakemake.log[0]):
         present=snakemake.params.present,
         settings=ScoringSettings.from_mapping(snakemake.params.scoring),
     )
-    write_flight_fidelity(flight, folder)
+    write_flight_fidelity(
+        flight,
+        folder,
+        ReconstructionSettings.from_mapping(snakemake.params.reconstruction),
+        StartSettings.from_mapping(snakemake.params.start),
+        TrustSettings.from_mapping(snakemake.params.trust),
+    )

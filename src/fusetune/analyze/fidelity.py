@@ -149,8 +149,10 @@ def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
 
 
 def load_innovations(path: Path) -> Innovations:
-    """Read a `<set>.innovations.parquet`."""
+    """Read a `<set>.innovations.parquet`; innovations of reconstructed samples are left out."""
     table = read_table(path)
+    if "measured" in table.column_names:
+        table = table.filter(table["measured"])
 
     def column(name: str, dtype: type) -> np.ndarray:
         return table.column(name).to_numpy().astype(dtype)

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.files import atomic_path
-from fusetune.px4.estimator_instances import primary_instance
+from fusetune.px4.estimator_instances import rows_of_primary
 from fusetune.px4.flight import Flight, TopicTable
 
 ONBOARD = "onboard"
@@ -19,24 +19,22 @@ ONBOARD = "onboard"
 _FIELDS = ("observation_variance", "innovation", "innovation_variance", "test_ratio")
 
 
-def onboard_samples(flight: Flight) -> dict[SourceAxis, AxisSamples]:
+def onboard_samples(flight: Flight, instance: int | None = None) -> dict[SourceAxis, AxisSamples]:
     """Innovations that the vehicle logged, from the canonical topics `estimator_aid_src_*`.
 
     Parameters
     ----------
     flight : in the layout of `px4.release_layouts.canonical`
+    instance : of the estimator; None takes, of each time, the one that was primary then
 
     Returns
     -------
-    Samples by source and axis; empty where the log holds none. Of several estimator instances the primary counts.
+    Samples by source and axis; empty where the log holds none.
     """
-    instance = primary_instance(flight)
     samples: dict[SourceAxis, AxisSamples] = {}
     for name, source in AID_SOURCES.items():
         topic = f"estimator_aid_src_{name}"
-        table = flight.topic(topic, instance)
-        if table is None:
-            table = flight.topic(topic)
+        table = rows_of_primary(flight, topic) if instance is None else flight.topic(topic, instance)
         if table is None or table["timestamp"].size == 0:
             continue
         for axis in range(source.axes):

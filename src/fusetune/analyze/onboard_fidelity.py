@@ -14,6 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from fusetune.analyze.fidelity import Innovations, load_innovations, mean_nll
+from fusetune.analyze.reconstruction import ReconstructionSettings
+from fusetune.analyze.start_choice import StartSettings
+from fusetune.analyze.trust_grade import TRUST_TOPICS, grade_flight
+from fusetune.analyze.trust_settings import TrustSettings
 from fusetune.files import atomic_path
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.flight import Flight
@@ -82,8 +86,17 @@ LEVEL_WORDS = {
 }
 
 
-def write_flight_fidelity(flight_folder: Path, analyze_folder: Path) -> None:
-    """Compare the as-flown replay of a flight with its own log, and write `fidelity.json` beside it.
+def write_flight_fidelity(
+    flight_folder: Path,
+    analyze_folder: Path,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+    trust: TrustSettings | None = None,
+) -> None:
+    """Compare the as-flown replay of a flight with its own log, grade it, and write `fidelity.json` beside it.
+
+    `grade` is the letter that the decision may weigh a flight by, `trust` what it follows from (see
+    `fusetune.analyze.trust_grade.TrustGrade`).
 
     Parameters
     ----------
@@ -91,13 +104,17 @@ def write_flight_fidelity(flight_folder: Path, analyze_folder: Path) -> None:
         `results/save/<flight>`.
     analyze_folder : Path
         `results/analyze/<flight>`, with `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
+    reconstruction, start, trust : settings
+        As the replays of the flight are made, and the limits of the grades.
     """
-    flight = canonical(load_flight(flight_folder, topics=REASON_TOPICS))
+    flight = canonical(load_flight(flight_folder, topics=(*REASON_TOPICS, *TRUST_TOPICS)), follow_primary=True)
     result = judge_onboard_fidelity(
         flight, analyze_folder / f"{AS_FLOWN}.innovations.parquet", analyze_folder / "onboard.innovations.parquet"
     )
+    grade = grade_flight(flight, reconstruction, start, trust)
+    document = asdict(result) | {"grade": grade.grade, "trust": asdict(grade)}
     with atomic_path(analyze_folder / "fidelity.json") as path:
-        path.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
 def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> OnboardFidelity:

@@ -9,7 +9,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -37,6 +39,8 @@ class ReplayIdentity:
     set: str
     overrides: Mapping[str, float]
     params: Mapping[str, float]
+    inputs: Mapping[str, Any] | None = None
+    """How the replay started and what was reconstructed for it; stands in the JSON file."""
 
 
 def replay_files(folder: Path, set_name: str) -> list[Path]:
@@ -44,11 +48,22 @@ def replay_files(folder: Path, set_name: str) -> list[Path]:
     return [folder / f"{set_name}.{table}.parquet" for table in TABLES] + [folder / f"{set_name}.json"]
 
 
-def write_replay(folder: Path, identity: ReplayIdentity, result: ReplayResult) -> None:
-    """Write the tables of a replay, and last the JSON that says the set is complete."""
+def write_replay(
+    folder: Path, identity: ReplayIdentity, result: ReplayResult, measured: np.ndarray | None = None
+) -> None:
+    """Write the tables of a replay, and last the JSON that says the set is complete.
+
+    Parameters
+    ----------
+    measured : for each innovation row whether its measurement stands in the log; None: all of them. The column
+        `measured` is written only where some do not.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for name, to_table in TABLES.items():
-        write_table(to_table(result), folder / f"{identity.set}.{name}.parquet")
+        table = to_table(result)
+        if name == "innovations" and measured is not None and not measured.all():
+            table = table.append_column("measured", pa.array(measured))
+        write_table(table, folder / f"{identity.set}.{name}.parquet")
     with atomic_path(folder / f"{identity.set}.json") as path:
         path.write_text(json.dumps(_summary(identity, result), indent=1) + "\n", encoding="utf-8")
 
@@ -79,6 +94,7 @@ def _summary(identity: ReplayIdentity, result: ReplayResult) -> dict[str, object
         "n_imu": result.imu_samples,
         "n_updates": result.updates,
         "mode": result.mode,
+        **(identity.inputs or {}),
         "resets": result.resets,
         "filter_fault_flags_max": result.filter_fault_flags_max,
         "origin": origin,

@@ -2,29 +2,99 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from fusetune.analyze.flight_phases import airborne_intervals
+from fusetune.analyze.reconstruction import (
+    RECONSTRUCTION_TOPICS,
+    ReconstructedFlight,
+    ReconstructionSettings,
+    as_logged,
+    measured_rows,
+    reconstruct,
+)
 from fusetune.analyze.replay_files import ReplayIdentity, write_replay
+from fusetune.analyze.start_choice import COLD, START_TOPICS, WARM, Start, StartSettings, choose_start
 from fusetune.analyze.withheld_gaps import WithholdingSettings, plan_gaps
-from fusetune.ekf2.inputs import build_inputs
+from fusetune.ekf2.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.parameters import complete
-from fusetune.ekf2.replay import replay
+from fusetune.ekf2.replay import Gap, ReplayResult, replay
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight
-from fusetune.px4.release_layouts import ESTIMATOR_TOPICS, canonical
+from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
 
 WRITTEN_BACK = "EKF2_MAG_DECL"
+
+
+REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
+"""What a replay reads of a saved flight."""
+
+
+@dataclass(frozen=True)
+class PreparedFlight:
+    """What the replays of all sets on one flight share: samples, start, and which samples were measured."""
+
+    inputs: EstimatorInputs
+    reconstructed: ReconstructedFlight
+    start: Start
+    gaps: tuple[Gap, ...] = ()
+
+    def replay(
+        self, params: Mapping[str, float], overridden: frozenset[str] = frozenset()
+    ) -> tuple[ReplayResult, np.ndarray]:
+        """Replay a complete set; the result, and for each innovation whether its sample was measured."""
+        result = replay(self.inputs, params, overridden=overridden, start=self.start.state, gaps=self.gaps)
+        time = result.states["timestamp_sample"]
+        interval_us = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+
+        def measured(rows: np.ndarray) -> np.ndarray:
+            return measured_rows(rows, self.reconstructed, params, interval_us)
+
+        gaps = tuple(
+            dataclasses.replace(gap, innovations=gap.innovations[measured(gap.innovations)]) for gap in result.gaps
+        )
+        return dataclasses.replace(result, gaps=gaps), measured(result.innovations)
+
+    def description(self, result: ReplayResult) -> dict[str, Any]:
+        """For the JSON file of a replay: how it started and what was reconstructed."""
+        warm = result.warm_start_us is not None
+        return {
+            "start": {"mode": WARM if warm else COLD, "why": self.start.why, "time_us": result.warm_start_us},
+            "reconstruction": [asdict(step) for step in self.reconstructed.steps],
+        }
+
+
+def prepare(
+    flight: Flight,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+    gaps: Sequence[Gap] = (),
+) -> PreparedFlight:
+    """Reconstruct the sensor stream of a canonical flight and choose how its replays start.
+
+    `None` leaves the stream as it was logged, and starts cold.
+    """
+    reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction)
+    chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
+    return PreparedFlight(build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps))
 
 
 def replay_saved_flight(
     flight_folder: Path,
     sets: Mapping[str, Mapping[str, float]],
     output_folder: Path,
+    *,
     withholding: WithholdingSettings | None = None,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
 ) -> None:
     """Replay sets on a saved flight.
 
@@ -38,30 +108,49 @@ def replay_saved_flight(
         Takes the files of `fusetune.analyze.replay_files` for each set.
     withholding : WithholdingSettings, optional
         Gaps to be made in the sensors; the default ones if None.
+    reconstruction, start : settings
+        What is done about a thinned log, and how the filter starts; `None`: nothing, and cold.
     """
-    replay_flight(load_flight(flight_folder, topics=ESTIMATOR_TOPICS), sets, output_folder, withholding)
+    flight = load_flight(flight_folder, topics=REPLAY_TOPICS)
+    replay_flight(flight, sets, output_folder, withholding=withholding, reconstruction=reconstruction, start=start)
 
 
 def replay_flight(
     flight: Flight,
     sets: Mapping[str, Mapping[str, float]],
     output_folder: Path,
+    *,
     withholding: WithholdingSettings | None = None,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
 ) -> None:
     """Replay sets on a flight in memory; each set gives overrides of the log's own parameters."""
-    flight = canonical(flight)
-    inputs = build_inputs(flight)
+    flight = canonical(flight, follow_primary=reconstruction is not None)
     gaps = plan_gaps(flight, airborne_intervals(flight, {}), withholding or WithholdingSettings())
+    prepared = prepare(flight, reconstruction, start, gaps)
     for name, overrides in sets.items():
         params = complete(flight.parameters.initial, overrides, flight.release)
-        result = replay(inputs, params, overridden=frozenset(overrides), gaps=gaps)
-        write_replay(output_folder, ReplayIdentity(name, overrides, params), result)
+        _replay_and_write(prepared, name, overrides, params, output_folder)
 
 
-def replay_log(log: Path, sets_folder: Path, output_folder: Path) -> list[str]:
+def _replay_and_write(
+    prepared: PreparedFlight, name: str, overrides: Mapping[str, float], params: Mapping[str, float], folder: Path
+) -> None:
+    result, measured = prepared.replay(params, frozenset(overrides))
+    write_replay(folder, ReplayIdentity(name, overrides, params, prepared.description(result)), result, measured)
+
+
+def replay_log(
+    log: Path,
+    sets_folder: Path,
+    output_folder: Path,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+) -> list[str]:
     """Replay every set that a folder holds as `SET.json` on one ULog file.
 
-    `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log.
+    `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log. Unless settings
+    are given, the samples are used as they were logged and the filter starts from nothing.
 
     Returns
     -------
@@ -79,14 +168,13 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path) -> list[str]:
     if not set_files:
         raise UserError(sets_folder, "holds no parameter set", "Put one SET.json with a params object per set there")
     flight = read_ulog(log)
-    inputs = build_inputs(canonical(flight))
+    prepared = prepare(canonical(flight, follow_primary=reconstruction is not None), reconstruction, start)
     for file in set_files:
         params, overrides = _read_set(file)
         # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.
         params.pop(WRITTEN_BACK, None)
         values = complete(flight.parameters.initial, params | overrides, flight.release)
-        result = replay(inputs, values, overridden=frozenset(overrides))
-        write_replay(output_folder, ReplayIdentity(file.stem, overrides, values), result)
+        _replay_and_write(prepared, file.stem, overrides, values, output_folder)
     return [file.stem for file in set_files]
 
 

@@ -127,7 +127,8 @@ def scoring_window(
             excluded[record.name] = f"starts aiding {late_s:.1f} s later than the present set"
         else:
             starts[record.name] = start
-    warm_up_end = max(starts.values()) + round(settings.settle_s * 1e6)
+    settle_s = settings.warm_settle_s if present_record.is_warm_started else settings.settle_s
+    warm_up_end = max(starts.values()) + round(settle_s * 1e6)
     flying = subtract(airborne, [Cut(-(2**62), warm_up_end, "warm-up")])
     cuts = cuts_within(records, excluded, flying, present, gaps, settings)
     intervals = subtract(flying, cuts)

@@ -58,6 +58,11 @@ class SetRecord:
     def status(self) -> str:
         return str(self.summary.get("status", "ok"))
 
+    @property
+    def is_warm_started(self) -> bool:
+        """Whether the replay started from the vehicle's own state."""
+        return bool(self.summary.get("start", {}).get("mode") == "warm")
+
 
 def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.NDArray[Any]]:
     """Read a Parquet table of plain columns as NumPy arrays.
@@ -93,6 +98,8 @@ def read_set(folder: Path, name: str) -> SetRecord:
 def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxis, AxisSamples]:
     """Read an innovations table, split by source and axis; sources that measure nothing are left out.
 
+    Innovations of reconstructed samples are left out, too: they are no witnesses.
+
     Parameters
     ----------
     parameters : of this set; where the table has no test ratio, it follows from the source's gate
@@ -101,6 +108,8 @@ def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxi
         table = read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
         raise UserError(path, f"cannot be read: {error}", "Delete it and run the pipeline again.") from error
+    if "measured" in table.column_names:
+        table = table.filter(table["measured"]).drop_columns("measured")
     if table.num_rows == 0:
         return {}
     source = table["source"].combine_chunks()

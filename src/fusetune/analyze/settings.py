@@ -59,6 +59,7 @@ class ScoringSettings:
     """What is scored of a flight. The same rules hold for all parameter sets of the flight."""
 
     settle_s: float = setting(5.0, 0.0, 60.0, "s", "time after aiding starts that is not scored")
+    warm_settle_s: float = setting(1.0, 0.0, 60.0, "s", "the same after a warm start")
     reset_cut_s: float = setting(3.0, 0.0, 30.0, "s", "time after a reset or a gap in the log that is not scored")
     log_gap_s: float = setting(0.25, 0.05, 5.0, "s", "an IMU gap longer than this is cut like a reset")
     block_s: float = setting(10.0, 2.0, 60.0, "s", "length of the blocks that the bootstrap draws")

@@ -50,8 +50,10 @@ from fusetune.ekf2.sample_arrival import (
     receive_range,
     receive_system_flags,
 )
+from fusetune.ekf2.warm_start import take_over, without_first_resets
 from fusetune.ekf2.withholding import WITHHOLDABLE
 from fusetune.px4.flight import ParameterChange
+from fusetune.px4.logged_state import LoggedState
 
 RUNS_PER_STRETCH = 8192
 MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
@@ -103,6 +105,8 @@ class ReplayResult:
     origin: tuple[float, float, float] | None
     """Latitude and longitude (deg) and altitude (m) of the local frame, None while never set."""
     gaps: tuple[GapResult, ...] = ()
+    warm_start_us: int | None = None
+    """Fusion time horizon at which the filter took over the vehicle's state, None where it started from nothing."""
 
     @property
     def resets(self) -> dict[str, int]:
@@ -135,6 +139,7 @@ def replay(
     *,
     overridden: frozenset[str] | None = None,
     gaps: Sequence[Gap] = (),
+    start: LoggedState | None = None,
 ) -> ReplayResult:
     """Run the estimator over one flight.
 
@@ -149,6 +154,9 @@ def replay(
     gaps : sequence of Gap
         Gaps that the replay is continued into beside its normal course. Each starts from the state that the filter
         has at that moment and ends without a trace, so gaps may overlap and cost nothing but their own length.
+    start : LoggedState, optional
+        State of the vehicle's own estimator that the filter starts from. Nothing is recorded before. Without it, or
+        where the samples end before that time, the filter starts from nothing, as when the vehicle boots.
 
     Returns
     -------
@@ -162,14 +170,17 @@ def replay(
         if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
     ]
     ranges = [_runs_of(inputs, gap) for gap in gaps]
+    if start is not None:
+        inputs = without_first_resets(inputs, start.time_us)
     course = _Course(inputs, parameter_record(parameters), changes)
+    first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
     kept: list[tuple[np.ndarray, ...]] = []
     found: list[GapResult | None] = [None] * len(gaps)
-    for start, stop in course.stretches(0, len(inputs.arrays.imu), [first for first, _ in ranges]):
+    for begin, end in course.stretches(first_run, len(inputs.arrays.imu), [first for first, _ in ranges]):
         for number, (first, last) in enumerate(ranges):
-            if first == start:
+            if first == begin:
                 found[number] = _continue_into_gap(course, gaps[number], first, last)
-        kept.append(course.run(start, stop))
+        kept.append(course.run(begin, end))
     innovations, states, local_position, flags = _joined(kept)
     return ReplayResult(
         mode=inputs.mode,
@@ -181,6 +192,7 @@ def replay(
         updates=int(course.recorder["updates"][0]),
         origin=_origin(course.ekf["origin"][0]),
         gaps=tuple(one for one in found if one is not None),
+        warm_start_us=warm_start_us,
     )
 
 
@@ -192,6 +204,32 @@ class _Course:
         self.ekf = np.zeros(1, EKF)
         self.recorder = np.zeros(1, RECORDER_MEMORY)
         self.records = allocate_records(RUNS_PER_STRETCH)
+
+    def start_from(self, state: LoggedState) -> tuple[int, int | None]:
+        """Fill the buffers up to the time of a logged state and take it over.
+
+        Returns
+        -------
+        The run to go on with and the horizon; (0, None), as if nothing had happened, where the samples end before.
+        """
+        before = self.branch()
+        times = self.inputs.arrays.imu["time_us"]
+        for begin, end in self.stretches(0, 1):
+            self.run(begin, end)
+        fresh = self.ekf.copy()
+        run = max(int(np.searchsorted(times, state.time_us)), 1)
+        for begin, end in self.stretches(1, min(run, len(times))):
+            self.run(begin, end)
+        while run < len(times) and self.ekf["time_delayed_us"][0] < state.time_us:
+            for begin, end in self.stretches(run, run + 1):
+                self.run(begin, end)
+            run += 1
+        if self.ekf["time_delayed_us"][0] < state.time_us:
+            self.ekf, self.params, self.recorder = before.ekf, before.params, before.recorder
+            return 0, None
+        take_over(self.ekf, fresh, self.params[0], self.inputs, state)
+        self.recorder = np.zeros(1, RECORDER_MEMORY)
+        return run, int(self.ekf["time_delayed_us"][0])
 
     def branch(self) -> _Course:
         """Another course that starts where this one is."""

@@ -58,3 +58,12 @@ def get_mag_strength_gauss(latitude_deg, longitude_deg):
     if not (math.isfinite(latitude_deg) and math.isfinite(longitude_deg)):
         return math.nan
     return _interpolate(latitude_deg, longitude_deg, _STRENGTH) * _STRENGTH_SCALE * _GAUSS_PER_NANOTESLA
+
+
+def field_at(latitude_deg: float, longitude_deg: float) -> tuple[float, float, float]:
+    """Declination, inclination (rad) and strength (Gauss) at a place, for callers outside compiled code."""
+    look_up = _interpolate.py_func
+    declination = look_up(latitude_deg, longitude_deg, _DECLINATION) * _DECLINATION_SCALE
+    inclination = look_up(latitude_deg, longitude_deg, _INCLINATION) * _INCLINATION_SCALE
+    strength = look_up(latitude_deg, longitude_deg, _STRENGTH) * _STRENGTH_SCALE * _GAUSS_PER_NANOTESLA
+    return math.radians(declination), math.radians(inclination), strength

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fusetune.px4 import sensor_layouts as layouts
-from fusetune.px4.estimator_instances import magnetometer_instance
+from fusetune.px4.estimator_instances import magnetometer_instance, primary_imu, primary_magnetometer
 from fusetune.px4.estimator_layouts import estimator_tables
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
 from fusetune.px4.onboard_innovations import aid_source_tables
@@ -41,7 +41,7 @@ ESTIMATOR_TOPICS = (
 """Topics of any release that the canonical inputs of the estimator are made from."""
 
 
-def canonical(flight: Flight) -> Flight:
+def canonical(flight: Flight, *, follow_primary: bool = False) -> Flight:
     """The flight with every topic that the estimator and the metrics read in the layout of v1.16.
 
     Other topics, and columns that v1.16 does not have, stay as they are; the flight given is not changed. Where a log
@@ -62,10 +62,21 @@ def canonical(flight: Flight) -> Flight:
     sound = replace(flight, topics=topics, left_out=(*flight.left_out, *left_out))
     topics = dict(topics)
     _put_first(topics, "vehicle_magnetometer", magnetometer_instance(sound))
+    if follow_primary:
+        _follow_primary(sound, topics)
     _put_first(topics, "vehicle_gps_position", _gnss_instance(sound))
     topics |= estimator_tables(sound)
     topics |= aid_source_tables(sound)
     return sound.with_topics(topics)
+
+
+def _follow_primary(flight: Flight, topics: dict[TopicKey, TopicTable]) -> None:
+    for name, table in (
+        ("sensor_combined", primary_imu(flight)),
+        ("vehicle_magnetometer", primary_magnetometer(flight)),
+    ):
+        if table is not None:
+            topics[name, 0] = layouts.CONVERTERS[name](table)
 
 
 def _put_first(topics: dict[TopicKey, TopicTable], name: str, instance: int) -> None:

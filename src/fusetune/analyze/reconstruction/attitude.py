@@ -1,0 +1,169 @@
+"""Attitude of the vehicle at any time: the logged attitude, and the gyro between its samples.
+
+`vehicle_attitude` is logged some 20 times a second, too seldom to say how a quadrotor turned in between; the gyro
+says that, but drifts. So the gyro carries the attitude on from each logged sample, and the small rotation by which it
+misses the next one is spread evenly over the interval.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fusetune.px4.flight import TopicTable, stacked
+
+MAX_INTERVAL_US = 1_000_000
+"""Over a longer pause of the logged attitude nothing is interpolated."""
+
+MAX_PUBLISH_DELAY_US = 20_000
+
+
+@dataclass(frozen=True)
+class AttitudeHistory:
+    """Attitude at the times of the IMU samples.
+
+    Attributes
+    ----------
+    time : (N,) µs, ascending
+    q : (N, 4) unit quaternions w, x, y, z, body to NED
+    known : (N,) whether the logged attitude covers the time
+    """
+
+    time: np.ndarray
+    q: np.ndarray
+    known: np.ndarray
+
+    def at(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Attitude (M, 4) at times (M,) µs, and whether it is known."""
+        if len(self.time) < 2:
+            return np.tile([1.0, 0.0, 0.0, 0.0], (len(time), 1)), np.zeros(len(time), np.bool_)
+        right = np.clip(np.searchsorted(self.time, time), 1, len(self.time) - 1)
+        known = self.known[right - 1] & self.known[right] & (time >= self.time[0]) & (time <= self.time[-1])
+        return attitude_at(self.time, self.q, time), known
+
+
+def attitude_history(attitude: TopicTable | None, imu: TopicTable) -> AttitudeHistory:
+    """Join `vehicle_attitude` and `sensor_combined`.
+
+    Parameters
+    ----------
+    attitude : `vehicle_attitude`; None where the log has none
+    imu : canonical `sensor_combined`, its gaps filled
+    """
+    time = imu["timestamp"].astype(np.int64)
+    nothing = AttitudeHistory(np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros(0, np.bool_))
+    if attitude is None or len(time) < 2:
+        return nothing
+    logged_time, logged = logged_attitude(attitude, time)
+    if len(logged_time) < 2:
+        return nothing
+    turned = integrated_gyro(imu)
+    # rotation that takes the integrated gyro's frame into NED, at each logged attitude
+    frame = multiply(logged, conjugate(attitude_at(time, turned, logged_time)))
+    right = np.clip(np.searchsorted(logged_time, time), 1, len(logged_time) - 1)
+    left = right - 1
+    interval = logged_time[right] - logged_time[left]
+    share = (time - logged_time[left]) / np.maximum(interval, 1)
+    known = (share >= 0.0) & (share <= 1.0) & (interval <= MAX_INTERVAL_US)
+    drift = rotation_vector(multiply(frame[right], conjugate(frame[left])))
+    here = multiply(from_rotation_vector(drift * np.clip(share, 0.0, 1.0)[:, None]), frame[left])
+    return AttitudeHistory(time, normalised(multiply(here, turned)), known)
+
+
+def logged_attitude(attitude: TopicTable, imu_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times (K,) of the IMU samples that the logged attitudes belong to, ascending, and the attitudes (K, 4).
+
+    Releases that log no sample time publish the attitude right after the IMU sample, so it belongs to the last one.
+    """
+    time = attitude["timestamp"].astype(np.int64)
+    sampled = attitude.get("timestamp_sample", np.zeros_like(time)).astype(np.int64)
+    last = imu_time[np.clip(np.searchsorted(imu_time, time, side="right") - 1, 0, len(imu_time) - 1)]
+    time = np.where(sampled > 0, sampled, np.where(time - last < MAX_PUBLISH_DELAY_US, last, time))
+    q = stacked(attitude, "q")
+    norm = np.linalg.norm(q, axis=1)
+    good = np.isfinite(norm) & (np.abs(norm - 1.0) < 0.1)
+    good &= (time >= imu_time[0]) & (time <= imu_time[-1])
+    time, q = time[good], q[good] / norm[good, None]
+    order = np.unique(time, return_index=True)[1]
+    return time[order], q[order]
+
+
+def integrated_gyro(imu: TopicTable) -> np.ndarray:
+    """Rotation (N, 4) from before the first row to the end of each."""
+    steps = from_rotation_vector(
+        stacked(imu, "gyro_rad") * (imu["gyro_integral_dt"].astype(np.float64) * 1e-6)[:, None]
+    )
+    turned = np.empty_like(steps)
+    w, x, y, z = 1.0, 0.0, 0.0, 0.0
+    for i, (a, b, c, d) in enumerate(steps.tolist()):
+        w, x, y, z = (
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c - x * d + y * a + z * b,
+            w * d + x * c - y * b + z * a,
+        )
+        turned[i] = w, x, y, z
+    return normalised(turned)
+
+
+def attitude_at(time: np.ndarray, q: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Attitudes (M, 4) at the times `wanted`, turning evenly between those (N, 4) given at `time` (µs, ascending)."""
+    right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    left = right - 1
+    share = np.clip((wanted - time[left]) / np.maximum(time[right] - time[left], 1), 0.0, 1.0)
+    step = rotation_vector(multiply(conjugate(q[left]), q[right]))
+    return multiply(q[left], from_rotation_vector(step * share[:, None]))
+
+
+def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Quaternion products (N, 4)."""
+    pw, px, py, pz = np.moveaxis(p, -1, 0)
+    qw, qx, qy, qz = np.moveaxis(q, -1, 0)
+    return np.stack(
+        [
+            pw * qw - px * qx - py * qy - pz * qz,
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(q: np.ndarray) -> np.ndarray:
+    """Inverses of unit quaternions (N, 4)."""
+    return q * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def normalised(q: np.ndarray) -> np.ndarray:
+    """Unit quaternions (N, 4)."""
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def from_rotation_vector(vector: np.ndarray) -> np.ndarray:
+    """Quaternions (N, 4) of rotation vectors (N, 3), rad."""
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
+    # sin(a/2)/a, which tends to 1/2
+    scale = np.where(angle < 1e-8, 0.5, np.sin(0.5 * angle) / np.where(angle < 1e-8, 1.0, angle))
+    return np.concatenate([np.cos(0.5 * angle), scale * vector], axis=-1)
+
+
+def rotation_vector(q: np.ndarray) -> np.ndarray:
+    """Rotation vectors (N, 3), rad, of unit quaternions (N, 4), the shorter way round."""
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    return q[..., 1:] * np.where(sine < 1e-12, 2.0, angle / np.where(sine < 1e-12, 1.0, sine))
+
+
+def to_earth(q: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Rotate body vectors (N, 3) to NED by the attitudes (N, 4)."""
+    axis = q[..., 1:]
+    twice = 2.0 * np.cross(axis, vector)
+    return vector + q[..., :1] * twice + np.cross(axis, twice)
+
+
+def to_body(q: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Rotate NED vectors (N, 3) to the body by the attitudes (N, 4)."""
+    return to_earth(conjugate(q), vector)

@@ -1,0 +1,139 @@
+"""What a signal most probably was where it is missing, from what it is like where it is not.
+
+The missing values of a stationary signal are estimated by their conditional mean given the values around the gap: the
+best linear estimate (Wiener, 1949), with the autocovariance taken from the signal itself. For a slow signal that is
+interpolation; vibration is carried into the gap as far as it keeps its phase, and averaged out where it does not, which
+a line between two vibrating neighbours would not do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+NEIGHBOURS = 16
+"""Values on each side of a gap that are looked at."""
+
+RIDGE = 1e-3
+"""Least variance, as a share of the signal's, in any direction; keeps the equations solvable for periodic signals."""
+
+MIN_PAIRS = 64
+TRIAL_DISTANCE = 5
+MIN_TRIALS, MAX_TRIALS = 16, 2000
+CHUNK = 2048
+
+
+def fill_missing(signal: np.ndarray, present: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Estimate the missing values of a signal on an even grid.
+
+    Of two estimates, the conditional mean and the line between the neighbours, the one is taken that would have been
+    nearer to the signal in gaps of the same lengths where the signal is known: the line wins where the vehicle hardly
+    vibrates and manoeuvres decide.
+
+    Parameters
+    ----------
+    signal : (N,) values, anything where missing
+    present : (N,) whether each value is there
+    first, count : (G,) position and number of missing values of the gaps to fill
+
+    Returns
+    -------
+    (sum of count,) values of the gaps, one after the other
+    """
+    mean = float(signal[present].mean())
+    deviation = np.where(present, signal - mean, 0.0)
+    covariance = autocovariance(deviation, present, 2 * NEIGHBOURS + int(count.max(initial=0)))
+    if covariance is None or _line_is_nearer(deviation, present, first, count, covariance):
+        return _on_the_line(signal, first, count)
+    return _conditional_means(deviation, present, first, count, covariance) + mean
+
+
+def _line_is_nearer(
+    deviation: np.ndarray, present: np.ndarray, first: np.ndarray, count: np.ndarray, covariance: np.ndarray
+) -> bool:
+    """Compare both estimates of the sum over gaps made where the signal is known: right after each real gap."""
+    trial = first + count + TRIAL_DISTANCE
+    fits = trial + count + 1 < len(deviation)
+    trial, length = trial[fits], count[fits]
+    known_so_far = np.concatenate([[0], np.cumsum(present)])
+    whole = known_so_far[trial + length + 1] - known_so_far[trial - 1] == length + 2
+    trial, length = trial[whole][:MAX_TRIALS], length[whole][:MAX_TRIALS]
+    if len(trial) < MIN_TRIALS:
+        return False
+    left_out = present.copy()
+    rows = np.repeat(trial, length) + np.concatenate([np.arange(n) for n in length])
+    left_out[rows] = False
+    starts = np.concatenate([[0], np.cumsum(length)[:-1]])
+    truth = np.add.reduceat(deviation[rows], starts)
+    mean = np.add.reduceat(_conditional_means(deviation, left_out, trial, length, covariance), starts)
+    line = np.add.reduceat(_on_the_line(deviation, trial, length), starts)
+    return bool(np.sum((line - truth) ** 2) < np.sum((mean - truth) ** 2))
+
+
+def _conditional_means(
+    deviation: np.ndarray, present: np.ndarray, first: np.ndarray, count: np.ndarray, covariance: np.ndarray
+) -> np.ndarray:
+    start = np.concatenate([[0], np.cumsum(count)])
+    values = np.empty(start[-1])
+    for length in np.unique(count):
+        chosen = np.flatnonzero(count == length)
+        for part in np.array_split(chosen, max(1, -(-len(chosen) // CHUNK))):
+            estimate = _conditional_mean(deviation, present, first[part], int(length), covariance)
+            values[start[part][:, None] + np.arange(length)] = estimate
+    return values
+
+
+def autocovariance(deviation: np.ndarray, present: np.ndarray, lags: int) -> np.ndarray | None:
+    """Autocovariance (lags + 1,) from all pairs of present values; None where there are too few.
+
+    Lags without pairs, and those beyond the end of the signal, count as uncorrelated.
+    """
+    weight = present.astype(np.float64)
+    result = np.zeros(lags + 1)
+    for lag in range(min(lags + 1, len(deviation))):
+        stop = len(deviation) - lag
+        pairs = float(weight[:stop] @ weight[lag:])
+        if pairs >= MIN_PAIRS:
+            result[lag] = float(deviation[:stop] @ deviation[lag:]) / pairs
+    if not result[0] > 0.0:
+        return None
+    return result
+
+
+def _on_the_line(signal: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    parts = []
+    for start, length in zip(first.tolist(), count.tolist(), strict=True):
+        share = np.arange(1, length + 1) / (length + 1)
+        parts.append(signal[start - 1] + share * (signal[start + length] - signal[start - 1]))
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def _conditional_mean(
+    deviation: np.ndarray, present: np.ndarray, first: np.ndarray, length: int, covariance: np.ndarray
+) -> np.ndarray:
+    """Estimates (G, length) for gaps of equal length."""
+    offset = np.concatenate([np.arange(-NEIGHBOURS, 0), np.arange(length, length + NEIGHBOURS)])
+    position = first[:, None] + offset
+    inside = (position >= 0) & (position < len(deviation))
+    position = np.clip(position, 0, len(deviation) - 1)
+    known = inside & present[position]
+    span = np.arange(-NEIGHBOURS, length + NEIGHBOURS)
+    joint = _possible(covariance[np.abs(span[:, None] - span[None, :])])
+    outside = (span < 0) | (span >= length)
+    between, towards = joint[np.ix_(outside, outside)], joint[np.ix_(~outside, outside)]
+    values = np.where(known, deviation[position], 0.0)
+    weights = np.empty_like(values)
+    whole = known.all(axis=1)
+    weights[whole] = np.linalg.solve(between, values[whole].T).T
+    if not whole.all():
+        part = known[~whole]
+        matrix = np.where(part[:, :, None] & part[:, None, :], between, 0.0)
+        diagonal = np.arange(len(offset))
+        matrix[:, diagonal, diagonal] = np.diag(between)
+        weights[~whole] = np.linalg.solve(matrix, values[~whole][:, :, None])[:, :, 0]
+    return np.where(known, weights, 0.0) @ towards.T
+
+
+def _possible(matrix: np.ndarray) -> np.ndarray:
+    """The nearest matrix that can be a covariance: estimated from pairs, it need not be one."""
+    values, vectors = np.linalg.eigh(matrix)
+    return (vectors * np.maximum(values, RIDGE * matrix[0, 0])) @ vectors.T

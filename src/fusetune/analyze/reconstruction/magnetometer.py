@@ -1,0 +1,82 @@
+"""Magnetometer samples between those that a thinned log holds.
+
+The field hardly changes over the ground, the attitude does: between two samples it is the field in the earth frame
+that is smoothed and interpolated. What turns with the vehicle (hard iron that the calibration left) is taken off before
+and put back after, as the field at rest in the body is no part of the earth's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusetune.analyze.reconstruction.attitude import AttitudeHistory, to_body, to_earth
+from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
+from fusetune.analyze.reconstruction.smoothing import smoothed_random_walk
+from fusetune.px4.flight import TopicTable, row_count, stacked
+
+MIN_SPREAD = 0.05
+"""Eigenvalue of the attitudes' spread (0: never turned, 1: all ways) from which a body-fixed field can be told."""
+
+MAX_BODY_FIELD_GAUSS = 0.2
+
+
+def interpolate_magnetometer(
+    table: TopicTable, attitude: AttitudeHistory, rate_hz: float, max_bridge_s: float
+) -> tuple[TopicTable, np.ndarray]:
+    """Interpolate `vehicle_magnetometer` to a higher rate.
+
+    Parameters
+    ----------
+    table : canonical `vehicle_magnetometer` of one device
+    attitude : of the vehicle
+    rate_hz : samples are placed evenly between two measured ones, this many a second at most
+    max_bridge_s : measured samples that are further apart stay as they are
+
+    Returns
+    -------
+    The table, and for each of its rows whether it was measured.
+    """
+    time, place = insertion_times(table, rate_hz, max_bridge_s)
+    if not len(time):
+        return table, np.ones(row_count(table), np.bool_)
+    sampled = table["timestamp_sample"].astype(np.int64)
+    measured = stacked(table, "magnetometer_ga")
+    q, known = attitude.at(sampled)
+    q_new, known_new = attitude.at(time)
+    usable = known_new & known[place - 1] & known[place]
+    time, place, q_new = time[usable], place[usable], q_new[usable]
+    body = body_field(q[known], measured[known])
+    earth = np.zeros_like(measured)
+    earth[known] = smoothed_random_walk(sampled[known], to_earth(q[known], measured[known] - body))
+    share = ((time - sampled[place - 1]) / (sampled[place] - sampled[place - 1]))[:, None]
+    between = earth[place - 1] + share * (earth[place] - earth[place - 1])
+    field = to_body(q_new, between) + body
+    values = {f"magnetometer_ga[{axis}]": field[:, axis] for axis in range(3)}
+    return insert_rows(table, time, place, values)
+
+
+def body_field(q: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Field (3,), Gauss, that turns with the vehicle.
+
+    Least squares of m = R(q)ᵀ e + b over all samples, e being the earth's field. Directions of b in which the
+    attitudes do not tell the two apart are left at zero.
+
+    Parameters
+    ----------
+    q : (N, 4) attitudes
+    measured : (N, 3) body field, Gauss
+    """
+    if len(q) < 8:
+        return np.zeros(3)
+    to_ned = np.stack([to_earth(q, np.tile(axis, (len(q), 1))) for axis in np.eye(3)], axis=-1)
+    # the earth's field that fits best for a given b is the mean of R (m - b): what is left is linear in b
+    turned = np.einsum("nij,nj->ni", to_ned, measured)
+    design = to_ned - to_ned.mean(axis=0)
+    target = turned - turned.mean(axis=0)
+    information = np.einsum("nij,nik->jk", design, design) / len(q)
+    values, vectors = np.linalg.eigh(information)
+    told = values > MIN_SPREAD
+    right = vectors.T @ (np.einsum("nij,ni->j", design, target) / len(q))
+    body = vectors[:, told] @ (right[told] / values[told])
+    length = float(np.linalg.norm(body))
+    return body * min(1.0, MAX_BODY_FIELD_GAUSS / length) if length > 0.0 else body

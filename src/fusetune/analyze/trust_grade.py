@@ -1,0 +1,265 @@
+"""How far the replay of one flight can be trusted: a grade from A to D, and what costs most.
+
+The parameters that flew are replayed and compared with what the vehicle's own estimator logged, as the log is and after
+reconstruction. Each figure of the comparison has a grade; the worst is the flight's. What a cause costs is measured by
+switching it: a repair is left out, the start made cold, every second GNSS sample dropped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fusetune.analyze.as_flown_figures import GROUPS, AsFlownFigures, Interval, as_flown_figures, rms
+from fusetune.analyze.flight_phases import airborne_intervals
+from fusetune.analyze.onboard import onboard_samples
+from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS, ReconstructionSettings
+from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
+from fusetune.analyze.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.scoring_window import Cut, subtract
+from fusetune.analyze.sources import AID_SOURCES, HORIZONTAL_AIDING
+from fusetune.analyze.start_choice import COLD, START_TOPICS, StartSettings
+from fusetune.analyze.trust_settings import FIGURES, TrustSettings
+from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.parameters import complete
+from fusetune.ekf2.replay import ReplayResult
+from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
+from fusetune.px4.estimator_instances import instance_shares
+from fusetune.px4.flight import Flight, row_count, select_rows
+
+GRADES = "ABCD"
+GRADE_WORDS = {
+    "A": "The replay repeats what the vehicle's own filter did.",
+    "B": "The replay follows the vehicle's own filter closely; differences between sets can be trusted.",
+    "C": "The replay resembles the vehicle's own filter; trust clear differences between sets only.",
+    "D": "The replay could not be shown to do what the vehicle's own filter did.",
+}
+TRUST_TOPICS = (
+    *dict.fromkeys(
+        (
+            *RECONSTRUCTION_TOPICS,
+            *START_TOPICS,
+            "estimator_innovations",
+            "estimator_innovation_variances",
+            "estimator_innovation_test_ratios",
+            "ekf2_innovations",
+            *(f"estimator_aid_src_{name}" for name in AID_SOURCES),
+        )
+    ),
+)
+"""What the grade reads of a flight."""
+
+COLD_WARM_UP_US = 10_000_000
+FULL_GNSS_RATE_HZ = 4.5
+REPAIRS = {
+    "imu": ("sensor_combined", "missing IMU rows"),
+    "magnetometer": ("vehicle_magnetometer", "thinned magnetometer"),
+    "barometer": ("vehicle_air_data", "thinned barometer"),
+}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What keeps, or kept, the replay from repeating the flight.
+
+    Attributes
+    ----------
+    cause : in words
+    repaired : whether the replay is made without it
+    measured : whether `cost` was found by switching the cause; otherwise it is what remains
+    cost : by how much it raises the distance from the vehicle; 1 is the width of the grades A and B
+    """
+
+    cause: str
+    repaired: bool
+    measured: bool
+    cost: float
+
+
+@dataclass(frozen=True)
+class InstanceFigures:
+    """As flown, one estimator instance of the vehicle: size of its innovations, and how long it was the primary one."""
+
+    instance: int
+    primary_share: float
+    innovation_rms: dict[str, float]
+
+
+@dataclass(frozen=True)
+class TrustGrade:
+    """Grade of one flight; `as_logged` is the replay of the log as it is, from nothing, `repaired` the one in use."""
+
+    grade: str
+    words: str
+    reason: str
+    """What costs most of what could not be repaired; empty for an A."""
+    start: str
+    as_logged_grade: str
+    as_logged: AsFlownFigures
+    repaired: AsFlownFigures
+    figure_grades: dict[str, str]
+    causes: tuple[Cause, ...]
+    instances: tuple[InstanceFigures, ...]
+
+
+def grade_of(figures: AsFlownFigures, settings: TrustSettings) -> tuple[str, dict[str, str]]:
+    """The worst grade of the figures, and each one's; D where there is none to compare."""
+    grades = {}
+    for name in FIGURES:
+        value = getattr(figures, name)
+        if value is not None:
+            limits = getattr(settings, name)
+            missed = sum(value < limit if name == "flags_equal" else value > limit for limit in limits)
+            grades[name] = GRADES[missed if math.isfinite(value) else 3]
+    # flags alone say nothing of how well the filter predicts
+    decisive = [grade for name, grade in grades.items() if name != "flags_equal"]
+    return (max(grades.values()) if decisive else "D"), grades
+
+
+def distance(figures: AsFlownFigures, settings: TrustSettings) -> float:
+    """How far a replay is from the vehicle: mean of the figures, each as a share of the limit of grade B."""
+    shares = []
+    if figures.innovation_factor is not None:
+        shares.append(math.log(figures.innovation_factor) / math.log(settings.innovation_factor[1]))
+    if figures.velocity_m_s is not None:
+        shares.append(figures.velocity_m_s / settings.velocity_m_s[1])
+    if figures.heading_deg is not None:
+        shares.append(figures.heading_deg / settings.heading_deg[1])
+    if figures.flags_equal is not None:
+        shares.append((1.0 - figures.flags_equal) / (1.0 - settings.flags_equal[1]))
+    return float(np.mean(shares)) if shares else math.nan
+
+
+def grade_flight(
+    flight: Flight,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+    settings: TrustSettings | None = None,
+) -> TrustGrade:
+    """Grade one flight.
+
+    Parameters
+    ----------
+    flight : in the layout of `fusetune.px4.release_layouts.canonical`, following the primary instance
+    reconstruction, start : as its replays are made
+    """
+    reconstruction, start = reconstruction or ReconstructionSettings(), start or StartSettings()
+    settings = settings or TrustSettings()
+    comparison = _Comparison(flight, settings)
+    prepared = prepare(flight, reconstruction, start)
+    repaired = comparison.figures(prepared)
+    raw = comparison.figures(prepare(flight))
+    grade, figure_grades = grade_of(repaired, settings)
+    causes: tuple[Cause, ...] = ()
+    if settings.causes and math.isfinite(distance(repaired, settings)):
+        causes = tuple(sorted(_causes(comparison, prepared, reconstruction, start, repaired), key=lambda c: -c.cost))
+    reason = ""
+    if not figure_grades or (grade == "D" and not repaired.innovation_ratio and repaired.velocity_m_s is None):
+        reason = "the log holds nothing of the vehicle's own estimator that could be compared"
+    elif grade != "A":
+        reason = next((cause.cause for cause in causes if not cause.repaired and cause.cost > 0.0), "")
+    return TrustGrade(
+        grade=grade,
+        words=GRADE_WORDS[grade],
+        reason=reason,
+        start=f"{prepared.start.mode}: {prepared.start.why}",
+        as_logged_grade=grade_of(raw, settings)[0],
+        as_logged=raw,
+        repaired=repaired,
+        figure_grades=figure_grades,
+        causes=causes,
+        instances=_instances(flight),
+    )
+
+
+class _Comparison:
+    """Replays of the parameters that flew against the log, all over the same part of the flight."""
+
+    def __init__(self, flight: Flight, settings: TrustSettings):
+        self.flight, self.settings = flight, settings
+        self.params = complete(flight.parameters.initial, {}, flight.release)
+        self.onboard = onboard_samples(flight)
+        self.intervals: tuple[Interval, ...] | None = None
+
+    def figures(self, prepared: PreparedFlight) -> AsFlownFigures:
+        """Figures of one replay; the first one, which is the one in use, decides which part is compared."""
+        result, measured = prepared.replay(self.params)
+        if self.intervals is None:
+            self.intervals = self._compared(result)
+        return as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)
+
+    def distance(self, prepared: PreparedFlight) -> float:
+        return distance(self.figures(prepared), self.settings)
+
+    def _compared(self, result: ReplayResult) -> tuple[Interval, ...]:
+        settle_us = round(self.settings.settle_s * 1e6)
+        if result.warm_start_us is not None:
+            begin = result.warm_start_us + settle_us
+        else:
+            sources = [AID_SOURCE_NAMES.index(name) for name in HORIZONTAL_AIDING if name in AID_SOURCE_NAMES]
+            fused = result.innovations["fused"] & np.isin(result.innovations["source"], sources)
+            first = result.innovations["timestamp_sample"][fused]
+            begin = (int(first.min()) if len(first) else 0) + settle_us + COLD_WARM_UP_US
+        return subtract(airborne_intervals(self.flight, {}), [Cut(-(2**62), begin, "warm-up")])
+
+
+def _causes(
+    comparison: _Comparison,
+    prepared: PreparedFlight,
+    reconstruction: ReconstructionSettings,
+    start: StartSettings,
+    repaired: AsFlownFigures,
+) -> Iterator[Cause]:
+    flight, reached = comparison.flight, distance(repaired, comparison.settings)
+    done = {step.sensor for step in prepared.reconstructed.steps if step.done}
+    for switch, (topic, words) in REPAIRS.items():
+        if topic in done:
+            without = replace(reconstruction, **{switch: False})
+            cost = comparison.distance(prepare(flight, without, start)) - reached
+            yield Cause(words, True, True, cost)
+    if prepared.start.state is not None:
+        cost = comparison.distance(prepare(flight, reconstruction, replace(start, mode=COLD))) - reached
+        yield Cause("the log begins too late for a start from nothing", True, True, cost)
+    lost_to_gnss = 0.0
+    rate = logged_rate_hz(flight.topic("vehicle_gps_position"))
+    if rate is not None and rate < FULL_GNSS_RATE_HZ:
+        halved = comparison.distance(prepare(_with_half_the_gnss(flight), reconstruction, start))
+        lost_to_gnss = max(halved - reached, 0.0)
+        yield Cause(f"GNSS logged at {rate:.1f} Hz (cost of halving it once more)", False, True, lost_to_gnss)
+    if flight.release is not None and flight.release[:2] != BASELINE_RELEASE:
+        baseline = "v{}.{}".format(*BASELINE_RELEASE)
+        words = f"the vehicle flew {flight.release_name}, the replay behaves like {baseline}"
+        yield Cause(words, False, False, max(reached - lost_to_gnss, 0.0))
+
+
+def _with_half_the_gnss(flight: Flight) -> Flight:
+    table = flight.topics["vehicle_gps_position", 0]
+    half = select_rows(table, np.arange(0, row_count(table), 2))
+    return flight.with_topics(flight.topics | {("vehicle_gps_position", 0): half})
+
+
+def _instances(flight: Flight) -> tuple[InstanceFigures, ...]:
+    """Innovations of every estimator instance of the vehicle, while it flew."""
+    shares = instance_shares(flight)
+    airborne = airborne_intervals(flight, {})
+    topics = [name for name, _ in flight.topics if name.startswith("estimator_aid_src_")]
+    figures = []
+    for instance in sorted({k for name in topics for k in flight.instances(name)}):
+        samples = onboard_samples(flight, instance)
+        sizes = {}
+        for group, keys in GROUPS.items():
+            parts = []
+            for key in keys:
+                if key in samples:
+                    one = samples[key]
+                    flying = np.zeros(len(one.innovation), np.bool_)
+                    for begin, end in airborne:
+                        flying |= (one.timestamp_sample >= begin) & (one.timestamp_sample < end)
+                    parts.append(one.innovation[flying & one.fused])
+            if parts and sum(map(len, parts)):
+                sizes[group] = rms(parts)
+        figures.append(InstanceFigures(instance, shares.get(instance, 0.0), sizes))
+    return tuple(figures)

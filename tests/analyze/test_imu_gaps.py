@@ -1,0 +1,133 @@
+"""Filled IMU rows: time, integrals and what is left alone; expected values by hand."""
+
+import numpy as np
+import pytest
+
+from fusetune.analyze.reconstruction.attitude import from_rotation_vector, multiply
+from fusetune.analyze.reconstruction.gap_values import fill_missing
+from fusetune.analyze.reconstruction.gyro_by_attitude import correct_gyro
+from fusetune.analyze.reconstruction.imu_gaps import fill_imu_gaps, find_imu_gaps
+from fusetune.px4.flight import select_rows
+
+INTERVAL_US = 5_000
+
+
+def imu(rate, force, jitter=0):
+    """`sensor_combined` of rates and forces (N, 3) at 200 Hz."""
+    rows = len(rate)
+    table = {f"gyro_rad[{i}]": rate[:, i].astype(np.float32) for i in range(3)}
+    table |= {f"accelerometer_m_s2[{i}]": force[:, i].astype(np.float32) for i in range(3)}
+    stamps = 1_000_000 + INTERVAL_US * np.arange(1, rows + 1)
+    return {
+        "timestamp": stamps + np.random.default_rng(0).integers(-jitter, jitter + 1, rows),
+        "gyro_integral_dt": np.full(rows, INTERVAL_US, np.uint32),
+        "accelerometer_integral_dt": np.full(rows, INTERVAL_US, np.uint32),
+        "accelerometer_clipping": np.ones(rows, np.uint8),
+        **table,
+    }
+
+
+def without(table, missing):
+    return select_rows(table, np.setdiff1d(np.arange(len(table["timestamp"])), missing))
+
+
+def manoeuvre(rows):
+    """Rates and forces of a vehicle that swings slowly: 0.3 Hz."""
+    phase = 2 * np.pi * 0.3 * np.arange(rows) * INTERVAL_US * 1e-6
+    rate = np.stack([0.5 * np.sin(phase), 0.4 * np.cos(phase), 0.2 * np.sin(phase + 1)], axis=1)
+    return rate, np.stack([np.sin(phase), np.cos(phase), -9.8 + 0.5 * np.sin(phase)], axis=1)
+
+
+def test_gap_is_where_windows_do_not_meet():
+    gaps = find_imu_gaps(without(imu(*manoeuvre(100)), [20, 21, 22, 60]))
+    assert gaps.row.tolist() == [20, 57]
+    assert gaps.missing.tolist() == [3, 1]
+    assert gaps.length_us.tolist() == [3 * INTERVAL_US, INTERVAL_US]
+
+
+def test_whole_table_is_handed_on_as_it_is():
+    table = imu(*manoeuvre(200), jitter=1000)
+    filled, measured = fill_imu_gaps(table, 0.2)
+    assert filled is table
+    assert measured.all()
+
+
+def test_filling_gives_back_time_rows_and_integrals():
+    whole = imu(*manoeuvre(2000))
+    missing = np.concatenate([np.arange(start, start + 1 + start % 4) for start in range(100, 1900, 50)])
+    filled, measured = fill_imu_gaps(without(whole, missing), 0.2)
+    np.testing.assert_array_equal(filled["timestamp"], whole["timestamp"])
+    np.testing.assert_array_equal(np.flatnonzero(~measured), missing)
+    assert filled["gyro_integral_dt"].sum() == whole["gyro_integral_dt"].sum()
+    for axis in range(3):
+        for name in (f"gyro_rad[{axis}]", f"accelerometer_m_s2[{axis}]"):
+            # the line between neighbours misses a sine by at most ⅛ (ω T)² of its amplitude, here 3e-4
+            np.testing.assert_allclose(filled[name], whole[name], atol=1e-3)
+            np.testing.assert_array_equal(filled[name][measured], whole[name][measured])
+    assert not filled["accelerometer_clipping"][~measured].any()
+
+
+def test_long_gap_stays_open():
+    table = without(imu(*manoeuvre(400)), np.arange(100, 150))
+    filled, measured = fill_imu_gaps(table, 0.2)
+    assert filled is table
+    assert measured.all()
+
+
+def test_vibration_that_keeps_its_phase_is_carried_into_the_gap():
+    """A line between neighbours would give nearly zero: half a period of 80 Hz is shorter than the gap."""
+    time = np.arange(4000) * 0.005
+    random = np.random.default_rng(1)
+    signal = np.sin(2 * np.pi * 80.0 * time) + 0.05 * random.standard_normal(len(time))
+    first = np.arange(100, 3900, 40)
+    count = np.full(len(first), 3)
+    rows = (first[:, None] + np.arange(3)).ravel()
+    present = np.ones(len(time), bool)
+    present[rows] = False
+    error = fill_missing(np.where(present, signal, 0.0), present, first, count) - signal[rows]
+    # white noise of 0.05 cannot be foreseen, and is what remains
+    assert np.sqrt(np.mean(error**2)) < 0.1
+
+
+def test_white_noise_is_filled_with_its_mean():
+    random = np.random.default_rng(2)
+    signal = 3.0 + random.standard_normal(4000)
+    first, count = np.arange(100, 3900, 40), np.full(95, 2)
+    rows = (first[:, None] + np.arange(2)).ravel()
+    present = np.ones(len(signal), bool)
+    present[rows] = False
+    filled = fill_missing(signal, present, first, count)
+    assert np.abs(filled.mean() - 3.0) < 0.1
+    assert filled.std() < 0.35
+
+
+def test_logged_attitude_tells_what_was_turned_in_a_gap():
+    """A pulse of 1 rad/s lies wholly in each gap: no neighbour shows it, the attitude does."""
+    rows = 4000
+    rate = np.zeros((rows, 3))
+    pulses = np.arange(205, 3800, 200)
+    for start in pulses:
+        rate[start : start + 2, 0] = 1.0
+    whole = imu(rate, np.tile([0.0, 0.0, -9.8], (rows, 1)))
+    turned = from_rotation_vector(np.cumsum(rate * 0.005, axis=0))
+    attitude = {"timestamp": whole["timestamp"][9::10], "timestamp_sample": whole["timestamp"][9::10]}
+    attitude |= {f"q[{i}]": turned[9::10, i] for i in range(4)}
+    missing = np.concatenate([np.arange(start, start + 2) for start in pulses])
+    filled, measured = fill_imu_gaps(without(whole, missing), 0.2)
+    assert np.abs(filled["gyro_rad[0]"][missing]).max() < 0.1
+    corrected = correct_gyro(filled, measured, attitude)
+    np.testing.assert_allclose(corrected["gyro_rad[0]"][missing], 1.0, atol=0.02)
+    np.testing.assert_array_equal(corrected["gyro_rad[0]"][measured], whole["gyro_rad[0]"][measured])
+
+
+def test_attitude_without_gaps_changes_nothing():
+    table = imu(*manoeuvre(300))
+    assert correct_gyro(table, np.ones(300, bool), None) is table
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_quaternion_product_of_rotation_vectors_about_one_axis_adds_them(seed):
+    axis = np.random.default_rng(seed).standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    product = multiply(from_rotation_vector(0.3 * axis), from_rotation_vector(0.5 * axis))
+    np.testing.assert_allclose(product, from_rotation_vector(0.8 * axis), atol=1e-15)

@@ -1,0 +1,114 @@
+"""Logged states of old and new releases in one layout; expected values by hand."""
+
+import numpy as np
+import pytest
+
+from fusetune.px4.flight import Flight, ParameterHistory
+from fusetune.px4.logged_state import logged_states, rotation_variances
+
+HORIZON = 5_000_000
+
+
+def release(major, minor):
+    return {"ver_sw_release": major << 24 | minor << 16 | 255}
+
+
+def table(**columns):
+    result = {}
+    for name, value in columns.items():
+        for i, one in enumerate(np.atleast_1d(value)):
+            result[f"{name}[{i}]" if np.ndim(value) else name] = np.array([one])
+    return result
+
+
+def made_flight(info, states, covariances, *, lag=100_000, parameters=None, **local):
+    origin = {"ref_lat": 47.0, "ref_lon": 8.0, "ref_alt": 500.0, "xy_global": True, "x": 3.0, "y": 4.0, "z": -5.0}
+    stamp = {"timestamp": HORIZON + lag, "timestamp_sample": HORIZON if lag > 20_000 else HORIZON + lag}
+    topics = {
+        ("estimator_states", 0): table(states=states, covariances=covariances, **stamp),
+        ("vehicle_local_position", 0): table(timestamp=HORIZON, timestamp_sample=HORIZON, **(origin | local)),
+        ("estimator_status_flags", 0): table(
+            timestamp=HORIZON - 1, cs_tilt_align=True, cs_yaw_align=True, cs_gnss_pos=True, cs_in_air=False
+        ),
+    }
+    return Flight("f", topics=topics, info=info, parameters=ParameterHistory(initial=parameters or {}))
+
+
+def test_states_of_v1_13_become_rates_and_rotations():
+    states = np.arange(24, dtype=float) * 1e-3
+    states[:4] = [1.0, 0.0, 0.0, 0.0]
+    covariances = np.full(24, 1e-6)
+    covariances[:4] = [0.0, 2.5e-5, 5e-5, 2.5e-4]
+    state = next(logged_states(made_flight(release(1, 13), states, covariances)))
+    assert state.time_us == HORIZON
+    np.testing.assert_allclose(state.position, [7e-3, 8e-3, 9e-3])
+    np.testing.assert_allclose(state.gyro_bias, np.array([10, 11, 12]) * 1e-3 / 0.01)
+    # level and facing north, a quaternion component is half the rotation: variances are four times as large
+    np.testing.assert_allclose(state.variances[:3], [1e-4, 2e-4, 1e-3])
+    np.testing.assert_allclose(state.variances[9:15], 1e-2)
+    np.testing.assert_allclose(state.variances[15:23], 1e-6)
+    assert state.variances[23] == 0.0
+    assert state.origin == (47.0, 8.0, 500.0)
+    assert state.is_aligned
+    assert state.uses_gnss
+    assert "in_air" not in state.flags
+
+
+def test_states_of_v1_15_are_rates_already():
+    states = np.zeros(24)
+    states[0], states[10] = 1.0, 0.02
+    state = next(logged_states(made_flight(release(1, 15), states, np.arange(24) * 1e-4)))
+    assert state.gyro_bias[0] == 0.02
+    np.testing.assert_allclose(state.variances[:23], np.arange(23) * 1e-4)
+
+
+def test_position_of_v1_16_comes_from_the_local_position():
+    states = np.zeros(25)
+    states[0], states[9] = 1.0, -510.0
+    state = next(logged_states(made_flight(release(1, 16), states, np.full(24, 0.5))))
+    np.testing.assert_allclose(state.position, [3.0, 4.0, -10.0])
+    assert state.variances[23] == 0.5
+
+
+def test_sample_time_of_the_newest_imu_is_moved_back_by_the_longest_delay():
+    states = np.zeros(24)
+    states[0] = 1.0
+    delays = {"EKF2_GPS_DELAY": 110.0, "EKF2_EV_DELAY": 175.0, "EKF2_MAG_DELAY": 0.0}
+    flight = made_flight(release(1, 12), states, np.ones(24), lag=1_000, parameters=delays)
+    assert next(logged_states(flight)).time_us == HORIZON + 1_000 - 175_000
+
+
+def test_origin_far_from_the_fix_is_put_there():
+    states = np.zeros(25)
+    states[0], states[9] = 1.0, -510.0
+    flight = made_flight(release(1, 16), states, np.ones(24))
+    fix = table(timestamp=HORIZON, latitude_deg=37.0, longitude_deg=8.0, fix_type=3)
+    flight = flight.with_topics(flight.topics | {("vehicle_gps_position", 0): fix})
+    latitude, longitude, altitude = next(logged_states(flight)).origin
+    assert latitude == pytest.approx(37.0 - 3.0 / 111_195)
+    assert longitude == pytest.approx(8.0 - 4.0 / 111_195 / np.cos(np.radians(37.0)))
+    assert altitude == 500.0
+
+
+def test_states_that_are_no_numbers_are_left_out():
+    states = np.zeros(24)
+    states[0], states[5] = 1.0, np.nan
+    assert not list(logged_states(made_flight(release(1, 13), states, np.ones(24))))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, 2.0, -2.8])
+def test_rotation_variances_invert_the_quaternions(yaw):
+    """Variances ¼ Σ B² var θ, made by hand for a level attitude."""
+    wanted = np.array([1e-4, 3e-4, 2e-3])
+    c, s = np.cos(yaw / 2), np.sin(yaw / 2)
+    quaternion = 0.25 * np.array(
+        [
+            s**2 * wanted[2],
+            c**2 * wanted[0] + s**2 * wanted[1],
+            s**2 * wanted[0] + c**2 * wanted[1],
+            c**2 * wanted[2],
+        ]
+    )
+    found = rotation_variances(np.array([c, 0.0, 0.0, s]), quaternion)
+    assert found[2] == pytest.approx(wanted[2])
+    np.testing.assert_allclose(found[:2], wanted[:2], rtol=1e-6)
