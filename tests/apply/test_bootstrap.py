@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fusetune.apply.bootstrap import bootstrap_scores, expanded_interval, holm, p_value, probability_best
+from fusetune.apply.bootstrap import (
+    bootstrap_scores,
+    expanded_interval,
+    holm,
+    p_value,
+    probability_best,
+    spread_of_flights,
+)
 from fusetune.apply.evidence import AIDED, UNAIDED, AimEvidence, FlightEvidence
 
 
@@ -117,6 +124,22 @@ def test_expanded_interval_covers_the_truth_with_few_flights() -> None:
         covered["plain"] += low <= 1.0 <= high
     assert 0.90 <= covered["expanded"] / 400 <= 0.99
     assert covered["plain"] / 400 < 0.92
+
+
+def test_blocks_do_not_count_the_noise_within_flights_twice() -> None:
+    # Flights differ by nothing but the noise of their blocks: redrawing both has twice the variance of the mean.
+    generator = np.random.default_rng(6)
+    blocks = generator.standard_normal((8, 12))
+    flights = blocks.mean(axis=1)
+    picks = generator.integers(0, 8, (20_000, 8))
+    inner = generator.integers(0, 12, (20_000, 8, 12))
+    draws = blocks[picks[..., None], inner].mean(axis=(1, 2))
+    alone = flights[picks].mean(axis=1)
+    assert draws.std() > 1.2 * alone.std()
+    drawn_together = spread_of_flights(draws, flights)
+    assert drawn_together.std() == pytest.approx(alone.std(), rel=0.02)
+    assert drawn_together.mean() == pytest.approx(draws.mean())
+    np.testing.assert_array_equal(spread_of_flights(draws, flights[:2]), draws)
 
 
 def test_p_value_is_students_with_the_corrected_error() -> None:

@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.apply.bootstrap import Redrawn, bootstrap_scores, expanded_interval, holm, p_value, probability_best
+from fusetune.apply.bootstrap import (
+    Redrawn,
+    bootstrap_scores,
+    expanded_interval,
+    holm,
+    p_value,
+    probability_best,
+    spread_of_flights,
+)
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.sign_flips import family_p_values
@@ -132,7 +140,7 @@ def _compared(
     own = np.array([one.scores[one.sets.index(name)] for one in evidence])
     base = np.array([one.scores[one.sets.index(present)] for one in evidence])
     difference = float(np.mean(own - base))
-    differences = _differences(redrawn.total, sets, name, present)
+    differences = spread_of_flights(_differences(redrawn.total, sets, name, present), own - base)
     interval = expanded_interval(differences, len(evidence), settings.confidence)
     reasons = tuple(vetoed.get(name, ()))
     return RankedSet(
@@ -174,9 +182,11 @@ def _aims(
         flights = [(one, part) for one in evidence if (part := one.aim(aim)) is not None]
         if not flights:
             continue
-        found = [part.scores[one.sets.index(name)] - part.scores[one.sets.index(present)] for one, part in flights]
-        differences = _differences(redrawn.aims[aim], sets, name, present)
-        interval = expanded_interval(differences[np.isfinite(differences)], len(flights), settings.confidence)
+        found = np.array(
+            [part.scores[one.sets.index(name)] - part.scores[one.sets.index(present)] for one, part in flights]
+        )
+        differences = spread_of_flights(_differences(redrawn.aims[aim], sets, name, present), found)
+        interval = expanded_interval(differences, len(flights), settings.confidence)
         compared[aim] = AimComparison(float(np.mean(found)), interval.lower, interval.upper, len(flights))
     return compared
 
