@@ -14,7 +14,7 @@ import numpy as np
 from fusetune.apply.settings import DecisionSettings
 
 from .collect import StudyFiles, collect
-from .judge import coverage, false_changes, judge_all, resample
+from .judge import changes_among_twins, coverage, false_changes, judge_all, resample
 from .tables import between_marks, calibration_table, choices_table, resampled_table, rules_table, truth_tables
 from .world import read_world
 
@@ -38,6 +38,7 @@ def main() -> None:
         ),
         "calibration": calibration_table(
             coverage(worlds, options.flights, options.resamples, quick, np.random.default_rng(SEED)),
+            changes_among_twins(worlds, options.flights, options.resamples, quick, np.random.default_rng(SEED)),
             false_changes(worlds, options.flights, options.null_studies, quick, np.random.default_rng(SEED)),
         ),
         "truth": truth_tables(worlds),

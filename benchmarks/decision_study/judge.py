@@ -163,6 +163,36 @@ def false_changes(
     return shares
 
 
+def changes_among_twins(
+    worlds: Sequence[World], flights: int, draws: int, settings: DecisionSettings, generator: np.random.Generator
+) -> dict[str, float]:
+    """Share of studies in which a change is recommended among sets that are one and the same under different names."""
+    shares = {}
+    for world in worlds:
+        twins = replace(world, flights=tuple(_as_twins(flight) for flight in world.flights), vetoed={})
+        chosen = [
+            decide(
+                twins, generator.choice(len(world.flights), flights, replace=False), range(len(world.sets)), settings
+            )[0]
+            for _ in range(draws)
+        ]
+        shares[world.name] = float(np.mean(np.array(chosen) != 0))
+    return shares
+
+
+def _as_twins(flight):  # type: ignore[no-untyped-def]
+    evidence = flight.evidence
+    aims = tuple(
+        replace(
+            aim,
+            sum_nis=np.repeat(aim.sum_nis[:1], len(evidence.sets), axis=0),
+            sum_log_variance=np.repeat(aim.sum_log_variance[:1], len(evidence.sets), axis=0),
+        )
+        for aim in evidence.aims
+    )
+    return replace(flight, evidence=replace(evidence, aims=aims))
+
+
 def _dealt_out(flight, generator: np.random.Generator):  # type: ignore[no-untyped-def]
     names = list(flight.evidence.sets)
     order = generator.permutation(len(names))
@@ -187,6 +217,7 @@ __all__ = [
     "Rule",
     "Verdict",
     "by_rule",
+    "changes_among_twins",
     "coverage",
     "failures",
     "false_changes",

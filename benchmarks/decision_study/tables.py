@@ -74,10 +74,13 @@ def resampled_table(found: Sequence[Resampled], options: argparse.Namespace) -> 
     return title + "\n\n" + _table(head, rows)
 
 
-def calibration_table(covered: Mapping[str, float], changed: Mapping[str, float]) -> str:
-    """Coverage of the intervals and false changes per world."""
-    rows = [[world, _percent(covered[world]), _percent(changed[world])] for world in covered]
-    return _table(["world", "95 % intervals that hold the truth %", "changes although all sets are equal %"], rows)
+def calibration_table(covered: Mapping[str, float], twins: Mapping[str, float], dealt: Mapping[str, float]) -> str:
+    """Coverage of the intervals, and changes recommended where no set is better, per world."""
+    columns = (covered, twins, dealt)
+    rows = [[world, *(_percent(column[world]) for column in columns)] for world in covered]
+    rows.append(["**all**", *(_percent(float(np.mean(list(column.values())))) for column in columns)])
+    head = ["95 % intervals that hold the truth %", "changes among identical sets %", "changes among equal sets %"]
+    return _table(["world", *head], rows)
 
 
 def truth_tables(worlds: Sequence[World]) -> str:

@@ -199,6 +199,21 @@ def test_the_number_of_candidates_is_allowed_for(tmp_path: Path, multiplicity: s
     assert (decision["status"] == "change") == (best["upper"] < 0.0 and p_value <= 0.05)
 
 
+def test_a_flight_whose_replay_cannot_be_trusted_does_not_count(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
+    folders, table = make_study(tmp_path, sets)
+    for folder, grade, compared in zip(folders, "ABCDDA", ({"x": "A"},) * 4 + ({}, {"x": "A"}), strict=True):
+        fidelity = {"grade": grade, "trust": {"figure_grades": compared}}
+        (folder / "fidelity.json").write_text(json.dumps(fidelity))
+    decide(folders, table, tmp_path / "apply", sets=list(sets))
+    decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
+    # The fourth has a D; the fifth, too, but only because its log holds nothing to compare with.
+    assert [row["scored"] for row in decision["flights"]] == [True, True, True, False, True, True]
+    assert "trust grade D" in decision["flights"][3]["reason"]
+    with pytest.raises(UserError, match="lowest_grade"):
+        DecisionSettings.from_mapping({"lowest_grade": "E"})
+
+
 def test_leaving_out_flights_is_reported(tmp_path: Path) -> None:
     sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
     validated = run(tmp_path, sets)["leave_one_out"]

@@ -123,6 +123,10 @@ def _read_flight(
     name = summary["flight"]
     if summary["status"] != "scored":
         return AnalyzedFlight(name, folder, summary, None, summary["reason"])
+    grade = trust_grade(folder)
+    if grade is not None and grade > settings.lowest_grade:
+        reason = f"its replay has trust grade {grade}, and the decision takes none below {settings.lowest_grade}"
+        return AnalyzedFlight(name, folder, summary, None, reason)
     aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
     unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
     evidence = flight_evidence(name, aided, unaided, whiteness, settings)
@@ -130,6 +134,16 @@ def _read_flight(
         sources = ", ".join(settings.sources)
         return AnalyzedFlight(name, folder, summary, None, f"the flight has no samples of {sources} to score")
     return AnalyzedFlight(name, folder, summary, evidence, "")
+
+
+def trust_grade(folder: Path) -> str | None:
+    """How far the replay of a flight can be trusted, "A" to "D"; None where there was nothing to compare it with."""
+    path = folder / "fidelity.json"
+    if not path.is_file():
+        return None
+    fidelity = json.loads(path.read_text(encoding="utf-8"))
+    compared = fidelity.get("trust", {}).get("figure_grades")
+    return str(fidelity["grade"]) if compared else None
 
 
 def white_shares(metrics: pa.Table, present: str) -> dict[str, float]:

@@ -13,6 +13,9 @@ from fusetune.errors import UserError
 MULTIPLICITY = ("sign_flips", "holm", "none")
 """Ways to allow for the best of many candidates looking better than it is, see `fusetune.apply.choice`."""
 
+GRADES = ("A", "B", "C", "D")
+"""Trust grades of a flight's replay, the best first."""
+
 _WITHHELD = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
 _WITHHELD_AXES = tuple(f"{source}.{axis}" for source in _WITHHELD for axis in AXES[: AID_SOURCES[source].axes])
 
@@ -35,6 +38,7 @@ class DecisionSettings:
     trust_white_share: float = setting(0.9, 0.0, 1.0, "", "a source whose error is whiter has its full weight")
     multiplicity: str = setting("sign_flips", None, None, "", "allowance for the best of many sets being lucky")
     equivalence_percent: float = setting(1.0, 0.0, 100.0, "%", "errors so much larger may be traded for nearness")
+    lowest_grade: str = setting("C", None, None, "", "flights whose replay has a lower trust grade do not count")
     confidence: float = setting(0.95, 0.5, 0.999, "", "level of the intervals")
     draws: int = setting(4000, 200, 200_000, "", "number of bootstrap draws")
     minimum_flights: int = setting(5, 1, 1000, "", "with fewer scored flights the decision is called exploratory")
@@ -72,12 +76,10 @@ class DecisionSettings:
             if key in values
         }
         settings = settings_from_mapping(cls, values, "decision", file)
-        if settings.multiplicity not in MULTIPLICITY:
-            raise UserError(
-                file,
-                f"decision.multiplicity is {settings.multiplicity!r}",
-                f"Use one of: {', '.join(MULTIPLICITY)}",
-            )
+        for key, allowed in (("multiplicity", MULTIPLICITY), ("lowest_grade", GRADES)):
+            if getattr(settings, key) not in allowed:
+                value = getattr(settings, key)
+                raise UserError(file, f"decision.{key} is {value!r}", f"Use one of: {', '.join(allowed)}")
         return cls(**{**_fields(settings), **weights})
 
 
