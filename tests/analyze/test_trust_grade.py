@@ -78,7 +78,8 @@ def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
 def two_instances():
     time = 1_000_000 * np.arange(1, 11)
     status = {"timestamp": time, "mag_device_id": np.full(10, 11)}
-    mag = {"timestamp": time + 10, "device_id": np.full(10, 11), "magnetometer_ga[0]": np.full(10, 0.1)}
+    field = {f"magnetometer_ga[{axis}]": np.full(10, 0.1) for axis in range(3)}
+    mag = {"timestamp": time + 10, "device_id": np.full(10, 11), **field}
     topics = {
         ("estimator_selector_status", 0): {
             "timestamp": np.array([1_000_000, 6_000_000]),

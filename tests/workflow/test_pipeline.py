@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 import signal
+import struct
 import subprocess
 import time
 from pathlib import Path
@@ -70,7 +70,11 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     assert (flown.folder / "results" / "report.html").exists()
 
     before = replay_times(flown, "first/*.json")
-    shutil.copy(flown.folder / "flights" / "first.ulg", flown.folder / "flights" / "second.ulg")
+    # One more message makes it another log; a plain copy would be refused as one.
+    note = b"char[5] notenote2"
+    message = struct.pack("<HBB", len(note) + 1, ord("I"), len("char[5] note")) + note
+    log = (flown.folder / "flights" / "first.ulg").read_bytes()
+    (flown.folder / "flights" / "second.ulg").write_bytes(log + message)
     assert flown.planned_jobs() == {"save_flight": 1, **SUMMARIES}
     flown.run_ok("--cores", "2")
     assert read_flights(flown)["second"]["status"] == "replayable"

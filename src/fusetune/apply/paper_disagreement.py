@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusetune.apply.bootstrap import bootstrap_scores, expanded_interval
+from fusetune.apply.bootstrap import bootstrap_scores, expanded_interval, spread_of_flights
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, white_shares
 from fusetune.apply.paper_mode import (
     PAPER_VARIABLES,
@@ -196,11 +196,10 @@ def _log_ratios(
     for name, found in scores.items():
         if found:
             draws = redrawn.total if name == "score" else redrawn.aims[name]
-            differences = draws[:, 0] - draws[:, 1]
-            differences = differences[np.isfinite(differences)]
+            each = np.array([row[flight.sets.index(one)] - row[flight.sets.index(other)] for flight, row in found])
+            differences = spread_of_flights(draws[:, 0] - draws[:, 1], each)
             interval = expanded_interval(differences, len(found), settings.confidence)
-            mean = np.mean([row[evidence.sets.index(one)] - row[evidence.sets.index(other)] for evidence, row in found])
-            ratios[name] = LogRatio(float(mean), interval.lower, interval.upper)
+            ratios[name] = LogRatio(float(each.mean()), interval.lower, interval.upper)
     return ratios
 
 
