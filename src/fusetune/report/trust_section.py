@@ -7,8 +7,6 @@ from typing import Any
 
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
 
-LEVEL_LABELS = {"same": "repeats the flight", "close": "close", "rough": "rough", "poor": "poor"}
-LEVEL_KINDS = {"same": "good", "close": "good", "rough": "", "poor": "bad"}
 GRADE_KINDS = {"A": "good", "B": "good", "C": "", "D": "bad"}
 FIGURE_WORDS = {
     "innovation_factor": "size of innovations, replay to vehicle",
@@ -18,8 +16,9 @@ FIGURE_WORDS = {
 }
 INTRODUCTION = (
     "Each flight was also replayed with the parameters it flew, and the result set beside what the vehicle's own "
-    "estimator logged. Where the two agree, the replay knows this vehicle; where they do not, the reasons say what the "
-    "log lacks."
+    "estimator logged. The grade follows from the size of the innovations, velocity, heading and flags: A and B repeat "
+    "the flight, of a C only clear differences between sets can be trusted. Logs that lack samples are repaired first; "
+    "how they would stand as they are is shown beside."
 )
 
 
@@ -29,21 +28,40 @@ def trust_section(analyze_folders: Sequence[Path]) -> str:
     flights = [json.loads(file.read_text(encoding="utf-8")) for file in found]
     if not flights:
         return ""
-    head = ("flight", "grade", "replay", "median difference", "in words", "why not closer")
-    rows = [
-        (
-            flight["flight"],
-            Cell(flight.get("grade", "–"), GRADE_KINDS.get(flight.get("grade", ""), "")),
-            Cell(LEVEL_LABELS.get(flight["level"], "not compared"), LEVEL_KINDS.get(flight["level"], "")),
-            _percent(flight["median_relative_rms"]),
-            flight["words"],
-            "; ".join(filter(None, [flight.get("trust", {}).get("reason", ""), *flight["reasons"]])) or "–",
-        )
-        for flight in flights
-    ]
-    parts = [details(f"{flight['flight']}: figures", _figures(flight)) for flight in flights if flight["axes"]]
-    parts += [details(f"{flight['flight']}: grade", _grade(flight["trust"])) for flight in flights if "trust" in flight]
+    head = ("flight", "grade", "as logged", "in words", "repaired", "what remains")
+    parts = [details(f"{flight['flight']}: figures", _details(flight)) for flight in flights]
+    rows = [_row(flight) for flight in flights]
     return section("How far the replay can be trusted", paragraph(INTRODUCTION), table(head, rows), *parts)
+
+
+def _row(flight: dict[str, Any]) -> tuple[str | Cell, ...]:
+    trust = flight.get("trust")
+    if trust is None:
+        return flight["flight"], "–", "–", flight["words"], "–", "; ".join(flight["reasons"]) or "–"
+    repaired = [cause["cause"] for cause in trust["causes"] if cause["repaired"]]
+    return (
+        flight["flight"],
+        Cell(trust["grade"], GRADE_KINDS[trust["grade"]]),
+        Cell(trust["as_logged_grade"], GRADE_KINDS[trust["as_logged_grade"]]),
+        trust["words"],
+        "; ".join(repaired) or "–",
+        trust["reason"] or "–",
+    )
+
+
+def _details(flight: dict[str, Any]) -> str:
+    """What the grade follows from, and the innovations sample by sample where the log holds them."""
+    parts = [_grade(flight["trust"])] if "trust" in flight else []
+    if flight["axes"]:
+        parts += [
+            paragraph(
+                f"Sample by sample the innovations differ by {_percent(flight['median_relative_rms'])} (median)."
+            ),
+            _figures(flight),
+        ]
+    if flight["reasons"]:
+        parts.append(paragraph(f"As logged: {'; '.join(flight['reasons'])}.", "note"))
+    return "".join(parts)
 
 
 def _percent(value: float | None) -> str:

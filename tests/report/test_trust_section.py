@@ -1,0 +1,51 @@
+"""The section on trust: one row per flight, from the files that the analyze room writes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from fusetune.report.trust_section import trust_section
+
+TRUST: dict[str, Any] = {
+    "grade": "B",
+    "as_logged_grade": "D",
+    "words": "The replay follows closely.",
+    "reason": "GNSS logged at 2.0 Hz",
+    "start": "warm: the log begins 2 s before take-off",
+    "as_logged": {"innovation_ratio": {"heading": 3.0}, "velocity_m_s": 0.5, "heading_deg": 9.0, "flags_equal": 0.5},
+    "repaired": {"innovation_ratio": {"heading": 1.1}, "velocity_m_s": 0.1, "heading_deg": 1.0, "flags_equal": 0.99},
+    "figure_grades": {"innovation_factor": "A", "velocity_m_s": "B", "heading_deg": "A", "flags_equal": "A"},
+    "causes": [
+        {"cause": "thinned magnetometer", "repaired": True, "measured": True, "cost": 2.0},
+        {"cause": "GNSS logged at 2.0 Hz", "repaired": False, "measured": True, "cost": 0.4},
+    ],
+}
+
+
+def write(folder: Path, name: str, **changes: Any) -> Path:
+    content = {"flight": name, "words": "Not compared.", "reasons": ["the log starts late"], "axes": []} | changes
+    target = folder / name
+    target.mkdir()
+    (target / "fidelity.json").write_text(json.dumps(content | {"median_relative_rms": None}))
+    return target
+
+
+def test_a_graded_flight_says_what_was_repaired_and_what_remains(tmp_path: Path) -> None:
+    html = trust_section([write(tmp_path, "first", trust=TRUST)])
+    table = html[: html.index("<details")]
+    for text in ("first", ">B<", ">D<", "thinned magnetometer", "GNSS logged at 2.0 Hz"):
+        assert text in table
+    # What held only of the log as it is stands behind the click.
+    assert "the log starts late" not in table
+    assert "As logged: the log starts late." in html
+    assert "warm: the log begins 2 s before take-off" in html
+
+
+def test_a_flight_without_a_grade_keeps_its_words(tmp_path: Path) -> None:
+    html = trust_section([write(tmp_path, "second")])
+    assert "Not compared." in html
+    assert "the log starts late" in html
+
+
+def test_nothing_compared_is_no_section(tmp_path: Path) -> None:
+    assert trust_section([tmp_path]) == ""
