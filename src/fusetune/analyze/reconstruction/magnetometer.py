@@ -28,7 +28,7 @@ def interpolate_magnetometer(
     Parameters
     ----------
     table : canonical `vehicle_magnetometer` of one device
-    attitude : of the vehicle
+    attitude : of the vehicle, in a frame that hardly moves (`steady_history`)
     rate_hz : samples are placed evenly between two measured ones, this many a second at most
     max_bridge_s : measured samples that are further apart stay as they are
 
