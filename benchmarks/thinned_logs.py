@@ -5,9 +5,9 @@
 LOGS_DIR holds ULog files; those named below are used, the others are passed over. REFERENCE_DIR holds one folder per
 log with parameter sets (SET.json), whose order by NLL is compared. Three flights are simulated beside.
 
-Full-rate logs are thinned as PX4's default logging profile thins them: IMU rows lost in short bursts, magnetometer at
-2 Hz, barometer at 5 Hz, attitude at 20 Hz, velocity at 10 Hz. Default-profile logs are compared with what the
-vehicle's own estimator logged.
+Full-rate logs are thinned as the default logging profile of their PX4 release thins them: IMU rows lost in short
+bursts, magnetometer at 2 Hz (5 Hz before v1.12), barometer at 5 Hz, attitude at 20 Hz, velocity at 10 Hz.
+Default-profile logs are compared with what the vehicle's own estimator logged.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import json
 import statistics
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +61,10 @@ GROUPS = {
 }
 SIMULATED_SEEDS = (1, 2, 3)
 THINNING_SEEDS = (1, 2, 3)
-IMU_LOST, MAG_HZ, BARO_HZ, ATTITUDE_HZ, VELOCITY_HZ, GNSS_HZ = 0.04, 2.0, 5.0, 20.0, 10.0, 2.0
+IMU_LOST, BARO_HZ, ATTITUDE_HZ, VELOCITY_HZ, GNSS_HZ = 0.04, 5.0, 20.0, 10.0, 2.0
+OLD_MAG_HZ, MAG_HZ, MAG_HZ_SINCE = 5.0, 2.0, (1, 12, 0)
+"""The default profile's magnetometer rate before v1.12 and since."""
+
 MEAN_BURST = 2.0
 WARM_UP_S, SHORT_LOG_S, SHORT_WARM_UP_S = 20.0, 40.0, 4.0
 SAME_SAMPLE_US = 8_000
@@ -73,6 +76,13 @@ class Thinning:
 
     gnss: bool = False
     seed: int = 1
+    other_mag_rate: bool = False
+    """Magnetometer as the default profile of the releases on the other side of v1.12 logs it."""
+
+    def mag_hz(self, release: tuple[int, int, int] | None) -> float:
+        """Magnetometer rate that is left of a flight of this release."""
+        recent = release is None or release >= MAG_HZ_SINCE
+        return MAG_HZ if recent != self.other_mag_rate else OLD_MAG_HZ
 
 
 def main() -> None:
@@ -112,7 +122,7 @@ def thinned(flight: Flight, thinning: Thinning) -> Flight:
     topics = {key: table for key, table in flight.topics.items() if key[0] != "ekf2_timestamps"}
     topics["sensor_combined", 0] = _with_bursts_lost(topics["sensor_combined", 0], thinning.seed)
     rates = {
-        "vehicle_magnetometer": MAG_HZ,
+        "vehicle_magnetometer": thinning.mag_hz(flight.release),
         "vehicle_air_data": BARO_HZ,
         "vehicle_attitude": ATTITUDE_HZ,
         "vehicle_local_position": VELOCITY_HZ,
@@ -184,19 +194,21 @@ def _print_differences(flights: list[Flight]) -> None:
     print("Median over three random losses of 4 % of the IMU rows.\n")
     print("| flight | variant | " + " | ".join(GROUPS) + " |")
     print("|---" * (2 + len(GROUPS)) + "|")
-    variants: dict[str, tuple[ReconstructionSettings | None, bool]] = {
-        "raw": (None, False),
-        "reconstructed": (ReconstructionSettings(), False),
-        "reconstructed, GNSS 2 Hz too": (ReconstructionSettings(), True),
+    repaired = ReconstructionSettings()
+    variants: dict[str, tuple[ReconstructionSettings | None, Thinning]] = {
+        "raw": (None, Thinning()),
+        "reconstructed": (repaired, Thinning()),
+        "reconstructed, mag rate of the other releases": (repaired, Thinning(other_mag_rate=True)),
+        "reconstructed, GNSS 2 Hz too": (repaired, Thinning(gnss=True)),
     }
     collected: dict[str, list[list[float]]] = {name: [] for name in variants}
     for flight in flights:
         full = _run(prepare(flight), flight)
         since = _warm(full[0])
-        for name, (settings, gnss) in variants.items():
+        for name, (settings, thinning) in variants.items():
             figures = []
             for seed in THINNING_SEEDS:
-                small = thinned(flight, Thinning(gnss, seed))
+                small = thinned(flight, replace(thinning, seed=seed))
                 run = _run(prepare(small, settings), small)
                 figures.append([difference(full, run, group, since) for group in GROUPS.values()])
             row = [statistics.median(column) for column in zip(*figures, strict=True)]

@@ -7,6 +7,7 @@ from fusetune.analyze.reconstruction.attitude import from_rotation_vector, multi
 from fusetune.analyze.reconstruction.gap_values import fill_missing
 from fusetune.analyze.reconstruction.gyro_by_attitude import correct_gyro
 from fusetune.analyze.reconstruction.imu_gaps import fill_imu_gaps, find_imu_gaps
+from fusetune.analyze.reconstruction.trial_gaps import try_gaps, variance_per_second
 from fusetune.px4.flight import select_rows
 
 INTERVAL_US = 5_000
@@ -102,12 +103,15 @@ def test_white_noise_is_filled_with_its_mean():
 
 
 def test_logged_attitude_tells_what_was_turned_in_a_gap():
-    """A pulse of 1 rad/s lies wholly in each gap: no neighbour shows it, the attitude does."""
+    """A pulse of 1 rad/s lies wholly in each gap: no neighbour shows it, the attitude does.
+
+    There are as many pulses after the gaps, which tell that lines over gaps cannot be relied on here.
+    """
     rows = 4000
     rate = np.zeros((rows, 3))
     pulses = np.arange(205, 3800, 200)
     for start in pulses:
-        rate[start : start + 2, 0] = 1.0
+        rate[start : start + 2, 0] = rate[start + 7 : start + 9, 0] = 1.0
     whole = imu(rate, np.tile([0.0, 0.0, -9.8], (rows, 1)))
     turned = from_rotation_vector(np.cumsum(rate * 0.005, axis=0))
     attitude = {"timestamp": whole["timestamp"][9::10], "timestamp_sample": whole["timestamp"][9::10]}
@@ -116,8 +120,42 @@ def test_logged_attitude_tells_what_was_turned_in_a_gap():
     filled, measured = fill_imu_gaps(without(whole, missing), 0.2)
     assert np.abs(filled["gyro_rad[0]"][missing]).max() < 0.1
     corrected = correct_gyro(filled, measured, attitude)
-    np.testing.assert_allclose(corrected["gyro_rad[0]"][missing], 1.0, atol=0.02)
+    turned_in_gaps = corrected["gyro_rad[0]"][missing].reshape(-1, 2).mean(axis=1)
+    np.testing.assert_allclose(turned_in_gaps, 1.0, atol=0.02)
     np.testing.assert_array_equal(corrected["gyro_rad[0]"][measured], whole["gyro_rad[0]"][measured])
+
+
+def test_corrections_of_the_filter_are_not_taken_for_motion():
+    """The vehicle does not turn at all; its attitude is corrected by 5 mrad either way, at random, all the time."""
+    rows = 4000
+    random = np.random.default_rng(8)
+    noise = 0.01 * random.standard_normal((rows, 3))
+    whole = imu(noise, np.tile([0.0, 0.0, -9.8], (rows, 1)))
+    corrections = np.repeat(0.005 * random.standard_normal((rows // 10, 3)), 10, axis=0)
+    logged = from_rotation_vector(corrections)
+    attitude = {"timestamp": whole["timestamp"][9::10], "timestamp_sample": whole["timestamp"][9::10]}
+    attitude |= {f"q[{i}]": logged[9::10, i] for i in range(4)}
+    missing = np.concatenate([np.arange(start, start + 2) for start in range(205, 3800, 50)])
+    filled, measured = fill_imu_gaps(without(whole, missing), 0.2)
+    corrected = correct_gyro(filled, measured, attitude)
+    for axis in range(3):
+        change = corrected[f"gyro_rad[{axis}]"][missing] - filled[f"gyro_rad[{axis}]"][missing]
+        # believed, a correction of 5 mrad over two rows would be 0.7 rad/s
+        assert np.abs(change).max() < 0.005
+
+
+def test_variance_of_filled_white_noise_is_the_noise_of_its_integral():
+    """n rows of variance s², each lasting t, filled by their mean: n s² t² over n t seconds."""
+    rows, sigma = 8000, 0.3
+    noise = sigma * np.random.default_rng(9).standard_normal((rows, 3))
+    whole = imu(noise, np.tile([0.0, 0.0, -9.8], (rows, 1)))
+    missing = np.concatenate([np.arange(start, start + 2) for start in range(105, 7800, 40)])
+    filled, measured = fill_imu_gaps(without(whole, missing), 0.2)
+    trials = try_gaps(filled, measured, "gyro_rad", "gyro_integral_dt")
+    np.testing.assert_allclose(trials.duration_s, 2 * INTERVAL_US * 1e-6)
+    expected = sigma**2 * INTERVAL_US * 1e-6
+    # 193 trials: a variance estimated from them scatters by sqrt(2 / 193) = 10 %
+    np.testing.assert_allclose(variance_per_second(trials, trials.error), expected, rtol=0.35)
 
 
 def test_attitude_without_gaps_changes_nothing():

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from fusetune.px4.flight import TopicTable, stacked
 
@@ -17,6 +18,12 @@ MAX_INTERVAL_US = 1_000_000
 """Over a longer pause of the logged attitude nothing is interpolated."""
 
 MAX_PUBLISH_DELAY_US = 20_000
+
+DRIFT_WINDOW_S = 20.0
+"""Time over which the gyro's drift is taken to be constant."""
+
+MIN_COVERED = 0.9
+"""With a smaller share of an interval covered by IMU rows the gyro does not tell how the vehicle turned in it."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +76,42 @@ def attitude_history(attitude: TopicTable | None, imu: TopicTable) -> AttitudeHi
     drift = rotation_vector(multiply(frame[right], conjugate(frame[left])))
     here = multiply(from_rotation_vector(drift * np.clip(share, 0.0, 1.0)[:, None]), frame[left])
     return AttitudeHistory(time, normalised(multiply(here, turned)), known)
+
+
+def steady_history(attitude: TopicTable | None, imu: TopicTable) -> AttitudeHistory:
+    """Attitude in a frame that does not follow the filter's corrections: that of the gyro, less its drift.
+
+    The filter's heading is corrected and reset in flight, while the earth's field stays where it is. The gyro tells how
+    the vehicle turned since some seconds ago much better than two such headings. Its drift is the median rate by which
+    the logged attitude turns otherwise, over `DRIFT_WINDOW_S`. Over rows that are missing the logged attitude is
+    followed. The frame turns slowly against north, by what the drift is wrong.
+
+    Parameters
+    ----------
+    attitude, imu : as for `attitude_history`
+    """
+    history = attitude_history(attitude, imu)
+    if attitude is None or not len(history.time):
+        return history
+    time, window = history.time, imu["gyro_integral_dt"].astype(np.float64)
+    logged_time, logged = logged_attitude(attitude, time)
+    turned = attitude_at(time, integrated_gyro(imu), logged_time)
+    length = np.diff(logged_time).astype(np.float64)
+    steps, turned_steps = (multiply(conjugate(q[:-1]), q[1:]) for q in (logged, turned))
+    rate = rotation_vector(multiply(conjugate(turned_steps), steps)) / length[:, None]
+    per_window = max(int(DRIFT_WINDOW_S * 1e6 / float(np.median(length))), 1)
+    drift = median_filter(rate, size=(per_window, 1), mode="nearest")
+    covered = np.diff(np.interp(logged_time, time, np.cumsum(window)))
+    follow = (covered < MIN_COVERED * length) | (length > MAX_INTERVAL_US)
+    drift[follow] = rate[follow] * (length / np.maximum(covered, 1.0))[follow, None]
+    interval = np.clip(np.searchsorted(logged_time, time) - 1, 0, len(length) - 1)
+    steady = dict(imu)
+    for axis in range(3):
+        steady[f"gyro_rad[{axis}]"] = imu[f"gyro_rad[{axis}]"] + drift[interval, axis] * 1e6
+    q = integrated_gyro(steady)
+    start = int(np.searchsorted(time, logged_time[0]))
+    frame = multiply(logged[0], conjugate(q[start]))
+    return AttitudeHistory(time, multiply(np.tile(frame, (len(q), 1)), q), history.known)
 
 
 def logged_attitude(attitude: TopicTable, imu_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from fusetune.analyze.reconstruction.attitude import attitude_history, to_body, to_earth
 from fusetune.analyze.reconstruction.gap_surplus import MIN_INTERVALS, surplus_rate
+from fusetune.analyze.reconstruction.trial_gaps import try_gaps, variance_per_second
 from fusetune.px4.flight import TopicTable, row_count, stacked
 
 MAX_INTERVAL_US = 250_000
@@ -42,7 +43,11 @@ def correct_force(
     row = np.searchsorted(time, logged_time)
     known = history.known[np.clip(row, 0, len(time) - 1)]
     usable &= known[:-1] & known[1:]
-    rate = surplus_rate(difference, logged_time, usable, (time - window, time), ~present)
+    trials = try_gaps(table, present, "accelerometer_m_s2", "accelerometer_integral_dt")
+    variance = variance_per_second(trials, to_earth(history.q[trials.row], trials.error))
+    if variance is None:
+        return table
+    rate = surplus_rate(difference, logged_time, usable, (time - window, time), ~present, variance)
     if rate is None:
         return table
     force = to_body(history.q, rate)

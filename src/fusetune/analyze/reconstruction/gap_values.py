@@ -9,6 +9,7 @@ a line between two vibrating neighbours would not do.
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 NEIGHBOURS = 16
 """Values on each side of a gap that are looked at."""
@@ -87,13 +88,13 @@ def autocovariance(deviation: np.ndarray, present: np.ndarray, lags: int) -> np.
 
     Lags without pairs, and those beyond the end of the signal, count as uncorrelated.
     """
-    weight = present.astype(np.float64)
-    result = np.zeros(lags + 1)
-    for lag in range(min(lags + 1, len(deviation))):
-        stop = len(deviation) - lag
-        pairs = float(weight[:stop] @ weight[lag:])
-        if pairs >= MIN_PAIRS:
-            result[lag] = float(deviation[:stop] @ deviation[lag:]) / pairs
+    size = next_fast_len(len(deviation) + lags + 1, real=True)
+
+    def products(values: np.ndarray) -> np.ndarray:
+        return irfft(np.abs(rfft(values, size)) ** 2, size)[: lags + 1]
+
+    pairs = np.round(products(present.astype(np.float64)))
+    result = np.where(pairs >= MIN_PAIRS, products(deviation) / np.maximum(pairs, 1.0), 0.0)
     if not result[0] > 0.0:
         return None
     return result

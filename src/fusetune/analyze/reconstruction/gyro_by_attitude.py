@@ -16,6 +16,7 @@ from fusetune.analyze.reconstruction.attitude import (
     rotation_vector,
 )
 from fusetune.analyze.reconstruction.gap_surplus import MIN_INTERVALS, surplus_rate
+from fusetune.analyze.reconstruction.trial_gaps import try_gaps, variance_per_second
 from fusetune.px4.flight import TopicTable
 
 MAX_INTERVAL_US = 250_000
@@ -40,7 +41,11 @@ def correct_gyro(table: TopicTable, present: np.ndarray, attitude: TopicTable | 
     difference = rotation_vector(multiply(conjugate(_steps(turned)), _steps(logged)))
     usable = (np.diff(logged_time) <= MAX_INTERVAL_US) & ~_has_reset(attitude, logged_time)
     start = time - table["gyro_integral_dt"].astype(np.int64)
-    rate = surplus_rate(difference, logged_time, usable, (start, time), ~present)
+    trials = try_gaps(table, present, "gyro_rad", "gyro_integral_dt")
+    variance = variance_per_second(trials, trials.error)
+    if variance is None:
+        return table
+    rate = surplus_rate(difference, logged_time, usable, (start, time), ~present, variance)
     if rate is None:
         return table
     corrected = dict(table)

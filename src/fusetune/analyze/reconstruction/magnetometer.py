@@ -8,6 +8,7 @@ and put back after, as the field at rest in the body is no part of the earth's.
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from fusetune.analyze.reconstruction.attitude import AttitudeHistory, to_body, to_earth
 from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
@@ -19,6 +20,8 @@ MIN_SPREAD = 0.05
 
 MAX_BODY_FIELD_GAUSS = 0.2
 
+MIN_SPLINE_SAMPLES = 16
+
 
 def interpolate_magnetometer(
     table: TopicTable, attitude: AttitudeHistory, rate_hz: float, max_bridge_s: float
@@ -28,7 +31,7 @@ def interpolate_magnetometer(
     Parameters
     ----------
     table : canonical `vehicle_magnetometer` of one device
-    attitude : of the vehicle
+    attitude : of the vehicle, in a frame that hardly moves (`steady_history`)
     rate_hz : samples are placed evenly between two measured ones, this many a second at most
     max_bridge_s : measured samples that are further apart stay as they are
 
@@ -48,11 +51,33 @@ def interpolate_magnetometer(
     body = body_field(q[known], measured[known])
     earth = np.zeros_like(measured)
     earth[known] = smoothed_random_walk(sampled[known], to_earth(q[known], measured[known] - body))
-    share = ((time - sampled[place - 1]) / (sampled[place] - sampled[place - 1]))[:, None]
-    between = earth[place - 1] + share * (earth[place] - earth[place - 1])
+    between = _between(sampled, earth, known, time, place)
     field = to_body(q_new, between) + body
     values = {f"magnetometer_ga[{axis}]": field[:, axis] for axis in range(3)}
     return insert_rows(table, time, place, values)
+
+
+def _between(
+    sampled: np.ndarray, earth: np.ndarray, known: np.ndarray, time: np.ndarray, place: np.ndarray
+) -> np.ndarray:
+    """Field (M, 3) at `time`: on the line between its neighbours, or on a spline where that foretells samples better.
+
+    A spline is for a smooth field that its samples show without noise; a random walk between samples is on the line.
+    """
+    if _spline_is_nearer(earth[known]):
+        return np.asarray(CubicSpline(sampled[known] * 1e-6, earth[known])(time * 1e-6))
+    share = ((time - sampled[place - 1]) / (sampled[place] - sampled[place - 1]))[:, None]
+    return earth[place - 1] + share * (earth[place] - earth[place - 1])
+
+
+def _spline_is_nearer(earth: np.ndarray) -> bool:
+    """Leave each sample out: is it nearer to the cubic through the two samples on each side, or to the line?"""
+    if len(earth) < MIN_SPLINE_SAMPLES:
+        return False
+    near, far, here = earth[1:-3] + earth[3:-1], earth[:-4] + earth[4:], earth[2:-2]
+    # Lagrange's weights at 0 of the points -2, -1, 1, 2
+    cubic, line = (4.0 * near - far) / 6.0, 0.5 * near
+    return bool(np.sum((cubic - here) ** 2) < np.sum((line - here) ** 2))
 
 
 def body_field(q: np.ndarray, measured: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fusetune.analyze.reconstruction.attitude import attitude_history
+from fusetune.analyze.reconstruction.attitude import steady_history
 from fusetune.analyze.reconstruction.barometer import interpolate_barometer
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz, sensor_rate_hz
 from fusetune.analyze.reconstruction.force_by_velocity import correct_force
@@ -79,7 +79,7 @@ def reconstruct(flight: Flight, settings: ReconstructionSettings | None = None) 
         topics.pop(("ekf2_timestamps", 0), None)
 
     def magnetometer(table: TopicTable, rate_hz: float) -> tuple[TopicTable, np.ndarray]:
-        attitude = attitude_history(topics.get(("vehicle_attitude", 0)), topics[IMU, 0])
+        attitude = steady_history(topics.get(("vehicle_attitude", 0)), topics[IMU, 0])
         return interpolate_magnetometer(table, attitude, rate_hz, settings.max_bridge_s)
 
     def barometer(table: TopicTable, rate_hz: float) -> tuple[TopicTable, np.ndarray]:
