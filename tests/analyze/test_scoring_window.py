@@ -4,6 +4,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.analyze.made_flight import LANDING_S, MadeSet, at, make_flight
@@ -70,6 +71,15 @@ def test_a_set_that_resets_all_the_time_is_left_out(tmp_path: Path) -> None:
     )
     assert set(window.excluded) == {"restless"}
     assert window.intervals == AIRBORNE
+
+
+def test_a_set_that_resets_as_often_as_the_present_one_is_not_left_out(tmp_path: Path) -> None:
+    restless = tuple(float(s) for s in range(12, 58, 4))
+    made = records(tmp_path, {"present": MadeSet(resets_s=restless), "alike": MadeSet(resets_s=restless)})
+    window = scoring_window(made, "present", AIRBORNE, (), SETTINGS)
+    assert window.excluded == {}
+    # 1.5 s before the first cut, half a second between each two of the twelve, and 11 s after the last
+    assert window.duration_s == pytest.approx(1.5 + 11 * 0.5 + 11.0)
 
 
 def test_a_diverged_set_is_left_out_with_its_reason(tmp_path: Path) -> None:

@@ -160,26 +160,34 @@ def cuts_within(
 ) -> tuple[Cut, ...]:
     """Cuts around the resets of all sets and the gaps of the log inside `flying`.
 
-    `excluded` takes sets whose own resets would cost the others too much.
+    `excluded` takes sets whose own resets would cost the others too much of what the present set leaves of the flight.
     """
     after = round(settings.reset_cut_s * 1e6)
     cuts = [Cut(start, stop + after, "gap in the log") for start, stop in gaps]
-    total = sum(stop - start for start, stop in flying)
-    for record in records:
-        if record.name in excluded:
-            continue
-        own = [
-            Cut(int(time) - FUSION_DELAY_US, int(time) + after, f"reset of {kind.replace('_', ' ')}")
-            for kind, times in reset_times(record).items()
-            for time in times
-        ]
-        lost = total - sum(stop - start for start, stop in subtract(flying, own))
-        if record.name != present and lost > _LONGEST_CUT_SHARE * total:
-            excluded[record.name] = f"its resets would cut {lost * 1e-6:.1f} s of {total * 1e-6:.1f} s"
+    of_set = {record.name: _around_resets(record, after) for record in records if record.name not in excluded}
+    cuts += of_set.get(present, [])
+    left = subtract(flying, cuts)
+    total = _duration(left)
+    for name, own in of_set.items():
+        lost = total - _duration(subtract(left, own))
+        if name != present and lost > _LONGEST_CUT_SHARE * total:
+            excluded[name] = f"its resets would cut {lost * 1e-6:.1f} s of {total * 1e-6:.1f} s"
         else:
-            cuts.extend(own)
+            cuts += own
     relevant = [cut for cut in cuts if any(cut.stop > start and cut.start < stop for start, stop in flying)]
     return _merged(relevant)
+
+
+def _around_resets(record: SetRecord, after_us: int) -> list[Cut]:
+    return [
+        Cut(int(time) - FUSION_DELAY_US, int(time) + after_us, f"reset of {kind.replace('_', ' ')}")
+        for kind, times in reset_times(record).items()
+        for time in times
+    ]
+
+
+def _duration(intervals: Sequence[Interval]) -> int:
+    return sum(stop - start for start, stop in intervals)
 
 
 def _merged(cuts: list[Cut]) -> tuple[Cut, ...]:

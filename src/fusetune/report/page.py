@@ -74,7 +74,7 @@ def build_report(
         f"<title>EKF2 parameters: the decision</title><style>{STYLE_SHEET.read_text(encoding='utf-8')}</style>"
         "</head><body>"
         f"<header><h1>Which EKF2 parameters to fly</h1><p>{product}, from "
-        f"{len(results.flights)} scored flights</p></header>"
+        f"{results.decision['flights_scored']} flights</p></header>"
         + "\n".join(sections)
         + f"<script>{_PRINT}</script></body></html>\n"
     )
