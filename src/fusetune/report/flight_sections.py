@@ -1,6 +1,6 @@
 """The parts of the page about the flights: verdicts, figures of the innovations, truth, single flights, origin."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,28 +33,37 @@ _AS_FLOWN_GROUPS = (
 def flights_section(results: Results, flights_table: Path) -> str:
     """Every log with its verdict."""
     verdicts = pd.read_parquet(flights_table).to_dict("records")
-    rows = []
-    for verdict in sorted(verdicts, key=lambda one: str(one["flight"])):
-        summary = results.scoring.get(verdict["flight"])
-        scored = summary is not None and summary["status"] == "scored"
-        reason = verdict.get("reason") or ""
-        if summary is not None and not scored:
-            reason = summary["reason"]
-        words = "scored" if scored else "not scored" if summary is not None else str(verdict["status"])
-        rows.append(
-            (
-                Cell(str(verdict["flight"])),
-                Cell(words, "short good" if scored else "short bad"),
-                number(summary["scored_s"] if scored and summary else None),
-                number(verdict.get("airborne_s")),
-                Cell(str(verdict.get("firmware") or "unknown"), "short"),
-                str(reason),
-            )
-        )
+    judged = {row["flight"]: row for row in results.decision["flights"]}
+    rows = [_flight_row(verdict, results, judged) for verdict in sorted(verdicts, key=lambda one: str(one["flight"]))]
     head = ("flight", "verdict", "scored s", "airborne s", "firmware", "reason")
-    count = len(rows)
-    text = f"{count} log{'s' if count != 1 else ''}, {len(results.flights)} scored."
+    count, decide = len(rows), results.decision["flights_scored"]
+    text = f"{count} log{'s' if count != 1 else ''}, {len(results.flights)} scored, {decide} in the decision."
     return section("The flights", paragraph(text), table(head, rows))
+
+
+def _flight_row(
+    verdict: Mapping[Hashable, Any], results: Results, judged: dict[str, dict[str, Any]]
+) -> tuple[Cell | str, ...]:
+    name = verdict["flight"]
+    summary = results.scoring.get(name)
+    scored = summary is not None and summary["status"] == "scored"
+    decides = scored and judged.get(name, {"scored": True})["scored"]
+    reason = verdict.get("reason") or ""
+    if summary is not None and not scored:
+        reason = summary["reason"]
+    elif scored and not decides:
+        reason = judged[name]["reason"]
+    words = "not scored" if summary is not None else str(verdict["status"])
+    if scored:
+        words = "scored" if decides else "not counted"
+    return (
+        Cell(str(name)),
+        Cell(words, "short good" if decides else "short bad"),
+        number(summary["scored_s"] if scored and summary else None),
+        number(verdict.get("airborne_s")),
+        Cell(str(verdict.get("firmware") or "unknown"), "short"),
+        str(reason),
+    )
 
 
 def innovations_section(results: Results, figures: Path) -> str:
