@@ -66,6 +66,8 @@ def read_ulog(path: str | os.PathLike[str]) -> Flight:
     if not messages:
         raise UserError(file, "holds no message that can be read", _COPY_AGAIN)
     left_out = _without_impossible_rows(messages)
+    if not messages:
+        raise UserError(file, "holds no message whose time stamp can be", _COPY_AGAIN)
     times, places = _times(messages), _places(messages)
     start, note = _start(content, times)
     return Flight(
@@ -77,7 +79,7 @@ def read_ulog(path: str | os.PathLike[str]) -> Flight:
         dropouts=_dropouts(values, times, places, start),
         messages=_texts(values),
         start_timestamp=start,
-        last_timestamp=max(start, *(int(one.max()) for one in times.values())),
+        last_timestamp=max([start, *(int(one.max()) for one in times.values())]),
         checksum=hashlib.sha256(content).hexdigest(),
         size_bytes=len(content),
         corruption=(*notes, *note),
