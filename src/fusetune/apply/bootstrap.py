@@ -140,6 +140,11 @@ def expanded_interval(differences: Array, flights: int, confidence: float) -> In
     return Interval(float(lower), float(upper))
 
 
+def interval_over_flights(draws: Array, differences: Array, confidence: float) -> Interval:
+    """Interval of a mean difference from its redrawn means (D,) and the differences on the flights (F,)."""
+    return expanded_interval(spread_of_flights(draws, differences), differences.size, confidence)
+
+
 def p_value(difference: float, differences: Array, flights: int) -> float:
     """Two-sided p-value of a mean difference against 0: Student's t with the bootstrap's standard error.
 

@@ -62,7 +62,7 @@ class AimEvidence:
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """What one flight says about the sets that were scored on it; the weights of its aims sum to 1."""
+    """What one flight says about the sets that were scored on it; its aims have weights above 0 that sum to 1."""
 
     flight: str
     sets: tuple[str, ...]
@@ -75,7 +75,7 @@ class FlightEvidence:
 
     def aim(self, name: str) -> AimEvidence | None:
         """One of the aims, None where this flight has no evidence of it or gives it no weight."""
-        return next((aim for aim in self.aims if aim.name == name and aim.weight > 0.0), None)
+        return next((aim for aim in self.aims if aim.name == name), None)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusetune.apply.bootstrap import bootstrap_scores, expanded_interval, spread_of_flights
+from fusetune.apply.bootstrap import bootstrap_scores, interval_over_flights
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, white_shares
 from fusetune.apply.paper_mode import (
     PAPER_VARIABLES,
@@ -197,8 +197,7 @@ def _log_ratios(
         if found:
             draws = redrawn.total if name == "score" else redrawn.aims[name]
             each = np.array([row[flight.sets.index(one)] - row[flight.sets.index(other)] for flight, row in found])
-            differences = spread_of_flights(draws[:, 0] - draws[:, 1], each)
-            interval = expanded_interval(differences, len(found), settings.confidence)
+            interval = interval_over_flights(draws[:, 0] - draws[:, 1], each, settings.confidence)
             ratios[name] = LogRatio(float(each.mean()), interval.lower, interval.upper)
     return ratios
 

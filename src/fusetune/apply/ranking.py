@@ -12,6 +12,7 @@ from fusetune.apply.bootstrap import (
     bootstrap_scores,
     expanded_interval,
     holm,
+    interval_over_flights,
     p_value,
     probability_best,
     spread_of_flights,
@@ -185,8 +186,8 @@ def _aims(
         found = np.array(
             [part.scores[one.sets.index(name)] - part.scores[one.sets.index(present)] for one, part in flights]
         )
-        differences = spread_of_flights(_differences(redrawn.aims[aim], sets, name, present), found)
-        interval = expanded_interval(differences, len(flights), settings.confidence)
+        draws = _differences(redrawn.aims[aim], sets, name, present)
+        interval = interval_over_flights(draws, found, settings.confidence)
         compared[aim] = AimComparison(float(np.mean(found)), interval.lower, interval.upper, len(flights))
     return compared
 

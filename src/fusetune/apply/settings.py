@@ -1,7 +1,7 @@
 """How the decision is made; read from the section `decision` of the configuration. `docs/decision.md` argues for it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +70,7 @@ class DecisionSettings:
         values = dict(values or {})
         if seed is not None:
             values.setdefault("seed", seed)
-        weights = {
+        weights: dict[str, Any] = {
             key: _weights(values.pop(key), key, allowed, file)
             for key, allowed in (("sources", tuple(AID_SOURCES)), ("withheld_sources", (*_WITHHELD, *_WITHHELD_AXES)))
             if key in values
@@ -80,11 +80,7 @@ class DecisionSettings:
             if getattr(settings, key) not in allowed:
                 value = getattr(settings, key)
                 raise UserError(file, f"decision.{key} is {value!r}", f"Use one of: {', '.join(allowed)}")
-        return cls(**{**_fields(settings), **weights})
-
-
-def _fields(settings: DecisionSettings) -> dict[str, Any]:
-    return {name: getattr(settings, name) for name in settings.__dataclass_fields__}
+        return replace(settings, **weights)
 
 
 def _weights(value: Any, key: str, allowed: tuple[str, ...], file: Path | str) -> dict[str, float]:
