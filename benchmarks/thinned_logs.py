@@ -6,7 +6,8 @@ LOGS_DIR holds ULog files; those named below are used, the others are passed ove
 log with parameter sets (SET.json), whose order by NLL is compared. Three flights are simulated beside.
 
 Full-rate logs are thinned as the default logging profile of their PX4 release thins them: IMU rows lost in short
-bursts, magnetometer at 2 Hz (5 Hz before v1.12), barometer at 5 Hz, attitude at 20 Hz, velocity at 10 Hz.
+bursts, magnetometer at 2 Hz (5 Hz before v1.12), barometer at 5 Hz, attitude at 20 Hz, velocity at 10 Hz, the
+estimator's own topics at 2 Hz.
 Default-profile logs are compared with what the vehicle's own estimator logged.
 """
 
@@ -61,7 +62,7 @@ GROUPS = {
 }
 SIMULATED_SEEDS = (1, 2, 3)
 THINNING_SEEDS = (1, 2, 3)
-IMU_LOST, BARO_HZ, ATTITUDE_HZ, VELOCITY_HZ, GNSS_HZ = 0.04, 5.0, 20.0, 10.0, 2.0
+IMU_LOST, BARO_HZ, ATTITUDE_HZ, VELOCITY_HZ, ESTIMATOR_HZ, GNSS_HZ = 0.04, 5.0, 20.0, 10.0, 2.0, 2.0
 OLD_MAG_HZ, MAG_HZ, MAG_HZ_SINCE = 5.0, 2.0, (1, 12, 0)
 """The default profile's magnetometer rate before v1.12 and since."""
 
@@ -129,9 +130,10 @@ def thinned(flight: Flight, thinning: Thinning) -> Flight:
     }
     if thinning.gnss:
         rates["vehicle_gps_position"] = GNSS_HZ
-    for topic, rate in rates.items():
-        if (topic, 0) in topics:
-            topics[topic, 0] = _decimated(topics[topic, 0], rate)
+    for (topic, instance), table in topics.items():
+        rate = ESTIMATOR_HZ if topic.startswith("estimator_") else rates.get(topic)
+        if rate is not None:
+            topics[topic, instance] = _decimated(table, rate)
     return flight.with_topics(topics)
 
 

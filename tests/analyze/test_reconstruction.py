@@ -15,8 +15,7 @@ from fusetune.analyze.reconstruction.attitude import (
     to_body,
 )
 from fusetune.analyze.reconstruction.between_samples import sensor_rate_hz
-from fusetune.analyze.reconstruction.magnetometer import _spline_is_nearer, body_field, interpolate_magnetometer
-from fusetune.analyze.reconstruction.smoothing import smoothed_random_walk
+from fusetune.analyze.reconstruction.magnetometer import _spline_is_nearer, interpolate_magnetometer
 from fusetune.analyze.replay_files import ReplayIdentity, write_replay
 from fusetune.analyze.replay_flight import prepare
 from fusetune.analyze.set_files import read_set
@@ -124,15 +123,6 @@ def test_attitude_is_followed_where_imu_rows_are_missing():
     history = steady_history(logged(imu, q, np.zeros(len(q))), select_rows(imu, kept))
     error = rotation_vector(multiply(conjugate(q[kept]), history.q))
     assert np.linalg.norm(error, axis=1).max() < 0.03
-
-
-def test_body_field_is_told_from_the_earths_where_the_vehicle_turned():
-    """Yaw alone, at a constant tilt, shows two directions of the body field; the third is left at zero."""
-    _, q = turning_vehicle()
-    measured = to_body(q, np.tile(EARTH, (len(q), 1))) + BODY
-    up = np.array([0.0, np.sin(0.3), np.cos(0.3)])
-    expected = BODY - (BODY @ up) * up
-    np.testing.assert_allclose(body_field(q, measured), expected, atol=1e-6)
 
 
 def test_without_attitude_nothing_is_interpolated():
@@ -272,15 +262,3 @@ def test_rate_without_a_grid_is_the_nominal_one():
     random = np.random.default_rng(3)
     times = np.cumsum(random.integers(400_000, 600_000, 200))
     assert sensor_rate_hz({"timestamp": times, "timestamp_sample": times}, 50.0) == 50.0
-
-
-def test_white_noise_is_smoothed_away_and_a_clean_walk_left_alone():
-    random = np.random.default_rng(5)
-    time = 500_000 * np.arange(400)
-    noisy = 0.3 + 0.01 * random.standard_normal((400, 1))
-    smooth = smoothed_random_walk(time, noisy)
-    # with the least drift, 1e-3 of the noise per second, the smoothed estimate keeps sqrt(5e-4) / 2 of the variance
-    # (half the filter's steady-state gain, sqrt of drift over noise per sample): 0.1 of the standard deviation
-    assert np.std(smooth - 0.3) < 0.002
-    walk = np.cumsum(0.01 * random.standard_normal((400, 1)), axis=0)
-    np.testing.assert_allclose(smoothed_random_walk(time, walk), walk, atol=0.01)

@@ -82,8 +82,8 @@ def prepare(
 
     `None` leaves the stream as it was logged, and starts cold.
     """
-    reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction)
     chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
+    reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction, chosen.state)
     return PreparedFlight(build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps))
 
 

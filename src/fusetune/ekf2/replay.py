@@ -163,17 +163,8 @@ def replay(
     ReplayResult
         The same inputs and parameters give the same bytes.
     """
-    ensure_compiled()
-    changes = [
-        (run, change)
-        for run, change in inputs.parameter_changes
-        if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
-    ]
     ranges = [_runs_of(inputs, gap) for gap in gaps]
-    if start is not None:
-        inputs = without_first_resets(inputs, start.time_us)
-    course = _Course(inputs, parameter_record(parameters), changes)
-    first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
+    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start)
     kept: list[tuple[np.ndarray, ...]] = []
     found: list[GapResult | None] = [None] * len(gaps)
     for begin, end in course.stretches(first_run, len(inputs.arrays.imu), [first for first, _ in ranges]):
@@ -196,7 +187,32 @@ def replay(
     )
 
 
-class _Course:
+def begin_course(
+    inputs: EstimatorInputs,
+    parameters: Mapping[str, float],
+    overridden: frozenset[str] | None = None,
+    start: LoggedState | None = None,
+) -> tuple[Course, int, int | None]:
+    """Set the estimator on its way; arguments as for `replay`.
+
+    Returns
+    -------
+    The course, the run to go on with, and the horizon at which `start` was taken over (None: it was not).
+    """
+    ensure_compiled()
+    changes = [
+        (run, change)
+        for run, change in inputs.parameter_changes
+        if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
+    ]
+    if start is not None:
+        inputs = without_first_resets(inputs, start.time_us)
+    course = Course(inputs, parameter_record(parameters), changes)
+    first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
+    return course, first_run, warm_start_us
+
+
+class Course:
     """The estimator on its way through a flight: its memory, its parameters, and what it has recorded last."""
 
     def __init__(self, inputs: EstimatorInputs, params: np.ndarray, changes: Sequence[tuple[int, ParameterChange]]):
@@ -213,17 +229,10 @@ class _Course:
         The run to go on with and the horizon; (0, None), as if nothing had happened, where the samples end before.
         """
         before = self.branch()
-        times = self.inputs.arrays.imu["time_us"]
         for begin, end in self.stretches(0, 1):
             self.run(begin, end)
         fresh = self.ekf.copy()
-        run = max(int(np.searchsorted(times, state.time_us)), 1)
-        for begin, end in self.stretches(1, min(run, len(times))):
-            self.run(begin, end)
-        while run < len(times) and self.ekf["time_delayed_us"][0] < state.time_us:
-            for begin, end in self.stretches(run, run + 1):
-                self.run(begin, end)
-            run += 1
+        run = self.reach(1, state.time_us)
         if self.ekf["time_delayed_us"][0] < state.time_us:
             self.ekf, self.params, self.recorder = before.ekf, before.params, before.recorder
             return 0, None
@@ -231,7 +240,19 @@ class _Course:
         self.recorder = np.zeros(1, RECORDER_MEMORY)
         return run, int(self.ekf["time_delayed_us"][0])
 
-    def branch(self) -> _Course:
+    def reach(self, run: int, time_us: int) -> int:
+        """Go on from a run until the horizon has come to a time or the samples end; the run to go on with."""
+        runs = len(self.inputs.arrays.imu)
+        near = min(max(int(np.searchsorted(self.inputs.arrays.imu["time_us"], time_us)), run), runs)
+        for begin, end in self.stretches(run, near):
+            self.run(begin, end)
+        while near < runs and self.ekf["time_delayed_us"][0] < time_us:
+            for begin, end in self.stretches(near, near + 1):
+                self.run(begin, end)
+            near += 1
+        return near
+
+    def branch(self) -> Course:
         """Another course that starts where this one is."""
         other = copy(self)
         other.ekf, other.params, other.recorder = self.ekf.copy(), self.params.copy(), self.recorder.copy()
@@ -269,7 +290,7 @@ def _runs_of(inputs: EstimatorInputs, gap: Gap) -> tuple[int, int]:
     return int(first), int(last)
 
 
-def _continue_into_gap(course: _Course, gap: Gap, first: int, last: int) -> GapResult | None:
+def _continue_into_gap(course: Course, gap: Gap, first: int, last: int) -> GapResult | None:
     """Replay the gap on a copy of the filter; None where the filter has not started, or the flight has no such time."""
     if not course.ekf["filter_initialised"][0]:
         return None

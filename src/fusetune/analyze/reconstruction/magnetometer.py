@@ -10,15 +10,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from fusetune.analyze.reconstruction.attitude import AttitudeHistory, to_body, to_earth
+from fusetune.analyze.reconstruction.attitude import AttitudeHistory, to_body
 from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
-from fusetune.analyze.reconstruction.smoothing import smoothed_random_walk
+from fusetune.analyze.reconstruction.magnetic_field import magnetic_field
 from fusetune.px4.flight import TopicTable, row_count, stacked
-
-MIN_SPREAD = 0.05
-"""Eigenvalue of the attitudes' spread (0: never turned, 1: all ways) from which a body-fixed field can be told."""
-
-MAX_BODY_FIELD_GAUSS = 0.2
 
 MIN_SPLINE_SAMPLES = 16
 
@@ -48,12 +43,11 @@ def interpolate_magnetometer(
     q_new, known_new = attitude.at(time)
     usable = known_new & known[place - 1] & known[place]
     time, place, q_new = time[usable], place[usable], q_new[usable]
-    body = body_field(q[known], measured[known])
+    field = magnetic_field(sampled[known], q[known], measured[known])
     earth = np.zeros_like(measured)
-    earth[known] = smoothed_random_walk(sampled[known], to_earth(q[known], measured[known] - body))
-    between = _between(sampled, earth, known, time, place)
-    field = to_body(q_new, between) + body
-    values = {f"magnetometer_ga[{axis}]": field[:, axis] for axis in range(3)}
+    earth[known] = field.earth
+    between = to_body(q_new, _between(sampled, earth, known, time, place)) + field.body
+    values = {f"magnetometer_ga[{axis}]": between[:, axis] for axis in range(3)}
     return insert_rows(table, time, place, values)
 
 
@@ -78,30 +72,3 @@ def _spline_is_nearer(earth: np.ndarray) -> bool:
     # Lagrange's weights at 0 of the points -2, -1, 1, 2
     cubic, line = (4.0 * near - far) / 6.0, 0.5 * near
     return bool(np.sum((cubic - here) ** 2) < np.sum((line - here) ** 2))
-
-
-def body_field(q: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Field (3,), Gauss, that turns with the vehicle.
-
-    Least squares of m = R(q)ᵀ e + b over all samples, e being the earth's field. Directions of b in which the
-    attitudes do not tell the two apart are left at zero.
-
-    Parameters
-    ----------
-    q : (N, 4) attitudes
-    measured : (N, 3) body field, Gauss
-    """
-    if len(q) < 8:
-        return np.zeros(3)
-    to_ned = np.stack([to_earth(q, np.tile(axis, (len(q), 1))) for axis in np.eye(3)], axis=-1)
-    # the earth's field that fits best for a given b is the mean of R (m - b): what is left is linear in b
-    turned = np.einsum("nij,nj->ni", to_ned, measured)
-    design = to_ned - to_ned.mean(axis=0)
-    target = turned - turned.mean(axis=0)
-    information = np.einsum("nij,nik->jk", design, design) / len(q)
-    values, vectors = np.linalg.eigh(information)
-    told = values > MIN_SPREAD
-    right = vectors.T @ (np.einsum("nij,ni->j", design, target) / len(q))
-    body = vectors[:, told] @ (right[told] / values[told])
-    length = float(np.linalg.norm(body))
-    return body * min(1.0, MAX_BODY_FIELD_GAUSS / length) if length > 0.0 else body

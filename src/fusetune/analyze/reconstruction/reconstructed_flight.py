@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,11 +14,14 @@ from fusetune.analyze.reconstruction.force_by_velocity import correct_force
 from fusetune.analyze.reconstruction.gyro_by_attitude import correct_gyro
 from fusetune.analyze.reconstruction.imu_gaps import fill_imu_gaps, find_imu_gaps
 from fusetune.analyze.reconstruction.magnetometer import interpolate_magnetometer
+from fusetune.analyze.reconstruction.magnetometer_by_state import add_noise_by_state
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
-from fusetune.px4.flight import Flight, TopicTable, row_count
+from fusetune.ekf2.parameters import complete
+from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count
+from fusetune.px4.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states
 from fusetune.px4.release_layouts import ESTIMATOR_TOPICS
 
-RECONSTRUCTION_TOPICS = (*ESTIMATOR_TOPICS, "vehicle_attitude", "vehicle_imu", "vehicle_local_position")
+RECONSTRUCTION_TOPICS = (*ESTIMATOR_TOPICS, "vehicle_attitude", "vehicle_imu", *LOGGED_STATE_TOPICS)
 """What a reconstruction reads of a flight."""
 
 FULL_MAG_RATE_HZ, FULL_BARO_RATE_HZ = 50.0, 20.0
@@ -63,8 +66,10 @@ def as_logged(flight: Flight) -> ReconstructedFlight:
     return ReconstructedFlight(flight)
 
 
-def reconstruct(flight: Flight, settings: ReconstructionSettings | None = None) -> ReconstructedFlight:
-    """Reconstruct the sensor topics of a canonical flight.
+def reconstruct(
+    flight: Flight, settings: ReconstructionSettings | None = None, start: LoggedState | None = None
+) -> ReconstructedFlight:
+    """Reconstruct the sensor topics of a canonical flight, for replays that start from `start` (None: cold).
 
     The flight given is not changed. Where nothing is missing its topics are handed on as they are. A log with
     `ekf2_timestamps` holds every magnetometer and barometer sample; if IMU rows are filled in such a log, that topic
@@ -95,7 +100,23 @@ def reconstruct(flight: Flight, settings: ReconstructionSettings | None = None) 
             steps.append(_unchanged(topic, topics, "the log holds every sample"))
         else:
             steps.append(_interpolate(topic, wanted, below_hz, rate_hz, function, topics, measured))
+    if MAG in measured and settings.magnetometer_by_state:
+        steps[1] = _with_noise(steps[1], flight.with_topics(topics), measured[MAG], start, topics)
     return ReconstructedFlight(flight.with_topics(topics), measured, tuple(steps))
+
+
+def _with_noise(
+    step: Step, flight: Flight, measured: np.ndarray, start: LoggedState | None, topics: dict[TopicKey, TopicTable]
+) -> Step:
+    parameters = complete(flight.parameters.initial, {}, flight.release)
+    noise = add_noise_by_state(flight, measured, parameters, tuple(logged_states(flight)), start)
+    if not noise.intervals:
+        return step
+    explained = f"{noise.explained} of {noise.intervals} intervals between logged states"
+    if not noise.used:
+        return replace(step, what=f"{step.what}; its noise explains only {explained} and is left out")
+    topics[MAG, 0] = noise.table
+    return replace(step, what=f"{step.what}, with the noise that explains {explained}")
 
 
 def _own_rate(flight: Flight, topic: str, parameter: str, default_hz: float) -> float:
@@ -106,12 +127,17 @@ def _own_rate(flight: Flight, topic: str, parameter: str, default_hz: float) -> 
     return nominal if table is None else sensor_rate_hz(table, nominal)
 
 
-def _unchanged(topic: str, topics: dict, why: str) -> Step:
+def _unchanged(topic: str, topics: dict[TopicKey, TopicTable], why: str) -> Step:
     table = topics.get((topic, 0))
     return Step(topic, False, 0 if table is None else row_count(table), 0, why)
 
 
-def _fill_imu(flight: Flight, settings: ReconstructionSettings, topics: dict, measured: dict) -> Step:
+def _fill_imu(
+    flight: Flight,
+    settings: ReconstructionSettings,
+    topics: dict[TopicKey, TopicTable],
+    measured: dict[str, np.ndarray],
+) -> Step:
     table = flight.topic(IMU)
     if table is None or not settings.imu:
         return _unchanged(IMU, topics, "switched off" if table is not None else "the log has none")
@@ -142,8 +168,8 @@ def _interpolate(
     below_hz: float,
     rate_hz: float,
     function: Callable[[TopicTable, float], tuple[TopicTable, np.ndarray]],
-    topics: dict,
-    measured: dict,
+    topics: dict[TopicKey, TopicTable],
+    measured: dict[str, np.ndarray],
 ) -> Step:
     table = topics.get((topic, 0))
     rate = logged_rate_hz(table)

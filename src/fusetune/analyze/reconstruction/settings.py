@@ -23,6 +23,7 @@ class ReconstructionSettings:
     imu_by_attitude: bool = setting(True, None, None, "", "let the logged attitude tell the rotation over a gap")
     imu_by_velocity: bool = setting(True, None, None, "", "let the logged velocity tell the acceleration over a gap")
     magnetometer: bool = setting(True, None, None, "", "interpolate the magnetometer in the earth frame")
+    magnetometer_by_state: bool = setting(True, None, None, "", "let the logged filter states tell the missing noise")
     magnetometer_below_hz: float = setting(10.0, 0.0, 100.0, "Hz", "a log with fewer samples is thinned")
     magnetometer_rate_hz: float = setting(0.0, 0.0, 200.0, "Hz", "rate to interpolate to; 0: the vehicle's own")
     barometer: bool = setting(True, None, None, "", "interpolate the barometer")
