@@ -11,8 +11,10 @@ from fusetune.kernel_cache import use_kernel_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Numba reads the variable when it is imported, so it is set before any test module is.
+# Both are read on import, so they are set before any test module is imported. The matrices are small: on several
+# threads their algebra takes ten times as long.
 use_kernel_cache()
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
 

@@ -27,10 +27,12 @@ def made_flight(seconds: float = 60.0, rate_hz: int = 200) -> Flight:
     slow = np.arange(int(seconds * SLOW_HZ), dtype=np.int64) * (1_000_000 // SLOW_HZ) + 1_000_000
     accuracy = {name: np.full(len(slow), 0.4, np.float32) for name in ("eph", "epv", "s_variance_m_s")}
     mag = {f"magnetometer_ga[{axis}]": np.zeros(len(slow), np.float32) for axis in range(3)}
+    level = {f"q[{i}]": np.full(len(slow), float(i == 0), np.float32) for i in range(4)}
     topics = {
         ("sensor_combined", 0): imu,
         ("vehicle_gps_position", 0): {"timestamp": slow, "fix_type": np.full(len(slow), 3, np.uint8), **accuracy},
         ("vehicle_magnetometer", 0): {"timestamp": slow, **mag},
+        ("vehicle_attitude", 0): {"timestamp": slow, **level},
         ("vehicle_air_data", 0): {"timestamp": slow, "baro_alt_meter": np.zeros(len(slow), np.float32)},
         ("estimator_status", 0): {"timestamp": slow, "control_mode_flags": np.zeros(len(slow), np.uint32)},
         ("sensor_selection", 0): {"timestamp": slow[[0, -1]], "accel_device_id": np.array([1, 1], np.uint32)},

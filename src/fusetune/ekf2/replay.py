@@ -56,6 +56,9 @@ from fusetune.px4.flight import ParameterChange
 from fusetune.px4.logged_state import LoggedState
 
 RUNS_PER_STRETCH = 8192
+HORIZON_MARGIN_US = 40_000
+"""The horizon lags behind the newest sample by a time that differs by less than this."""
+
 MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
 
 
@@ -243,7 +246,9 @@ class Course:
     def reach(self, run: int, time_us: int) -> int:
         """Go on from a run until the horizon has come to a time or the samples end; the run to go on with."""
         runs = len(self.inputs.arrays.imu)
-        near = min(max(int(np.searchsorted(self.inputs.arrays.imu["time_us"], time_us)), run), runs)
+        horizon = int(self.ekf["time_delayed_us"][0])
+        lag = max(int(self.ekf["time_latest_us"][0]) - horizon - HORIZON_MARGIN_US, 0) if horizon else 0
+        near = min(max(int(np.searchsorted(self.inputs.arrays.imu["time_us"], time_us + lag)), run), runs)
         for begin, end in self.stretches(run, near):
             self.run(begin, end)
         while near < runs and self.ekf["time_delayed_us"][0] < time_us:

@@ -9,6 +9,7 @@ import numpy as np
 from fusetune.px4.ekf2_parameters import complete
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.save.log_facts import rate_hz
+from fusetune.save.magnetometer_mounting import magnetometer_mounting
 from fusetune.save.verdict import Check, VerdictThresholds
 
 _FIX_3D = 3
@@ -192,6 +193,7 @@ def _onboard_aids(flight: Flight) -> list[str]:
 
 CHECKS: tuple[Callable[[Flight, VerdictThresholds], Check], ...] = (
     magnetometer,
+    magnetometer_mounting,
     barometer,
     gnss,
     gnss_fix,

@@ -37,6 +37,8 @@ class VerdictThresholds:
     """Share of the IMU samples that are impossible: with more the damage is not one of single bits."""
     high_clipping_share: float = 0.001
     low_magnetometer_rate_hz: float = 10.0
+    max_field_scatter_left: float = 0.1
+    """Share of the field's scatter left by another mounting of the magnetometer, below which it sits otherwise."""
     low_barometer_rate_hz: float = 10.0
     low_gnss_rate_hz: float = 4.0
     low_gnss_fix_share: float = 0.8

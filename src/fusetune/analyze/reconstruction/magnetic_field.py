@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fusetune.analyze.reconstruction.attitude import to_earth
+from fusetune.analyze.reconstruction.attitude import to_body, to_earth
+from fusetune.save.magnetometer_mounting import MAX_SCATTER_LEFT, stillest_mounting
 
 MIN_SAMPLES = 24
 LOG_DRIFT_RANGE = (-5.0, 4.0)
@@ -35,10 +36,16 @@ class MagneticField:
     ----------
     earth : (N, 3) Gauss, at the times of the samples, in the frame of the attitudes
     body : (3,) Gauss, what turns with the vehicle
+    mounting : (3, 3) rotation from the axes in which the field turns as the vehicle does to those of the samples
     """
 
     earth: np.ndarray
     body: np.ndarray
+    mounting: np.ndarray
+
+    def seen(self, earth: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Samples (M, 3) of a field (M, 3) in the frame of the attitudes (M, 4)."""
+        return (to_body(q, earth) + self.body) @ self.mounting.T
 
 
 def magnetic_field(time: np.ndarray, q: np.ndarray, measured: np.ndarray) -> MagneticField:
@@ -62,7 +69,10 @@ def magnetic_field(time: np.ndarray, q: np.ndarray, measured: np.ndarray) -> Mag
         Of too few samples, as measured.
     """
     if len(time) < MIN_SAMPLES:
-        return MagneticField(to_earth(q, measured), np.zeros(3))
+        return MagneticField(to_earth(q, measured), np.zeros(3), np.eye(3))
+    mounting, left = stillest_mounting(q, measured)
+    mounting = mounting if left <= MAX_SCATTER_LEFT else np.eye(3)
+    measured = measured @ mounting
     # (N, 3, 4): the samples in the frame of e, and the axes of b there
     series = np.stack([to_earth(q, measured), *(to_earth(q, np.tile(axis, (len(q), 1))) for axis in np.eye(3))], -1)
     interval_s = np.diff(time) * 1e-6
@@ -77,7 +87,7 @@ def magnetic_field(time: np.ndarray, q: np.ndarray, measured: np.ndarray) -> Mag
     exponent = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": 0.05}).x
     step = 10.0**exponent * interval_s
     body = _fit(series, step, stiffness)[1]
-    return MagneticField(_smoothed(series[..., 0] - series[..., 1:] @ body, step), body)
+    return MagneticField(_smoothed(series[..., 0] - series[..., 1:] @ body, step), body, mounting)
 
 
 def _noise_variance(earth: np.ndarray) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from fusetune.analyze.reconstruction.attitude import AttitudeHistory, to_body
+from fusetune.analyze.reconstruction.attitude import AttitudeHistory
 from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
 from fusetune.analyze.reconstruction.magnetic_field import magnetic_field
 from fusetune.px4.flight import TopicTable, row_count, stacked
@@ -46,7 +46,7 @@ def interpolate_magnetometer(
     field = magnetic_field(sampled[known], q[known], measured[known])
     earth = np.zeros_like(measured)
     earth[known] = field.earth
-    between = to_body(q_new, _between(sampled, earth, known, time, place)) + field.body
+    between = field.seen(_between(sampled, earth, known, time, place), q_new)
     values = {f"magnetometer_ga[{axis}]": between[:, axis] for axis in range(3)}
     return insert_rows(table, time, place, values)
 

@@ -134,22 +134,19 @@ def _intervals(departures: Iterator[Departure], fused: np.ndarray) -> Iterator[t
 def reaction_to_offset(departure: Departure, samples: int, variance: float) -> np.ndarray:
     """Change (7, 3) of heading, earth field and body field per Gauss that each of some samples is off in the body.
 
-    The Kalman filter's own equations for the magnetometer alone, linearised at the end of the interval; a small
-    rotation θ in NED changes the field seen in the body, Rᵀ m, by Rᵀ (m × θ).
+    The Kalman filter's gain for the magnetometer alone, linearised at the end of the interval: samples that are off
+    alike act as their mean does, whose variance is theirs over their number. A small rotation θ in NED changes the
+    field seen in the body, Rᵀ m, by Rᵀ (m × θ).
     """
     m = departure.field
     cross = np.array([[0.0, -m[2], m[1]], [m[2], 0.0, -m[0]], [-m[1], m[0], 0.0]])
     to_body = departure.to_earth.T
     jacobian = np.concatenate([to_body @ cross, to_body, np.eye(3)], axis=1)
-    covariance, reaction, unit = departure.covariance, np.zeros((9, 3)), np.eye(9)
-    for _ in range(samples):
-        expected = jacobian @ covariance @ jacobian.T + variance * np.eye(3)
-        gain = np.linalg.solve(expected, jacobian @ covariance).T
-        if not departure.turns_attitude:
-            gain[:3] = 0.0
-        kept = unit - gain @ jacobian
-        reaction = kept @ reaction + gain
-        covariance = kept @ covariance @ kept.T + variance * gain @ gain.T
+    gain_of_error = departure.covariance @ jacobian.T
+    expected = jacobian @ gain_of_error + variance / samples * np.eye(3)
+    reaction = np.linalg.solve(expected, gain_of_error.T).T
+    if not departure.turns_attitude:
+        reaction[:3] = 0.0
     return reaction[2:]
 
 
