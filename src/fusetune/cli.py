@@ -6,6 +6,7 @@ Each sub-command loads only the rooms it needs. Bad input ends it with status 2 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +25,8 @@ USER_ERROR_STATUS = 2
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command; returns the exit status."""
+    # read when NumPy is first imported; the matrices are too small for threads, which would only cost time
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     options = _parser().parse_args(arguments)
     try:
         options.run(options)

@@ -56,8 +56,8 @@ from fusetune.px4.flight import ParameterChange
 from fusetune.px4.logged_state import LoggedState
 
 RUNS_PER_STRETCH = 8192
-HORIZON_MARGIN_US = 40_000
-"""The horizon lags behind the newest sample by a time that differs by less than this."""
+HORIZON_MARGIN_US = 12_000
+"""The horizon moves by one update interval at a time, so that its lag differs by less than this."""
 
 MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
 

@@ -77,8 +77,9 @@ def _conditional_means(
     values = np.empty(start[-1])
     for length in np.unique(count):
         chosen = np.flatnonzero(count == length)
+        joint = _joint_covariance(covariance, int(length))
         for part in np.array_split(chosen, max(1, -(-len(chosen) // CHUNK))):
-            estimate = _conditional_mean(deviation, present, first[part], int(length), covariance)
+            estimate = _conditional_mean(deviation, present, first[part], int(length), joint)
             values[start[part][:, None] + np.arange(length)] = estimate
     return values
 
@@ -109,16 +110,15 @@ def _on_the_line(signal: np.ndarray, first: np.ndarray, count: np.ndarray) -> np
 
 
 def _conditional_mean(
-    deviation: np.ndarray, present: np.ndarray, first: np.ndarray, length: int, covariance: np.ndarray
+    deviation: np.ndarray, present: np.ndarray, first: np.ndarray, length: int, joint: np.ndarray
 ) -> np.ndarray:
-    """Estimates (G, length) for gaps of equal length."""
+    """Estimates (G, length) for gaps of equal length; `joint` as of `_joint_covariance`."""
     offset = np.concatenate([np.arange(-NEIGHBOURS, 0), np.arange(length, length + NEIGHBOURS)])
     position = first[:, None] + offset
     inside = (position >= 0) & (position < len(deviation))
     position = np.clip(position, 0, len(deviation) - 1)
     known = inside & present[position]
     span = np.arange(-NEIGHBOURS, length + NEIGHBOURS)
-    joint = _possible(covariance[np.abs(span[:, None] - span[None, :])])
     outside = (span < 0) | (span >= length)
     between, towards = joint[np.ix_(outside, outside)], joint[np.ix_(~outside, outside)]
     values = np.where(known, deviation[position], 0.0)
@@ -132,6 +132,12 @@ def _conditional_mean(
         matrix[:, diagonal, diagonal] = np.diag(between)
         weights[~whole] = np.linalg.solve(matrix, values[~whole][:, :, None])[:, :, 0]
     return np.where(known, weights, 0.0) @ towards.T
+
+
+def _joint_covariance(covariance: np.ndarray, length: int) -> np.ndarray:
+    """Covariance of the values in a gap and of its neighbours on both sides, in order of time."""
+    span = np.arange(-NEIGHBOURS, length + NEIGHBOURS)
+    return _possible(covariance[np.abs(span[:, None] - span[None, :])])
 
 
 def _possible(matrix: np.ndarray) -> np.ndarray:
