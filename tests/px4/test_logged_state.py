@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fusetune.px4.flight import Flight, ParameterHistory
-from fusetune.px4.logged_state import logged_states, rotation_variances
+from fusetune.px4.logged_state import logged_handovers, logged_states, rotation_variances
 
 HORIZON = 5_000_000
 
@@ -112,3 +112,37 @@ def test_rotation_variances_invert_the_quaternions(yaw):
     found = rotation_variances(np.array([c, 0.0, 0.0, s]), quaternion)
     assert found[2] == pytest.approx(wanted[2])
     np.testing.assert_allclose(found[:2], wanted[:2], rtol=1e-6)
+
+
+def two_instances(second_horizon):
+    """Instance 1, with a gyro bias of its own, becomes primary at 5.5 s."""
+    states = np.zeros(24)
+    states[0] = 1.0
+    flight = made_flight(release(1, 15), states, np.arange(24) * 1e-4)
+    states[10] = 0.02
+    stamp = {"timestamp": second_horizon + 100_000, "timestamp_sample": second_horizon}
+    selector = {"timestamp": np.array([1_000_000, 5_500_000, 6_000_000]), "primary_instance": np.array([0, 1, 1])}
+    return flight.with_topics(
+        flight.topics
+        | {
+            ("estimator_states", 1): table(states=states, covariances=np.arange(24) * 1e-4, **stamp),
+            ("estimator_selector_status", 0): selector,
+        }
+    )
+
+
+def test_a_handover_comes_with_the_state_of_the_new_primary_instance():
+    (handover,) = logged_handovers(two_instances(4_900_000))
+    assert handover.time_us == 5_500_000
+    assert handover.state.time_us == 4_900_000
+    np.testing.assert_allclose(handover.state.gyro_bias, [0.02, 0.0, 0.0])
+
+
+def test_a_state_long_before_tells_nothing_of_a_handover():
+    assert logged_handovers(two_instances(200_000)) == ()
+
+
+def test_one_instance_hands_nothing_over():
+    states = np.zeros(24)
+    states[0] = 1.0
+    assert logged_handovers(made_flight(release(1, 15), states, np.zeros(24))) == ()

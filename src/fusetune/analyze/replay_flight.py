@@ -28,6 +28,7 @@ from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import Gap, ReplayResult, replay
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight
+from fusetune.px4.logged_state import Handover, logged_handovers
 from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
 
@@ -46,12 +47,20 @@ class PreparedFlight:
     reconstructed: ReconstructedFlight
     start: Start
     gaps: tuple[Gap, ...] = ()
+    handovers: tuple[Handover, ...] = ()
 
     def replay(
         self, params: Mapping[str, float], overridden: frozenset[str] = frozenset()
     ) -> tuple[ReplayResult, np.ndarray]:
         """Replay a complete set; the result, and for each innovation whether its sample was measured."""
-        result = replay(self.inputs, params, overridden=overridden, start=self.start.state, gaps=self.gaps)
+        result = replay(
+            self.inputs,
+            params,
+            overridden=overridden,
+            start=self.start.state,
+            gaps=self.gaps,
+            handovers=self.handovers,
+        )
         time = result.states["timestamp_sample"]
         interval_us = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
 
@@ -69,6 +78,7 @@ class PreparedFlight:
         return {
             "start": {"mode": WARM if warm else COLD, "why": self.start.why, "time_us": result.warm_start_us},
             "reconstruction": [asdict(step) for step in self.reconstructed.steps],
+            "handover_timestamps": [one.time_us for one in self.handovers],
         }
 
 
@@ -80,11 +90,12 @@ def prepare(
 ) -> PreparedFlight:
     """Reconstruct the sensor stream of a canonical flight and choose how its replays start.
 
-    `None` leaves the stream as it was logged, and starts cold.
+    `None` leaves the stream as it was logged, of one estimator instance, and starts cold.
     """
     chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
     reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction, chosen.state)
-    return PreparedFlight(build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps))
+    handovers = () if reconstruction is None else logged_handovers(flight)
+    return PreparedFlight(build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps), handovers)
 
 
 def replay_saved_flight(

@@ -22,6 +22,7 @@ from fusetune.ekf2.commands import handle_command
 from fusetune.ekf2.compilation import ensure_compiled
 from fusetune.ekf2.covariance import reset_accel_bias, reset_gyro_bias
 from fusetune.ekf2.estimator import EKF, initialise_estimator, update
+from fusetune.ekf2.handover import handover_runs, take_sensor_states, without_resets_at
 from fusetune.ekf2.imu_down_sampler import accumulate_imu, initialise_down_sampler, reset_down_sampler
 from fusetune.ekf2.inputs import EstimatorInputs
 from fusetune.ekf2.kernel import entry_kernel, kernel
@@ -53,7 +54,7 @@ from fusetune.ekf2.sample_arrival import (
 from fusetune.ekf2.warm_start import take_over, without_first_resets
 from fusetune.ekf2.withholding import WITHHOLDABLE
 from fusetune.px4.flight import ParameterChange
-from fusetune.px4.logged_state import LoggedState
+from fusetune.px4.logged_state import Handover, LoggedState
 
 RUNS_PER_STRETCH = 8192
 HORIZON_MARGIN_US = 12_000
@@ -143,6 +144,7 @@ def replay(
     overridden: frozenset[str] | None = None,
     gaps: Sequence[Gap] = (),
     start: LoggedState | None = None,
+    handovers: Sequence[Handover] = (),
 ) -> ReplayResult:
     """Run the estimator over one flight.
 
@@ -160,6 +162,8 @@ def replay(
     start : LoggedState, optional
         State of the vehicle's own estimator that the filter starts from. Nothing is recorded before. Without it, or
         where the samples end before that time, the filter starts from nothing, as when the vehicle boots.
+    handovers : sequence of Handover
+        Another estimator instance became primary: the filter takes over what that knew of its sensors.
 
     Returns
     -------
@@ -167,7 +171,7 @@ def replay(
         The same inputs and parameters give the same bytes.
     """
     ranges = [_runs_of(inputs, gap) for gap in gaps]
-    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start)
+    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers)
     kept: list[tuple[np.ndarray, ...]] = []
     found: list[GapResult | None] = [None] * len(gaps)
     for begin, end in course.stretches(first_run, len(inputs.arrays.imu), [first for first, _ in ranges]):
@@ -195,6 +199,7 @@ def begin_course(
     parameters: Mapping[str, float],
     overridden: frozenset[str] | None = None,
     start: LoggedState | None = None,
+    handovers: Sequence[Handover] = (),
 ) -> tuple[Course, int, int | None]:
     """Set the estimator on its way; arguments as for `replay`.
 
@@ -210,7 +215,9 @@ def begin_course(
     ]
     if start is not None:
         inputs = without_first_resets(inputs, start.time_us)
-    course = Course(inputs, parameter_record(parameters), changes)
+    inputs = without_resets_at(inputs, handovers)
+    record = parameter_record(parameters)
+    course = Course(inputs, record, changes, handover_runs(inputs, float(record["EKF2_DELAY_MAX"][0]), handovers))
     first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
     return course, first_run, warm_start_us
 
@@ -218,8 +225,14 @@ def begin_course(
 class Course:
     """The estimator on its way through a flight: its memory, its parameters, and what it has recorded last."""
 
-    def __init__(self, inputs: EstimatorInputs, params: np.ndarray, changes: Sequence[tuple[int, ParameterChange]]):
-        self.inputs, self.params, self.changes = inputs, params, changes
+    def __init__(
+        self,
+        inputs: EstimatorInputs,
+        params: np.ndarray,
+        changes: Sequence[tuple[int, ParameterChange]],
+        handovers: Sequence[tuple[int, LoggedState]] = (),
+    ):
+        self.inputs, self.params, self.changes, self.handovers = inputs, params, changes, handovers
         self.ekf = np.zeros(1, EKF)
         self.recorder = np.zeros(1, RECORDER_MEMORY)
         self.records = allocate_records(RUNS_PER_STRETCH)
@@ -264,13 +277,16 @@ class Course:
         return other
 
     def stretches(self, first: int, last: int, cuts: Sequence[int] = ()) -> Iterator[tuple[int, int]]:
-        """Split the runs, and change parameters between the parts where the log says so."""
-        changed = {min(run, last) for run, _ in self.changes if run >= first}
+        """Split the runs; between the parts, change parameters and take over sensors where the log says so."""
+        changed = {min(run, last) for run, _ in (*self.changes, *self.handovers) if run >= first}
         edges = {*range(first, last, RUNS_PER_STRETCH), *changed, *(cut for cut in cuts if first <= cut < last), last}
         for start, stop in pairwise(sorted(edges)):
             for run, change in self.changes:
                 if run == start:
                     self.params[change.name] = change.value
+            for run, state in self.handovers:
+                if run == start:
+                    take_sensor_states(self.ekf[0], state)
             yield start, stop
 
     def run(self, start: int, stop: int) -> tuple[np.ndarray, ...]:

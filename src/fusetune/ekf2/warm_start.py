@@ -169,7 +169,7 @@ def _set_variances(e: np.void, params: np.void, state: LoggedState) -> None:
     if variances[0] <= 1e-8 and variances[1] <= 1e-8:
         variances[:2] = params["EKF2_ANGERR_INIT"] ** 2
     mag = slice(MAG_EARTH, MAG_BODY + 3)
-    if not _knows_field(state):
+    if not knows_field(state):
         variances[mag] = params["EKF2_MAG_NOISE"] ** 2
     unknown_wind = variances[WIND : WIND + 2] <= 0.0
     variances[WIND : WIND + 2][unknown_wind] = WIND_VARIANCE
@@ -180,7 +180,7 @@ def _set_variances(e: np.void, params: np.void, state: LoggedState) -> None:
     e["P"] = np.diag(variances)
 
 
-def _knows_field(state: LoggedState) -> bool:
+def knows_field(state: LoggedState) -> bool:
     """Whether the vehicle estimated the field, in its heading mode of old releases it did not."""
     return bool(
         MAG_FUSED & state.flags
@@ -195,7 +195,7 @@ def _set_flags(e: np.void, params: np.void, state: LoggedState) -> None:
     enabled["baro_hgt"] &= int(params["EKF2_BARO_CTRL"]) == 1
     for name, value in enabled.items():
         e["cs"][name] = value
-    if _knows_field(state):
+    if knows_field(state):
         e["cs"]["mag"] = True
     e["cs"]["mag_heading_consistent"] = "mag_heading_consistent" in state.flags or bool(MAG_FUSED & state.flags)
     e["cs_prev"] = e["cs"]
@@ -260,13 +260,13 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
     """Field states where the vehicle had them; else the filter resets them, not the heading, at the first sample."""
     now = int(e["time_delayed_us"])
     mag = e["mag"]
-    if e["origin"]["lat_lon_valid"] and _knows_field(state):
+    if e["origin"]["lat_lon_valid"] and knows_field(state):
         place = math.degrees(e["gpos_lat"]), math.degrees(e["gpos_lon"])
         declination, inclination, strength = field_at(*place)
         mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = declination, inclination, strength
         earth_field_vector.py_func(declination, inclination, strength, mag["wmm_earth_field"])
         mag["wmm_time_last_checked"] = now
-    if _knows_field(state):
+    if knows_field(state):
         e["mag_I"], e["mag_B"] = state.mag_earth, state.mag_body
     samples = inputs.arrays.mag
     if len(samples):

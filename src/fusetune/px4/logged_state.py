@@ -31,6 +31,9 @@ UPDATE_INTERVAL_S = 0.01
 HORIZON_LAG_US = 20_000
 """A sample time nearer than this to the time of publication is that of the newest IMU sample, not of the horizon."""
 
+MAX_HANDOVER_AGE_US = 5_000_000
+"""Biases and field change little in such a time."""
+
 ERROR_STATES = 24
 MIN_FIX_TYPE = 3
 MAX_ORIGIN_DISTANCE_DEG = 1.0
@@ -77,6 +80,45 @@ class LoggedState:
     @property
     def uses_gnss(self) -> bool:
         return bool({"gnss_pos", "gnss_vel"} & self.flags)
+
+
+@dataclass(frozen=True)
+class Handover:
+    """Another estimator instance became the primary one.
+
+    Attributes
+    ----------
+    time_us : when
+    state : of the new primary instance, the nearest to that time that the log holds
+    """
+
+    time_us: int
+    state: LoggedState
+
+
+def logged_handovers(flight: Flight) -> tuple[Handover, ...]:
+    """Changes of the primary instance for which the log holds a state of the new one, in order of time."""
+    selector = flight.topic("estimator_selector_status")
+    if selector is None or row_count(selector) < 2:
+        return ()
+    chosen, times = selector["primary_instance"].astype(np.int64), selector["timestamp"].astype(np.int64)
+    found = []
+    for row in np.flatnonzero(np.diff(chosen) != 0) + 1:
+        state = _nearest_state(flight, int(chosen[row]), int(times[row]))
+        if state is not None:
+            found.append(Handover(int(times[row]), state))
+    return tuple(found)
+
+
+def _nearest_state(flight: Flight, instance: int, time: int) -> LoggedState | None:
+    table = flight.topic("estimator_states", instance)
+    if table is None or not row_count(table):
+        return None
+    horizons = _horizons(flight, table)
+    row = int(np.argmin(np.abs(horizons - time)))
+    if abs(int(horizons[row]) - time) > MAX_HANDOVER_AGE_US:
+        return None
+    return _state(flight, instance, row, int(horizons[row]))
 
 
 def logged_states(flight: Flight, since: int = 0) -> Iterator[LoggedState]:
