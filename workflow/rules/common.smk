@@ -11,6 +11,7 @@ REPLAY_PARTS = (
     "gaps.parquet",
     "json",
 )
+REPLAY_SECTIONS = ("withheld", "reconstruction", "start")
 SCORE_PARTS = (
     "metrics.parquet",
     "scores.parquet",
@@ -21,6 +22,11 @@ SCORE_PARTS = (
     "onboard.innovations.parquet",
     "fidelity.json",
 )
+
+
+def replay_files(names):
+    """Files of the replays of some sets on a flight."""
+    return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=REPLAY_PARTS)
 
 
 def read_csv(path):
