@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fusetune.analyze.fidelity import Innovations, load_innovations, mean_nll
+from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
 from fusetune.analyze.replay_flight import PreparedFlight
 from fusetune.analyze.replay_settings import ReplaySettings
 from fusetune.analyze.trust_grade import TRUST_TOPICS, grade_flight
@@ -174,7 +175,7 @@ def _reasons(flight: Flight) -> Sequence[str]:
         ("vehicle_air_data", "barometer", FULL_BARO_RATE_HZ),
         ("vehicle_gps_position", "GNSS", FULL_GNSS_RATE_HZ),
     ):
-        rate = _rate(flight, topic)
+        rate = logged_rate_hz(flight.topic(topic))
         if rate is not None and rate < full:
             reasons.append(f"the log holds the {what} at only {rate:.1f} Hz (SDLOG_PROFILE bit 1 logs every sample)")
     land = flight.topic("vehicle_land_detected")
@@ -189,11 +190,3 @@ def _reasons(flight: Flight) -> Sequence[str]:
         baseline = "v{}.{}".format(*BASELINE_RELEASE)
         reasons.append(f"the vehicle flew {flight.release_name}, the replay behaves like {baseline}")
     return reasons
-
-
-def _rate(flight: Flight, topic: str) -> float | None:
-    table = flight.topic(topic)
-    if table is None or len(table["timestamp"]) < 2:
-        return None
-    span_s = float(table["timestamp"][-1] - table["timestamp"][0]) * 1e-6
-    return (len(table["timestamp"]) - 1) / span_s if span_s > 0 else None
