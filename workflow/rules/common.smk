@@ -42,9 +42,9 @@ def replayable_flights():
     return [row["flight"] for row in replayable_rows()]
 
 
-def of_replayable_flights(pattern):
-    """Input function: one file of every flight that can be replayed."""
-    return lambda wildcards: expand(pattern, flight=replayable_flights())
+def of_replayable_flights(patterns):
+    """Input function: some files of every flight that can be replayed."""
+    return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
 def present_flight():
