@@ -67,7 +67,7 @@ def measure(flight: Path, replays: Path, sets: list[str]) -> tuple[float, dict[s
                 if file.name.split(".")[0] in sets:
                     (Path(folder) / file.name).symlink_to(file.resolve())
             start = time.process_time()
-            scoring.score_flight(flight, Path(folder), sets, present=sets[0])
+            scoring.score_saved_flight(flight, Path(folder), sets, present=sets[0])
             return time.process_time() - start, spent
     finally:
         for name, original in originals.items():

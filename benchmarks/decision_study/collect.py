@@ -13,7 +13,8 @@ from typing import Any
 import yaml
 
 from fusetune.analyze.replay_flight import replay_saved_flight
-from fusetune.analyze.score_flight import score_flight
+from fusetune.analyze.replay_settings import ReplaySettings
+from fusetune.analyze.score_flight import score_saved_flight
 from fusetune.analyze.withheld_gaps import WithholdingSettings
 from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study
@@ -99,8 +100,9 @@ def _fly_and_score(files: StudyFiles, world: str, seed: int, target: Path) -> st
         simulate(load_mission(files.mission), vehicle, {}, seed, (), log)
         save_log(log, saved)
         # Only gaps without GNSS decide; the others would cost as much again.
-        replay_saved_flight(saved, sets, analyzed, withholding=WithholdingSettings(baro_s=0.0, mag_s=0.0))
-        score_flight(saved, analyzed, list(sets), present=PRESENT)
+        settings = ReplaySettings(withholding=WithholdingSettings(baro_s=0.0, mag_s=0.0))
+        replay_saved_flight(saved, sets, analyzed, settings)
+        score_saved_flight(saved, analyzed, list(sets), present=PRESENT)
         for name in KEPT:
             shutil.copy(analyzed / name, target / name)
     stamp.write_text(key, encoding="utf-8")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fusetune.apply.criteria import criteria, paper_entries, read_metrics
+from fusetune.apply.criteria import criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AnalyzedFlight, read_flights
 from fusetune.apply.paper_mode import paper_ranking
 from fusetune.apply.settings import DecisionSettings
@@ -62,12 +62,12 @@ def read_world(
     sets = tuple(overrides)
     present = sets[0]
     flights = read_flights(folders, settings, present)
-    metrics = read_metrics([flight.folder for flight in flights])
+    metrics = metrics_of(flights)
     reasons = {one: vetoes(one, present, flights, metrics) for one in sets if one != present}
     figures: dict[str, list[list[float]]] = {}
     truth: dict[str, list[list[float]]] = {quantity: [] for quantity in TRUTH}
     for flight in flights:
-        table = read_metrics([flight.folder])
+        table = flight.metrics
         values = criteria(sets, settings.main_source, [flight], table)
         order = [entry.name for entry in paper_ranking(paper_entries(sets, [flight], table, values))]
         columns = {

@@ -153,11 +153,12 @@ def _add_replay(commands: Commands) -> None:
 def _replay(options: argparse.Namespace) -> None:
     from fusetune.analyze.reconstruction import ReconstructionSettings
     from fusetune.analyze.replay_flight import replay_log
+    from fusetune.analyze.replay_settings import ReplaySettings
     from fusetune.analyze.start_choice import StartSettings
 
     reconstruction = ReconstructionSettings() if options.reconstruct else None
-    start = StartSettings(mode=options.start)
-    print("replayed:", *replay_log(options.log, options.sets, options.out, reconstruction, start))
+    settings = ReplaySettings(reconstruction=reconstruction, start=StartSettings(mode=options.start))
+    print("replayed:", *replay_log(options.log, options.sets, options.out, settings))
 
 
 def _add_fidelity(commands: Commands) -> None:

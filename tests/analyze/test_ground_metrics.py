@@ -8,7 +8,7 @@ import pytest
 from tests.analyze.made_flight import END_S, START_US, MadeSet, at, make_flight
 
 from fusetune.analyze.ground_metrics import AFTER_LANDING_US, BEFORE_TAKE_OFF_US, ground_window
-from fusetune.analyze.score_flight import score_flight
+from fusetune.analyze.score_flight import score_saved_flight
 from fusetune.analyze.scoring_window import ScoringWindow
 from fusetune.analyze.set_files import read_set
 from fusetune.analyze.settings import ScoringSettings
@@ -50,7 +50,7 @@ def test_ground_figures_have_names_of_their_own(tmp_path: Path) -> None:
     save, folder = make_flight(
         tmp_path, "flight", {"present": MadeSet(error=0.1, claimed=0.2), "b": MadeSet(error=0.3)}, landing_s=50.0
     )
-    score_flight(save, folder, ["present", "b"])
+    score_saved_flight(save, folder, ["present", "b"])
     metrics = pd.read_parquet(folder / "metrics.parquet").set_index(["set", "source", "axis", "metric"])
     # 24 s at 5 Hz after the landing: the relative standard error of an RMS is 1/sqrt(2 · 120).
     assert metrics.loc[("b", "gnss_vel", "x", "ground_rms_innovation"), "value"] == pytest.approx(0.3, rel=0.25)

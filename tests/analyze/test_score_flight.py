@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from tests.analyze.made_flight import MadeSet, make_flight
 
-from fusetune.analyze.score_flight import score_flight
+from fusetune.analyze.score_flight import score_saved_flight
 from fusetune.save.log_folder import save_log
 
 OUTPUTS = (
@@ -32,7 +32,7 @@ def test_figures_are_those_of_the_made_innovations(tmp_path: Path) -> None:
     save, folder = make_flight(
         tmp_path, "flight", {"present": MadeSet(error=0.1, claimed=0.2), "b": MadeSet(error=0.3)}
     )
-    score_flight(save, folder, ["present", "b"])
+    score_saved_flight(save, folder, ["present", "b"])
     metrics = pd.read_parquet(folder / "metrics.parquet")
     # 60 s of flight at 5 Hz: relative standard error of an RMS 1/sqrt(600)
     assert value(metrics, "present", "gnss_vel", "x", "rms_innovation") == pytest.approx(0.1, rel=0.15)
@@ -52,7 +52,7 @@ def test_profile_ranks_by_error_and_not_by_the_claimed_noise(tmp_path: Path) -> 
         "inflated": MadeSet(error=0.12, claimed=1.0, own=0.0),
     }
     save, folder = make_flight(tmp_path, "flight", sets)
-    score_flight(save, folder, list(sets))
+    score_saved_flight(save, folder, list(sets))
     metrics = pd.read_parquet(folder / "metrics.parquet")
     difference = [value(metrics, name, "gnss_vel", "all", "nll_profile") for name in sets]
     # three axes, errors larger by 1.2 on each
@@ -64,7 +64,7 @@ def test_profile_ranks_by_error_and_not_by_the_claimed_noise(tmp_path: Path) -> 
 
 def test_truth_is_compared_where_the_log_has_one(tmp_path: Path) -> None:
     save, folder = make_flight(tmp_path, "flight", {"present": MadeSet(error=0.1)}, truth=True)
-    score_flight(save, folder, ["present"])
+    score_saved_flight(save, folder, ["present"])
     metrics = pd.read_parquet(folder / "metrics.parquet")
     # the made estimate flies 0.1 m/s too fast, in the right attitude
     assert value(metrics, "present", "truth_velocity", "x", "rmse") == pytest.approx(0.1, abs=1e-6)
@@ -75,7 +75,7 @@ def test_truth_is_compared_where_the_log_has_one(tmp_path: Path) -> None:
 
 def test_a_flight_that_cannot_be_scored_has_all_its_files_and_the_reason(tmp_path: Path) -> None:
     save, folder = make_flight(tmp_path, "flight", {"present": MadeSet()}, landing_s=12.0)
-    score_flight(save, folder, ["present"])
+    score_saved_flight(save, folder, ["present"])
     assert all((folder / name).exists() for name in OUTPUTS)
     summary = json.loads((folder / "scoring.json").read_text())
     assert summary["status"] == "not_scored"
@@ -86,9 +86,9 @@ def test_a_flight_that_cannot_be_scored_has_all_its_files_and_the_reason(tmp_pat
 def test_the_same_inputs_give_the_same_bytes(tmp_path: Path) -> None:
     sets = {"present": MadeSet(), "b": MadeSet(error=0.2, resets_s=(30.0,))}
     save, folder = make_flight(tmp_path, "flight", sets)
-    score_flight(save, folder, list(sets))
+    score_saved_flight(save, folder, list(sets))
     first = {name: (folder / name).read_bytes() for name in OUTPUTS}
-    score_flight(save, folder, list(sets))
+    score_saved_flight(save, folder, list(sets))
     assert first == {name: (folder / name).read_bytes() for name in OUTPUTS}
 
 
@@ -105,7 +105,7 @@ def real_flight(
     for file in (shared_reference / name).iterdir():
         if file.is_file():
             (folder / file.name).symlink_to(file)
-    score_flight(root / name, folder, ["asflown", "paper5", "delay"], present="asflown")
+    score_saved_flight(root / name, folder, ["asflown", "paper5", "delay"], present="asflown")
     return root / name, folder
 
 

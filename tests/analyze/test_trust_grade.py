@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.as_flown_figures import AsFlownFigures
-from fusetune.analyze.trust_grade import distance, grade_flight, grade_of
+from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
+from fusetune.analyze.replay_flight import prepare
+from fusetune.analyze.replay_settings import IN_USE
+from fusetune.analyze.trust_grade import GNSS, distance, grade_flight, grade_of, with_half_the_gnss, without_repair
 from fusetune.analyze.trust_settings import TrustSettings
 from fusetune.design.mission import load_mission
 from fusetune.errors import UserError
 from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.estimator_instances import instance_shares, primary_magnetometer, rows_of_primary
-from fusetune.px4.flight import Flight, select_rows
+from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.release_layouts import canonical
 
 SETTINGS = TrustSettings()
@@ -73,6 +76,39 @@ def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
     assert causes["missing IMU rows"].repaired
     assert causes["missing IMU rows"].cost > 0.1
     assert grade.grade <= grade.as_logged_grade
+
+
+def test_switched_causes_are_the_flight_prepared_anew(flight):
+    """What is taken from the prepared flight must be what preparing it with the switch gives."""
+    imu = flight.topics["sensor_combined", 0]
+    lost = np.random.default_rng(2).random(len(imu["timestamp"])) < 0.06
+    thin = {(topic, 0): every_nth(flight, topic, 10) for topic in (MAG, BARO)}
+    kept = {key: table for key, table in flight.topics.items() if key[0] != "ekf2_timestamps"}
+    small = flight.with_topics(kept | thin | {(IMU, 0): select_rows(imu, ~lost)})
+    in_use = prepare(small, IN_USE.reconstruction, IN_USE.start)
+    assert {step.sensor for step in in_use.reconstructed.steps if step.done} == {IMU, MAG, BARO}
+    for topic, switch in ((IMU, "imu"), (MAG, "magnetometer"), (BARO, "barometer")):
+        anew = prepare(small, dataclasses.replace(IN_USE.reconstruction, **{switch: False}), IN_USE.start)
+        assert_same_stream(without_repair(in_use, IN_USE, topic), anew)
+    halved = small.with_topics(small.topics | {(GNSS, 0): every_nth(small, GNSS, 2)})
+    assert_same_stream(with_half_the_gnss(in_use, IN_USE), prepare(halved, IN_USE.reconstruction, IN_USE.start))
+
+
+def every_nth(flight, topic, step):
+    table = flight.topics[topic, 0]
+    return select_rows(table, np.arange(0, row_count(table), step))
+
+
+def assert_same_stream(left, right):
+    for name, array in left.inputs.arrays._asdict().items():
+        other = getattr(right.inputs.arrays, name)
+        for column in array.dtype.names or [...]:
+            np.testing.assert_array_equal(array[column], other[column], err_msg=name)
+    masks = left.reconstructed.measured, right.reconstructed.measured
+    assert masks[0].keys() == masks[1].keys()
+    for topic, mask in masks[0].items():
+        np.testing.assert_array_equal(mask, masks[1][topic])
+    assert left.start.why == right.start.why
 
 
 def two_instances():

@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from tests.analyze.made_flight import MadeSet, make_flight
 
-from fusetune.analyze.score_flight import score_flight
+from fusetune.analyze.score_flight import score_saved_flight
 
 
 def make_study(
@@ -22,7 +22,7 @@ def make_study(
     for index in range(flights):
         name = f"flight_{index}"
         save, folder = make_flight(root, name, sets, seed=100 + index, landing_s=landing_s, truth=index == 0)
-        score_flight(save, folder, list(sets))
+        score_saved_flight(save, folder, list(sets))
         folders.append(folder)
         rows.append(
             {"flight": name, "status": "replayable", "reason": "", "firmware": "v1.16.0", "checksum": "ab" * 32}

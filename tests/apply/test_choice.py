@@ -5,8 +5,8 @@ import math
 import pytest
 from tests.apply.test_leave_one_out import flight
 
-from fusetune.apply.choice import choose, is_proved, parameter_distance
-from fusetune.apply.ranking import AimComparison, RankedSet
+from fusetune.apply.choice import choose, parameter_distance
+from fusetune.apply.ranking import AimComparison, RankedSet, is_proved
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.wording import _for_the_pick
 

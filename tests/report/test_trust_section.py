@@ -23,10 +23,10 @@ TRUST: dict[str, Any] = {
 
 
 def write(folder: Path, name: str, **changes: Any) -> Path:
-    content = {"flight": name, "words": "Not compared.", "reasons": ["the log starts late"], "axes": []} | changes
+    content = {"flight": name, "reasons": ["the log starts late"], "median_relative_rms": None, "axes": []} | changes
     target = folder / name
     target.mkdir()
-    (target / "fidelity.json").write_text(json.dumps(content | {"median_relative_rms": None}))
+    (target / "fidelity.json").write_text(json.dumps(content))
     return target
 
 
@@ -41,10 +41,14 @@ def test_a_graded_flight_says_what_was_repaired_and_what_remains(tmp_path: Path)
     assert "warm: the log begins 2 s before take-off" in html
 
 
-def test_a_flight_without_a_grade_keeps_its_words(tmp_path: Path) -> None:
-    html = trust_section([write(tmp_path, "second")])
-    assert "Not compared." in html
-    assert "the log starts late" in html
+def test_a_flight_with_nothing_to_compare_says_so(tmp_path: Path) -> None:
+    nothing = {"innovation_ratio": {}, "velocity_m_s": None, "heading_deg": None, "flags_equal": None}
+    changes = {"grade": "D", "reason": "nothing to compare", "figure_grades": {}, "causes": []}
+    trust = TRUST | changes | {"as_logged": nothing, "repaired": nothing}
+    html = trust_section([write(tmp_path, "second", trust=trust)])
+    table = html[: html.index("<details")]
+    assert ">D<" in table
+    assert "nothing to compare" in table
 
 
 def test_nothing_compared_is_no_section(tmp_path: Path) -> None:

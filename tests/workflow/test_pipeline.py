@@ -86,7 +86,7 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     before = flown.results()
     flown.run_ok("--cores", "2")
     for flight in ("first", "second"):
-        log = flown.folder / "results" / "logs" / "replay" / f"{flight}.1.log"
+        log = flown.folder / "results" / "logs" / "analyze" / f"{flight}.log"
         assert "replayed: new; up to date: 4" in log.read_text(encoding="utf-8")
         for name in (f"analyze/{flight}/{pset}.states.parquet" for pset in ("present", "low", "high")):
             assert flown.results()[name] == before[name]

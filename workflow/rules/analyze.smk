@@ -1,8 +1,13 @@
-for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"]), 1):
-    chunk = REPLAYED[first : first + SETTINGS["sets_per_job"]]
+REPLAY_CHUNKS = [
+    REPLAYED[first : first + SETTINGS["sets_per_job"]] for first in range(0, len(REPLAYED), SETTINGS["sets_per_job"])
+]
 
-    # One job replays several sets; each set keeps its own files. They are updated, not made anew, so that a job that is
-    # started for a new set leaves the others' files as they are.
+
+# Replays of several sets are one job's work; each set keeps its own files. They are updated, not made anew, so that a
+# job that is started for a new set leaves the others' files as they are. The last sets are replayed by the job that
+# scores all; with no more sets than one job takes, there is no other.
+for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
+
     rule:
         name:
             f"replay_{number}"
@@ -10,13 +15,7 @@ for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"])
             flight="results/save/{flight}",
             kernels=ancient(KERNELS_READY),
         output:
-            update(
-                expand(
-                    "results/analyze/{{flight}}/{pset}.{part}",
-                    pset=chunk,
-                    part=REPLAY_PARTS,
-                )
-            ),
+            update(replay_files(chunk)),
         log:
             f"results/logs/replay/{{flight}}.{number}.log",
         benchmark:
@@ -25,9 +24,7 @@ for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"])
             "../envs/fusetune.yaml"
         params:
             sets=overrides_of(chunk),
-            withheld=SETTINGS["withheld"],
-            reconstruction=SETTINGS["reconstruction"],
-            start=SETTINGS["start"],
+            replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},
             ledger=f"results/analyze/{{flight}}/.replay_{number}.json",
             code=DIGEST["replay"],
         message:
@@ -36,25 +33,33 @@ for number, first in enumerate(range(0, len(REPLAYED), SETTINGS["sets_per_job"])
             "../scripts/replay_flight.py"
 
 
-rule score_flight:
+rule analyze_flight:
     input:
         flight="results/save/{flight}",
-        replays=expand("results/analyze/{{flight}}/{pset}.{part}", pset=REPLAYED, part=REPLAY_PARTS),
+        kernels=ancient(KERNELS_READY),
+        replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
     output:
+        update(replay_files(REPLAY_CHUNKS[-1])),
         expand("results/analyze/{{flight}}/{part}", part=SCORE_PARTS),
     log:
-        "results/logs/score/{flight}.log",
+        "results/logs/analyze/{flight}.log",
+    benchmark:
+        "results/benchmarks/analyze/{flight}.tsv"
+    # so that pictures are drawn while the decision, which needs all scores, is on its way
+    priority: 1
     conda:
         "../envs/fusetune.yaml"
     params:
-        sets=SETS,
+        sets=overrides_of(REPLAY_CHUNKS[-1]),
+        replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},
+        ledger=f"results/analyze/{{flight}}/.replay_{len(REPLAY_CHUNKS)}.json",
+        code=DIGEST["replay"],
+        scored=SETS,
         present=PRESENT,
         scoring=SETTINGS["scoring"],
-        reconstruction=SETTINGS["reconstruction"],
-        start=SETTINGS["start"],
         trust=SETTINGS["trust"],
-        code=DIGEST["score"],
+        score_code=DIGEST["score"],
     message:
-        "Analyze: score {wildcards.flight}"
+        "Analyze: replay and score {wildcards.flight}"
     script:
-        "../scripts/score_flight.py"
+        "../scripts/analyze_flight.py"

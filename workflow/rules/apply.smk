@@ -2,6 +2,8 @@ rule decide:
     input:
         flights="results/save/flights.parquet",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        # asked for so that a set that is new is replayed and scored
+        replays=of_replayable_flights([f"results/analyze/{{flight}}/{pset}.json" for pset in REPLAYED]),
         configuration=CONFIGURATION_FILES,
     output:
         "results/apply/ranking.parquet",

@@ -11,6 +11,7 @@ REPLAY_PARTS = (
     "gaps.parquet",
     "json",
 )
+REPLAY_SECTIONS = ("withheld", "reconstruction", "start")
 SCORE_PARTS = (
     "metrics.parquet",
     "scores.parquet",
@@ -21,6 +22,11 @@ SCORE_PARTS = (
     "onboard.innovations.parquet",
     "fidelity.json",
 )
+
+
+def replay_files(names):
+    """Files of the replays of some sets on a flight."""
+    return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=REPLAY_PARTS)
 
 
 def read_csv(path):
@@ -36,9 +42,9 @@ def replayable_flights():
     return [row["flight"] for row in replayable_rows()]
 
 
-def of_replayable_flights(pattern):
-    """Input function: one file of every flight that can be replayed."""
-    return lambda wildcards: expand(pattern, flight=replayable_flights())
+def of_replayable_flights(patterns):
+    """Input function: some files of every flight that can be replayed."""
+    return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
 def present_flight():

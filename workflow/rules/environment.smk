@@ -67,11 +67,11 @@ BASE = ("errors.py", "files.py", "parquet.py", "px4")
 REPLAY_SOURCES = (
     "ekf2",
     "save",
-    "ledger.py",
     "analyze/flight_phases.py",
     "analyze/reconstruction",
     "analyze/replay_files.py",
     "analyze/replay_flight.py",
+    "analyze/replay_settings.py",
     "analyze/settings.py",
     "analyze/start_choice.py",
     "analyze/withheld_gaps.py",

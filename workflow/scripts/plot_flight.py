@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.report.flight_figures import plot_flight
 
-from job import logged_job
+from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
 
+keep_out("pandas")
 with logged_job(snakemake.log[0]):
     plot_flight(
         Path(snakemake.input.flight),

@@ -123,7 +123,9 @@ def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
     """Compare one set of two folders."""
     ref, rep = (load_innovations(folder / f"{name}.innovations.parquet") for folder in (reference, replay))
     start = comparison_start(ref)
-    ref = ref.rows((ref.timestamp >= start) & np.isin(ref.source, COMPARED_SOURCES) & (ref.variance > 0))
+    # An innovation that is no number, as of a vision system that measures no height, cannot be repeated.
+    usable = (ref.variance > 0) & np.isfinite(ref.innovation)
+    ref = ref.rows((ref.timestamp >= start) & np.isin(ref.source, COMPARED_SOURCES) & usable)
     ours, theirs, missing = _match(ref, rep)
     axes = tuple(
         _axis_fidelity(source, axis, ours.rows(rows), theirs.rows(rows))

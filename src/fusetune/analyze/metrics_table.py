@@ -15,27 +15,13 @@ from fusetune.analyze.error_figures import ErrorFigure
 from fusetune.analyze.filter_events import FilterEvents
 from fusetune.analyze.innovation_metrics import mean_innovation, rms_innovation, rms_norm
 from fusetune.analyze.measurement_alignment import PairedSamples
+from fusetune.analyze.metrics_schema import METRICS_SCHEMA
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.source_whiteness import Whiteness
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.analyze.whiteness import autocorrelation, effective_samples, lag_limit, ljung_box
 
 Array = npt.NDArray[np.float64]
-
-METRICS_SCHEMA = pa.schema(
-    [
-        pa.field("flight", pa.string()),
-        pa.field("set", pa.string()),
-        pa.field("source", pa.string()),
-        pa.field("axis", pa.string()),
-        pa.field("metric", pa.string()),
-        pa.field("value", pa.float64()),
-        pa.field("lower", pa.float64()),
-        pa.field("upper", pa.float64()),
-        pa.field("n", pa.float64()),
-    ]
-)
-"""`n` is the number of samples behind the figure (N_eff where the figure says so), `lower`, `upper` its bounds."""
 
 FEWEST_SAMPLES = 4
 """Fewer samples than this tell nothing about variances and correlations."""

@@ -14,28 +14,26 @@ from pathlib import Path
 import numpy as np
 
 from fusetune.analyze.fidelity import Innovations, load_innovations, mean_nll
-from fusetune.analyze.reconstruction import ReconstructionSettings
-from fusetune.analyze.start_choice import StartSettings
+from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
+from fusetune.analyze.replay_flight import PreparedFlight
+from fusetune.analyze.replay_settings import ReplaySettings
 from fusetune.analyze.trust_grade import TRUST_TOPICS, grade_flight
 from fusetune.analyze.trust_settings import TrustSettings
 from fusetune.files import atomic_path
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
-from fusetune.save.flight_folder import load_flight
 
 AS_FLOWN = "as_flown"
 """Name of the replay with the log's own parameters."""
 
-REASON_TOPICS = (
-    "sensor_combined", "vehicle_magnetometer", "vehicle_air_data", "vehicle_gps_position", "sensor_gps",
-    "vehicle_land_detected", "estimator_selector_status", "estimator_status",
-)  # fmt: skip
+FIDELITY_TOPICS = (*dict.fromkeys((*TRUST_TOPICS, "sensor_gps")),)
+"""What the comparison and the grade read of a flight."""
+
 JUDGED_SOURCES = ("gnss_vel", "gnss_pos", "gnss_hgt", "baro_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt")
 MATCH_TOLERANCE_US = 30_000
 MIN_SAMPLES = 8
 WARM_UP_US = 10_000_000
-SAME_WITHIN, CLOSE_WITHIN, ROUGH_WITHIN = 0.1, 0.35, 0.8
 FULL_MAG_RATE_HZ, FULL_BARO_RATE_HZ, FULL_GNSS_RATE_HZ = 20.0, 10.0, 4.5
 FULL_COVERAGE = 0.995
 MID_AIR_START_S = 10.0
@@ -60,38 +58,22 @@ class OnboardAxis:
 
 @dataclass(frozen=True)
 class OnboardFidelity:
-    """What a pilot needs to know of the replay of one flight."""
+    """The replay of one flight against its log, sample by sample."""
 
     flight: str
-    status: str
-    """"compared" or "not_compared"."""
-    level: str
-    """"same", "close", "rough" or "poor"; empty when not compared."""
     median_relative_rms: float | None
+    """None where the vehicle logged no innovations that the replay could be compared with."""
     axes: tuple[OnboardAxis, ...]
-    words: str
     reasons: tuple[str, ...]
-    """Why the replay is not closer, most important first."""
-
-
-LEVEL_WORDS = {
-    "same": "The replay repeats what the vehicle's own filter did almost exactly. What it says about other parameters "
-    "can be taken at face value.",
-    "close": "The replay follows the vehicle's own filter closely. Differences between parameter sets can be trusted, "
-    "absolute figures to about a third.",
-    "rough": "The replay resembles the vehicle's own filter, but single innovations differ by about as much as they "
-    "are large. Trust clear differences between sets only.",
-    "poor": "The replay does not repeat the innovations that the vehicle logged. Use it to compare sets with each "
-    "other, never with the flight, and prefer flights with a better log.",
-}
+    """What the log lacks for a closer replay, most important first."""
 
 
 def write_flight_fidelity(
-    flight_folder: Path,
+    flight: Flight,
     analyze_folder: Path,
-    reconstruction: ReconstructionSettings | None = None,
-    start: StartSettings | None = None,
+    replay: ReplaySettings,
     trust: TrustSettings | None = None,
+    prepared: PreparedFlight | None = None,
 ) -> None:
     """Compare the as-flown replay of a flight with its own log, grade it, and write `fidelity.json` beside it.
 
@@ -100,18 +82,20 @@ def write_flight_fidelity(
 
     Parameters
     ----------
-    flight_folder : Path
-        `results/save/<flight>`.
+    flight : Flight
+        With `FIDELITY_TOPICS`, as it was logged.
     analyze_folder : Path
         `results/analyze/<flight>`, with `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
-    reconstruction, start, trust : settings
+    replay, trust : settings
         As the replays of the flight are made, and the limits of the grades.
+    prepared : PreparedFlight, optional
+        What these replays shared.
     """
-    flight = canonical(load_flight(flight_folder, topics=(*REASON_TOPICS, *TRUST_TOPICS)), follow_primary=True)
+    flight = canonical(flight, follow_primary=True)
     result = judge_onboard_fidelity(
         flight, analyze_folder / f"{AS_FLOWN}.innovations.parquet", analyze_folder / "onboard.innovations.parquet"
     )
-    grade = grade_flight(flight, reconstruction, start, trust)
+    grade = grade_flight(flight, replay, trust, prepared)
     document = asdict(result) | {"grade": grade.grade, "trust": asdict(grade)}
     with atomic_path(analyze_folder / "fidelity.json") as path:
         path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
@@ -135,14 +119,8 @@ def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> Onb
         for number in range(3)
         if (axis := _compare_axis(source, number, ours, theirs)) is not None
     )
-    reasons = tuple(_reasons(flight))
-    if not axes:
-        words = "The vehicle logged no innovations of its own that the replay could be compared with."
-        return OnboardFidelity(flight.name, "not_compared", "", None, (), words, reasons)
-    median = float(np.median([axis.relative_rms for axis in axes]))
-    level = _level(median)
-    words = f"{LEVEL_WORDS[level]} The median difference is {median:.0%} of the logged innovations."
-    return OnboardFidelity(flight.name, "compared", level, median, axes, words, reasons if level != "same" else ())
+    median = float(np.median([axis.relative_rms for axis in axes])) if axes else None
+    return OnboardFidelity(flight.name, median, axes, tuple(_reasons(flight)))
 
 
 def _warm(ours: Innovations) -> int:
@@ -183,14 +161,6 @@ def _compare_axis(source: str, axis: int, ours: Innovations, theirs: Innovations
     )
 
 
-def _level(median: float) -> str:
-    if median <= SAME_WITHIN:
-        return "same"
-    if median <= CLOSE_WITHIN:
-        return "close"
-    return "rough" if median <= ROUGH_WITHIN else "poor"
-
-
 def _reasons(flight: Flight) -> Sequence[str]:
     """What keeps a replay of this log from repeating the flight, in the order in which it usually matters."""
     reasons = []
@@ -205,7 +175,7 @@ def _reasons(flight: Flight) -> Sequence[str]:
         ("vehicle_air_data", "barometer", FULL_BARO_RATE_HZ),
         ("vehicle_gps_position", "GNSS", FULL_GNSS_RATE_HZ),
     ):
-        rate = _rate(flight, topic)
+        rate = logged_rate_hz(flight.topic(topic))
         if rate is not None and rate < full:
             reasons.append(f"the log holds the {what} at only {rate:.1f} Hz (SDLOG_PROFILE bit 1 logs every sample)")
     land = flight.topic("vehicle_land_detected")
@@ -220,11 +190,3 @@ def _reasons(flight: Flight) -> Sequence[str]:
         baseline = "v{}.{}".format(*BASELINE_RELEASE)
         reasons.append(f"the vehicle flew {flight.release_name}, the replay behaves like {baseline}")
     return reasons
-
-
-def _rate(flight: Flight, topic: str) -> float | None:
-    table = flight.topic(topic)
-    if table is None or len(table["timestamp"]) < 2:
-        return None
-    span_s = float(table["timestamp"][-1] - table["timestamp"][0]) * 1e-6
-    return (len(table["timestamp"]) - 1) / span_s if span_s > 0 else None

@@ -21,8 +21,9 @@ from fusetune.analyze.reconstruction import (
     reconstruct,
 )
 from fusetune.analyze.replay_files import ReplayIdentity, write_replay
+from fusetune.analyze.replay_settings import ReplaySettings
 from fusetune.analyze.start_choice import COLD, START_TOPICS, WARM, Start, StartSettings, choose_start
-from fusetune.analyze.withheld_gaps import WithholdingSettings, plan_gaps
+from fusetune.analyze.withheld_gaps import plan_gaps
 from fusetune.ekf2.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import Gap, ReplayResult, replay
@@ -34,7 +35,6 @@ from fusetune.save.flight_folder import load_flight
 
 WRITTEN_BACK = "EKF2_MAG_DECL"
 
-
 REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
 """What a replay reads of a saved flight."""
 
@@ -43,6 +43,8 @@ REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
 class PreparedFlight:
     """What the replays of all sets on one flight share: samples, start, and which samples were measured."""
 
+    flight: Flight
+    """As it was logged, in the layout of `fusetune.px4.release_layouts.canonical`."""
     inputs: EstimatorInputs
     reconstructed: ReconstructedFlight
     start: Start
@@ -72,6 +74,10 @@ class PreparedFlight:
         )
         return dataclasses.replace(result, gaps=gaps), measured(result.innovations)
 
+    def with_stream(self, reconstructed: ReconstructedFlight) -> PreparedFlight:
+        """The same flight, started alike, with another sensor stream."""
+        return dataclasses.replace(self, inputs=build_inputs(reconstructed.flight), reconstructed=reconstructed)
+
     def description(self, result: ReplayResult) -> dict[str, Any]:
         """For the JSON file of a replay: how it started and what was reconstructed."""
         warm = result.warm_start_us is not None
@@ -95,53 +101,51 @@ def prepare(
     chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
     reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction, chosen.state)
     handovers = () if reconstruction is None else logged_handovers(flight)
-    return PreparedFlight(build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps), handovers)
+    return PreparedFlight(flight, build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps), handovers)
 
 
 def replay_saved_flight(
     flight_folder: Path,
     sets: Mapping[str, Mapping[str, float]],
     output_folder: Path,
-    *,
-    withholding: WithholdingSettings | None = None,
-    reconstruction: ReconstructionSettings | None = None,
-    start: StartSettings | None = None,
-) -> None:
-    """Replay sets on a saved flight.
-
-    Parameters
-    ----------
-    flight_folder : Path
-        `results/save/<flight>`.
-    sets : mapping
-        Name of each set → its overrides of the log's own parameters.
-    output_folder : Path
-        Takes the files of `fusetune.analyze.replay_files` for each set.
-    withholding : WithholdingSettings, optional
-        Gaps to be made in the sensors; the default ones if None.
-    reconstruction, start : settings
-        What is done about a thinned log, and how the filter starts; `None`: nothing, and cold.
-    """
-    flight = load_flight(flight_folder, topics=REPLAY_TOPICS)
-    replay_flight(flight, sets, output_folder, withholding=withholding, reconstruction=reconstruction, start=start)
+    settings: ReplaySettings | None = None,
+) -> PreparedFlight:
+    """Replay sets on a saved flight, `results/save/<flight>`; all else as in `replay_flight`."""
+    return replay_flight(load_flight(flight_folder, topics=REPLAY_TOPICS), sets, output_folder, settings)
 
 
 def replay_flight(
     flight: Flight,
     sets: Mapping[str, Mapping[str, float]],
     output_folder: Path,
-    *,
-    withholding: WithholdingSettings | None = None,
-    reconstruction: ReconstructionSettings | None = None,
-    start: StartSettings | None = None,
-) -> None:
-    """Replay sets on a flight in memory; each set gives overrides of the log's own parameters."""
-    flight = canonical(flight, follow_primary=reconstruction is not None)
-    gaps = plan_gaps(flight, airborne_intervals(flight, {}), withholding or WithholdingSettings())
-    prepared = prepare(flight, reconstruction, start, gaps)
+    settings: ReplaySettings | None = None,
+) -> PreparedFlight:
+    """Replay sets on a flight in memory.
+
+    Parameters
+    ----------
+    flight : Flight
+        With `REPLAY_TOPICS`.
+    sets : mapping
+        Name of each set → its overrides of the log's own parameters; may be empty.
+    output_folder : Path
+        Takes the files of `fusetune.analyze.replay_files` for each set.
+    settings : ReplaySettings, optional
+        By default the samples are used as they were logged, and the filter starts from nothing.
+
+    Returns
+    -------
+    PreparedFlight
+        For further replays.
+    """
+    settings = settings or ReplaySettings()
+    flight = canonical(flight, follow_primary=settings.reconstruction is not None)
+    gaps = plan_gaps(flight, airborne_intervals(flight, {}), settings.withholding) if settings.withholding else ()
+    prepared = prepare(flight, settings.reconstruction, settings.start, gaps)
     for name, overrides in sets.items():
         params = complete(flight.parameters.initial, overrides, flight.release)
         _replay_and_write(prepared, name, overrides, params, output_folder)
+    return prepared
 
 
 def _replay_and_write(
@@ -151,17 +155,15 @@ def _replay_and_write(
     write_replay(folder, ReplayIdentity(name, overrides, params, prepared.description(result)), result, measured)
 
 
-def replay_log(
-    log: Path,
-    sets_folder: Path,
-    output_folder: Path,
-    reconstruction: ReconstructionSettings | None = None,
-    start: StartSettings | None = None,
-) -> list[str]:
+def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: ReplaySettings | None = None) -> list[str]:
     """Replay every set that a folder holds as `SET.json` on one ULog file.
 
-    `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log. Unless settings
-    are given, the samples are used as they were logged and the filter starts from nothing.
+    `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log.
+
+    Parameters
+    ----------
+    settings : ReplaySettings, optional
+        By default the samples are used as they were logged, and the filter starts from nothing. No gaps are made.
 
     Returns
     -------
@@ -178,8 +180,10 @@ def replay_log(
     set_files = sorted(sets_folder.glob("*.json"))
     if not set_files:
         raise UserError(sets_folder, "holds no parameter set", "Put one SET.json with a params object per set there")
+    settings = settings or ReplaySettings()
     flight = read_ulog(log)
-    prepared = prepare(canonical(flight, follow_primary=reconstruction is not None), reconstruction, start)
+    followed = canonical(flight, follow_primary=settings.reconstruction is not None)
+    prepared = prepare(followed, settings.reconstruction, settings.start)
     for file in set_files:
         params, overrides = _read_set(file)
         # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.

@@ -68,7 +68,7 @@ SAMPLES_SCHEMA = pa.schema(
 _NOT_IN_SAMPLES = ("gravity",)
 """Sampled at every update: the samples would fill the disk and no plot shows them."""
 
-TOPICS = (
+SCORE_TOPICS = (
     "vehicle_land_detected",
     "sensor_combined",
     "vehicle_imu",
@@ -84,8 +84,21 @@ TOPICS = (
 """What the metrics need of a saved flight."""
 
 
-def score_flight(
+def score_saved_flight(
     flight_folder: Path,
+    analyze_folder: Path,
+    sets: Sequence[str],
+    *,
+    present: str = "present",
+    settings: ScoringSettings | None = None,
+) -> None:
+    """Score the sets on a saved flight, `results/save/<flight>`; all else as in `score_flight`."""
+    flight = load_flight(flight_folder, topics=SCORE_TOPICS)
+    score_flight(flight, analyze_folder, sets, present=present, settings=settings)
+
+
+def score_flight(
+    flight: Flight,
     analyze_folder: Path,
     sets: Sequence[str],
     *,
@@ -97,7 +110,7 @@ def score_flight(
 
     Parameters
     ----------
-    flight_folder : the saved flight, `results/save/<flight>`
+    flight : with `SCORE_TOPICS`, as it was logged
     analyze_folder : holds the replays of all sets, `results/analyze/<flight>`
     sets : names of the sets, the present one among them or added
     present : the set that flies now; the others are compared with it
@@ -108,7 +121,7 @@ def score_flight(
         If a file of a replay is missing or damaged. A flight that cannot be scored is no error: its files say why.
     """
     settings = settings or ScoringSettings()
-    flight = canonical(load_flight(Path(flight_folder), topics=TOPICS))
+    flight = canonical(flight)
     records = [read_set(Path(analyze_folder), name) for name in dict.fromkeys((present, *sets))]
     airborne = airborne_intervals(flight, records[0].flags)
     log_gaps = imu_gaps(flight, settings.log_gap_s)

@@ -7,28 +7,31 @@ switching it: a repair is left out, the start made cold, every second GNSS sampl
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fusetune.analyze.as_flown_figures import GROUPS, AsFlownFigures, Interval, as_flown_figures, rms
 from fusetune.analyze.flight_phases import airborne_intervals
 from fusetune.analyze.onboard import onboard_samples
-from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS, ReconstructionSettings
+from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS, ReconstructedFlight
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
+from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
 from fusetune.analyze.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.scoring_window import Cut, subtract
 from fusetune.analyze.sources import AID_SOURCES, HORIZONTAL_AIDING
-from fusetune.analyze.start_choice import COLD, START_TOPICS, StartSettings
+from fusetune.analyze.start_choice import START_TOPICS, Start, choose_start
 from fusetune.analyze.trust_settings import FIGURES, TrustSettings
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import ReplayResult
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.estimator_instances import instance_shares
-from fusetune.px4.flight import Flight, row_count, select_rows
+from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows
 
 GRADES = "ABCD"
 GRADE_WORDS = {
@@ -54,11 +57,8 @@ TRUST_TOPICS = (
 
 COLD_WARM_UP_US = 10_000_000
 FULL_GNSS_RATE_HZ = 4.5
-REPAIRS = {
-    "imu": ("sensor_combined", "missing IMU rows"),
-    "magnetometer": ("vehicle_magnetometer", "thinned magnetometer"),
-    "barometer": ("vehicle_air_data", "thinned barometer"),
-}
+GNSS = "vehicle_gps_position"
+REPAIRS = {IMU: "missing IMU rows", MAG: "thinned magnetometer", BARO: "thinned barometer"}
 
 
 @dataclass(frozen=True)
@@ -135,27 +135,27 @@ def distance(figures: AsFlownFigures, settings: TrustSettings) -> float:
 
 def grade_flight(
     flight: Flight,
-    reconstruction: ReconstructionSettings | None = None,
-    start: StartSettings | None = None,
+    replay: ReplaySettings = IN_USE,
     settings: TrustSettings | None = None,
+    prepared: PreparedFlight | None = None,
 ) -> TrustGrade:
     """Grade one flight.
 
     Parameters
     ----------
     flight : in the layout of `fusetune.px4.release_layouts.canonical`, following the primary instance
-    reconstruction, start : as its replays are made
+    replay : as its replays are made; they are compared without gaps
+    prepared : what these replays shared, to spare doing it again
     """
-    reconstruction, start = reconstruction or ReconstructionSettings(), start or StartSettings()
     settings = settings or TrustSettings()
+    prepared = dataclasses.replace(prepared or prepare(flight, replay.reconstruction, replay.start), gaps=())
     comparison = _Comparison(flight, settings)
-    prepared = prepare(flight, reconstruction, start)
     repaired = comparison.figures(prepared)
     raw = comparison.figures(prepare(flight))
     grade, figure_grades = grade_of(repaired, settings)
     causes: tuple[Cause, ...] = ()
     if settings.causes and math.isfinite(distance(repaired, settings)):
-        causes = tuple(sorted(_causes(comparison, prepared, reconstruction, start, repaired), key=lambda c: -c.cost))
+        causes = tuple(sorted(_causes(comparison, prepared, replay, repaired), key=lambda c: -c.cost))
     reason = ""
     if not figure_grades or (grade == "D" and not repaired.innovation_ratio and repaired.velocity_m_s is None):
         reason = "the log holds nothing of the vehicle's own estimator that could be compared"
@@ -207,26 +207,20 @@ class _Comparison:
 
 
 def _causes(
-    comparison: _Comparison,
-    prepared: PreparedFlight,
-    reconstruction: ReconstructionSettings,
-    start: StartSettings,
-    repaired: AsFlownFigures,
+    comparison: _Comparison, prepared: PreparedFlight, replay: ReplaySettings, repaired: AsFlownFigures
 ) -> Iterator[Cause]:
     flight, reached = comparison.flight, distance(repaired, comparison.settings)
     done = {step.sensor for step in prepared.reconstructed.steps if step.done}
-    for switch, (topic, words) in REPAIRS.items():
+    for topic, words in REPAIRS.items():
         if topic in done:
-            without = replace(reconstruction, **{switch: False})
-            cost = comparison.distance(prepare(flight, without, start)) - reached
-            yield Cause(words, True, True, cost)
+            yield Cause(words, True, True, comparison.distance(without_repair(prepared, replay, topic)) - reached)
     if prepared.start.state is not None:
-        cost = comparison.distance(prepare(flight, reconstruction, replace(start, mode=COLD))) - reached
+        cost = comparison.distance(dataclasses.replace(prepared, start=Start(None, "asked for"))) - reached
         yield Cause("the log begins too late for a start from nothing", True, True, cost)
     lost_to_gnss = 0.0
-    rate = logged_rate_hz(flight.topic("vehicle_gps_position"))
+    rate = logged_rate_hz(flight.topic(GNSS))
     if rate is not None and rate < FULL_GNSS_RATE_HZ:
-        halved = comparison.distance(prepare(_with_half_the_gnss(flight), reconstruction, start))
+        halved = comparison.distance(with_half_the_gnss(prepared, replay))
         lost_to_gnss = max(halved - reached, 0.0)
         yield Cause(f"GNSS logged at {rate:.1f} Hz (cost of halving it once more)", False, True, lost_to_gnss)
     if flight.release is not None and flight.release[:2] != BASELINE_RELEASE:
@@ -235,10 +229,34 @@ def _causes(
         yield Cause(words, False, False, max(reached - lost_to_gnss, 0.0))
 
 
-def _with_half_the_gnss(flight: Flight) -> Flight:
-    table = flight.topics["vehicle_gps_position", 0]
+def without_repair(prepared: PreparedFlight, replay: ReplaySettings, topic: str) -> PreparedFlight:
+    """The same flight with one sensor's samples as they were logged."""
+    if topic == IMU and replay.reconstruction is not None:
+        # what is done about the magnetometer follows from the IMU
+        return prepare(prepared.flight, dataclasses.replace(replay.reconstruction, imu=False), replay.start)
+    reconstructed = prepared.reconstructed
+    measured = {name: mask for name, mask in reconstructed.measured.items() if name != topic}
+    return prepared.with_stream(_with_table(reconstructed, topic, prepared.flight.topics[topic, 0], measured))
+
+
+def with_half_the_gnss(prepared: PreparedFlight, replay: ReplaySettings) -> PreparedFlight:
+    """The same flight without every second sample of GNSS."""
+    table = prepared.flight.topics[GNSS, 0]
     half = select_rows(table, np.arange(0, row_count(table), 2))
-    return flight.with_topics(flight.topics | {("vehicle_gps_position", 0): half})
+    reconstructed = prepared.reconstructed
+    halved = prepared.with_stream(_with_table(reconstructed, GNSS, half, reconstructed.measured))
+    if replay.start is None:
+        return halved
+    # whether a logged state can be taken over may depend on the samples of GNSS
+    flight = prepared.flight.with_topics(prepared.flight.topics | {(GNSS, 0): half})
+    return dataclasses.replace(halved, start=choose_start(flight, replay.start))
+
+
+def _with_table(
+    reconstructed: ReconstructedFlight, topic: str, table: TopicTable, measured: dict[str, np.ndarray]
+) -> ReconstructedFlight:
+    flight = reconstructed.flight.with_topics(reconstructed.flight.topics | {(topic, 0): table})
+    return dataclasses.replace(reconstructed, flight=flight, measured=measured)
 
 
 def _instances(flight: Flight) -> tuple[InstanceFigures, ...]:

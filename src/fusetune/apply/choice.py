@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fusetune.apply.evidence import FlightEvidence
 from fusetune.apply.leave_one_out import LeaveOneOut, leave_one_out
-from fusetune.apply.ranking import RankedSet
+from fusetune.apply.ranking import RankedSet, is_proved
 from fusetune.apply.settings import DecisionSettings
 
 
@@ -70,12 +70,6 @@ def choose(
     near = [one for one in proved if one.score - first.score <= min(one.behind_best_error, hardly)]
     pick = min([first, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
     return Choice("change", pick.name, best, pick, exploratory, validated)
-
-
-def is_proved(candidate: RankedSet, settings: DecisionSettings) -> bool:
-    """Better than the present set beyond doubt, by itself and as one of many candidates."""
-    p_value = {"holm": candidate.p_holm, "sign_flips": candidate.p_family, "none": 0.0}[settings.multiplicity]
-    return candidate.upper < 0.0 and p_value <= 1.0 - settings.confidence
 
 
 def parameter_distance(values: Mapping[str, float], present: Mapping[str, float]) -> float:

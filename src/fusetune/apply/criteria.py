@@ -3,16 +3,14 @@
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusetune.analyze.metrics_table import METRICS_SCHEMA
+from fusetune.analyze.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
-from fusetune.parquet import read_table
 
 Criteria = dict[str, float]
 
@@ -33,10 +31,9 @@ _FIGURES = {
 _AIDING = ("gnss_pos", "gnss_vel", "gnss_hgt", "baro_hgt", "rng_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt", "ev_yaw")
 
 
-def read_metrics(folders: Sequence[Path]) -> pa.Table:
-    """Metrics of all flights in one table, in the order of the folders."""
-    tables = [read_table(folder / "metrics.parquet") for folder in folders]
-    return pa.concat_tables(tables) if tables else METRICS_SCHEMA.empty_table()
+def metrics_of(flights: Sequence[AnalyzedFlight]) -> pa.Table:
+    """Metrics of some flights in one table, in the order of the flights."""
+    return pa.concat_tables([flight.metrics for flight in flights]) if flights else METRICS_SCHEMA.empty_table()
 
 
 def criteria(

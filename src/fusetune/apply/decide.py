@@ -12,7 +12,7 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 
 from fusetune.apply.choice import Choice, choose, parameter_distance
-from fusetune.apply.criteria import Criteria, criteria, paper_entries, read_metrics
+from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
@@ -64,7 +64,7 @@ def decide(
     sets = list(dict.fromkeys((present, *sets)))
     flights = read_flights(analyze_folders, settings, present)
     newest = _newest(flights, newest_flight, flights_table)
-    metrics = read_metrics([flight.folder for flight in flights])
+    metrics = metrics_of(flights)
     vetoed = {name: vetoes(name, present, flights, metrics) for name in sets if name != present}
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
     evidence = [flight.evidence for flight in flights if flight.evidence is not None]

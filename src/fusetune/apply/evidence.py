@@ -80,11 +80,15 @@ class FlightEvidence:
 
 @dataclass(frozen=True)
 class AnalyzedFlight:
-    """What the analyze room says about one flight: the summary, and the evidence or the reason why there is none."""
+    """What the analyze room says about one flight: its summary, and the evidence or the reason why there is none.
+
+    `metrics` are its figures, columns of `METRICS_SCHEMA`.
+    """
 
     name: str
     folder: Path
     summary: dict[str, Any]
+    metrics: pa.Table
     evidence: FlightEvidence | None
     reason: str
 
@@ -106,34 +110,44 @@ def read_flights(folders: Sequence[Path], settings: DecisionSettings, present: s
     A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
     """
     folders = [Path(folder) for folder in folders]
-    shares = {folder: white_shares(read_table(folder / "metrics.parquet"), present) for folder in folders}
+    metrics = {folder: read_table(folder / "metrics.parquet") for folder in folders}
+    shares = {folder: white_shares(table, present) for folder, table in metrics.items()}
     known: dict[str, list[float]] = {}
     for one in shares.values():
         for source, share in one.items():
             known.setdefault(source, []).append(share)
     usual = {source: float(np.mean(sorted(found))) for source, found in known.items()}
-    flights = (_read_flight(folder, settings, present, usual | shares[folder]) for folder in folders)
+    flights = (_read_flight(folder, metrics[folder], settings, present, usual | shares[folder]) for folder in folders)
     return sorted(flights, key=lambda one: one.name)
 
 
 def _read_flight(
-    folder: Path, settings: DecisionSettings, present: str, whiteness: Mapping[str, float]
+    folder: Path, metrics: pa.Table, settings: DecisionSettings, present: str, whiteness: Mapping[str, float]
 ) -> AnalyzedFlight:
     summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
-    name = summary["flight"]
+    evidence, reason = _evidence_of(folder, summary, settings, present, whiteness)
+    return AnalyzedFlight(summary["flight"], folder, summary, metrics, evidence, reason)
+
+
+def _evidence_of(
+    folder: Path,
+    summary: Mapping[str, Any],
+    settings: DecisionSettings,
+    present: str,
+    whiteness: Mapping[str, float],
+) -> tuple[FlightEvidence | None, str]:
+    """The evidence, or why there is none."""
     if summary["status"] != "scored":
-        return AnalyzedFlight(name, folder, summary, None, summary["reason"])
+        return None, summary["reason"]
     grade = trust_grade(folder)
     if grade is not None and grade > settings.lowest_grade:
-        reason = f"its replay has trust grade {grade}, and the decision takes none below {settings.lowest_grade}"
-        return AnalyzedFlight(name, folder, summary, None, reason)
+        return None, f"its replay has trust grade {grade}, and the decision takes none below {settings.lowest_grade}"
     aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
     unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
-    evidence = flight_evidence(name, aided, unaided, whiteness, settings)
+    evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings)
     if evidence is None or present not in evidence.sets:
-        sources = ", ".join(settings.sources)
-        return AnalyzedFlight(name, folder, summary, None, f"the flight has no samples of {sources} to score")
-    return AnalyzedFlight(name, folder, summary, evidence, "")
+        return None, f"the flight has no samples of {', '.join(settings.sources)} to score"
+    return evidence, ""
 
 
 def trust_grade(folder: Path) -> str | None:

@@ -54,7 +54,8 @@ class RankedSet:
     flights, flights_better : flights behind the score, and on how many of them it beats the present set
     equal_to_present : same results on every flight
     improvement_percent : by how much smaller its typical prediction error is than the present set's
-    behind_best, behind_best_error : score less that of the best eligible set, and its standard error
+    behind_best, behind_best_error : score less that of the best set, and its standard error; best is the lowest of
+        those that are proved better than the present set, or where none is, of all that may be flown
     aims : the comparison in each kind of prediction
     """
 
@@ -86,6 +87,12 @@ class RankedSet:
     def is_eligible(self) -> bool:
         """Whether the set may be chosen, if the evidence is for it."""
         return self.status == "candidate" and not self.equal_to_present and not self.worse_aims
+
+
+def is_proved(candidate: RankedSet, settings: DecisionSettings) -> bool:
+    """Better than the present set beyond doubt, by itself and as one of many candidates."""
+    p_value = {"holm": candidate.p_holm, "sign_flips": candidate.p_family, "none": 0.0}[settings.multiplicity]
+    return candidate.upper < 0.0 and p_value <= 1.0 - settings.confidence
 
 
 def rank(
@@ -217,13 +224,21 @@ def _with_family(
         return ranked
     best = probability_best(scores[:, [complete.index(name) for name in eligible]])
     shares = dict(zip(eligible, best, strict=True))
-    lead = min((one for one in ranked if one.status == "present" or one.is_eligible), key=lambda one: one.score)
-    return [
+    ranked = [
         replace(
             one,
             p_holm=adjusted.get(one.name, 1.0),
             p_family=family.get(one.name, 1.0),
             p_best=float(shares.get(one.name, 0.0)),
+        )
+        for one in ranked
+    ]
+    able = [one for one in ranked if one.status == "present" or one.is_eligible]
+    proved = [one for one in able if one.is_eligible and is_proved(one, settings)]
+    lead = min(proved or able, key=lambda one: (one.score, one.name))
+    return [
+        replace(
+            one,
             behind_best=one.score - lead.score,
             behind_best_error=float(np.std(_differences(scores, complete, one.name, lead.name))),
         )

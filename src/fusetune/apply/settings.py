@@ -7,7 +7,6 @@ from typing import Any
 
 from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.analyze.sources import AID_SOURCES, AXES
-from fusetune.ekf2.withholding import WITHHOLDABLE
 from fusetune.errors import UserError
 
 MULTIPLICITY = ("sign_flips", "holm", "none")
@@ -15,9 +14,6 @@ MULTIPLICITY = ("sign_flips", "holm", "none")
 
 GRADES = ("A", "B", "C", "D")
 """Trust grades of a flight's replay, the best first."""
-
-_WITHHELD = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
-_WITHHELD_AXES = tuple(f"{source}.{axis}" for source in _WITHHELD for axis in AXES[: AID_SOURCES[source].axes])
 
 
 @dataclass(frozen=True)
@@ -72,7 +68,7 @@ class DecisionSettings:
             values.setdefault("seed", seed)
         weights: dict[str, Any] = {
             key: _weights(values.pop(key), key, allowed, file)
-            for key, allowed in (("sources", tuple(AID_SOURCES)), ("withheld_sources", (*_WITHHELD, *_WITHHELD_AXES)))
+            for key, allowed in (("sources", tuple(AID_SOURCES)), ("withheld_sources", _withheld_sources()))
             if key in values
         }
         settings = settings_from_mapping(cls, values, "decision", file)
@@ -81,6 +77,15 @@ class DecisionSettings:
                 value = getattr(settings, key)
                 raise UserError(file, f"decision.{key} is {value!r}", f"Use one of: {', '.join(allowed)}")
         return replace(settings, **weights)
+
+
+def _withheld_sources() -> tuple[str, ...]:
+    """Sources that are predicted without their sensor, whole and by axis."""
+    # imported where it is needed: it brings the estimator's compiler along, which readers of results have no use for
+    from fusetune.ekf2.withholding import WITHHOLDABLE
+
+    sources = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
+    return (*sources, *(f"{source}.{axis}" for source in sources for axis in AXES[: AID_SOURCES[source].axes]))
 
 
 def _weights(value: Any, key: str, allowed: tuple[str, ...], file: Path | str) -> dict[str, float]:

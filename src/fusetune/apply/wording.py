@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from fusetune.apply.choice import Choice, is_proved
+from fusetune.apply.choice import Choice
 from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight
-from fusetune.apply.ranking import RankedSet, improvement_percent
+from fusetune.apply.ranking import RankedSet, improvement_percent, is_proved
 from fusetune.apply.settings import DecisionSettings
 
 _MOST_NAMES = 4

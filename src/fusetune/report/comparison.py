@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy.stats import binomtest
+from scipy.special import bdtr
 
 from fusetune.apply.evidence import AIDED, AIMS, UNAIDED
 from fusetune.report.results import Results
@@ -107,5 +107,6 @@ def sign_counts(changes: Sequence[float]) -> tuple[int, int, int, float]:
     """Flights on which a set is better, worse and equal, and the two-sided p-value of the sign test."""
     values = np.asarray(changes, dtype=np.float64)
     better, worse = int(np.count_nonzero(values < 0.0)), int(np.count_nonzero(values > 0.0))
-    p_value = float(binomtest(better, better + worse).pvalue) if better + worse else 1.0
+    # With equal chances both tails of the binomial distribution weigh the same.
+    p_value = min(2.0 * float(bdtr(min(better, worse), better + worse, 0.5)), 1.0) if better + worse else 1.0
     return better, worse, int(np.count_nonzero(values == 0.0)), p_value

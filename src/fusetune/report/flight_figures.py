@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
+from fusetune.analyze.attitude import interpolate
+from fusetune.analyze.ground_truth import Truth, read_truth
 from fusetune.analyze.set_files import AxisSamples, SourceAxis, read_columns, read_innovations
 from fusetune.analyze.sources import AID_SOURCES
-from fusetune.analyze.true_errors import Truth, interpolate, read_truth
 from fusetune.px4.flight import Flight
 from fusetune.report.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +48,17 @@ class Results:
 
     def status(self, name: str) -> str:
         """Part of a set in the decision: "present", "candidate", "vetoed" or "not_scored"."""
-        return str(self.ranking.loc[self.ranking["name"] == name, "status"].iloc[0])
+        return str(self._ranked[name]["status"])
 
     def is_ruled_out(self, name: str) -> bool:
         """Whether a set cannot be chosen: vetoed, not scored, or worse than the present one in a kind of prediction."""
-        row = self.ranking.loc[self.ranking["name"] == name].to_dict("records")[0]
+        row = self._ranked[name]
         return name != self.present and (row["status"] != "candidate" or bool(worse_aims(row)))
+
+    @cached_property
+    def _ranked(self) -> dict[str, dict[Hashable, Any]]:
+        """Rows of the ranking by set: the figures ask for them hundreds of times."""
+        return {row["name"]: row for row in self.ranking.to_dict("records")}
 
 
 def worse_aims(row: Mapping[Hashable, Any]) -> list[str]:

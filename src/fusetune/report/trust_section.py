@@ -35,9 +35,7 @@ def trust_section(analyze_folders: Sequence[Path]) -> str:
 
 
 def _row(flight: dict[str, Any]) -> tuple[str | Cell, ...]:
-    trust = flight.get("trust")
-    if trust is None:
-        return flight["flight"], "–", "–", flight["words"], "–", "; ".join(flight["reasons"]) or "–"
+    trust = flight["trust"]
     repaired = [cause["cause"] for cause in trust["causes"] if cause["repaired"]]
     return (
         flight["flight"],
@@ -51,7 +49,7 @@ def _row(flight: dict[str, Any]) -> tuple[str | Cell, ...]:
 
 def _details(flight: dict[str, Any]) -> str:
     """What the grade follows from, and the innovations sample by sample where the log holds them."""
-    parts = [_grade(flight["trust"])] if "trust" in flight else []
+    parts = [_grade(flight["trust"])]
     if flight["axes"]:
         parts += [
             paragraph(

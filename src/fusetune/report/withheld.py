@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import sem
 
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.report.results import Results
@@ -93,7 +92,7 @@ def drift_summary(results: Results, withheld: Withheld) -> pd.DataFrame:
         paired["log_ratio"] = np.log(paired["drift"] / paired["base"])
     grouped = paired.groupby(["set", "horizon_s"])
     ratio = grouped["log_ratio"].mean()
-    error = grouped["log_ratio"].agg(lambda values: float(sem(values)) if len(values) > 1 else 0.0)
+    error = grouped["log_ratio"].sem().fillna(0.0)  # one flight alone has none
     return pd.DataFrame(
         {
             "mean": grouped["drift"].mean(),

@@ -1,0 +1,47 @@
+"""Which replays of a flight are out of date, so that a job that handles many sets makes only those."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from fusetune.analyze.replay_files import replay_files
+from fusetune.ledger import Ledger, key_of
+from fusetune.save.flight_folder import read_metadata
+
+
+class ReplayLedger:
+    """The record of the replays of one flight.
+
+    Parameters
+    ----------
+    file : of the record
+    flight_folder : `results/save/<flight>`
+    output_folder : holds the files of the replays
+    made_with : what beside the log and the values of a set the replays follow from: settings, state of the sources
+    """
+
+    def __init__(self, file: Path, flight_folder: Path, output_folder: Path, made_with: Any) -> None:
+        self._ledger = Ledger(file)
+        self._folder = output_folder
+        self._source = [read_metadata(flight_folder)["checksum"], made_with]
+
+    def outdated(self, sets: Mapping[str, Mapping[str, float]]) -> dict[str, Mapping[str, float]]:
+        """Those of the sets, name → values, whose files do not stand as they were made from just this."""
+        return {
+            name: values
+            for name, values in sets.items()
+            if not self._ledger.is_current(name, self._key(values), self._files(name))
+        }
+
+    def record(self, sets: Mapping[str, Mapping[str, float]]) -> None:
+        """Enter sets that have just been replayed."""
+        for name, values in sets.items():
+            self._ledger.record(name, self._key(values), self._files(name))
+
+    def _key(self, values: Mapping[str, float]) -> str:
+        return key_of([*self._source, dict(values)])
+
+    def _files(self, name: str) -> Iterable[Path]:
+        return replay_files(self._folder, name)

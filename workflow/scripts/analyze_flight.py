@@ -1,0 +1,30 @@
+"""Replay one flight with the sets that are out of date, score all sets, and grade how far the replay can be trusted."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusetune.analyze.analyze_flight import AnalysisSettings, analyze_flight
+from fusetune.analyze.replay_ledger import ReplayLedger
+from fusetune.analyze.replay_settings import ReplaySettings
+from fusetune.analyze.settings import ScoringSettings
+from fusetune.analyze.trust_settings import TrustSettings
+
+from job import keep_out, logged_job
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+keep_out("pandas")
+with logged_job(snakemake.log[0]):
+    params = snakemake.params
+    flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
+    ledger = ReplayLedger(Path(params.ledger), flight, folder, [params.code, dict(params.replay)])
+    outdated = ledger.outdated(params.sets)
+    settings = AnalysisSettings(
+        ReplaySettings.from_mapping(params.replay),
+        ScoringSettings.from_mapping(params.scoring),
+        TrustSettings.from_mapping(params.trust),
+    )
+    analyze_flight(flight, folder, outdated, params.scored, present=params.present, settings=settings)
+    ledger.record(outdated)
+    print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(params.sets) - len(outdated)}")
