@@ -125,7 +125,8 @@ def _write_table(file: Path, table: TopicTable) -> None:
     arrays = pa.Table.from_arrays([pa.array(values) for values in table.values()], names=list(table))
     # hundreds of small files with thousands of short columns: what is done per file and column counts, not the bytes
     sink = pa.BufferOutputStream()
-    pq.write_table(arrays, sink, compression="lz4", use_dictionary=False, write_statistics=False)
+    options = {"use_dictionary": False, "write_statistics": False, "store_schema": False}
+    pq.write_table(arrays, sink, compression="lz4", **options)
     with open(file, "wb", buffering=0) as target:
         target.write(sink.getvalue())
 
