@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,6 +15,9 @@ ROOT = Path(__file__).resolve().parents[1]
 # Numba reads the variable when it is imported, so it is set before any test module is.
 use_kernel_cache()
 
+SHARING_FOLDERS = {"tests/report", "tests/workflow"}
+"""Folders whose files share a fixture that takes long to make; elsewhere only tests of one file do."""
+
 SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
 
 
@@ -22,6 +26,25 @@ def _shared_part(name: str) -> Path:
     if not folder.is_dir():
         pytest.skip(f"needs {name} of real flights in {folder} (or below FUSETUNE_SHARED), which is not there")
     return folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the tests of the workflow, which take longest."""
+    items.sort(key=lambda item: not item.path.is_relative_to(ROOT / "tests" / "workflow"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Where tests are spread over several processes (pytest-xdist), keep those together that share a fixture."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class BySharedFixture(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            folder = file.rpartition("/")[0]
+            return folder if folder in SHARING_FOLDERS else file
+
+    return BySharedFixture(config, log)
 
 
 @pytest.fixture(scope="session")
