@@ -15,8 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Numba reads the variable when it is imported, so it is set before any test module is.
 use_kernel_cache()
 
-SHARING_FOLDERS = {"tests/report", "tests/workflow"}
-"""Folders whose files share a fixture that takes long to make; elsewhere only tests of one file do."""
+SHARING_FOLDERS = ("tests/workflow", "tests/ekf2", "tests/report")
+"""Folders whose files share what takes long to make: a run of the pipeline, compiled functions, a report."""
 
 SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
 
@@ -28,23 +28,28 @@ def _shared_part(name: str) -> Path:
     return folder
 
 
+def _shared_scope(nodeid: str) -> str:
+    """Folder or file whose tests share fixtures."""
+    file = nodeid.partition("::")[0]
+    return next((folder for folder in SHARING_FOLDERS if file.startswith(f"{folder}/")), file)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the tests of the workflow, which take longest."""
-    items.sort(key=lambda item: not item.path.is_relative_to(ROOT / "tests" / "workflow"))
+    """Begin with the folders that take longest."""
+    order = {folder: number for number, folder in enumerate(SHARING_FOLDERS)}
+    items.sort(key=lambda item: order.get(_shared_scope(item.nodeid), len(order)))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Where tests are spread over several processes (pytest-xdist), keep those together that share a fixture."""
+    """Where tests are spread over several processes (pytest-xdist), keep those together that share fixtures."""
     from xdist.scheduler import LoadScopeScheduling
 
-    class BySharedFixture(LoadScopeScheduling):
+    class BySharedFixtures(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            file = nodeid.partition("::")[0]
-            folder = file.rpartition("/")[0]
-            return folder if folder in SHARING_FOLDERS else file
+            return _shared_scope(nodeid)
 
-    return BySharedFixture(config, log)
+    return BySharedFixtures(config, log)
 
 
 @pytest.fixture(scope="session")
