@@ -17,7 +17,7 @@ all: $(READY)
 setup: $(READY)
 
 test: $(READY)
-	$(BIN)/pytest
+	$(BIN)/pytest -n $(CORES) --no-loadscope-reorder
 
 # The stamp goes first and comes last: a set-up that was interrupted is done again from nothing.
 $(READY): requirements.lock pyproject.toml

@@ -3,8 +3,9 @@
     python benchmarks/save_speed.py LOGS_DIR [--minutes 15 30 60] [--estimator]
 
 Each log of the folder is saved, then simulated flights of the given lengths, laps of the survey mission. Every log has
-a process of its own, which saves it three times; the fastest counts. Memory is the process's peak over what a log of
-two messages takes. Simulated flights also show the time of the simulation, with the vehicle's estimator if asked for.
+a process of its own, which saves it three times, each time to a new folder; the fastest counts. Memory is the process's
+peak over what a log of two messages takes. Simulated flights also show the time of the simulation, with the vehicle's
+estimator if asked for.
 """
 
 from __future__ import annotations
@@ -28,27 +29,27 @@ def main() -> None:
     parser.add_argument("logs", type=Path)
     parser.add_argument("--minutes", type=float, nargs="*", default=[15.0, 30.0, 60.0])
     parser.add_argument("--estimator", action="store_true", help="simulate the vehicle's estimator, too")
-    parser.add_argument("--measure", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--measure", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.measure:
-        print(json.dumps(measure(options.logs)))
+        print(json.dumps(measure(options.logs, options.measure)))
         return
     print("| log | MB | topics | columns | MB/s | peak memory / log | simulated in |")
     print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:
-        results = [row(log) for log in sorted(options.logs.glob("*.ulg"))]
+        results = [row(log, Path(scratch)) for log in sorted(options.logs.glob("*.ulg"))]
         for minutes in options.minutes:
             log, seconds = simulated(Path(scratch) / f"simulated_{minutes:g}_min.ulg", minutes, options.estimator)
-            row(log, f"{seconds:.0f} s")
+            row(log, Path(scratch), f"{seconds:.0f} s")
             log.unlink()
     total, cpu = sum(one["bytes"] for one in results), sum(one["cpu_s"] for one in results)
     if cpu:
         print(f"| **all logs of the folder** | {total / 1e6:.1f} | | | {total / 1e6 / cpu:.1f} | | |")
 
 
-def row(log: Path, simulated_in: str = "–") -> dict[str, float]:
+def row(log: Path, scratch: Path, simulated_in: str = "–") -> dict[str, float]:
     """Measure one log and print its line."""
-    result = measured(log)
+    result = measured(log, scratch)
     size = result["bytes"]
     cells = (
         log.stem,
@@ -63,40 +64,41 @@ def row(log: Path, simulated_in: str = "–") -> dict[str, float]:
     return result
 
 
-def measured(log: Path) -> dict[str, float]:
+def measured(log: Path, scratch: Path) -> dict[str, float]:
     """Figures of one log from a process of its own."""
-    command = [sys.executable, __file__, str(log), "--measure"]
+    command = [sys.executable, __file__, str(log), "--measure", str(scratch)]
     return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
-def measure(log: Path) -> dict[str, float]:
+def measure(log: Path, scratch: Path) -> dict[str, float]:
     """Save a log; CPU time of the fastest run and peak memory of this process."""
     import numpy as np
-    import pyarrow.parquet as pq
 
     from fusetune.px4.flight import Flight
     from fusetune.px4.ulog_writer import write_ulog
     from fusetune.save import save_log
 
-    with tempfile.TemporaryDirectory() as scratch:
-        tiny = Path(scratch) / "tiny.ulg"
-        write_ulog(tiny, Flight("tiny", {("vehicle_status", 0): {"timestamp": np.arange(2)}}))
-        save_log(tiny, Path(scratch) / "tiny")
-        baseline = peak_bytes()
-        folder, times = Path(scratch) / log.stem, []
-        for _ in range(RUNS):
-            begin = time.process_time()
-            save_log(log, folder)
-            times.append(time.process_time() - begin)
-        entries = json.loads((folder / "metadata.json").read_text(encoding="utf-8")).get("topics", [])
-        columns = sum(pq.read_metadata(folder / entry["file"]).num_columns for entry in entries)
-    return {
-        "bytes": log.stat().st_size,
-        "cpu_s": min(times),
-        "peak_bytes": peak_bytes() - baseline,
-        "topics": len(entries),
-        "columns": columns,
-    }
+    # What is saved stays until the end of all: file systems are slow to make files where others were just removed.
+    folder = Path(tempfile.mkdtemp(dir=scratch))
+    tiny = folder / "tiny.ulg"
+    write_ulog(tiny, Flight("tiny", {("vehicle_status", 0): {"timestamp": np.arange(2)}}))
+    save_log(tiny, folder / "tiny")
+    baseline, times = peak_bytes(), []
+    for run in range(RUNS):
+        begin = time.process_time()
+        save_log(log, folder / f"run_{run}")
+        times.append(time.process_time() - begin)
+    peak = peak_bytes() - baseline
+    return {"bytes": log.stat().st_size, "cpu_s": min(times), "peak_bytes": peak, **contents(folder / "run_0")}
+
+
+def contents(folder: Path) -> dict[str, int]:
+    """Number of topics and columns of a saved flight."""
+    import pyarrow.parquet as pq
+
+    entries = json.loads((folder / "metadata.json").read_text(encoding="utf-8")).get("topics", [])
+    columns = sum(pq.read_metadata(folder / entry["file"]).num_columns for entry in entries)
+    return {"topics": len(entries), "columns": columns}
 
 
 def peak_bytes() -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,9 @@ ROOT = Path(__file__).resolve().parents[1]
 use_kernel_cache()
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+SHARING_FOLDERS = ("tests/workflow", "tests/ekf2", "tests/report")
+"""Folders whose files share what takes long to make: a run of the pipeline, compiled functions, a report."""
+
 SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
 
 
@@ -24,6 +28,30 @@ def _shared_part(name: str) -> Path:
     if not folder.is_dir():
         pytest.skip(f"needs {name} of real flights in {folder} (or below FUSETUNE_SHARED), which is not there")
     return folder
+
+
+def _shared_scope(nodeid: str) -> str:
+    """Folder or file whose tests share fixtures."""
+    file = nodeid.partition("::")[0]
+    return next((folder for folder in SHARING_FOLDERS if file.startswith(f"{folder}/")), file)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the folders that take longest."""
+    order = {folder: number for number, folder in enumerate(SHARING_FOLDERS)}
+    items.sort(key=lambda item: order.get(_shared_scope(item.nodeid), len(order)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Where tests are spread over several processes (pytest-xdist), keep those together that share fixtures."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class BySharedFixtures(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return _shared_scope(nodeid)
+
+    return BySharedFixtures(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -185,13 +185,21 @@ def test_an_unknown_newest_flight_is_an_error(tmp_path: Path) -> None:
         run(tmp_path, {"present": MadeSet()}, flights=1, newest_flight="nowhere")
 
 
-@pytest.mark.parametrize("multiplicity", ["sign_flips", "holm", "none"])
-def test_the_number_of_candidates_is_allowed_for(tmp_path: Path, multiplicity: str) -> None:
+@pytest.fixture(scope="module")
+def many_candidates(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Path], Path, list[str]]:
+    """Folders, table of flights and sets of a study in which one of eight candidates is a little better."""
     sets = {"present": MadeSet(error=0.1)} | {f"s{i}": MadeSet(error=0.1, own=0.6) for i in range(8)}
     sets["s3"] = MadeSet(error=0.096, own=0.6)
-    folders, table = make_study(tmp_path, sets)
+    return *make_study(tmp_path_factory.mktemp("many_candidates"), sets), list(sets)
+
+
+@pytest.mark.parametrize("multiplicity", ["sign_flips", "holm", "none"])
+def test_the_number_of_candidates_is_allowed_for(
+    many_candidates: tuple[list[Path], Path, list[str]], tmp_path: Path, multiplicity: str
+) -> None:
+    folders, table, sets = many_candidates
     settings = DecisionSettings(multiplicity=multiplicity)
-    decide(folders, table, tmp_path / "apply", sets=list(sets), settings=settings)
+    decide(folders, table, tmp_path / "apply", sets=sets, settings=settings)
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
     best = ranked(decision, decision["best_candidate"])
     assert best["p_holm"] > best["p_value"]

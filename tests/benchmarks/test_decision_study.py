@@ -20,7 +20,7 @@ SETS = {
 
 @pytest.fixture(scope="module")
 def worlds(tmp_path_factory: pytest.TempPathFactory, project_root: Path):
-    """Two worlds of three flights with four sets each."""
+    """Two worlds of three flights with four sets each, on the first lane of the survey mission."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(project_root)
         patch.syspath_prepend(project_root)
@@ -37,7 +37,9 @@ def worlds(tmp_path_factory: pytest.TempPathFactory, project_root: Path):
         everything = yaml.safe_load(Path("benchmarks/decision_study/worlds.yaml").read_text())
         chosen = {name: everything[name] for name in ("calm", "vibrating")}
         (root / "worlds.yaml").write_text(yaml.safe_dump(chosen))
-        files = StudyFiles(root / "worlds.yaml", root / "sets.yaml", Path("config/missions/survey.yaml"))
+        mission = yaml.safe_load(Path("config/missions/survey.yaml").read_text())
+        (root / "lane.yaml").write_text(yaml.safe_dump(mission | {"waypoints": mission["waypoints"][:3]}))
+        files = StudyFiles(root / "worlds.yaml", root / "sets.yaml", root / "lane.yaml")
         folders = collect(files, 3, root / "flights", 1)
         settings = DecisionSettings(draws=500)
         yield {name: read_world(name, paths, files.overrides(), settings) for name, paths in folders.items()}

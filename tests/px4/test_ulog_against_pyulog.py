@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from fusetune.px4.flight import TopicTable
+from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.ulog_reader import read_ulog
 
 DAMAGED = {"Auterion__corrupt_format_not_utf8", "Auterion__corrupt_unregistered_msg_id"}
@@ -29,41 +29,40 @@ def table_of(data: ULog.Data) -> TopicTable:
     return table
 
 
-def all_logs(shared_logs: Path) -> list[Path]:
-    return [log for log in sorted(shared_logs.glob("*.ulg")) if log.stem not in DAMAGED]
+def same_tables(flight: Flight, judge: ULog) -> None:
+    expected = {(data.name, data.multi_id): data for data in judge.data_list}
+    assert flight.topics.keys() == expected.keys(), flight.name
+    assert flight.left_out == (), flight.name
+    for key, data in expected.items():
+        table, judged = flight.topics[key], table_of(data)
+        assert list(table) == list(judged), (flight.name, key)
+        for name, values in judged.items():
+            assert table[name].dtype == values.dtype, (flight.name, key, name)
+            np.testing.assert_array_equal(table[name], values, err_msg=f"{flight.name} {key} {name}")
 
 
-def test_same_tables(shared_logs: Path) -> None:
-    for log in all_logs(shared_logs):
+def same_parameters_texts_and_dropouts(flight: Flight, judge: ULog) -> None:
+    assert repr(flight.info) == repr(judge.msg_info_dict), flight.name
+    assert flight.start_timestamp == judge.start_timestamp
+    assert {name: repr(value) for name, value in flight.parameters.initial.items()} == {
+        name: repr(value) for name, value in judge.initial_parameters.items()
+    }
+    for own, kind in ((flight.parameters.default_system, 0), (flight.parameters.default_current_setup, 1)):
+        assert own == judge.get_default_parameters(kind), flight.name
+    tagged = [text for texts in judge.logged_messages_tagged.values() for text in texts]
+    texts = sorted((text.timestamp, text.message) for text in [*judge.logged_messages, *tagged])
+    assert sorted((text.timestamp, text.text) for text in flight.messages) == texts
+    if flight.name not in STORED_TIME:
+        assert flight.last_timestamp == judge.last_timestamp, flight.name
+        assert [tuple(one) for one in flight.dropouts] == [(one.timestamp, one.duration) for one in judge.dropouts]
+        assert [tuple(one) for one in flight.parameters.changed] == judge.changed_parameters, flight.name
+
+
+def test_same_tables_parameters_texts_and_dropouts(shared_logs: Path) -> None:
+    for log in [log for log in sorted(shared_logs.glob("*.ulg")) if log.stem not in DAMAGED]:
         flight, judge = read_ulog(log), ULog(str(log))
-        expected = {(data.name, data.multi_id): data for data in judge.data_list}
-        assert flight.topics.keys() == expected.keys(), log.stem
-        assert flight.left_out == (), log.stem
-        for key, data in expected.items():
-            table, judged = flight.topics[key], table_of(data)
-            assert list(table) == list(judged), (log.stem, key)
-            for name, values in judged.items():
-                assert table[name].dtype == values.dtype, (log.stem, key, name)
-                np.testing.assert_array_equal(table[name], values, err_msg=f"{log.stem} {key} {name}")
-
-
-def test_same_parameters_texts_and_dropouts(shared_logs: Path) -> None:
-    for log in all_logs(shared_logs):
-        flight, judge = read_ulog(log), ULog(str(log))
-        assert repr(flight.info) == repr(judge.msg_info_dict), log.stem
-        assert flight.start_timestamp == judge.start_timestamp
-        assert {name: repr(value) for name, value in flight.parameters.initial.items()} == {
-            name: repr(value) for name, value in judge.initial_parameters.items()
-        }
-        for own, kind in ((flight.parameters.default_system, 0), (flight.parameters.default_current_setup, 1)):
-            assert own == judge.get_default_parameters(kind), log.stem
-        tagged = [text for texts in judge.logged_messages_tagged.values() for text in texts]
-        texts = sorted((text.timestamp, text.message) for text in [*judge.logged_messages, *tagged])
-        assert sorted((text.timestamp, text.text) for text in flight.messages) == texts
-        if log.stem not in STORED_TIME:
-            assert flight.last_timestamp == judge.last_timestamp, log.stem
-            assert [tuple(one) for one in flight.dropouts] == [(one.timestamp, one.duration) for one in judge.dropouts]
-            assert [tuple(one) for one in flight.parameters.changed] == judge.changed_parameters, log.stem
+        same_tables(flight, judge)
+        same_parameters_texts_and_dropouts(flight, judge)
 
 
 @pytest.mark.parametrize("name", sorted(DAMAGED))

@@ -13,6 +13,7 @@ from pathlib import Path
 from tests.workflow.conftest import STUDY, Workspace
 
 SUMMARIES = {"list_flights": 1, "decide": 1, "plot_summary": 1, "build_report": 1, "all": 1}
+DECISION = "results/apply/decision.json"
 PATIENCE_S = 300.0
 
 
@@ -76,7 +77,7 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     log = (flown.folder / "flights" / "first.ulg").read_bytes()
     (flown.folder / "flights" / "second.ulg").write_bytes(log + message)
     assert flown.planned_jobs() == {"save_flight": 1, **SUMMARIES}
-    flown.run_ok("--cores", "2")
+    flown.run_ok("--cores", "2", DECISION)
     assert read_flights(flown)["second"]["status"] == "replayable"
     assert replay_times(flown, "first/*.json") == before
 
@@ -84,7 +85,7 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
         "small.yaml", STUDY | {"sets": [*STUDY["sets"], {"name": "new", "parameters": {"EKF2_ACC_NOISE": 0.5}}]}
     )
     before = flown.results()
-    flown.run_ok("--cores", "2")
+    flown.run_ok("--cores", "2", DECISION)
     for flight in ("first", "second"):
         log = flown.folder / "results" / "logs" / "analyze" / f"{flight}.log"
         assert "replayed: new; up to date: 4" in log.read_text(encoding="utf-8")

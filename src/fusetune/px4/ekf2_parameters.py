@@ -15,7 +15,7 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Literal
 
-from fusetune.px4.parameter_migration import migrate_names
+from fusetune.px4.parameter_migration import PREDECESSORS, migrate_names
 
 Release = tuple[int, int] | tuple[int, int, int]
 
@@ -146,7 +146,8 @@ def migrate(logged: Mapping[str, float | int], release: Release | None = None) -
     dict
         Only parameters that the log determines; values rounded to float32. Values that are no numbers count as missing.
     """
-    sound = {name: value for name, value in logged.items() if math.isfinite(value)}
+    known = (name for name in logged if name in PARAMETERS or name in PREDECESSORS)
+    sound = {name: logged[name] for name in known if math.isfinite(logged[name])}
     return {name: as_float32(float(value)) for name, value in migrate_names(sound).items() if name in PARAMETERS}
 
 
@@ -171,8 +172,7 @@ def complete(
     """
     for name in overrides:
         metadata_of(name)
-    values = {name: metadata.default for name, metadata in PARAMETERS.items()}
-    values.update(migrate(logged, release))
+    values = _DEFAULTS | migrate(logged, release)
     values.update({name: as_float32(float(value)) for name, value in overrides.items()})
     return values
 
@@ -256,3 +256,5 @@ PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
     {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE_RELEASE)}
 )
 """EKF2 parameters of the baseline release, by name in alphabetical order."""
+
+_DEFAULTS = {name: metadata.default for name, metadata in PARAMETERS.items()}

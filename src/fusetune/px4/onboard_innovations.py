@@ -71,10 +71,10 @@ def aid_source_tables(flight: Flight) -> dict[TopicKey, TopicTable]:
     computed one) of any axis exceeds 1; `fused` where that is not so and the control flags name the source.
     An instance of which the log holds `estimator_aid_src_*` itself is left as it is.
     """
-    gates = complete(flight.parameters.initial, {}, flight.release)
     tables: dict[TopicKey, TopicTable] = {}
     own = {instance for name, instance in flight.topics if name.startswith(_TOPIC_PREFIX)}
     logged = {*flight.instances("estimator_innovations"), *flight.instances("ekf2_innovations")}
+    gates = complete(flight.parameters.initial, {}, flight.release) if logged - own else {}
     for instance in sorted(logged - own):
         series = _modern_series(flight, instance) if flight.topic("estimator_innovations", instance) else None
         series = series or _old_series(flight, instance)

@@ -35,6 +35,9 @@ _RENAMED = {
 }
 """One parameter that went on under another name (or two) with the same meaning and unit."""
 
+PREDECESSORS = frozenset({*_RENAMED, "EKF2_WIND_NOISE", "EKF2_AID_MASK"})
+"""Parameters of other releases that tell those of v1.16."""
+
 _MAG_TYPE_AUTOMATIC, _MAG_TYPES_REMOVED = 0, (2, 3, 4)
 
 

@@ -32,6 +32,8 @@ def out_of_line(timestamps: np.ndarray) -> np.ndarray:
     timestamps
         (rows,) int64, µs, of one topic in the order of the file.
     """
+    if not len(timestamps) or (timestamps[0] >= 0 and _in_order(timestamps, _LATEST_US)):
+        return np.zeros(len(timestamps), np.bool_)
     wrong = (timestamps < 0) | (timestamps > _LATEST_US)
     timestamps = np.clip(timestamps, 0, _LATEST_US)
     if len(timestamps) < 3:

@@ -24,6 +24,7 @@ _CODES = {
     "bool": "<?",
     "char": "<c",
 }
+_PARAMETER_TYPES = {"int32_t": struct.Struct("<i"), "float": struct.Struct("<f")}
 _SYSTEM_DEFAULT_BIT, _CURRENT_SETUP_BIT = 1, 2
 
 
@@ -117,12 +118,11 @@ def _key_value(payload: bytes) -> KeyValue:
 
 
 def _parameter(payload: bytes) -> tuple[str, ParameterValue]:
-    type_name = payload[1 : 1 + payload[0]].split(b" ")[0]
-    if type_name not in (b"int32_t", b"float"):
+    length = payload[0]
+    type_name, _, name = payload[1 : 1 + length].decode("utf-8", "ignore").partition(" ")
+    if type_name not in _PARAMETER_TYPES or not name:
         raise ValueError("a parameter that is neither INT32 nor FLOAT")
-    key, value = _key_value(payload)
-    assert isinstance(value, int | float)
-    return key, value
+    return name, _PARAMETER_TYPES[type_name].unpack(payload[1 + length :])[0]
 
 
 def _text(level: int, payload: bytes) -> Text:

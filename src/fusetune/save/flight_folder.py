@@ -122,10 +122,13 @@ def read_metadata(folder: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _write_table(file: Path, table: TopicTable) -> None:
-    arrays = pa.Table.from_arrays([pa.array(values) for values in table.values()], names=list(table))
     # hundreds of small files with thousands of short columns: what is done per file and column counts, not the bytes
+    arrays = {name: pa.array(values) for name, values in table.items()}
+    schema = pa.schema([pa.field(name, array.type, nullable=False) for name, array in arrays.items()])
+    rows = pa.Table.from_arrays(list(arrays.values()), schema=schema)
+    options = {"use_dictionary": False, "write_statistics": False, "store_schema": False}
     sink = pa.BufferOutputStream()
-    pq.write_table(arrays, sink, compression="lz4", use_dictionary=False, write_statistics=False)
+    pq.write_table(rows, sink, compression="lz4", **options)
     with open(file, "wb", buffering=0) as target:
         target.write(sink.getvalue())
 
