@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from fusetune.kernel_cache import use_kernel_cache
+
+if TYPE_CHECKING:
+    from fusetune.px4.flight import Flight
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -58,6 +61,19 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def project_root() -> Path:
     """Folder that holds the Snakefile."""
     return ROOT
+
+
+@pytest.fixture(scope="session")
+def survey_flight(project_root: Path) -> Flight:
+    """The survey mission as a simulated vehicle flies it, with its own estimator on board; not to be changed."""
+    from fusetune.design.mission import load_mission
+    from fusetune.execute.simulation import fly
+    from fusetune.execute.vehicle import load_vehicle
+    from fusetune.px4.release_layouts import canonical
+
+    mission = load_mission(project_root / "config/missions/survey.yaml")
+    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
+    return canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
 
 
 @pytest.fixture(scope="session")

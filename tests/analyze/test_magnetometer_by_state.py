@@ -12,30 +12,24 @@ from fusetune.analyze.reconstruction.magnetometer_by_state import (
     noise_of_measured,
     reaction_to_offset,
 )
-from fusetune.design.mission import load_mission
 from fusetune.ekf2.following import Departure, follow
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.parameters import complete
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.logged_state import logged_states
-from fusetune.px4.release_layouts import canonical
 
 FIELD = np.array([0.2, 0.05, 0.4])
 MAG = "vehicle_magnetometer"
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    whole = canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
+def flight(survey_flight) -> Flight:
+    """Magnetometer and estimator states at 2 Hz."""
     keep = {name: 5 if name == "estimator_states" else 25 for name in (MAG, "estimator_states")}
-    topics = {key: table for key, table in whole.topics.items() if key[0] != "ekf2_timestamps"}
+    topics = {key: table for key, table in survey_flight.topics.items() if key[0] != "ekf2_timestamps"}
     for name, step in keep.items():
         topics[name, 0] = select_rows(topics[name, 0], np.arange(0, row_count(topics[name, 0]), step))
-    return whole.with_topics(topics)
+    return survey_flight.with_topics(topics)
 
 
 def departure(covariance: np.ndarray, to_earth: np.ndarray | None = None, **values) -> Departure:

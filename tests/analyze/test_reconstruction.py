@@ -17,15 +17,11 @@ from fusetune.analyze.reconstruction.attitude import (
 from fusetune.analyze.reconstruction.between_samples import sensor_rate_hz
 from fusetune.analyze.reconstruction.magnetometer import _spline_is_nearer, interpolate_magnetometer
 from fusetune.analyze.replay_files import ReplayIdentity, write_replay
-from fusetune.analyze.replay_flight import prepare
+from fusetune.analyze.replay_flight import PreparedFlight, prepare
 from fusetune.analyze.set_files import read_set
-from fusetune.design.mission import load_mission
 from fusetune.ekf2.parameters import complete
 from fusetune.errors import UserError
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight, select_rows
-from fusetune.px4.release_layouts import canonical
 
 EARTH = np.array([0.21, 0.03, 0.43])
 BODY = np.array([0.05, -0.03, 0.02])
@@ -134,10 +130,8 @@ def test_without_attitude_nothing_is_interpolated():
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    return canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
+def flight(survey_flight) -> Flight:
+    return survey_flight
 
 
 def thinned(flight: Flight) -> Flight:
@@ -151,6 +145,16 @@ def thinned(flight: Flight) -> Flight:
     rows = np.arange(len(imu["timestamp"]))
     topics["sensor_combined", 0] = select_rows(imu, rows % 100 > 2)
     return flight.with_topics(topics)
+
+
+@pytest.fixture(scope="module")
+def small(flight) -> Flight:
+    return thinned(flight)
+
+
+@pytest.fixture(scope="module")
+def mended(small) -> PreparedFlight:
+    return prepare(small, ReconstructionSettings())
 
 
 def test_whole_log_passes_through_as_it_is(flight):
@@ -169,9 +173,8 @@ def test_every_step_can_be_switched_off(flight):
     assert [step.what for step in result.steps] == ["switched off"] * 3
 
 
-def test_steps_are_recorded_with_their_samples(flight):
-    small = thinned(flight)
-    result = reconstruct(small)
+def test_steps_are_recorded_with_their_samples(flight, small, mended):
+    result = mended.reconstructed
     for step in result.steps:
         assert step.done
         assert step.measured == len(small.topics[step.sensor, 0]["timestamp"])
@@ -189,11 +192,9 @@ def test_sparse_imu_is_not_made_up(flight):
     assert result.flight.topics["sensor_combined", 0] is tenth
 
 
-def test_only_measured_samples_are_scored(flight, tmp_path):
-    small = thinned(flight)
+def test_only_measured_samples_are_scored(small, mended, tmp_path):
     params = complete(small.parameters.initial, {}, small.release)
-    prepared = prepare(small, ReconstructionSettings())
-    result, measured = prepared.replay(params)
+    result, measured = mended.replay(params)
     for source, topic in (("mag", "vehicle_magnetometer"), ("baro_hgt", "vehicle_air_data")):
         of_source = result.source_names() == source
         axis = of_source & (result.innovations["axis"] == 0)
@@ -202,7 +203,7 @@ def test_only_measured_samples_are_scored(flight, tmp_path):
         assert logged - 12 <= measured[axis].sum() <= logged
         assert axis.sum() > 3 * logged
     assert measured[result.source_names() == "gnss_vel"].all()
-    write_replay(tmp_path, ReplayIdentity("s", {}, params, prepared.description(result)), result, measured)
+    write_replay(tmp_path, ReplayIdentity("s", {}, params, mended.description(result)), result, measured)
     record = read_set(tmp_path, "s")
     mag = (result.source_names() == "mag") & (result.innovations["axis"] == 0) & measured
     assert len(record.samples["mag", 0].innovation) == mag.sum()
@@ -211,9 +212,8 @@ def test_only_measured_samples_are_scored(flight, tmp_path):
     assert record.summary["reconstruction"][0]["added"] > 0
 
 
-def test_reconstruction_brings_the_replay_back(flight):
+def test_reconstruction_brings_the_replay_back(flight, small, mended):
     """Velocity innovations of the thinned log: far from the whole log's as it is, near after reconstruction."""
-    small = thinned(flight)
     params = complete(flight.parameters.initial, {}, flight.release)
 
     def velocity(prepared):
@@ -221,18 +221,15 @@ def test_reconstruction_brings_the_replay_back(flight):
         rows = result.innovations[(result.source_names() == "gnss_vel") & (result.innovations["axis"] < 2)]
         return rows[rows["timestamp_sample"] > rows["timestamp_sample"][0] + 30_000_000]
 
-    whole, raw, mended = (velocity(prepare(f, s)) for f, s in ((flight, None), (small, None), (small, DEFAULT)))
+    whole, raw, near = (velocity(one) for one in (prepare(flight), prepare(small), mended))
 
     def difference(other):
         _, left, right = np.intersect1d(whole["timestamp_sample"], other["timestamp_sample"], return_indices=True)
         a, b = whole["innovation"][left], other["innovation"][right]
         return np.sqrt(np.mean((a - b) ** 2) / np.mean(a**2))
 
-    assert difference(mended) < 0.35
-    assert difference(raw) > 3 * difference(mended)
-
-
-DEFAULT = ReconstructionSettings()
+    assert difference(near) < 0.1
+    assert difference(raw) > 10 * difference(near)
 
 
 def test_wrong_settings_are_told():

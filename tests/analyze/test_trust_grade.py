@@ -11,10 +11,7 @@ from fusetune.analyze.replay_flight import prepare
 from fusetune.analyze.replay_settings import IN_USE
 from fusetune.analyze.trust_grade import GNSS, distance, grade_flight, grade_of, with_half_the_gnss, without_repair
 from fusetune.analyze.trust_settings import TrustSettings
-from fusetune.design.mission import load_mission
 from fusetune.errors import UserError
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.estimator_instances import instance_shares, primary_magnetometer, rows_of_primary
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.release_layouts import canonical
@@ -52,10 +49,8 @@ def test_limits_must_rise():
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    return canonical(fly(mission, vehicle, {}, seed=5, with_estimator=True), follow_primary=True)
+def flight(survey_flight) -> Flight:
+    return survey_flight
 
 
 def test_whole_log_of_the_same_estimator_is_an_a(flight):

@@ -5,23 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fusetune.design.mission import load_mission
 from fusetune.ekf2.following import follow
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.parameters import complete
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight
 from fusetune.px4.logged_state import logged_states
-from fusetune.px4.release_layouts import canonical
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
+def flight(survey_flight) -> Flight:
     """Simulated, with the states that this estimator had on board."""
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    return canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
+    return survey_flight
 
 
 def departures(flight, states, start=None):

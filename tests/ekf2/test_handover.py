@@ -5,16 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fusetune.design.mission import load_mission
 from fusetune.ekf2.handover import handover_runs, without_resets_at
 from fusetune.ekf2.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import ReplayResult, replay
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight
 from fusetune.px4.logged_state import Handover, logged_states
-from fusetune.px4.release_layouts import canonical
 
 OTHER_ACCEL_BIAS = np.array([0.25, -0.2, 0.1])
 OTHER_GYRO_BIAS = np.array([0.01, -0.01, 0.02])
@@ -22,10 +18,8 @@ CHANGE_S = 50.0
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    return canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
+def flight(survey_flight) -> Flight:
+    return survey_flight
 
 
 @pytest.fixture(scope="module")

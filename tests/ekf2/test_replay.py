@@ -9,25 +9,19 @@ import pytest
 
 from fusetune.analyze.fidelity import compare_set
 from fusetune.analyze.replay_flight import replay_log
-from fusetune.design.mission import load_mission
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import replay
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.ekf2_parameters import PARAMETERS
 from fusetune.px4.flight import Flight
-from fusetune.px4.release_layouts import canonical
 
 LATITUDE_DEG_M = 111_132.0
 PUBLISHED = ("innovations", "states", "local_position", "flags")
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    return canonical(fly(mission, vehicle, {}, seed=3, with_estimator=False))
+def flight(survey_flight) -> Flight:
+    return survey_flight
 
 
 def replayed(flight: Flight, **overrides: float):

@@ -5,25 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fusetune.design.mission import load_mission
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import replay
 from fusetune.ekf2.warm_start import rotation_matrix
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight, select_rows
 from fusetune.px4.logged_state import LoggedState
-from fusetune.px4.release_layouts import canonical
 
 CUT_S = 45.0
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    return canonical(fly(mission, vehicle, {}, seed=3, with_estimator=False))
+def flight(survey_flight) -> Flight:
+    return survey_flight
 
 
 def run(flight, **options):

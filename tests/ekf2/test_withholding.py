@@ -7,15 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fusetune.design.mission import load_mission
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import Gap, ReplayResult, replay
-from fusetune.execute.simulation import fly
-from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight
-from fusetune.px4.release_layouts import canonical
 
 START, STOP = 45_000_000, 54_000_000
 """In flight: the simulated vehicle takes off some 15 s after the log begins (µs after its first sample)."""
@@ -29,10 +25,8 @@ MEASURED = {
 
 
 @pytest.fixture(scope="module")
-def flight(project_root) -> Flight:
-    mission = load_mission(project_root / "config/missions/survey.yaml")
-    vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
-    return canonical(fly(mission, vehicle, {}, seed=5, with_estimator=False))
+def flight(survey_flight) -> Flight:
+    return survey_flight
 
 
 def replayed(flight: Flight, *gaps: Gap) -> ReplayResult:

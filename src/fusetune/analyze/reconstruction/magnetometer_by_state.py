@@ -22,7 +22,9 @@ MAG = "vehicle_magnetometer"
 PASSES = 2
 """The filter's reaction is worked out with the covariance of one moment; a second pass makes up for that."""
 
-MAX_INTERVAL_US = 2_000_000
+MIN_INTERVAL_US, MAX_INTERVAL_US = 400_000, 2_000_000
+"""Default profiles log one or two states a second; of more, some are left out."""
+
 REACTION_ERROR = 0.05
 """Of the reaction, by which it may be wrong."""
 
@@ -74,6 +76,7 @@ def add_noise_by_state(
     nothing = Noise(table, 0, 0)
     if noise < MIN_NOISE_GAUSS or not states:
         return nothing
+    states = _apart(states)
     found = nothing
     for _ in range(PASSES):
         found = _one_pass(
@@ -91,6 +94,14 @@ def noise_of_measured(field: np.ndarray, measured: np.ndarray) -> float:
         return 0.0
     off = field[alone] - 0.5 * (field[alone - 1] + field[alone + 1])
     return float(np.sqrt(np.mean(off**2)))
+
+
+def _apart(states: Sequence[LoggedState]) -> list[LoggedState]:
+    kept: list[LoggedState] = []
+    for state in states:
+        if not kept or state.time_us - kept[-1].time_us >= MIN_INTERVAL_US:
+            kept.append(state)
+    return kept
 
 
 def _one_pass(
