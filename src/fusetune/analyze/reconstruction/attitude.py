@@ -137,16 +137,11 @@ def integrated_gyro(imu: TopicTable) -> np.ndarray:
     steps = from_rotation_vector(
         stacked(imu, "gyro_rad") * (imu["gyro_integral_dt"].astype(np.float64) * 1e-6)[:, None]
     )
-    turned = np.empty_like(steps)
-    w, x, y, z = 1.0, 0.0, 0.0, 0.0
-    for i, (a, b, c, d) in enumerate(steps.tolist()):
-        w, x, y, z = (
-            w * a - x * b - y * c - z * d,
-            w * b + x * a + y * d - z * c,
-            w * c - x * d + y * a + z * b,
-            w * d + x * c - y * b + z * a,
-        )
-        turned[i] = w, x, y, z
+    turned, reach = steps, 1
+    # each pass doubles the number of steps that a product covers (Hillis and Steele, 1986)
+    while reach < len(turned):
+        turned = np.concatenate([turned[:reach], multiply(turned[:-reach], turned[reach:])])
+        reach *= 2
     return normalised(turned)
 
 
