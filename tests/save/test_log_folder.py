@@ -159,7 +159,7 @@ def test_flights_table_keeps_the_given_order(tmp_path: Path, log: Path) -> None:
     assert rows[0]["checksum"] == read_ulog(log).checksum
     assert rows[1]["airborne_s"] is None
     csv = pa_csv.read_csv(tmp_path / "flights.csv")
-    assert csv.column_names == list(rows[0])
+    assert csv.column_names == [name for name in rows[0] if name != "advice"]
     assert csv.column("status").to_pylist() == ["replayable", "refused"]
 
 
@@ -194,6 +194,18 @@ def test_all_checks_are_in_metadata_and_table(tmp_path: Path, log: Path) -> None
     (row,) = pq.read_table(tmp_path / "flights.parquet").to_pylist()
     for check in verdict.checks:
         assert f"{check.name} {check.status}" in row["checks"]
+
+
+def test_remedies_of_what_did_not_pass_are_in_the_table(tmp_path: Path, log: Path) -> None:
+    verdict = save_log(log, tmp_path / "made")
+    (tmp_path / "bad.ulg").write_bytes(b"")
+    refused = save_log(tmp_path / "bad.ulg", tmp_path / "bad")
+    write_flights_table([tmp_path / "made", tmp_path / "bad"], tmp_path / "flights.parquet", tmp_path / "flights.csv")
+    rows = pq.read_table(tmp_path / "flights.parquet").to_pylist()
+    for row, told in zip(rows, (verdict, refused), strict=True):
+        expected = {check.name: check.remedy for check in told.checks if check.status in ("warning", "fail")}
+        assert {one["check"]: one["remedy"] for one in row["advice"]} == expected
+    assert rows[0]["advice"]
 
 
 def test_thresholds_decide(tmp_path: Path, log: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from fusetune.analyze.sources import AID_SOURCES
+from fusetune.report.advice import advice_table
 from fusetune.report.innovation_figures import rms_table
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
 from fusetune.report.results import Results, as_flown, figure_values
@@ -38,7 +39,7 @@ def flights_section(results: Results, flights_table: Path) -> str:
     head = ("flight", "verdict", "scored s", "airborne s", "firmware", "reason")
     count, decide = len(rows), results.decision["flights_scored"]
     text = f"{count} log{'s' if count != 1 else ''}, {len(results.flights)} scored, {decide} in the decision."
-    return section("The flights", paragraph(text), table(head, rows))
+    return section("The flights", paragraph(text), table(head, rows), advice_table(verdicts))
 
 
 def _flight_row(

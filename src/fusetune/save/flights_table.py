@@ -32,11 +32,13 @@ SCHEMA = pa.schema(
         ("airborne_s", pa.float64()),
         ("checksum", pa.string()),
         ("size_bytes", pa.int64()),
+        ("advice", pa.list_(pa.struct([(name, pa.string()) for name in ("check", "reason", "remedy")]))),
     ]
 )
 """Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused.
 
-`checks` holds name, status and figure of every check.
+`checks` holds name, status and figure of every check; `advice`, which the CSV leaves out, the remedies of those that
+did not pass.
 """
 
 _DUPLICATE = "duplicate"
@@ -61,7 +63,7 @@ def write_flights_table(
     with atomic_path(table) as temporary:
         pq.write_table(rows, temporary)
     with atomic_path(csv) as temporary:
-        pa_csv.write_csv(rows, temporary)
+        pa_csv.write_csv(rows.drop_columns(["advice"]), temporary)
 
 
 def _row(folder: Path) -> dict[str, Any]:
@@ -82,6 +84,11 @@ def _row(folder: Path) -> dict[str, Any]:
         "airborne_s": metadata.get("airborne_s"),
         "checksum": metadata["checksum"],
         "size_bytes": metadata["size_bytes"],
+        "advice": [
+            {"check": check["name"], "reason": check["reason"], "remedy": check["remedy"]}
+            for check in (*failed, *warned)
+            if check["remedy"]
+        ],
     }
 
 
@@ -97,6 +104,7 @@ def _refuse_duplicates(rows: list[dict[str, Any]]) -> None:
             row["status"] = "refused"
             row["reason"] = f"is the same log as {original}, which stands for both"
             row["remedy"] = "Remove one of the two files"
+            row["advice"] = [{"check": _DUPLICATE, "reason": row["reason"], "remedy": row["remedy"]}]
 
 
 def _compact(check: dict[str, Any]) -> str:
