@@ -36,7 +36,7 @@ def advice_table(verdicts: Iterable[Mapping[Hashable, Any]]) -> str:
         )
         for remedy, names in sorted(flights.items(), key=lambda item: (-len(item[1]), item[0]))
     ]
-    return table(("what to do", "because", "flights", "of them"), rows, "For the next flights") if rows else ""
+    return table(("what to do", "because", "flights", "how many"), rows, "For the next flights") if rows else ""
 
 
 def _names(names: list[str]) -> str:
