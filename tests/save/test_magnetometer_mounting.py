@@ -9,7 +9,7 @@ from tests.save.made_flight import judged, made_flight
 
 from fusetune.px4.release_layouts import canonical
 from fusetune.px4.ulog_reader import read_ulog
-from fusetune.save.magnetometer_mounting import described, magnetometer_mounting, stillest_mounting
+from fusetune.save.magnetometer_mounting import QUARTER_TURNS, described, magnetometer_mounting, stillest_mounting
 from fusetune.save.verdict import VerdictThresholds
 
 EARTH = np.array([0.21, 0.02, 0.43])
@@ -82,3 +82,19 @@ def test_only_gazebos_magnetometer_is_turned_among_the_shared_logs(shared_logs):
     ):
         flight = canonical(read_ulog(shared_logs / f"{stem}.ulg"))
         assert magnetometer_mounting(flight, VerdictThresholds()).status == expected
+
+
+def test_the_quarter_turns_are_the_rotations_of_a_cube():
+    """SciPy's octahedral group."""
+    ours = {tuple(turn.ravel()) for turn in np.round(QUARTER_TURNS)}
+    assert ours == {tuple(turn.ravel() + 0.0) for turn in TURNS}
+
+
+@given(st.integers(0, len(TURNS) - 1))
+def test_names_give_the_rotation_back(number):
+    turn = TURNS[number]
+    words = {
+        part.split()[0]: int(part.split()[1].removesuffix("°")) for part in described(turn).split(", ") if "°" in part
+    }
+    angles = [words.get(name, 0) for name in ("yaw", "pitch", "roll")]
+    np.testing.assert_allclose(Rotation.from_euler("ZYX", angles, degrees=True).as_matrix(), turn, atol=1e-9)

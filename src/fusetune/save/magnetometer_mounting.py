@@ -6,8 +6,9 @@ others, the sensor is mounted otherwise than its parameters say.
 
 from __future__ import annotations
 
+from itertools import permutations, product
+
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.save.verdict import Check, VerdictThresholds
@@ -15,6 +16,13 @@ from fusetune.save.verdict import Check, VerdictThresholds
 MIN_SAMPLES, MAX_SAMPLES = 24, 500
 MAX_SCATTER_LEFT = 0.1
 """Share of the field's variance that may be left; of sensors that are mounted as told nearly all is."""
+
+QUARTER_TURNS = tuple(
+    matrix
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3))
+    if np.linalg.det(matrix := np.diag(signs)[:, order]) > 0.0
+)
+"""The 24 rotations (3, 3) that take axes to axes."""
 
 _REMEDY = "Compare CAL_MAG0_ROT (and SENS_BOARD_ROT) with how the sensor sits; in a simulation, ask its sensor model"
 
@@ -50,22 +58,40 @@ def stillest_mounting(q: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, 
     Rotation (3, 3) from axes that turn with the vehicle to those of the samples, and the variance of the field that it
     leaves as a share of what the samples have as they are. Where nothing is better it is none, and 1.
     """
-    turns = np.round(Rotation.create_group("O").as_matrix())
-    to_earth = Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix()
-    fields = [np.einsum("nij,nj->ni", to_earth, measured @ turn) for turn in turns]
-    scatter = np.array([np.var(field[:, 2]) + np.var(np.hypot(field[:, 0], field[:, 1])) for field in fields])
-    as_told = scatter[np.argmax(np.trace(turns, axis1=1, axis2=2))]
-    best = int(np.argmin(scatter))
-    if not scatter[best] < as_told:
+    down = _down_axis(q)
+    as_told = _scatter(down, measured)
+    best = min(QUARTER_TURNS, key=lambda turn: _scatter(down, measured @ turn))
+    least = _scatter(down, measured @ best)
+    if not least < as_told:
         return np.eye(3), 1.0
-    return turns[best], max(float(scatter[best] / as_told), 0.0)
+    return best, least / as_told
+
+
+def _down_axis(q: np.ndarray) -> np.ndarray:
+    """The axis that points down, in the body (N, 3): the last row of the rotation to NED."""
+    w, x, y, z = q.T
+    return np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
+
+
+def _scatter(down: np.ndarray, field: np.ndarray) -> float:
+    """Variance of the field's part that points down and of the length of its level part, Gauss²."""
+    vertical = np.sum(down * field, axis=1)
+    level = np.sqrt(np.maximum(np.sum(field * field, axis=1) - vertical**2, 0.0))
+    return float(np.var(vertical) + np.var(level))
 
 
 def described(mounting: np.ndarray) -> str:
-    """Angles of a rotation in PX4's order of its rotation names."""
-    with_lock = Rotation.from_matrix(mounting).as_euler("ZYX", degrees=True, suppress_warnings=True)
-    yaw, pitch, roll = (round(float(angle)) % 360 for angle in with_lock)
-    parts = [f"{name} {angle}°" for name, angle in (("roll", roll), ("pitch", pitch), ("yaw", yaw)) if angle]
+    """Angles of a rotation by quarter turns, in PX4's order of its rotation names."""
+    m = np.round(mounting)
+    pitch = np.arcsin(-m[2, 0])
+    if m[2, 0] == 0.0:
+        roll, yaw = np.arctan2(m[2, 1], m[2, 2]), np.arctan2(m[1, 0], m[0, 0])
+    else:
+        # nose up or down, roll and yaw turn about the same axis
+        roll, yaw = 0.0, np.arctan2(-m[0, 1], m[1, 1])
+    angles = {"roll": roll, "pitch": pitch, "yaw": yaw}
+    degrees = {name: round(float(np.degrees(angle))) % 360 for name, angle in angles.items()}
+    parts = [f"{name} {angle}°" for name, angle in degrees.items() if angle]
     return ", ".join(parts) or "nothing"
 
 
