@@ -33,7 +33,9 @@ def magnetometer_mounting(flight: Flight, limits: VerdictThresholds) -> Check:
     table, attitude = flight.topic("vehicle_magnetometer"), flight.topic("vehicle_attitude")
     if table is None or attitude is None or "q[0]" not in attitude or "magnetometer_ga[0]" not in table:
         return Check(name, "does-not-apply", "without magnetometer or attitude the two cannot be compared")
-    q, measured = _together(table, attitude)
+    # damaged numbers may be of the kind of NaN that even a cast complains of; they are left out
+    with np.errstate(invalid="ignore"):
+        q, measured = _together(table, attitude)
     if len(measured) < MIN_SAMPLES:
         return Check(name, "does-not-apply", f"only {len(measured)} magnetometer samples with an attitude")
     mounting, left = stillest_mounting(q, measured)
