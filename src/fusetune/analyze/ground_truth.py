@@ -55,8 +55,8 @@ def read_truth(flight: Flight) -> Truth | None:
     v1.17 show how errors against it can surprise: their true attitude differs from the estimated one by 6° in heading
     at rest and up to 14° in flight, while tilt agrees within 0.2° and velocity within centimetres per second, whatever
     the shift in time. That is a true heading error: the simulated magnetic field points 2.6° west of true north where
-    the estimator's field model says 3.4° east, and it turns further with the vehicle. Hence heading and tilt
-    have figures of their own.
+    the estimator's field model says 3.4° east, and its samples are those of a sensor that sits a quarter turn off
+    (`fusetune.save.magnetometer_mounting`). Hence heading and tilt have figures of their own.
     """
     local = flight.topic("vehicle_local_position_groundtruth")
     attitude = flight.topic("vehicle_attitude_groundtruth")

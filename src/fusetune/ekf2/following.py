@@ -15,7 +15,7 @@ import numpy as np
 from fusetune.ekf2.inputs import EstimatorInputs
 from fusetune.ekf2.replay import begin_course
 from fusetune.ekf2.state import ATTITUDE, MAG_BODY, MAG_EARTH
-from fusetune.ekf2.warm_start import rotation_matrix
+from fusetune.ekf2.warm_start import quaternion_product, rotation_matrix
 from fusetune.px4.logged_state import LoggedState
 
 FIELD_STATES = np.r_[ATTITUDE : ATTITUDE + 3, MAG_EARTH : MAG_EARTH + 3, MAG_BODY : MAG_BODY + 3]
@@ -97,9 +97,8 @@ def _departure(ekf: np.void, state: LoggedState, since: int, until: int, covaria
 
 
 def _return_to(ekf: np.void, state: LoggedState, heading: float) -> None:
-    w, x, y, z = np.array(ekf["q"], np.float64)
-    cosine, sine = math.cos(0.5 * heading), math.sin(0.5 * heading)
-    q = (cosine * w - sine * z, cosine * x - sine * y, cosine * y + sine * x, cosine * z + sine * w)
+    turn = np.array([math.cos(0.5 * heading), 0.0, 0.0, math.sin(0.5 * heading)])
+    q = quaternion_product(turn, np.array(ekf["q"], np.float64))
     ekf["q"] = q
-    ekf["R_to_earth"] = rotation_matrix(np.array(q))
+    ekf["R_to_earth"] = rotation_matrix(q)
     ekf["mag_I"], ekf["mag_B"] = state.mag_earth, state.mag_body

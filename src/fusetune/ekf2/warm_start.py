@@ -140,11 +140,12 @@ def _carried_on(state: LoggedState, imu: np.ndarray, until: int) -> tuple[np.nda
 def _turned(q: np.ndarray, turn: np.ndarray) -> np.ndarray:
     angle = float(np.linalg.norm(turn))
     scale = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
-    result = _product(q, np.array([math.cos(0.5 * angle), *(scale * turn)]))
+    result = quaternion_product(q, np.array([math.cos(0.5 * angle), *(scale * turn)]))
     return result / np.linalg.norm(result)
 
 
-def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Product (4,) of two quaternions (w, x, y, z)."""
     vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
     return np.array([p[0] * q[0] - p[1:] @ q[1:], *vector])
 
@@ -281,12 +282,12 @@ def _align_output(e: np.void) -> None:
     output = e["output"]
     oldest = output["history"][int(output["tail"])]
     inverse = oldest["q"] * np.array([1.0, -1.0, -1.0, -1.0])
-    turn = _product(e["q"], inverse)
+    turn = quaternion_product(e["q"], inverse)
     matrix = rotation_matrix(turn / np.linalg.norm(turn))
     start = oldest["vel"].copy()
     for i in range(int(output["size"])):
         sample = output["history"][i]
-        sample["q"] = _product(turn, sample["q"])
+        sample["q"] = quaternion_product(turn, sample["q"])
         sample["vel"] = start + matrix @ (sample["vel"] - start)
     output["vel_offset"] = e["vel"] - start
     output["pos_offset"] = -oldest["pos"]

@@ -14,9 +14,6 @@ from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.save.verdict import Check, VerdictThresholds
 
 MIN_SAMPLES, MAX_SAMPLES = 24, 500
-MAX_SCATTER_LEFT = 0.1
-"""Share of the field's variance that may be left; of sensors that are mounted as told nearly all is."""
-
 QUARTER_TURNS = tuple(
     matrix
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3))

@@ -38,7 +38,10 @@ class VerdictThresholds:
     high_clipping_share: float = 0.001
     low_magnetometer_rate_hz: float = 10.0
     max_field_scatter_left: float = 0.1
-    """Share of the field's scatter left by another mounting of the magnetometer, below which it sits otherwise."""
+    """Share of the field's scatter left by another mounting of the magnetometer, below which it sits otherwise.
+
+    Of sensors that are mounted as told nearly all is left.
+    """
     low_barometer_rate_hz: float = 10.0
     low_gnss_rate_hz: float = 4.0
     low_gnss_fix_share: float = 0.8

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fusetune.analyze.reconstruction.attitude import to_body, to_earth
-from fusetune.save.magnetometer_mounting import MAX_SCATTER_LEFT, stillest_mounting
+from fusetune.save.magnetometer_mounting import stillest_mounting
+from fusetune.save.verdict import VerdictThresholds
 
 MIN_SAMPLES = 24
 LOG_DRIFT_RANGE = (-5.0, 4.0)
@@ -71,7 +73,7 @@ def magnetic_field(time: np.ndarray, q: np.ndarray, measured: np.ndarray) -> Mag
     if len(time) < MIN_SAMPLES:
         return MagneticField(to_earth(q, measured), np.zeros(3), np.eye(3))
     mounting, left = stillest_mounting(q, measured)
-    mounting = mounting if left <= MAX_SCATTER_LEFT else np.eye(3)
+    mounting = mounting if left <= VerdictThresholds.max_field_scatter_left else np.eye(3)
     measured = measured @ mounting
     # (N, 3, 4): the samples in the frame of e, and the axes of b there
     series = np.stack([to_earth(q, measured), *(to_earth(q, np.tile(axis, (len(q), 1))) for axis in np.eye(3))], -1)
@@ -101,8 +103,8 @@ def _fit(series: np.ndarray, step: np.ndarray, stiffness: float) -> tuple[float,
     `step` (N-1,) are the variances that the walk gains between samples, `stiffness` the prior's precision of the body's
     field, both in units of the noise's variance.
     """
-    innovations, expected = _innovations(series, step)
-    scaled = innovations / np.sqrt(expected)[:, None, None]
+    *_, innovation, expected = _filtered(series, step)
+    scaled = innovation / np.sqrt(expected)[:, None, None]
     design, target = scaled[..., 1:].reshape(-1, 3), scaled[..., 0].reshape(-1)
     information = design.T @ design + stiffness * np.eye(3)
     body = np.linalg.solve(information, design.T @ target)
@@ -111,27 +113,35 @@ def _fit(series: np.ndarray, step: np.ndarray, stiffness: float) -> tuple[float,
     return 0.5 * (len(target) * math.log(max(squares, 1e-300)) + logarithms), body
 
 
-def _innovations(series: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Innovations (N-1, 3, 4) of each series as a random walk under noise of variance 1, and their variances (N-1,)."""
-    estimate, variance = series[0], 1.0
-    innovations, expected = np.empty_like(series[1:]), np.empty(len(step))
+class _Filtered(NamedTuple):
+    """A random walk of known steps under noise of variance 1, by the Kalman filter.
+
+    `estimate` (N, …) and its `variance` (N,) after each sample; `innovation` (N-1, …) of each sample but the first and
+    its `expected` variance (N-1,).
+    """
+
+    estimate: np.ndarray
+    variance: np.ndarray
+    innovation: np.ndarray
+    expected: np.ndarray
+
+
+def _filtered(value: np.ndarray, step: np.ndarray) -> _Filtered:
+    result = _Filtered(np.empty_like(value), np.empty(len(value)), np.empty_like(value[1:]), np.empty(len(step)))
+    result.estimate[0], result.variance[0] = value[0], 1.0
+    estimate, variance = value[0], 1.0
     for k, gained in enumerate(step.tolist()):
         predicted = variance + gained
-        expected[k] = predicted + 1.0
-        variance = predicted / (predicted + 1.0)
-        innovations[k] = series[k + 1] - estimate
-        estimate = estimate + variance * innovations[k]
-    return innovations, expected
+        result.expected[k] = predicted + 1.0
+        result.innovation[k] = value[k + 1] - estimate
+        result.variance[k + 1] = variance = predicted / (predicted + 1.0)
+        result.estimate[k + 1] = estimate = estimate + variance * result.innovation[k]
+    return result
 
 
 def _smoothed(value: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Mean of the walk given all samples (Rauch, Tung and Striebel); variances in units of the noise's."""
-    estimate, variance = np.empty_like(value), np.empty(len(value))
-    estimate[0], variance[0] = value[0], 1.0
-    for k in range(1, len(value)):
-        predicted = variance[k - 1] + step[k - 1]
-        variance[k] = predicted / (predicted + 1.0)
-        estimate[k] = estimate[k - 1] + variance[k] * (value[k] - estimate[k - 1])
+    """Mean of the walk given all samples (Rauch, Tung and Striebel)."""
+    estimate, variance, *_ = _filtered(value, step)
     for k in range(len(value) - 2, -1, -1):
         gain = variance[k] / (variance[k] + step[k])
         estimate[k] += gain * (estimate[k + 1] - estimate[k])

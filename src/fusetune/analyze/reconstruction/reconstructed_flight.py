@@ -101,7 +101,10 @@ def reconstruct(
         else:
             steps.append(_interpolate(topic, wanted, below_hz, rate_hz, function, topics, measured))
     if MAG in measured and settings.magnetometer_by_state:
-        steps[1] = _with_noise(steps[1], flight.with_topics(topics), measured[MAG], start, topics)
+        repaired = flight.with_topics(dict(topics))
+        steps = [
+            _with_noise(step, repaired, measured[MAG], start, topics) if step.sensor == MAG else step for step in steps
+        ]
     return ReconstructedFlight(flight.with_topics(topics), measured, tuple(steps))
 
 
