@@ -35,7 +35,7 @@ HORIZON = np.dtype(
 @njit
 def follow_horizon(horizon, params, imu, times):
     initialise_buffers(horizon, params, imu[0].time_us)
-    initialise_down_sampler(horizon.down_sampler, params)
+    initialise_down_sampler(horizon.down_sampler)
     count = 0
     for i in range(len(imu)):
         if accumulate_imu(horizon.down_sampler, imu[i]):
@@ -60,7 +60,7 @@ def constant_motion(count, rate, acceleration):
 def down_sampled(imu, predict_us):
     params = parameter_record(complete({}, {"EKF2_PREDICT_US": predict_us}))
     sampler = np.zeros(1, DOWN_SAMPLER_MEMORY)
-    initialise_down_sampler(sampler[0], params[0])
+    initialise_down_sampler(sampler[0])
     out = []
     for sample in imu:
         if accumulate_imu(sampler[0], sample):
@@ -87,6 +87,20 @@ def test_interval_settles_on_the_samples_that_fill_the_period():
     samples = down_sampled(constant_motion(400, (0, 0, 0.1), (0, 0, 0)), 8000)
     counts = [round(float(sample["delta_ang_dt"] / DT)) for sample in samples]
     assert set(counts[5:]) == {2}
+
+
+@pytest.mark.parametrize(("predict_us", "later"), [(5000, 1), (10_000, 2), (20_000, 5)])
+def test_first_interval_has_the_default_length(predict_us, later):
+    """PX4's down-sampler exists before parameters are bound, so its first interval aims at 10 ms: two samples of its
+    initial mean of 5 ms. With the true 4 ms, three samples are the first to exceed 10 ms, two the first to make 2
+    samples in more than 5 ms; afterwards EKF2_PREDICT_US / 4 ms, rounded, samples fill an interval.
+    """
+    counts = [
+        round(float(sample["delta_ang_dt"] / DT))
+        for sample in down_sampled(constant_motion(400, (0, 0, 0.1), (0, 0, 0)), predict_us)
+    ]
+    assert counts[0] == 2
+    assert set(counts[20:]) == {later}
 
 
 def test_velocity_without_rotation_is_the_plain_sum():

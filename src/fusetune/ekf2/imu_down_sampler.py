@@ -27,18 +27,26 @@ DOWN_SAMPLER_MEMORY = np.dtype(
 """The estimator's sub-record `ekf.down_sampler`."""
 
 INITIAL_MEAN_DT = np.float32(0.005)
+FIRST_INTERVAL_US = 10_000.0
+"""PX4 makes its down-sampler before it binds parameters: the first interval has EKF2_PREDICT_US's default length."""
 
 
 @kernel
-def initialise_down_sampler(sampler, params):
-    """Start with PX4's guess of the gyro interval."""
+def initialise_down_sampler(sampler):
+    """Start with PX4's guess of the gyro interval, and an interval of the default length."""
     sampler.mean_dt = INITIAL_MEAN_DT
-    reset_down_sampler(sampler, params)
+    _start_interval(sampler, FIRST_INTERVAL_US)
 
 
 @kernel
 def reset_down_sampler(sampler, params):
-    """Start the next interval; its length follows the mean gyro interval seen so far."""
+    """Start the next interval, of EKF2_PREDICT_US."""
+    _start_interval(sampler, params.EKF2_PREDICT_US)
+
+
+@kernel
+def _start_interval(sampler, length_us):
+    """Empty the sum; the number of samples that fill it follows from the mean gyro interval seen so far."""
     sample = sampler.sample
     sample.time_us = 0
     sample.delta_ang[:] = 0.0
@@ -49,7 +57,7 @@ def reset_down_sampler(sampler, params):
     sampler.rotation[0] = 1.0
     sampler.rotation[1:] = 0.0
     sampler.count = 0
-    target = np.float32(min(max(params.EKF2_PREDICT_US, 1000.0), 100_000.0)) * np.float32(1e-6)
+    target = np.float32(min(max(length_us, 1000.0), 100_000.0)) * np.float32(1e-6)
     mean_dt = sampler.mean_dt
     sampler.required = max(int(np.floor(target / mean_dt + np.float32(0.5))), 1)
     sampler.target_dt = np.float32(sampler.required) * mean_dt

@@ -359,7 +359,7 @@ def receive_imu(ekf, params, imu):
     """Feed the output predictor and the down-sampler; move the horizon when an interval is complete."""
     if not ekf.buffers.initialised:
         initialise_buffers(ekf, params, imu.time_us)
-        initialise_down_sampler(ekf.down_sampler, params)
+        initialise_down_sampler(ekf.down_sampler)
         initialise_output_predictor(ekf)
         initialise_estimator(ekf, params)
     ekf.time_latest_us = imu.time_us

@@ -39,13 +39,18 @@ def initialise_models(gsf, vel_n, vel_e, vel_accuracy):
 def predict_model(gsf, model, imu, in_air):
     """Propagate velocity and covariance of one model by an IMU sample; for its yaw see `look_up_yaw`.
 
-    With the velocity increment (Δn, Δe) in NED, F = I + [[0, 0, -Δe], [0, 0, Δn], [0, 0, 0]].
+    With the velocity increment (Δn, Δe) in NED, F = [[1, 0, -Δe], [0, 1, Δn], [0, 0, s]]. The yaw would carry over with
+    s = 1, but PX4's generated equations have s = 1 + δ², δ (rad) the down component of the increment of rotation: the
+    product of two rotations of which one is linearised. Yaw variances grow by it while the vehicle turns.
     """
     quat_to_dcm(gsf.q[model], gsf.R)
     R = gsf.R
     dv = imu.delta_vel
     dv_n = R[0, 0] * dv[0] + R[0, 1] * dv[1] + R[0, 2] * dv[2]
     dv_e = R[1, 0] * dv[0] + R[1, 1] * dv[1] + R[1, 2] * dv[2]
+    da = imu.delta_ang
+    da_d = R[2, 0] * da[0] + R[2, 1] * da[1] + R[2, 2] * da[2]
+    yaw_growth = 1.0 + da_d * da_d
 
     accel_noise = ACCEL_NOISE if in_air else 2.0 * ACCEL_NOISE
     dv_variance = (accel_noise * imu.delta_vel_dt) ** 2
@@ -57,10 +62,10 @@ def predict_model(gsf, model, imu, in_air):
     cross_12 = p12 + dv_n * p22
     P[0, 0] = p00 - dv_e * p02 - dv_e * cross_02 + dv_variance
     P[0, 1] = p01 - dv_e * p12 + dv_n * cross_02
-    P[0, 2] = cross_02
+    P[0, 2] = cross_02 * yaw_growth
     P[1, 1] = p11 + dv_n * p12 + dv_n * cross_12 + dv_variance
-    P[1, 2] = cross_12
-    P[2, 2] = p22 + da_variance
+    P[1, 2] = cross_12 * yaw_growth
+    P[2, 2] = p22 * yaw_growth * yaw_growth + da_variance
     _mirror_and_constrain(P)
 
     gsf.x[model, 0] += dv_n

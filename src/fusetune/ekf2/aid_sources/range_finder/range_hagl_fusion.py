@@ -2,7 +2,11 @@
 
 import math
 
-from fusetune.ekf2.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.aid_source_status import (
+    reset_aid_source_status_zero_innovation,
+    set_axis,
+    update_aid_source_status,
+)
 from fusetune.ekf2.aid_sources.range_finder.range_memory import dist_bottom
 from fusetune.ekf2.conditions import get_hagl
 from fusetune.ekf2.covariance import reset_covariance_block
@@ -97,4 +101,4 @@ def reset_terrain_to_rng(ekf, params):
     K[TERRAIN] = 1.0
     measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
     update_terrain_reset_status(ekf, ekf.terrain - old_terrain)
-    aid.time_last_fuse = ekf.time_delayed_us
+    reset_aid_source_status_zero_innovation(ekf, aid, 1)

@@ -6,6 +6,7 @@
 
 import math
 
+from fusetune.ekf2.aid_source_status import reset_aid_source_status_zero_innovation
 from fusetune.ekf2.aid_sources.range_finder.range_consistency_check import update_range_consistency
 from fusetune.ekf2.aid_sources.range_finder.range_hagl_fusion import (
     fuse_hagl_rng,
@@ -144,7 +145,7 @@ def _start_height_aiding(ekf, params, conditional_aid):
         ekf.events.reset_hgt_to_rng = True
         reset_altitude_to(ekf, params, aid.observation[0], aid.observation_variance[0])
         ekf.terrain = 0.0
-        aid.time_last_fuse = ekf.time_delayed_us
+        reset_aid_source_status_zero_innovation(ekf, aid, 1)
     elif not ekf.cs.opt_flow_terrain and aid.innovation_rejected:
         reset_terrain_to_rng(ekf, params)
 
@@ -159,9 +160,9 @@ def _fuse_or_recover(ekf, params):
     if is_height_reset_required(ekf) and ekf.cs.rng_hgt and ekf.height_sensor_ref == HEIGHT_REF_RANGE:
         ekf.events.reset_hgt_to_rng = True
         reset_altitude_to(ekf, params, aid.observation[0] - ekf.terrain, math.nan)
+        reset_aid_source_status_zero_innovation(ekf, aid, 1)
         if not is_vertical_velocity_aiding_active(ekf):
             reset_vertical_velocity_to_zero(ekf, params)
-        aid.time_last_fuse = ekf.time_delayed_us
     elif is_fusion_failing:
         if ekf.cs.opt_flow_terrain and is_terrain_estimate_valid(ekf):
             stop_rng_hgt_fusion(ekf)
