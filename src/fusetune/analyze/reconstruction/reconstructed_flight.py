@@ -113,7 +113,7 @@ def _with_noise(
 ) -> Step:
     parameters = complete(flight.parameters.initial, {}, flight.release)
     states = tuple(logged_states(flight))
-    if not states:
+    if not states and flight.has("estimator_states"):
         return replace(step, what=f"{step.what}; without its noise, since {why_no_state(flight)}")
     noise = add_noise_by_state(flight, measured, parameters, states, start)
     if not noise.intervals:
