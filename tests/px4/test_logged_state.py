@@ -5,6 +5,7 @@ import pytest
 
 from fusetune.px4.flight import Flight, ParameterHistory
 from fusetune.px4.logged_state import logged_handovers, logged_states, rotation_variances, why_no_state
+from fusetune.px4.release_layouts import canonical
 
 HORIZON = 5_000_000
 
@@ -135,6 +136,12 @@ def test_sample_time_of_the_newest_imu_is_moved_back_by_the_longest_delay():
     delays = {"EKF2_GPS_DELAY": 110.0, "EKF2_EV_DELAY": 175.0, "EKF2_MAG_DELAY": 0.0}
     flight = made_flight(release(1, 12), states, np.ones(24), lag=1_000, parameters=delays)
     assert next(logged_states(flight)).time_us == HORIZON + 1_000 - 175_000
+
+
+def test_a_damaged_delay_does_not_move_the_horizon():
+    delays = {"EKF2_GPS_DELAY": 110.0, "EKF2_EV_DELAY": 6e26, "EKF2_OF_DELAY": np.inf, "EKF2_MAG_DELAY": -1e30}
+    flight = made_flight(release(1, 14), states_with(24), np.ones(24), lag=1_000, parameters=delays)
+    assert next(logged_states(canonical(flight))).time_us == HORIZON + 1_000 - 110_000
 
 
 def test_origin_far_from_the_fix_is_put_there():
