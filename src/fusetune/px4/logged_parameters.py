@@ -2,9 +2,9 @@
 
 PX4 does not hold parameters to their ranges: QGroundControl warns, and what is stored is flown. EKF2 itself limits some
 where it uses them (noises, gates, the update interval), as the replay does. So a value somewhat outside of its range is
-replayed as it flew. A value that is no number, or orders of magnitude away, is damage of the log; it says nothing of the
-true one, not even on which side of the range that lies, so the default takes its place: that of the vehicle's airframe or
-firmware where the log tells it, else that of the release.
+replayed as it flew. A value that is no number, or orders of magnitude away, is damage of the log; it says nothing of
+the true one, not even on which side of the range that lies, so the default takes its place: that of the airframe or
+the firmware where the log tells it, else that of the release.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ _LARGEST_INT32 = 2.0**31
 _OWN_LIMITS: Mapping[str, tuple[float, float]] = {
     # what EKF2 itself limits the interval to
     "EKF2_PREDICT_US": (1e3, 1e5),
+    # the length of buffers
+    "EKF2_DELAY_MAX": (0.0, 2e3),
     # ids of devices
     "EKF2_MAGBIAS_ID": (-_LARGEST_INT32, _LARGEST_INT32),
 }
