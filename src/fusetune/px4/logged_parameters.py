@@ -79,19 +79,19 @@ def checked_history(
     for name, value in history.initial.items():
         if not is_read(name):
             continue
-        initial[name] = sound = typed_value(name, value)
+        sound = typed_value(name, value)
+        initial[name] = used = _default(name, history, release) if sound is None else sound
         if sound is None:
-            initial[name] = default = _default(name, history, release)
-            replaced.append(ReplacedParameter(name, value, default, None))
+            replaced.append(ReplacedParameter(name, value, used, None))
     current, changed = dict(initial), []
     for change in history.changed:
-        value = typed_value(change.name, change.value) if is_read(change.name) else change.value
-        if value is None:
+        new = typed_value(change.name, change.value) if is_read(change.name) else change.value
+        if new is None:
             kept = current.get(change.name, _default(change.name, history, release))
             replaced.append(ReplacedParameter(change.name, change.value, kept, change.timestamp))
             continue
-        current[change.name] = value
-        changed.append(ParameterChange(change.timestamp, change.name, value))
+        current[change.name] = new
+        changed.append(ParameterChange(change.timestamp, change.name, new))
     return replace(history, initial=initial, changed=changed), tuple(replaced)
 
 

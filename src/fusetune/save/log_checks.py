@@ -7,11 +7,13 @@ from collections.abc import Callable
 
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.flight import Flight
-from fusetune.px4.sensor_limits import NO_ADVANCE
+from fusetune.px4.sensor_limits import LACKS_FIELD, NO_ADVANCE
 from fusetune.save.log_facts import rate_hz
 from fusetune.save.parameter_checks import parameter_values
 from fusetune.save.verdict import Check, Status, VerdictThresholds
 
+_CHECK_SENSORS = "Check the SD card and the sensors"
+WHOLE_LOG = "Use the log as PX4 wrote it: what made or converted this file kept some fields only"
 _COPY_AGAIN = "Copy the log from the vehicle again; check the SD card"
 _IMU, _REPLAY_PROFILE_BIT, _DEFAULT_PROFILE_BIT = "sensor_combined", 0b10, 0b01
 _TIME_REASONS = ("impossible time stamp", NO_ADVANCE)
@@ -70,10 +72,11 @@ def _left_out(flight: Flight, limits: VerdictThresholds, name: str, what: str, *
     more = f" and {len(entries) - 5} topics more" if len(entries) > 5 else ""
     reason = f"{rows} {'message' if rows == 1 else 'messages'} left out ({places}{more})"
     share = max((entry.rows / max(entry.total, 1) for entry in entries if entry.topic == _IMU), default=0.0)
+    remedy = WHOLE_LOG if all(entry.reason.startswith(LACKS_FIELD) for entry in entries) else _CHECK_SENSORS
     if share > threshold:
         reason = f"{share:.1%} of the IMU samples have impossible {what}: {reason}"
-        return Check(name, "fail", reason, "Check the SD card and the sensors", share, threshold)
-    return Check(name, "warning", reason, "Check the SD card and the sensors", share, threshold)
+        return Check(name, "fail", reason, remedy, share, threshold)
+    return Check(name, "warning", reason, remedy, share, threshold)
 
 
 def firmware(flight: Flight, limits: VerdictThresholds) -> Check:
