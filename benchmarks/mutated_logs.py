@@ -98,6 +98,7 @@ def _gnss(time_us: np.ndarray, rng: np.random.Generator) -> TopicTable:
         "longitude_deg": 8.545594 + 1e-7 * rng.standard_normal(rows),
         "altitude_msl_m": 488.0 + 0.1 * rng.standard_normal(rows),
         "fix_type": np.full(rows, 3, np.uint8),
+        "satellites_used": np.full(rows, 12, np.uint8),
         "eph": np.full(rows, 0.8, np.float32),
         "epv": np.full(rows, 1.2, np.float32),
         "s_variance_m_s": np.full(rows, 0.2, np.float32),

@@ -133,3 +133,13 @@ def test_without_states_nothing_is_added(flight):
     topics = {key: table for key, table in flight.topics.items() if key[0] != "estimator_states"}
     led = reconstruct(flight.with_topics(topics))
     assert "noise" not in led.steps[1].what
+
+
+def test_states_that_cannot_be_read_are_told(flight):
+    table = dict(flight.topics["estimator_states", 0])
+    for name in ("states[24]", "covariances[22]", "covariances[23]"):
+        del table[name]
+    table["n_states"] = np.full(len(table["timestamp"]), 24, np.uint8)
+    led = reconstruct(flight.with_topics(flight.topics | {("estimator_states", 0): table}))
+    assert "without its noise, since the states" in led.steps[1].what
+    assert "24 states with 22 variances" in led.steps[1].what

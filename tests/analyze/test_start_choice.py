@@ -81,3 +81,22 @@ def test_wrong_mode_is_told():
 
 def test_settings_are_plain_values():
     assert dataclasses.asdict(StartSettings.from_mapping(None))["mode"] == "auto"
+
+
+def test_states_of_no_layout_and_states_that_are_not_aligned_give_different_reasons():
+    readable = made(3, np.arange(0.5, 50))
+    flags = readable.topics["estimator_status_flags", 0]
+
+    def with_flags(**changed):
+        return readable.with_topics(readable.topics | {("estimator_status_flags", 0): flags | changed})
+
+    unaligned = choose_start(with_flags(cs_yaw_align=np.zeros(60, bool)))
+    assert unaligned.why == "the log holds no state of an aligned estimator"
+    states = {name: column for name, column in readable.topics["estimator_states", 0].items() if name != "states[24]"}
+    del states["covariances[22]"], states["covariances[23]"]
+    unreadable = choose_start(readable.with_topics(readable.topics | {("estimator_states", 0): states}))
+    assert "cannot be read: 24 states with 22 variances" in unreadable.why
+    missing = {key: table for key, table in readable.topics.items() if key[0] != "estimator_status_flags"}
+    assert "does not tell whether" in choose_start(readable.with_topics(missing)).why
+    assert "holds no states" in choose_start(made(3, [])).why
+    assert {unaligned.mode, unreadable.mode} == {"cold"}

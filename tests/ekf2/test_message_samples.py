@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fusetune.ekf2 import message_samples as convert
+from fusetune.px4.sample_times import measurement_time
 
 
 def table(**columns):
@@ -34,8 +35,10 @@ def test_new_device_or_calibration_resets_the_magnetometer_bias():
 
 
 def test_sample_time_falls_back_to_the_time_of_publication():
-    assert convert.sample_time(table(timestamp=[10, 20], timestamp_sample=[7, 0])).tolist() == [7, 20]
-    assert convert.sample_time(table(timestamp=[10])).tolist() == [10]
+    stamps = table(timestamp=[10, 20], timestamp_sample=[7, 0])
+    assert measurement_time("vehicle_magnetometer", stamps).tolist() == [7, 20]
+    assert measurement_time("vehicle_magnetometer", table(timestamp=[10])).tolist() == [10]
+    assert measurement_time("vehicle_gps_position", stamps).tolist() == [10, 20]
 
 
 def test_gnss_velocity_must_be_valid_and_dilution_combines_both_directions():
@@ -44,7 +47,7 @@ def test_gnss_velocity_must_be_valid_and_dilution_combines_both_directions():
         vel_n_m_s=[0.0, 0.0], vel_e_m_s=[0.0, 0.0], vel_d_m_s=[0.0, 0.0], hdop=[3.0, 3.0], vdop=[4.0, 4.0],
         vel_ned_valid=[True, False], spoofing_state=[3, 1],
     )  # fmt: skip
-    samples, usable = convert.gnss_samples(rows)
+    samples, usable = convert.gnss_samples(rows), convert.taken(rows, convert.gnss_refusals(rows))
     assert samples["pdop"].tolist() == [5.0, 5.0]
     assert usable.tolist() == [True, False]
     assert samples["spoofed"].tolist() == [True, False]
@@ -56,12 +59,12 @@ def test_flow_turns_round_becomes_a_rate_and_is_stamped_mid_interval():
         delta_angle__0=[0.0], delta_angle__1=[0.1], delta_angle__2=[0.0], integration_timespan_us=[20_000],
         quality=[200], max_flow_rate=[7.0], min_ground_distance=[0.1], max_ground_distance=[30.0],
     )  # fmt: skip
-    samples, limits, usable = convert.flow_samples(rows)
+    samples, limits = convert.flow_samples(rows)
     np.testing.assert_allclose(samples["flow_rate"][0], [-1.0, 0.5])
     assert samples["gyro_rate"][0][1] == pytest.approx(-5.0)
     assert samples["time_us"][0] == 80_000
     assert limits.tolist() == [[7.0, 0.1, 30.0]]
-    assert usable.all()
+    assert convert.taken(rows, convert.flow_refusals(rows)).all()
 
 
 def vision(**changes):
@@ -89,6 +92,5 @@ def test_validated_airspeed_needs_a_selected_sensor():
         timestamp=[1, 2], true_airspeed_m_s=[22.0, 22.0], calibrated_airspeed_m_s=[20.0, np.nan],
         selected_airspeed_index=[1, 0],
     )  # fmt: skip
-    samples, usable = convert.validated_airspeed_samples(rows)
-    assert samples["eas2tas"].tolist() == [pytest.approx(1.1), 1.0]
-    assert usable.tolist() == [True, False]
+    assert convert.validated_airspeed_samples(rows)["eas2tas"].tolist() == [pytest.approx(1.1), 1.0]
+    assert convert.taken(rows, convert.validated_airspeed_refusals(rows)).tolist() == [True, False]

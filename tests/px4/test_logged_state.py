@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fusetune.px4.flight import Flight, ParameterHistory
-from fusetune.px4.logged_state import logged_handovers, logged_states, rotation_variances
+from fusetune.px4.logged_state import logged_handovers, logged_states, rotation_variances, why_no_state
+from fusetune.px4.release_layouts import canonical
 
 HORIZON = 5_000_000
 
@@ -57,9 +58,68 @@ def test_states_of_v1_13_become_rates_and_rotations():
 def test_states_of_v1_15_are_rates_already():
     states = np.zeros(24)
     states[0], states[10] = 1.0, 0.02
-    state = next(logged_states(made_flight(release(1, 15), states, np.arange(24) * 1e-4)))
+    state = next(logged_states(made_flight(release(1, 15), states, np.arange(23) * 1e-4)))
     assert state.gyro_bias[0] == 0.02
     np.testing.assert_allclose(state.variances[:23], np.arange(23) * 1e-4)
+    assert state.variances[23] == 0.0
+    np.testing.assert_allclose(state.position, [0.0, 0.0, 0.0])
+
+
+def states_with(size, **named):
+    states = np.zeros(size)
+    states[0], states[4:7], states[16:19] = 1.0, [1.0, 2.0, 3.0], [0.2, 0.0, 0.4]
+    for name, value in named.items():
+        states[int(name.removeprefix("s"))] = value
+    return states
+
+
+QUATERNION = {"s7": 7.0, "s8": 8.0, "s9": -9.0}
+INCREMENTS, RATES = np.full(24, 1e-6), np.full(24, 1e-3)
+
+
+@pytest.mark.parametrize("info", [release(1, 13), release(1, 15), release(1, 16), {}])
+@pytest.mark.parametrize(
+    ("states", "covariances", "gyro_bias", "position", "bias_variance"),
+    [
+        (states_with(24, s10=2e-4, **QUATERNION), INCREMENTS, 0.02, [7.0, 8.0, -9.0], 1e-2),
+        (states_with(24, s10=0.02, **QUATERNION), RATES, 0.02, [7.0, 8.0, -9.0], 1e-3),
+        (states_with(24, s10=0.02, **QUATERNION), RATES[:23], 0.02, [7.0, 8.0, -9.0], 1e-3),
+        (states_with(25, s10=0.02, **QUATERNION), RATES, 0.02, [7.0, 8.0, -9.0], 1e-3),
+        (states_with(25, s10=0.02, s9=-509.0), RATES, 0.02, [3.0, 4.0, -9.0], 1e-3),
+    ],
+    ids=["v1.8 to v1.14", "July 2023", "v1.15", "May 2024", "v1.16"],
+)
+def test_the_layout_is_told_by_the_data_and_not_by_the_release(
+    info, states, covariances, gyro_bias, position, bias_variance
+):
+    """Counts as in each layout's messages; an update of 0.01 s makes rates of increments."""
+    state = next(logged_states(made_flight(info, states, covariances)))
+    assert state.gyro_bias[0] == pytest.approx(gyro_bias)
+    np.testing.assert_allclose(state.position, position)
+    np.testing.assert_allclose(state.velocity, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(state.variances[9:15], bias_variance)
+    np.testing.assert_allclose(state.mag_earth, [0.2, 0.0, 0.4])
+
+
+def test_biases_that_the_log_also_tells_as_rates_decide_what_the_states_are():
+    """The variances are those of increments; the states themselves are as large as the rates."""
+    flight = made_flight(release(1, 15), states_with(24, s10=0.02, s13=0.1), INCREMENTS)
+    rates = table(timestamp=HORIZON, gyro_bias=[0.02, 0.0, 0.0], accel_bias=[0.1, 0.0, 0.0])
+    flight = flight.with_topics(flight.topics | {("estimator_sensor_bias", 0): rates})
+    state = next(logged_states(flight))
+    assert state.gyro_bias[0] == 0.02
+    np.testing.assert_allclose(state.variances[9:15], 1e-6)
+
+
+def test_unreadable_and_unaligned_states_are_told_apart():
+    sound = made_flight(release(1, 15), states_with(24), np.ones(23))
+    assert why_no_state(sound) == ""
+    assert "24 states with 20 variances" in why_no_state(made_flight(release(1, 15), states_with(24), np.ones(20)))
+    assert "10 states" in why_no_state(made_flight(release(1, 8), np.ones(10), np.ones(10)))
+    nowhere = sound.with_topics({key: one for key, one in sound.topics.items() if key[0] != "vehicle_local_position"})
+    assert "lacks vehicle_local_position" in why_no_state(nowhere)
+    assert "holds no states" in why_no_state(sound.with_topics({}))
+    assert "none is a number" in why_no_state(made_flight(release(1, 15), states_with(24, s5=np.nan), np.ones(23)))
 
 
 def test_position_of_v1_16_comes_from_the_local_position():
@@ -76,6 +136,12 @@ def test_sample_time_of_the_newest_imu_is_moved_back_by_the_longest_delay():
     delays = {"EKF2_GPS_DELAY": 110.0, "EKF2_EV_DELAY": 175.0, "EKF2_MAG_DELAY": 0.0}
     flight = made_flight(release(1, 12), states, np.ones(24), lag=1_000, parameters=delays)
     assert next(logged_states(flight)).time_us == HORIZON + 1_000 - 175_000
+
+
+def test_a_damaged_delay_does_not_move_the_horizon():
+    delays = {"EKF2_GPS_DELAY": 110.0, "EKF2_EV_DELAY": 6e26, "EKF2_OF_DELAY": np.inf, "EKF2_MAG_DELAY": -1e30}
+    flight = made_flight(release(1, 14), states_with(24), np.ones(24), lag=1_000, parameters=delays)
+    assert next(logged_states(canonical(flight))).time_us == HORIZON + 1_000 - 110_000
 
 
 def test_origin_far_from_the_fix_is_put_there():
@@ -118,14 +184,14 @@ def two_instances(second_horizon):
     """Instance 1, with a gyro bias of its own, becomes primary at 5.5 s."""
     states = np.zeros(24)
     states[0] = 1.0
-    flight = made_flight(release(1, 15), states, np.arange(24) * 1e-4)
+    flight = made_flight(release(1, 15), states, np.arange(23) * 1e-4)
     states[10] = 0.02
     stamp = {"timestamp": second_horizon + 100_000, "timestamp_sample": second_horizon}
     selector = {"timestamp": np.array([1_000_000, 5_500_000, 6_000_000]), "primary_instance": np.array([0, 1, 1])}
     return flight.with_topics(
         flight.topics
         | {
-            ("estimator_states", 1): table(states=states, covariances=np.arange(24) * 1e-4, **stamp),
+            ("estimator_states", 1): table(states=states, covariances=np.arange(23) * 1e-4, **stamp),
             ("estimator_selector_status", 0): selector,
         }
     )
@@ -145,4 +211,4 @@ def test_a_state_long_before_tells_nothing_of_a_handover():
 def test_one_instance_hands_nothing_over():
     states = np.zeros(24)
     states[0] = 1.0
-    assert logged_handovers(made_flight(release(1, 15), states, np.zeros(24))) == ()
+    assert logged_handovers(made_flight(release(1, 15), states, np.zeros(23))) == ()

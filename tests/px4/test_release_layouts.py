@@ -28,7 +28,10 @@ def test_gnss_before_v1_15_is_scaled_to_degrees_and_metres() -> None:
         "alt": np.array([488123], np.int32),
         "alt_ellipsoid": np.array([535456], np.int32),
         "vel_ned_valid": np.array([True]),
+        "fix_type": np.array([3], np.uint8),
+        "satellites_used": np.array([9], np.uint8),
     }
+    table |= dict.fromkeys(("vel_n_m_s", "vel_e_m_s", "vel_d_m_s", "eph", "epv", "s_variance_m_s"), np.float32([0.5]))
     gnss = canonical_topic("vehicle_gps_position", table)
     assert gnss["latitude_deg"][0] == pytest.approx(47.3977418, abs=1e-12)
     assert gnss["longitude_deg"][0] == pytest.approx(-8.5455940, abs=1e-12)
@@ -75,7 +78,10 @@ def test_at_rest_is_taken_from_landed_where_it_is_missing() -> None:
 
 
 def test_vehicle_type_from_the_flag_of_v1_8() -> None:
-    status = canonical_topic("vehicle_status", {"timestamp": TIME[:2], "is_rotary_wing": np.array([True, False])})
+    status = canonical_topic(
+        "vehicle_status",
+        {"timestamp": TIME[:2], "arming_state": np.uint8([1, 2]), "is_rotary_wing": np.array([True, False])},
+    )
     assert status["vehicle_type"].tolist() == [1, 2]
 
 

@@ -25,12 +25,16 @@ def made_flight(seconds: float = 60.0, rate_hz: int = 200) -> Flight:
     steps = np.full(rows, 1_000_000 // rate_hz, np.uint32)
     imu = {"timestamp": time, "gyro_integral_dt": steps, "accelerometer_integral_dt": steps.copy(), **vectors}
     slow = np.arange(int(seconds * SLOW_HZ), dtype=np.int64) * (1_000_000 // SLOW_HZ) + 1_000_000
-    accuracy = {name: np.full(len(slow), 0.4, np.float32) for name in ("eph", "epv", "s_variance_m_s")}
+    place = {"latitude_deg": 47.0, "longitude_deg": 8.0, "altitude_msl_m": 500.0}
+    fix = {name: np.full(len(slow), value) for name, value in place.items()}
+    fix |= {name: np.full(len(slow), 0.4, np.float32) for name in ("eph", "epv", "s_variance_m_s")}
+    fix |= {f"vel_{axis}_m_s": np.zeros(len(slow), np.float32) for axis in "ned"}
+    fix |= {"fix_type": np.full(len(slow), 3, np.uint8), "satellites_used": np.full(len(slow), 12, np.uint8)}
     mag = {f"magnetometer_ga[{axis}]": np.zeros(len(slow), np.float32) for axis in range(3)}
     level = {f"q[{i}]": np.full(len(slow), float(i == 0), np.float32) for i in range(4)}
     topics = {
         ("sensor_combined", 0): imu,
-        ("vehicle_gps_position", 0): {"timestamp": slow, "fix_type": np.full(len(slow), 3, np.uint8), **accuracy},
+        ("vehicle_gps_position", 0): {"timestamp": slow, **fix},
         ("vehicle_magnetometer", 0): {"timestamp": slow, **mag},
         ("vehicle_attitude", 0): {"timestamp": slow, **level},
         ("vehicle_air_data", 0): {"timestamp": slow, "baro_alt_meter": np.zeros(len(slow), np.float32)},

@@ -221,6 +221,17 @@ def test_damaged_parameters_are_named(name: str, value: float) -> None:
     assert name in check.reason
 
 
+def test_a_parameter_that_cannot_be_is_named_with_what_takes_its_place() -> None:
+    flight = made_flight()
+    flight.parameters.initial |= {"EKF2_EV_DELAY": 6e26, "EKF2_GPS_DELAY": 310.0}
+    flight.parameters.changed.append(ParameterChange(21_000_000, "EKF2_HGT_REF", 3e38))
+    check = check_of(flight, "parameter_values")
+    assert check.figure == 3.0
+    assert "EKF2_EV_DELAY = 6e+26 cannot be: replayed with its default 0" in check.reason
+    assert "EKF2_HGT_REF = 3e+38 cannot be: the change in flight is left out, 1 stays" in check.reason
+    assert "EKF2_GPS_DELAY = 310 is outside 0 to 300: replayed as it flew" in check.reason
+
+
 def test_defaults_of_old_releases_are_in_range() -> None:
     flight = made_flight()
     flight.parameters.initial["EKF2_DECL_TYPE"] = 7  # default of v1.13; the highest value is now 3

@@ -51,7 +51,8 @@ def gnss(release: tuple[int, int]) -> TopicTable:
         }
     accuracy = {"eph": constant(0.8), "epv": constant(1.2), "s_variance_m_s": constant(0.2)}
     velocity = {f"vel_{axis}_m_s": constant(0.0) for axis in "ned"}
-    return {"timestamp": SLOW, "fix_type": constant(3, np.uint8), **place, **accuracy, **velocity}
+    fix = {"fix_type": constant(3, np.uint8), "satellites_used": constant(12, np.uint8)}
+    return {"timestamp": SLOW, **fix, **place, **accuracy, **velocity}
 
 
 def topics_of(release: tuple[int, int]) -> dict[TopicKey, TopicTable]:

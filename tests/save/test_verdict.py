@@ -80,7 +80,8 @@ def test_gnss_without_fix_is_refused_only_where_nothing_else_aids() -> None:
     vision.parameters.initial["EKF2_EV_CTRL"] = 1
     time = vision.topics["vehicle_air_data", 0]["timestamp"]
     position = {f"position[{axis}]": np.ones(len(time), np.float32) for axis in range(3)}
-    vision.topics["vehicle_visual_odometry", 0] = {"timestamp": time, **position}
+    frame = {"pose_frame": np.ones(len(time), np.uint8)}
+    vision.topics["vehicle_visual_odometry", 0] = {"timestamp": time, **frame, **position}
     assert judged(vision).status == "replayable"
     assert "external vision" in check_of(vision, "horizontal_aid").reason
     flow = without_fix()

@@ -78,10 +78,16 @@ def write_table(table: pa.Table, target: Path) -> None:
         )
 
 
+def _why_not_started(result: ReplayResult) -> str:
+    if result.levelled:
+        return "the IMU samples end before the fusion time horizon has moved"
+    return "the filter never found the vehicle still enough to take its tilt"
+
+
 def _summary(identity: ReplayIdentity, result: ReplayResult) -> dict[str, object]:
     status, reason = ("diverged", "a state or variance is no finite number") if result.diverged else ("ok", "")
     if not result.updates:
-        status, reason = "not_started", "the filter never found the vehicle still enough to take its tilt"
+        status, reason = "not_started", _why_not_started(result)
     origin = None
     if result.origin is not None:
         origin = dict(zip(("latitude_deg", "longitude_deg", "altitude_m"), result.origin, strict=True))

@@ -181,9 +181,8 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: Repl
     if not set_files:
         raise UserError(sets_folder, "holds no parameter set", "Put one SET.json with a params object per set there")
     settings = settings or ReplaySettings()
-    flight = read_ulog(log)
-    followed = canonical(flight, follow_primary=settings.reconstruction is not None)
-    prepared = prepare(followed, settings.reconstruction, settings.start)
+    flight = canonical(read_ulog(log), follow_primary=settings.reconstruction is not None)
+    prepared = prepare(flight, settings.reconstruction, settings.start)
     for file in set_files:
         params, overrides = _read_set(file)
         # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.

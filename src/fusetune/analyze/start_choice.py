@@ -12,7 +12,7 @@ import numpy as np
 from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, row_count
-from fusetune.px4.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states
+from fusetune.px4.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states, why_no_state
 
 AUTO, WARM, COLD = "auto", "warm", "cold"
 START_TOPICS = (*LOGGED_STATE_TOPICS, "sensor_combined", "vehicle_land_detected", "vehicle_gps_position")
@@ -73,7 +73,7 @@ def choose_start(flight: Flight, settings: StartSettings | None = None) -> Start
         return Start(None, f"the log begins {on_ground_s:.0f} s before take-off")
     state = first_usable_state(flight, begin + BUFFER_FILL_US)
     if state is None:
-        return Start(None, "the log holds no state of an aligned estimator")
+        return Start(None, _why_none(flight, begin + BUFFER_FILL_US))
     after_s = (state.time_us - begin) * 1e-6
     if settings.mode == AUTO and after_s > settings.warm_within_s:
         return Start(None, f"the vehicle's own estimator was ready only {after_s:.0f} s after the log began")
@@ -89,6 +89,19 @@ def first_usable_state(flight: Flight, since: int) -> LoggedState | None:
             if state.uses_gnss:
                 return state
     return aligned
+
+
+def _why_none(flight: Flight, since: int) -> str:
+    """Why no logged state can be started from: none can be read, or none is that of an aligned estimator."""
+    unreadable = why_no_state(flight)
+    if unreadable:
+        return unreadable
+    state = next(logged_states(flight, since), None)
+    if state is None:
+        return "the vehicle's own estimator logged no state after the first IMU samples"
+    if not flight.has("estimator_status_flags"):
+        return "the log does not tell whether the vehicle's own estimator was aligned"
+    return "the log holds no state of an aligned estimator"
 
 
 def _seconds_before_take_off(flight: Flight, begin: int) -> float | None:

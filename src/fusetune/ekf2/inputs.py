@@ -12,24 +12,14 @@ import numpy as np
 
 from fusetune.ekf2 import message_samples as convert
 from fusetune.ekf2.arrival_order import RunSchedule, schedule_runs
-from fusetune.ekf2.range_selection import select_range_samples
-from fusetune.ekf2.sensor_samples import (
-    AIRSPEED_SAMPLE,
-    AUXVEL_SAMPLE,
-    BARO_SAMPLE,
-    EV_SAMPLE,
-    FLOW_SAMPLE,
-    GNSS_SAMPLE,
-    MAG_SAMPLE,
-    SYSTEM_FLAGS_SAMPLE,
-)
+from fusetune.ekf2.sensor_samples import SYSTEM_FLAGS_SAMPLE
+from fusetune.ekf2.taken_samples import AIDING, only_usable
 from fusetune.px4.flight import Flight, ParameterChange
 
 ARMING_STATE_ARMED = 2
 VEHICLE_TYPE_FIXED_WING = 2
 LAUNCH_STATE_WAITING = 1
 STATUS_MAX_AGE_US = 3_000_000
-AIRSPEED_VALIDATED_MAX_AGE_US = 3_000_000
 
 COMMAND_SET_GPS_GLOBAL_ORIGIN = 100000
 COMMAND_EXTERNAL_POSITION_ESTIMATE = 43003
@@ -99,31 +89,18 @@ def build_inputs(flight: Flight) -> EstimatorInputs:
     imu_table = flight.topics["sensor_combined", 0]
     arrivals = np.full(len(runs.timestamp), -1, ARRIVALS)
     arrivals["reset_accel_bias"], arrivals["reset_gyro_bias"] = _bias_resets(flight, runs)
-    gnss = _used(flight, runs, arrivals, "vehicle_gps_position", "gnss", convert.gnss_samples, GNSS_SAMPLE)
-    mag = _plain(flight, runs, arrivals, "vehicle_magnetometer", "mag", convert.mag_samples, MAG_SAMPLE)
-    baro, air_density = _baro(flight, runs, arrivals)
-    flow, flow_limits = _flow(flight, runs, arrivals)
-    ev = _used(flight, runs, arrivals, "vehicle_visual_odometry", "ev", convert.vision_samples, EV_SAMPLE)
-    auxvel = _used(flight, runs, arrivals, "landing_target_pose", "auxvel", convert.auxvel_samples, AUXVEL_SAMPLE)
-    airspeed = _airspeed(flight, runs, arrivals)
-    ranges = select_range_samples(flight, runs)
-    arrivals["range"] = ranges.arrival
+    aiding = {name: take(flight, runs) for name, take in AIDING.items()}
+    for name, one in aiding.items():
+        arrivals[name] = one.arrival
     system_flags = _system_flags(flight, runs, arrivals)
     command = _commands(flight, runs, arrivals)
     arrays = SampleArrays(
         imu=convert.imu_samples(imu_table)[runs.imu_rows],
         arrivals=arrivals,
-        gnss=gnss,
-        mag=mag,
-        baro=baro,
-        air_density=air_density,
-        range=ranges.samples,
-        range_limits=ranges.limits,
-        flow=flow,
-        flow_limits=flow_limits,
-        ev=ev,
-        airspeed=airspeed,
-        auxvel=auxvel,
+        **{name: one.samples for name, one in aiding.items()},
+        air_density=aiding["baro"].beside,
+        range_limits=aiding["range"].beside,
+        flow_limits=aiding["flow"].beside,
         system_flags=system_flags,
         command=command,
     )
@@ -131,72 +108,6 @@ def build_inputs(flight: Flight) -> EstimatorInputs:
         (int(np.searchsorted(runs.timestamp, change.timestamp)), change) for change in flight.parameters.changed
     )
     return EstimatorInputs(flight.name, runs.mode, arrays, changes)
-
-
-def _plain(flight, runs, arrivals, topic, field, to_samples, dtype):  # type: ignore[no-untyped-def]
-    """Samples of a topic of which every message is used; notes their arrivals."""
-    table = flight.topic(topic)
-    if table is None:
-        return np.zeros(0, dtype)
-    arrivals[field] = runs.newest_message(topic, table["timestamp"])
-    return to_samples(table)
-
-
-def _used(flight, runs, arrivals, topic, field, to_samples, dtype):  # type: ignore[no-untyped-def]
-    """Samples of a topic of which messages can be unusable; those arrive as nothing."""
-    table = flight.topic(topic)
-    if table is None:
-        return np.zeros(0, dtype)
-    samples, usable = to_samples(table)
-    arrivals[field] = _only_usable(runs.newest_message(topic, table["timestamp"]), usable)
-    return samples
-
-
-def _only_usable(newest: np.ndarray, usable: np.ndarray) -> np.ndarray:
-    return np.where((newest >= 0) & usable[newest], newest, -1)
-
-
-def _baro(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    table = flight.topic("vehicle_air_data")
-    if table is None:
-        return np.zeros(0, BARO_SAMPLE), np.zeros(0)
-    arrivals["baro"] = runs.newest_message("vehicle_air_data", table["timestamp"])
-    return convert.baro_samples(table)
-
-
-def _flow(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    table = flight.topic("vehicle_optical_flow")
-    if table is None:
-        return np.zeros(0, FLOW_SAMPLE), np.zeros((0, 3))
-    samples, limits, usable = convert.flow_samples(table)
-    arrivals["flow"] = _only_usable(runs.newest_message("vehicle_optical_flow", table["timestamp"]), usable)
-    return samples, limits
-
-
-def _airspeed(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
-    """Validated airspeed where it is published, the raw sensor after 3 s without it."""
-    validated, raw = flight.topic("airspeed_validated"), flight.topic("airspeed")
-    samples = np.zeros(0, AIRSPEED_SAMPLE)
-    arrival = np.full(len(runs.timestamp), -1)
-    last_validated = np.zeros(len(runs.timestamp), dtype=np.int64)
-    if validated is not None:
-        samples, usable = convert.validated_airspeed_samples(validated)
-        newest = runs.newest_message("airspeed_validated", validated["timestamp"])
-        arrival = _only_usable(newest, usable)
-        seen = np.where(newest >= 0, validated["timestamp"].astype(np.int64)[newest], 0)
-        last_validated = np.concatenate([[0], np.maximum.accumulate(seen)[:-1]])
-        validated_is_new = newest >= 0
-    else:
-        validated_is_new = np.zeros(len(runs.timestamp), dtype=bool)
-    if raw is not None:
-        scale = float(flight.parameters.initial.get("ASPD_SCALE_1", 1.0))
-        raw_samples, usable = convert.airspeed_samples(raw, scale)
-        newest = _only_usable(runs.newest_message("airspeed", raw["timestamp"]), usable)
-        stale = runs.timestamp - last_validated > AIRSPEED_VALIDATED_MAX_AGE_US
-        arrival = np.where((newest >= 0) & stale & ~validated_is_new, newest + len(samples), arrival)
-        samples = np.concatenate([samples, raw_samples])
-    arrivals["airspeed"] = arrival
-    return samples
 
 
 def _bias_resets(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndarray]:
@@ -280,5 +191,5 @@ def _commands(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.nda
     for i in range(7):
         commands["param"][:, i] = convert.column(table, f"param{i + 1}")
     relevant = np.isin(commands["command"], ESTIMATOR_COMMANDS)
-    arrivals["command"] = _only_usable(runs.newest_message("vehicle_command", table["timestamp"]), relevant)
+    arrivals["command"] = only_usable(runs.newest_message("vehicle_command", table["timestamp"]), relevant)
     return commands

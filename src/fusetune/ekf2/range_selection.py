@@ -11,15 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fusetune.ekf2.arrival_order import RunSchedule
-from fusetune.ekf2.message_samples import column, sample_time
+from fusetune.ekf2.message_samples import flow_range_samples, range_refusals, range_samples, taken
 from fusetune.ekf2.sensor_samples import RANGE_SAMPLE
 from fusetune.px4.flight import Flight, TopicTable
 
-ROTATION_DOWNWARD_FACING = 25
 STALE_US = 100_000
 RESELECT_AFTER_US = 1_000_000
 MAX_INSTANCES = 4
-FLOW_QUALITY_MAX = 255.0
 
 
 @dataclass(frozen=True)
@@ -42,72 +40,70 @@ class _Selection:
 def select_range_samples(flight: Flight, runs: RunSchedule) -> RangeInputs:
     """Follow the module's choice through all runs at which a distance or flow message arrives."""
     tables = {i: table for i in range(MAX_INSTANCES) if (table := flight.topic("distance_sensor", i)) is not None}
-    newest = {i: runs.newest_message("distance_sensor", table["timestamp"]) for i, table in tables.items()}
+    sensors = {i: _Sensor(table, runs) for i, table in tables.items()}
     flow = flight.topic("vehicle_optical_flow")
-    flow_newest = np.full(len(runs.timestamp), -1)
+    flow_newest, flow_ranges = np.full(len(runs.timestamp), -1), None
     if flow is not None and "distance_m" in flow:
         flow_newest = runs.newest_message("vehicle_optical_flow", flow["timestamp"])
+        flow_ranges = flow_range_samples(flow)
     busy = flow_newest >= 0
-    for arrival in newest.values():
-        busy = busy | (arrival >= 0)
+    for sensor in sensors.values():
+        busy = busy | (sensor.newest >= 0)
     arrival = np.full(len(runs.timestamp), -1)
-    rows: list[tuple[int, float, int]] = []
-    limits: list[tuple[float, float]] = []
+    samples: list[np.void] = []
+    limits: list[np.ndarray] = []
     selection = _Selection()
     for run in np.flatnonzero(busy):
         now = int(runs.timestamp[run])
         if run > 0 and selection.last_update < int(runs.timestamp[run - 1]) - RESELECT_AFTER_US:
             selection.instance = -1
-        if flow is not None and flow_newest[run] >= 0:
-            distance = float(flow["distance_m"][flow_newest[run]])
-            if np.isfinite(distance) and now > selection.last_update + RESELECT_AFTER_US:
-                arrival[run] = len(rows)
-                rows.append(_flow_range(flow, int(flow_newest[run]), distance))
-                limits.append(_row_limits(flow, int(flow_newest[run]), "min_ground_distance", "max_ground_distance"))
-        message = _distance_message(tables, newest, selection, int(run), now)
+        if flow_ranges is not None and flow_newest[run] >= 0:
+            row = int(flow_newest[run])
+            if np.isfinite(flow_ranges[0]["range"][row]) and now > selection.last_update + RESELECT_AFTER_US:
+                arrival[run] = len(samples)
+                samples.append(flow_ranges[0][row])
+                limits.append(flow_ranges[1][row])
+        message = _distance_message(sensors, selection, int(run), now)
         if message is not None:
             instance, row = message
-            arrival[run] = len(rows)
-            rows.append(_distance_range(tables[instance], row))
-            limits.append(_row_limits(tables[instance], row, "min_distance", "max_distance"))
+            arrival[run] = len(samples)
+            samples.append(sensors[instance].samples[row])
+            limits.append(sensors[instance].limits[row])
             selection.last_update = now
-    samples = np.array(rows, dtype=RANGE_SAMPLE) if rows else np.zeros(0, RANGE_SAMPLE)
-    return RangeInputs(samples, np.array(limits, dtype=np.float64).reshape(-1, 2), arrival)
+    return RangeInputs(
+        np.array(samples, dtype=RANGE_SAMPLE) if samples else np.zeros(0, RANGE_SAMPLE),
+        np.array(limits, dtype=np.float64).reshape(-1, 2),
+        arrival,
+    )
 
 
-def _distance_message(
-    tables: dict[int, TopicTable], newest: dict[int, np.ndarray], selection: _Selection, run: int, now: int
-) -> tuple[int, int] | None:
+class _Sensor:
+    """One instance of `distance_sensor`: its samples, and which of them is new at each run."""
+
+    def __init__(self, table: TopicTable, runs: RunSchedule) -> None:
+        self.timestamp = table["timestamp"].astype(np.int64)
+        self.newest = runs.newest_message("distance_sensor", table["timestamp"])
+        self.usable = taken(table, range_refusals(table))
+        self.samples, self.limits = range_samples(table)
+
+
+def _distance_message(sensors: dict[int, _Sensor], selection: _Selection, run: int, now: int) -> tuple[int, int] | None:
     """Instance and row of the message to use at this run; selects an instance where none is selected."""
     used_up = -1
     if selection.instance < 0:
-        for instance, table in tables.items():
-            row = int(newest[instance][run])
+        for instance, sensor in sensors.items():
+            row = int(sensor.newest[run])
             if row < 0:
                 continue
-            timestamp = int(table["timestamp"][row])
-            if timestamp > now - STALE_US and int(table["orientation"][row]) == ROTATION_DOWNWARD_FACING:
+            timestamp = int(sensor.timestamp[row])
+            if timestamp > now - STALE_US and sensor.usable[row]:
                 selection.instance = used_up = instance
                 selection.last_update = timestamp
                 break
     instance = selection.instance
     if instance < 0 or instance == used_up:
         return None
-    row = int(newest[instance][run])
-    if row < 0 or int(tables[instance]["orientation"][row]) != ROTATION_DOWNWARD_FACING:
+    row = int(sensors[instance].newest[run])
+    if row < 0 or not sensors[instance].usable[row]:
         return None
     return instance, row
-
-
-def _distance_range(table: TopicTable, row: int) -> tuple[int, float, int]:
-    quality = int(table["signal_quality"][row]) if "signal_quality" in table else -1
-    return int(table["timestamp"][row]), float(table["current_distance"][row]), quality
-
-
-def _flow_range(table: TopicTable, row: int, distance: float) -> tuple[int, float, int]:
-    quality = int(float(table["quality"][row]) / FLOW_QUALITY_MAX * 100.0)
-    return int(sample_time(table)[row]), distance, quality
-
-
-def _row_limits(table: TopicTable, row: int, low: str, high: str) -> tuple[float, float]:
-    return float(column(table, low)[row]), float(column(table, high)[row])

@@ -111,6 +111,8 @@ class ReplayResult:
     gaps: tuple[GapResult, ...] = ()
     warm_start_us: int | None = None
     """Fusion time horizon at which the filter took over the vehicle's state, None where it started from nothing."""
+    levelled: bool = False
+    """Whether the filter ever had its tilt, without which it does not begin."""
 
     @property
     def resets(self) -> dict[str, int]:
@@ -191,6 +193,7 @@ def replay(
         origin=_origin(course.ekf["origin"][0]),
         gaps=tuple(one for one in found if one is not None),
         warm_start_us=warm_start_us,
+        levelled=bool(course.ekf["filter_initialised"][0]),
     )
 
 

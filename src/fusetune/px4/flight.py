@@ -26,6 +26,18 @@ class ParameterChange(NamedTuple):
     value: ParameterValue
 
 
+class ReplacedParameter(NamedTuple):
+    """A parameter with which no vehicle can have flown, see `fusetune.px4.logged_parameters`."""
+
+    name: str
+    value: ParameterValue
+    """As logged."""
+    used: ParameterValue
+    """What stands in its place."""
+    timestamp: int | None
+    """Of a change in flight that was left out (µs since boot); None for the value that the log begins with."""
+
+
 class Dropout(NamedTuple):
     """A time in which the logger lost messages."""
 
@@ -93,6 +105,7 @@ class Flight:
     undefined_topics: tuple[str, ...] = ()
     """Topics that were logged but whose definition the log lacks."""
     left_out: tuple[LeftOut, ...] = ()
+    replaced_parameters: tuple[ReplacedParameter, ...] = ()
 
     def topic(self, name: str, instance: int = 0) -> TopicTable | None:
         """Columns of one topic instance, or `None` where the log has none."""

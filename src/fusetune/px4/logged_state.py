@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fusetune.px4.estimator_instances import primary_instance_at
-from fusetune.px4.flight import Flight, TopicTable, row_count
+from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows, stacked
+from fusetune.px4.state_layout import UPDATE_INTERVAL_S, StateLayout, state_counts, state_layout
 
 LOGGED_STATE_TOPICS = (
     "estimator_states",
@@ -21,13 +22,6 @@ LOGGED_STATE_TOPICS = (
 )
 """What `logged_states` reads of a flight."""
 
-DELTA_STATES, RATE_STATES, GLOBAL_STATES = "delta", "rate", "global"
-"""Layouts: biases as increments per update and a quaternion covariance (to v1.14); biases as rates and a covariance of
-rotation (v1.15); the same with the terrain, and the position not among the states (v1.16)."""
-
-UPDATE_INTERVAL_S = 0.01
-"""Update interval of the estimator in the releases whose bias states are increments per update."""
-
 HORIZON_LAG_US = 20_000
 """A sample time nearer than this to the time of publication is that of the newest IMU sample, not of the horizon."""
 
@@ -35,6 +29,9 @@ MAX_HANDOVER_AGE_US = 5_000_000
 """Biases and field change little in such a time."""
 
 ERROR_STATES = 24
+MAX_NORM_ERROR = 0.1
+"""By which the norm of a logged quaternion may differ from 1."""
+
 MIN_FIX_TYPE = 3
 MAX_ORIGIN_DISTANCE_DEG = 1.0
 METRES_PER_DEGREE = 111_195.0
@@ -111,36 +108,114 @@ def logged_handovers(flight: Flight) -> tuple[Handover, ...]:
 
 
 def _nearest_state(flight: Flight, instance: int, time: int) -> LoggedState | None:
-    table = flight.topic("estimator_states", instance)
-    if table is None or not row_count(table):
+    states = _InstanceStates(flight, instance)
+    if not len(states.horizons):
         return None
-    horizons = _horizons(flight, table)
-    row = int(np.argmin(np.abs(horizons - time)))
-    if abs(int(horizons[row]) - time) > MAX_HANDOVER_AGE_US:
+    row = int(np.argmin(np.abs(states.horizons - time)))
+    if abs(int(states.horizons[row]) - time) > MAX_HANDOVER_AGE_US:
         return None
-    return _state(flight, instance, row, int(horizons[row]))
+    return states.read(row)
 
 
 def logged_states(flight: Flight, since: int = 0) -> Iterator[LoggedState]:
-    """States of the primary estimator instance from a time (µs) on, in order; those that are not finite are left out.
+    """States of the primary estimator instance from a time (µs) on, in order; those that cannot be are left out.
 
     Parameters
     ----------
     flight : in the layout of `fusetune.px4.release_layouts.canonical`
     """
+    found = {instance: _InstanceStates(flight, instance) for instance in flight.instances("estimator_states")}
     rows = [
         (int(horizon), instance, row)
-        for instance in flight.instances("estimator_states")
-        for row, horizon in enumerate(_horizons(flight, flight.topics["estimator_states", instance]))
+        for instance, states in found.items()
+        for row, horizon in enumerate(states.horizons)
         if horizon >= since
     ]
     rows.sort()
     primary = primary_instance_at(flight, np.array([time for time, _, _ in rows], np.int64))
-    for (time, instance, row), chosen in zip(rows, primary.tolist(), strict=True):
+    for (_, instance, row), chosen in zip(rows, primary.tolist(), strict=True):
         if instance == chosen:
-            state = _state(flight, instance, row, time)
+            state = found[instance].read(row)
             if state is not None:
                 yield state
+
+
+def why_no_state(flight: Flight) -> str:
+    """What keeps every state of the vehicle's estimator from being read, in words; empty where some can be.
+
+    Parameters
+    ----------
+    flight : in the layout of `fusetune.px4.release_layouts.canonical`
+    """
+    found = [_InstanceStates(flight, instance) for instance in flight.instances("estimator_states")]
+    found = [states for states in found if len(states.horizons)]
+    if not found:
+        return "the log holds no states of the vehicle's own estimator"
+    if next(logged_states(flight), None) is not None:
+        return ""
+    problems = [states.problem for states in found if states.problem]
+    why = problems[0] if problems else "none is a number throughout, with an attitude"
+    return f"the states of the vehicle's own estimator cannot be read: {why}"
+
+
+class _InstanceStates:
+    """The states that one estimator instance logged.
+
+    Attributes
+    ----------
+    horizons : (rows,) fusion time horizon of each, µs
+    problem : why none of them can be read; empty where they can be
+    """
+
+    def __init__(self, flight: Flight, instance: int) -> None:
+        self._flight, self._instance = flight, instance
+        table = flight.topic("estimator_states", instance)
+        self._table: TopicTable = {"timestamp": np.zeros(0, np.int64)} if table is None else table
+        self.horizons = _horizons(flight, self._table)
+        local = flight.topic("vehicle_local_position")
+        self._local = local if local is not None and row_count(local) else None
+        self._layout: StateLayout | None = None
+        self.problem = self._recognise() if len(self.horizons) else "there are none"
+
+    def _recognise(self) -> str:
+        self._layout = state_layout(self._table, self._flight.topic("estimator_sensor_bias", self._instance))
+        if self._layout is None:
+            states, variances = state_counts(self._table)
+            return f"{states} states with {variances} variances are the layout of no release"
+        if self._local is None:
+            return "the log lacks vehicle_local_position"
+        self._states, self._variances = stacked(self._table, "states"), stacked(self._table, "covariances")
+        return ""
+
+    def read(self, row: int) -> LoggedState | None:
+        """The state of one row; None where it cannot be read or is none."""
+        if self._layout is None or self._local is None:
+            return None
+        flight, instance, layout, time = self._flight, self._instance, self._layout, int(self.horizons[row])
+        states, q = self._states[row], self._states[row, :4]
+        norm = float(np.linalg.norm(q))
+        if not abs(norm - 1.0) < MAX_NORM_ERROR:
+            return None
+        q = q / norm
+        position, origin = _position(self._local, states, time, layout)
+        origin = _checked_origin(origin, position, flight.topic("vehicle_gps_position"), time)
+        gyro_bias, accel_bias = _biases(flight, instance, states, time, layout)
+        state = LoggedState(
+            time_us=time,
+            q=q,
+            velocity=states[4:7],
+            position=position,
+            origin=origin,
+            gyro_bias=gyro_bias,
+            accel_bias=accel_bias,
+            mag_earth=states[16:19],
+            mag_body=states[19:22],
+            wind=states[22:24],
+            variances=_error_variances(self._variances[row], q, layout),
+            flags=_flags(flight, instance, time),
+        )
+        numbers = (q, state.velocity, position, gyro_bias, accel_bias, state.mag_earth, state.mag_body, state.variances)
+        return state if all(np.isfinite(part).all() for part in numbers) else None
 
 
 def _horizons(flight: Flight, table: TopicTable) -> np.ndarray:
@@ -158,59 +233,11 @@ def _horizons(flight: Flight, table: TopicTable) -> np.ndarray:
         for name, value in flight.parameters.initial.items()
         if name.startswith("EKF2_") and name.endswith("_DELAY")
     ]
-    return sampled - round(max(delays, default=0.0) * 1e3)
-
-
-def _layout(flight: Flight, table: TopicTable, row: int) -> str:
-    columns = sum(1 for name in table if name.startswith("states["))
-    number = int(table["n_states"][row]) if "n_states" in table else columns
-    if number >= 25:
-        return GLOBAL_STATES
-    return RATE_STATES if flight.release is not None and flight.release >= (1, 15, 0) else DELTA_STATES
-
-
-def _state(flight: Flight, instance: int, row: int, time: int) -> LoggedState | None:
-    table = flight.topics["estimator_states", instance]
-    layout = _layout(flight, table, row)
-    states, raw_variances = (_array(table, name, row) for name in ("states", "covariances"))
-    if len(states) < 24 or len(raw_variances) < 24:
-        return None
-    q = states[:4]
-    norm = float(np.linalg.norm(q))
-    local = flight.topic("vehicle_local_position")
-    if not abs(norm - 1.0) < 0.1 or local is None or not row_count(local):
-        return None
-    q = q / norm
-    position, origin = _position(local, states, time, layout)
-    origin = _checked_origin(origin, position, flight.topic("vehicle_gps_position"), time)
-    gyro_bias, accel_bias = _biases(flight, instance, states, time, layout)
-    state = LoggedState(
-        time_us=time,
-        q=q,
-        velocity=states[4:7],
-        position=position,
-        origin=origin,
-        gyro_bias=gyro_bias,
-        accel_bias=accel_bias,
-        mag_earth=states[16:19],
-        mag_body=states[19:22],
-        wind=states[22:24],
-        variances=_variances(raw_variances, q, layout),
-        flags=_flags(flight, instance, time),
-    )
-    numbers = (q, state.velocity, position, gyro_bias, accel_bias, state.mag_earth, state.mag_body, state.variances)
-    return state if all(np.isfinite(part).all() for part in numbers) else None
-
-
-def _array(table: TopicTable, name: str, row: int) -> np.ndarray:
-    length = 0
-    while f"{name}[{length}]" in table:
-        length += 1
-    return np.array([float(table[f"{name}[{i}]"][row]) for i in range(length)])
+    return sampled - round(max([0.0, *delays]) * 1e3)
 
 
 def _position(
-    local: TopicTable, states: np.ndarray, time: int, layout: str
+    local: TopicTable, states: np.ndarray, time: int, layout: StateLayout
 ) -> tuple[np.ndarray, tuple[float, float, float] | None]:
     """Position relative to the local origin, and the origin."""
     sampled = local.get("timestamp_sample", local["timestamp"]).astype(np.int64)
@@ -220,7 +247,7 @@ def _position(
     origin = None
     if known and np.isfinite(reference).all() and reference[:2] != [0.0, 0.0]:
         origin = (reference[0], reference[1], reference[2])
-    if layout != GLOBAL_STATES:
+    if layout.has_local_position:
         return states[7:10], origin
     xy = [float(np.interp(time, sampled, local[name])) for name in ("x", "y")]
     down = states[9] + (origin[2] if origin else 0.0)
@@ -244,28 +271,29 @@ def _checked_origin(
     return latitude - north_deg, longitude - east_deg, origin[2]
 
 
-def _biases(flight: Flight, instance: int, states: np.ndarray, time: int, layout: str) -> tuple[np.ndarray, np.ndarray]:
+def _biases(
+    flight: Flight, instance: int, states: np.ndarray, time: int, layout: StateLayout
+) -> tuple[np.ndarray, np.ndarray]:
     """Biases as rates; of increments per update, those that the log also gives as rates."""
-    if layout != DELTA_STATES:
+    if layout.has_bias_rates:
         return states[10:13], states[13:16]
     table = flight.topic("estimator_sensor_bias", instance)
-    if table is not None and row_count(table) and "gyro_bias[0]" in table:
+    if table is not None and row_count(table) and {"gyro_bias[2]", "accel_bias[2]"} <= table.keys():
         row = int(np.argmin(np.abs(table["timestamp"].astype(np.int64) - time)))
-        return _array(table, "gyro_bias", row), _array(table, "accel_bias", row)
+        nearest = select_rows(table, np.array([row]))
+        return stacked(nearest, "gyro_bias")[0], stacked(nearest, "accel_bias")[0]
     return states[10:13] / UPDATE_INTERVAL_S, states[13:16] / UPDATE_INTERVAL_S
 
 
-def _variances(raw: np.ndarray, q: np.ndarray, layout: str) -> np.ndarray:
-    """Variances of the error state of v1.16 from those of the log's release."""
+def _error_variances(raw: np.ndarray, q: np.ndarray, layout: StateLayout) -> np.ndarray:
+    """Variances of the error state of v1.16 from those of the log's layout."""
     variances = np.zeros(ERROR_STATES)
-    if layout == GLOBAL_STATES:
-        variances[:] = raw[:ERROR_STATES]
-    elif layout == RATE_STATES:
-        variances[:23] = raw[:23]
+    if layout.has_rotation_variances:
+        variances[: layout.variances] = raw[: layout.variances]
     else:
         variances[:3] = rotation_variances(q, raw[:4])
         variances[3:9] = raw[4:10]
-        variances[9:15] = raw[10:16] / UPDATE_INTERVAL_S**2
+        variances[9:15] = raw[10:16] if layout.has_bias_rates else raw[10:16] / UPDATE_INTERVAL_S**2
         variances[15:23] = raw[16:24]
     return np.maximum(variances, 0.0)
 

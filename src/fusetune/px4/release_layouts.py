@@ -10,6 +10,7 @@ from fusetune.px4 import sensor_layouts as layouts
 from fusetune.px4.estimator_instances import magnetometer_instance, primary_imu, primary_magnetometer
 from fusetune.px4.estimator_layouts import estimator_tables
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
+from fusetune.px4.logged_parameters import checked_history
 from fusetune.px4.onboard_innovations import aid_source_tables
 from fusetune.px4.sensor_limits import without_impossible
 
@@ -49,7 +50,8 @@ def canonical(flight: Flight, *, follow_primary: bool = False) -> Flight:
     GNSS receivers (before v1.12), instance 0 becomes the first that ever has a 3D fix.
     `estimator_aid_src_*`, `estimator_status_flags` and `estimator_states` are made from the topics that came before
     them (see `fusetune.px4.onboard_innovations` and `fusetune.px4.estimator_layouts`). Samples that cannot be, see
-    `fusetune.px4.sensor_limits`, are left out and counted in `Flight.left_out`.
+    `fusetune.px4.sensor_limits`, are left out and counted in `Flight.left_out`; parameters that cannot be, see
+    `fusetune.px4.logged_parameters`, are replaced and listed in `Flight.replaced_parameters`.
     """
     topics = dict(flight.topics)
     for (name, instance), table in flight.topics.items():
@@ -59,7 +61,14 @@ def canonical(flight: Flight, *, follow_primary: bool = False) -> Flight:
     topics |= _optical_flow(flight)
     topics |= _vision(flight)
     topics, left_out = without_impossible(topics)
-    sound = replace(flight, topics=topics, left_out=(*flight.left_out, *left_out))
+    parameters, replaced = checked_history(flight.parameters, flight.release)
+    sound = replace(
+        flight,
+        topics=topics,
+        parameters=parameters,
+        left_out=(*flight.left_out, *left_out),
+        replaced_parameters=(*flight.replaced_parameters, *replaced),
+    )
     topics = dict(topics)
     _put_first(topics, "vehicle_magnetometer", magnetometer_instance(sound))
     if follow_primary:

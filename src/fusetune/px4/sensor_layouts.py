@@ -10,12 +10,13 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from fusetune.px4.flight import TopicTable, row_count
+from fusetune.px4.flight import TopicTable, field_names, row_count
 
 STANDARD_AIR_DENSITY_KG_M3 = 1.225
 RELATIVE_TIMESTAMP_INVALID = 0x7FFFFFFF
 DOWNWARD_FACING = 25
 _ROTARY_WING, _FIXED_WING = 1, 2
+_AXES, _QUATERNION_PARTS = 3, 4
 _POSE_FRAME_OF_LOCAL_FRAME = {0: 1, 1: 2, 3: 3}
 """LOCAL_FRAME_* (NED, FRD, BODY_FRD) of the odometry message as POSE_FRAME_* / VELOCITY_FRAME_* of v1.14."""
 
@@ -144,6 +145,8 @@ def vehicle_optical_flow(table: TopicTable) -> TopicTable:
     result = dict(table)
     result.update({new: table[old] for new, old in renamed.items() if new not in table and old in table})
     unlimited = np.float32(np.nan)
+    # a sensor without a gyro says so by no numbers, and EKF2 takes the IMU's
+    result = _without_vectors(result, {"delta_angle": _AXES})
     return _with_defaults(
         result,
         timestamp_sample=table["timestamp"],
@@ -158,8 +161,9 @@ def vehicle_visual_odometry(table: TopicTable) -> TopicTable:
     """Vectors, frames and variances of v1.14 from the odometry message of v1.9 to v1.13."""
     result = dict(table)
     for vector, components in {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}.items():
-        if f"{vector}[0]" not in result and all(component in table for component in components):
-            result.update({f"{vector}[{axis}]": table[component] for axis, component in enumerate(components)})
+        if not _has_any(result, vector):
+            known = {f"{vector}[{axis}]": name for axis, name in enumerate(components) if name in table}
+            result.update({new: table[old] for new, old in known.items()})
     if "pose_frame" not in result and "local_frame" in table:
         # before v1.11 the velocity has no frame of its own
         velocity_frame = table.get("velocity_frame", table["local_frame"])
@@ -167,28 +171,30 @@ def vehicle_visual_odometry(table: TopicTable) -> TopicTable:
         result["velocity_frame"] = _new_frames(velocity_frame)
     _add_variances(result, table, "pose_covariance", ("position", "orientation"))
     _add_variances(result, table, "velocity_covariance", ("velocity",))
-    missing = {f"{vector}[{axis}]": np.float32(np.nan) for vector in ("position", "velocity") for axis in range(3)}
-    missing |= {
-        f"{kind}_variance[{axis}]": np.float32(np.nan)
-        for kind in ("position", "orientation", "velocity")
-        for axis in range(3)
-    }
-    missing |= {f"q[{part}]": np.float32(np.nan) for part in range(4)}
-    result = _with_defaults(result, **missing)
-    return _with_defaults(
-        result,
-        timestamp_sample=table["timestamp"],
-        pose_frame=np.uint8(0),
-        velocity_frame=np.uint8(0),
-        reset_counter=np.uint8(0),
-        quality=np.int8(0),
-    )
+    absent = {"position": 3, "velocity": 3, "q": 4}
+    absent |= {f"{kind}_variance": 3 for kind in ("position", "orientation", "velocity")}
+    result = _without_vectors(result, absent)
+    if not field_names(table, "position") and "x" not in table:
+        result = _with_defaults(result, pose_frame=np.uint8(0))
+    if not field_names(table, "velocity") and "vx" not in table:
+        result = _with_defaults(result, velocity_frame=np.uint8(0))
+    return _with_defaults(result, timestamp_sample=table["timestamp"], reset_counter=np.uint8(0), quality=np.int8(0))
+
+
+def _without_vectors(table: TopicTable, sizes: Mapping[str, int]) -> TopicTable:
+    """The table with vectors that it lacks altogether as no numbers; of others a missing component stays missing."""
+    lacking = [f"{name}[{axis}]" for name, size in sizes.items() if not _has_any(table, name) for axis in range(size)]
+    return _with_defaults(table, **dict.fromkeys(lacking, np.float32(np.nan)))
+
+
+def _has_any(table: TopicTable, vector: str) -> bool:
+    return any(name.startswith(f"{vector}[") for name in table)
 
 
 def magnetometer_of_sensor_combined(table: TopicTable) -> TopicTable | None:
     """`vehicle_magnetometer` from `sensor_combined` of releases that had the field there, `None` for others."""
     rows = _new_samples(table, "magnetometer_timestamp_relative")
-    if rows is None or "magnetometer_ga[0]" not in table:
+    if rows is None or len(field_names(table, "magnetometer_ga")) != _AXES:
         return None
     result = {"timestamp": table["timestamp"][rows], "timestamp_sample": _sample_time(table, "magnetometer", rows)}
     result.update({f"magnetometer_ga[{axis}]": table[f"magnetometer_ga[{axis}]"][rows] for axis in range(3)})
@@ -210,12 +216,12 @@ def visual_odometry_of_vision_topics(position: TopicTable, attitude: TopicTable 
 
     Each position takes the newest attitude at its time; before the first there is none (NaN).
     """
-    result = {name: position[name] for name in ("timestamp", "x", "y", "z")}
+    result: TopicTable = {name: position[name] for name in ("timestamp", "x", "y", "z") if name in position}
     rows = row_count(position)
     for axis, accuracy in enumerate(("eph", "eph", "epv")):
         error = position.get(accuracy, np.full(rows, np.nan))
         result[f"position_variance[{axis}]"] = np.square(error.astype(np.float32))
-    if attitude is not None:
+    if attitude is not None and len(field_names(attitude, "q")) == _QUATERNION_PARTS:
         newest = np.searchsorted(attitude["timestamp"], position["timestamp"], side="right") - 1
         for part in range(4):
             values = attitude[f"q[{part}]"][np.maximum(newest, 0)].astype(np.float32)
@@ -241,12 +247,12 @@ def _new_frames(local_frame: np.ndarray) -> np.ndarray:
 
 
 def _add_variances(result: TopicTable, table: TopicTable, covariance: str, kinds: tuple[str, ...]) -> None:
-    if f"{covariance}[0]" not in table:
+    names = [f"{covariance}[{entry}]" for entry in _COVARIANCE_DIAGONAL[: 3 * len(kinds)]]
+    if any(name not in table for name in names):
         return
     for block, kind in enumerate(kinds):
         for axis in range(3):
-            diagonal = table[f"{covariance}[{_COVARIANCE_DIAGONAL[3 * block + axis]}]"]
-            result.setdefault(f"{kind}_variance[{axis}]", diagonal)
+            result.setdefault(f"{kind}_variance[{axis}]", table[names[3 * block + axis]])
 
 
 def _new_samples(table: TopicTable, relative: str) -> np.ndarray | None:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fusetune.px4.flight import LeftOut, TopicKey, TopicTable, row_count, select_rows
+from fusetune.px4.sample_times import STAMPED_BY_SAMPLE
 
 _FIX_3D = 3
 _IMU = "sensor_combined"
@@ -27,11 +28,16 @@ class _Limit(NamedTuple):
     may_be_nan: bool = False
 
 
+def _names(name: str, size: int = 3) -> tuple[str, ...]:
+    return tuple(f"{name}[{axis}]" for axis in range(size))
+
+
 def _vector(name: str, limit: _Limit, size: int = 3) -> dict[str, _Limit]:
-    return {f"{name}[{axis}]": limit for axis in range(size)}
+    return dict.fromkeys(_names(name, size), limit)
 
 
 _INTEGRATION_TIME_US = _Limit(1.0, 1e6)
+_AIRSPEED = {"true_airspeed_m_s": _Limit(-1e3, 1e3, may_be_nan=True)}
 _LIMITS: Mapping[str, Mapping[str, _Limit]] = {
     "sensor_combined": {
         **_vector("gyro_rad", _Limit(-100.0, 100.0)),
@@ -63,18 +69,63 @@ _LIMITS: Mapping[str, Mapping[str, _Limit]] = {
         **_vector("velocity", _Limit(-1e3, 1e3, may_be_nan=True)),
         **_vector("q", _Limit(-1.5, 1.5, may_be_nan=True), 4),
     },
-    "airspeed": {"true_airspeed_m_s": _Limit(-1e3, 1e3, may_be_nan=True)},
+    "airspeed": _AIRSPEED | {"indicated_airspeed_m_s": _Limit(-1e3, 1e3, may_be_nan=True)},
+    "airspeed_validated": _AIRSPEED | {"calibrated_airspeed_m_s": _Limit(-1e3, 1e3, may_be_nan=True)},
+    "landing_target_pose": {
+        "vx_rel": _Limit(-1e3, 1e3, may_be_nan=True),
+        "vy_rel": _Limit(-1e3, 1e3, may_be_nan=True),
+        "cov_vx_rel": _Limit(0.0, 1e9, may_be_nan=True),
+        "cov_vy_rel": _Limit(0.0, 1e9, may_be_nan=True),
+    },
 }
 _NEEDED: Mapping[str, tuple[str, ...]] = {
-    "vehicle_magnetometer": ("magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"),
+    "vehicle_magnetometer": _names("magnetometer_ga"),
     "vehicle_air_data": ("baro_alt_meter",),
+    "vehicle_gps_position": (
+        "latitude_deg",
+        "longitude_deg",
+        "altitude_msl_m",
+        "vel_n_m_s",
+        "vel_e_m_s",
+        "vel_d_m_s",
+        "s_variance_m_s",
+        "eph",
+        "epv",
+        "fix_type",
+        "satellites_used",
+    ),
     "vehicle_land_detected": ("landed",),
+    "vehicle_status": ("arming_state",),
+    "vehicle_attitude": _names("q", 4),
+    "vehicle_local_position": ("x", "y", "z", "vx", "vy", "vz"),
+    "vehicle_imu": (*_names("delta_angle"), *_names("delta_velocity"), "delta_angle_dt", "delta_velocity_dt"),
+    "vehicle_command": ("command", *(f"param{number}" for number in range(1, 8))),
     "distance_sensor": ("current_distance",),
-    "vehicle_optical_flow": ("pixel_flow[0]", "pixel_flow[1]", "integration_timespan_us"),
-    "airspeed": ("true_airspeed_m_s",),
+    "vehicle_optical_flow": (*_names("pixel_flow", 2), "integration_timespan_us", "quality", *_names("delta_angle")),
+    "vehicle_visual_odometry": (
+        *_names("position"),
+        *_names("velocity"),
+        *_names("q", 4),
+        "pose_frame",
+        "velocity_frame",
+        *_names("position_variance"),
+        *_names("velocity_variance"),
+        *_names("orientation_variance"),
+    ),
+    "airspeed": ("true_airspeed_m_s", "indicated_airspeed_m_s"),
+    "airspeed_validated": ("true_airspeed_m_s", "calibrated_airspeed_m_s", "airspeed_source"),
+    "landing_target_pose": ("vx_rel", "vy_rel", "cov_vx_rel", "cov_vy_rel", "is_static", "rel_vel_valid"),
+    "launch_detection_status": ("launch_detection_state",),
     "estimator_selector_status": ("primary_instance",),
 }
-"""Fields without which a topic says nothing."""
+"""Fields without which a topic says nothing, or which every release has; those that came later have defaults before."""
+
+LACKS_FIELD = "lacks the field"
+
+
+def missing_field(topic: str, table: TopicTable) -> str | None:
+    """First field that a topic in v1.16's layout cannot do without and lacks; None where it has all."""
+    return next((name for name in _NEEDED.get(topic, ()) if name not in table), None)
 
 
 def impossible_samples(topic: str, table: TopicTable) -> np.ndarray:
@@ -93,8 +144,9 @@ def impossible_samples(topic: str, table: TopicTable) -> np.ndarray:
 
 
 def _impossible_sample_time(topic: str, table: TopicTable) -> np.ndarray:
+    """Rows whose sample time cannot be, of topics whose sample time is read at all."""
     sampled = table.get("timestamp_sample")
-    if topic not in _LIMITS or sampled is None:
+    if topic not in STAMPED_BY_SAMPLE or sampled is None:
         return np.zeros(row_count(table), np.bool_)
     age = table["timestamp"] - sampled
     return (sampled != 0) & ((age > _MOST_SAMPLE_AGE_US) | (age < -_MOST_SAMPLE_LEAD_US))
@@ -114,9 +166,9 @@ def without_impossible(topics: Mapping[TopicKey, TopicTable]) -> tuple[dict[Topi
     left_out = []
     for key, table in topics.items():
         rows = row_count(table)
-        missing = [name for name in _NEEDED.get(key[0], ()) if name not in table]
-        if missing:
-            left_out.append(LeftOut(*key, rows, rows, f"lacks the field {missing[0]}"))
+        missing = missing_field(key[0], table)
+        if missing is not None:
+            left_out.append(LeftOut(*key, rows, rows, f"{LACKS_FIELD} {missing}"))
             continue
         if key[0] in _LIMITS or key[0] in _NEEDED:
             for reason, fault in (("impossible value", impossible_samples), (NO_ADVANCE, _stands_still)):

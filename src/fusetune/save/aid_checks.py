@@ -2,19 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from fusetune.ekf2.given_samples import NO_NUMBER, GivenSamples, given_samples
+from fusetune.ekf2.message_samples import gnss_refusals, taken
 from fusetune.px4.ekf2_parameters import complete
-from fusetune.px4.flight import Flight, TopicTable
+from fusetune.px4.flight import Flight, LeftOut, row_count
+from fusetune.px4.sensor_limits import LACKS_FIELD
+from fusetune.save.log_checks import WHOLE_LOG
 from fusetune.save.log_facts import rate_hz
 from fusetune.save.magnetometer_mounting import magnetometer_mounting
 from fusetune.save.verdict import Check, VerdictThresholds
 
 _FIX_3D = 3
 _MAG_TYPE_NONE = 5
-_GPS_CTRL_HORIZONTAL, _GPS_CTRL_ALTITUDE, _EV_CTRL_HORIZONTAL, _EV_CTRL_HEIGHT = 0b101, 0b010, 0b101, 0b010
+_GNSS, _VISION = "vehicle_gps_position", "vehicle_visual_odometry"
+_POSITION, _ALTITUDE, _VELOCITY, _YAW = 0b0001, 0b0010, 0b0100, 0b1000
+"""Bits of EKF2_GPS_CTRL and EKF2_EV_CTRL."""
+
+_HORIZONTAL = _POSITION | _VELOCITY
+_VISION_PARTS = {
+    "ev_pos": ("position", _POSITION | _ALTITUDE),
+    "ev_vel": ("velocity", _VELOCITY),
+    "ev_yaw": ("heading", _YAW),
+}
+_WORDS = {
+    "gnss": "GNSS",
+    "mag": "magnetometer",
+    "baro": "barometer",
+    "range": "range finder",
+    "flow": "optical flow",
+    "airspeed": "airspeed",
+    "auxvel": "landing target",
+} | {sensor: f"external vision's {part}" for sensor, (part, _) in _VISION_PARTS.items()}
+_DROPPED = "Mend what the sensor's driver reports, or switch the sensor off"
 _LOG_MORE = "Log with SDLOG_PROFILE bit 1 (estimator replay) set"
 _BETTER_SKY = "Wait for a fix before take-off, with a free sky"
 _ONBOARD_AIDS = {
@@ -27,67 +52,134 @@ _ONBOARD_AIDS = {
 """Control flags of the vehicle's own estimator that stand for horizontal aiding."""
 
 
-def magnetometer(flight: Flight, limits: VerdictThresholds) -> Check:
+@dataclass(frozen=True)
+class _Aids:
+    """What the checks below share of one flight."""
+
+    flight: Flight
+    limits: VerdictThresholds
+    parameters: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def given(self) -> dict[str, GivenSamples]:
+        return given_samples(self.flight)
+
+    def is_given(self, *sensors: str) -> bool:
+        """Whether the estimator is given a sample of any of these sensors."""
+        return any(sensor in self.given and self.given[sensor].given for sensor in sensors)
+
+    def uses(self, parameter: str, bits: int) -> bool:
+        """Whether a control parameter of the estimator has any of some bits."""
+        return bool(int(self.parameters[parameter]) & bits)
+
+    def lacks_fields(self, topic: str) -> LeftOut | None:
+        """The topic as it was left out, since it lacks a field that the estimator needs."""
+        entries = (entry for entry in self.flight.left_out if entry.topic == topic and not self.flight.has(topic))
+        return next((entry for entry in entries if entry.reason.startswith(LACKS_FIELD)), None)
+
+    def why_no_samples(self, topic: str, words: str) -> tuple[str, str]:
+        """Why there are no messages of a topic, and the remedy."""
+        entry = self.lacks_fields(topic)
+        if entry is None:
+            return f"no {words} samples", _LOG_MORE
+        return f"no {words} samples that can be used (each {entry.reason})", WHOLE_LOG
+
+    @property
+    def uses_gnss(self) -> bool:
+        table = self.flight.topic(_GNSS)
+        return self.uses("EKF2_GPS_CTRL", ~0) and table is not None and bool(len(table["timestamp"]))
+
+    @cached_property
+    def fix_share(self) -> float:
+        """Share of the GNSS samples that have a 3D fix."""
+        table = self.flight.topic(_GNSS)
+        return 0.0 if table is None or not row_count(table) else float(np.mean(table["fix_type"] >= _FIX_3D))
+
+    @cached_property
+    def usable_fixes(self) -> int:
+        """GNSS samples with a 3D fix that the estimator is given."""
+        table = self.flight.topic(_GNSS)
+        if table is None or not self.is_given("gnss"):
+            return 0
+        usable = taken(table, gnss_refusals(table, self.flight.release))
+        return int(np.sum(usable & (table["fix_type"] >= _FIX_3D)))
+
+
+def checks(flight: Flight, limits: VerdictThresholds) -> list[Check]:
+    """All checks of this module on a flight that has IMU samples."""
+    aids = _Aids(flight, limits, complete(flight.parameters.initial, {}, flight.release))
+    return [check(aids) for check in CHECKS]
+
+
+def magnetometer(aids: _Aids) -> Check:
     """Whether the heading has its usual reference."""
-    if _parameters(flight)["EKF2_MAG_TYPE"] == _MAG_TYPE_NONE:
-        return Check("magnetometer", "does-not-apply", "EKF2_MAG_TYPE switches the magnetometer off")
-    rate = rate_hz(flight.topic("vehicle_magnetometer"))
-    threshold = limits.low_magnetometer_rate_hz
+    name, threshold = "magnetometer", aids.limits.low_magnetometer_rate_hz
+    if aids.parameters["EKF2_MAG_TYPE"] == _MAG_TYPE_NONE:
+        return Check(name, "does-not-apply", "EKF2_MAG_TYPE switches the magnetometer off")
+    rate = rate_hz(aids.flight.topic("vehicle_magnetometer"))
     if rate is None:
-        reason = "no magnetometer samples: the heading comes from other sources only"
-        return Check("magnetometer", "warning", reason, _LOG_MORE, 0.0, threshold)
+        why, remedy = aids.why_no_samples("vehicle_magnetometer", "magnetometer")
+        return Check(name, "warning", f"{why}: the heading comes from other sources only", remedy, 0.0, threshold)
     if rate < threshold:
         reason = f"the magnetometer is logged at only {rate:.1f} Hz"
-        return Check("magnetometer", "warning", reason, _LOG_MORE, rate, threshold)
-    return Check("magnetometer", "pass", f"the magnetometer is logged at {rate:.1f} Hz", "", rate, threshold)
+        return Check(name, "warning", reason, _LOG_MORE, rate, threshold)
+    return Check(name, "pass", f"the magnetometer is logged at {rate:.1f} Hz", "", rate, threshold)
 
 
-def barometer(flight: Flight, limits: VerdictThresholds) -> Check:
+def mounting(aids: _Aids) -> Check:
+    """Whether the magnetometer sits as its parameters say."""
+    return magnetometer_mounting(aids.flight, aids.limits)
+
+
+def barometer(aids: _Aids) -> Check:
     """Whether the height has a reference: the barometer, or another source that takes its place."""
-    parameters = _parameters(flight)
-    rate = rate_hz(flight.topic("vehicle_air_data"))
-    threshold = limits.low_barometer_rate_hz
+    name, threshold = "barometer", aids.limits.low_barometer_rate_hz
+    rate = rate_hz(aids.flight.topic("vehicle_air_data"))
     if rate is not None and rate >= threshold:
-        return Check("barometer", "pass", f"the barometer is logged at {rate:.1f} Hz", "", rate, threshold)
+        return Check(name, "pass", f"the barometer is logged at {rate:.1f} Hz", "", rate, threshold)
     if rate is not None:
-        return Check(
-            "barometer", "warning", f"the barometer is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold
-        )
+        return Check(name, "warning", f"the barometer is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
     others = []
-    if int(parameters["EKF2_GPS_CTRL"]) & _GPS_CTRL_ALTITUDE and _fix_share(flight) > 0.0:
+    if aids.uses("EKF2_GPS_CTRL", _ALTITUDE) and aids.usable_fixes:
         others.append("GNSS")
-    if int(parameters["EKF2_EV_CTRL"]) & _EV_CTRL_HEIGHT and flight.topic("vehicle_visual_odometry") is not None:
+    if aids.uses("EKF2_EV_CTRL", _ALTITUDE) and aids.is_given("ev_pos"):
         others.append("external vision")
-    if parameters["EKF2_RNG_CTRL"] > 0 and flight.has("distance_sensor"):
+    if aids.parameters["EKF2_RNG_CTRL"] > 0 and aids.is_given("range"):
         others.append("range finder")
+    why, remedy = aids.why_no_samples("vehicle_air_data", "barometer")
     if not others:
-        return Check("barometer", "fail", "nothing in the log measures the height", _LOG_MORE, 0.0, threshold)
-    if not parameters["EKF2_BARO_CTRL"]:
-        return Check("barometer", "does-not-apply", "EKF2_BARO_CTRL switches the barometer off")
-    return Check(
-        "barometer", "warning", f"no barometer samples; height from {', '.join(others)}", _LOG_MORE, 0.0, threshold
-    )
+        said = "nothing in the log measures the height"
+        return Check(name, "fail", said if remedy == _LOG_MORE else f"{said} ({why})", remedy, 0.0, threshold)
+    if not aids.parameters["EKF2_BARO_CTRL"]:
+        return Check(name, "does-not-apply", "EKF2_BARO_CTRL switches the barometer off")
+    return Check(name, "warning", f"{why}; height from {', '.join(others)}", remedy, 0.0, threshold)
 
 
-def gnss(flight: Flight, limits: VerdictThresholds) -> Check:
-    """Presence and rate of GNSS."""
-    table, threshold = flight.topic("vehicle_gps_position"), limits.low_gnss_rate_hz
-    if not int(_parameters(flight)["EKF2_GPS_CTRL"]):
-        return Check("gnss", "does-not-apply", "EKF2_GPS_CTRL switches GNSS off")
-    rate = rate_hz(table)
+def gnss(aids: _Aids) -> Check:
+    """Presence and rate of GNSS, and whether the estimator is given it."""
+    name, threshold = "gnss", aids.limits.low_gnss_rate_hz
+    if not aids.uses("EKF2_GPS_CTRL", ~0):
+        return Check(name, "does-not-apply", "EKF2_GPS_CTRL switches GNSS off")
+    rate = rate_hz(aids.flight.topic(_GNSS))
     if rate is None:
-        return Check("gnss", "does-not-apply", "the log holds no GNSS samples")
+        why, remedy = aids.why_no_samples(_GNSS, "GNSS")
+        if remedy == _LOG_MORE:
+            return Check(name, "does-not-apply", "the log holds no GNSS samples")
+        return Check(name, "warning", why, remedy, 0.0, threshold)
+    one = aids.given["gnss"]
+    refused = max((rows for _, rows in one.refused), default=0)
+    if refused > (1.0 - aids.limits.low_gnss_fix_share) * one.messages:
+        return Check(name, "warning", f"{_told(one)}, at {rate:.1f} Hz", _DROPPED, float(one.given), threshold)
     if rate < threshold:
-        return Check("gnss", "warning", f"GNSS is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
-    return Check("gnss", "pass", f"GNSS is logged at {rate:.1f} Hz", "", rate, threshold)
+        return Check(name, "warning", f"GNSS is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
+    return Check(name, "pass", f"GNSS is logged at {rate:.1f} Hz", "", rate, threshold)
 
 
-def gnss_fix(flight: Flight, limits: VerdictThresholds) -> Check:
+def gnss_fix(aids: _Aids) -> Check:
     """Share of the GNSS samples that have a 3D fix."""
-    name, threshold = "gnss_fix", limits.low_gnss_fix_share
-    if not _uses_gnss(flight):
+    name, threshold, share = "gnss_fix", aids.limits.low_gnss_fix_share, aids.fix_share
+    if not aids.uses_gnss:
         return Check(name, "does-not-apply", "GNSS is switched off or not logged")
-    share = _fix_share(flight)
     if share == 0.0:
         reason = "GNSS is logged but never has a 3D fix"
         return Check(name, "warning", reason, "Fly where satellites can be received", share, threshold)
@@ -96,25 +188,25 @@ def gnss_fix(flight: Flight, limits: VerdictThresholds) -> Check:
     return Check(name, "pass", f"GNSS has a 3D fix {share:.0%} of the time", "", share, threshold)
 
 
-def gnss_position_accuracy(flight: Flight, limits: VerdictThresholds) -> Check:
+def gnss_position_accuracy(aids: _Aids) -> Check:
     """Horizontal accuracy that the receiver reports, median over the samples with a fix."""
-    return _accuracy(flight, "gnss_position_accuracy", "eph", limits.high_gnss_eph_m, "m horizontally")
+    return _accuracy(aids, "gnss_position_accuracy", "eph", aids.limits.high_gnss_eph_m, "m horizontally")
 
 
-def gnss_height_accuracy(flight: Flight, limits: VerdictThresholds) -> Check:
+def gnss_height_accuracy(aids: _Aids) -> Check:
     """Vertical accuracy that the receiver reports, median over the samples with a fix."""
-    return _accuracy(flight, "gnss_height_accuracy", "epv", limits.high_gnss_epv_m, "m vertically")
+    return _accuracy(aids, "gnss_height_accuracy", "epv", aids.limits.high_gnss_epv_m, "m vertically")
 
 
-def gnss_speed_accuracy(flight: Flight, limits: VerdictThresholds) -> Check:
+def gnss_speed_accuracy(aids: _Aids) -> Check:
     """Accuracy of the velocity that the receiver reports, median over the samples with a fix."""
-    limit = limits.high_gnss_speed_error_m_s
-    return _accuracy(flight, "gnss_speed_accuracy", "s_variance_m_s", limit, "m/s")
+    limit = aids.limits.high_gnss_speed_error_m_s
+    return _accuracy(aids, "gnss_speed_accuracy", "s_variance_m_s", limit, "m/s")
 
 
-def _accuracy(flight: Flight, name: str, column: str, threshold: float, unit: str) -> Check:
-    table = flight.topic("vehicle_gps_position")
-    if table is None or not _uses_gnss(flight) or column not in table or not _fix_share(flight):
+def _accuracy(aids: _Aids, name: str, column: str, threshold: float, unit: str) -> Check:
+    table = aids.flight.topic(_GNSS)
+    if table is None or not aids.uses_gnss or not aids.fix_share:
         return Check(name, "does-not-apply", "no GNSS samples with a fix and an accuracy")
     median = float(np.median(table[column][table["fix_type"] >= _FIX_3D]))
     said = f"the GNSS receiver reports an accuracy of {median:.1f} {unit}"
@@ -123,64 +215,64 @@ def _accuracy(flight: Flight, name: str, column: str, threshold: float, unit: st
     return Check(name, "pass", said, "", median, threshold)
 
 
-def _uses_gnss(flight: Flight) -> bool:
-    table = flight.topic("vehicle_gps_position")
-    return bool(int(_parameters(flight)["EKF2_GPS_CTRL"]) and table is not None and len(table["timestamp"]))
-
-
-def horizontal_aid(flight: Flight, limits: VerdictThresholds) -> Check:
-    """Whether anything in the log can hold the horizontal position or velocity.
+def horizontal_aid(aids: _Aids) -> Check:
+    """Whether anything that the estimator is given can hold the horizontal position or velocity.
 
     A flight that was meant to be aided by GNSS and never got a fix is refused; one that flew unaided, or whose aiding
     the log does not hold, still has heights, heading and tilt to judge.
     """
     name = "horizontal_aid"
-    aids = _horizontal_aids(flight)
-    if aids:
-        return Check(name, "pass", f"horizontal aiding by {', '.join(aids)}", "", float(len(aids)), 1.0)
-    onboard = _onboard_aids(flight)
-    if onboard:
-        reason = f"the vehicle was aided by {', '.join(onboard)}, whose samples the log lacks: no horizontal aiding"
-        return Check(name, "warning", reason, _LOG_MORE, 0.0, 1.0)
-    receiver = flight.topic("vehicle_gps_position") is not None
-    if receiver and int(_parameters(flight)["EKF2_GPS_CTRL"]) & _GPS_CTRL_HORIZONTAL:
+    found = _horizontal_aids(aids)
+    if found:
+        return Check(name, "pass", f"horizontal aiding by {', '.join(found)}", "", float(len(found)), 1.0)
+    onboard = _onboard_aids(aids.flight)
+    flown = f"the vehicle was aided by {', '.join(onboard)}" if onboard else ""
+    never_fixed = (
+        aids.uses("EKF2_GPS_CTRL", _HORIZONTAL) and aids.flight.topic(_GNSS) is not None and not aids.fix_share
+    )
+    unusable = list(_unusable_aids(aids))
+    if never_fixed and not onboard:
         reason = "not replayable with GNSS: it never has a 3D fix, and nothing else aids the horizontal position"
         return Check(name, "fail", reason, "Fly where satellites can be received, or log the other aid", 0.0, 1.0)
+    if unusable:
+        reason = f"no horizontal aiding: {'; '.join(why for why, _ in unusable)}{f'; {flown}' if flown else ''}"
+        return Check(name, "warning", reason, unusable[0][1], 0.0, 1.0)
+    if onboard:
+        reason = f"{flown}, whose samples the log lacks: no horizontal aiding"
+        return Check(name, "warning", reason, _LOG_MORE, 0.0, 1.0)
     reason = "nothing in the log aids the horizontal position: only height, heading and tilt can be judged"
     return Check(name, "warning", reason, "Log GNSS, optical flow or external vision", 0.0, 1.0)
 
 
-def _parameters(flight: Flight) -> dict[str, float]:
-    return complete(flight.parameters.initial, {}, flight.release)
+def _horizontal_aids(aids: _Aids) -> list[str]:
+    found = []
+    if aids.uses("EKF2_GPS_CTRL", _HORIZONTAL) and aids.usable_fixes:
+        found.append("GNSS")
+    vision = (("ev_pos", _POSITION), ("ev_vel", _VELOCITY))
+    if any(aids.uses("EKF2_EV_CTRL", bit) and aids.is_given(sensor) for sensor, bit in vision):
+        found.append("external vision")
+    if aids.parameters["EKF2_OF_CTRL"] and aids.is_given("flow"):
+        found.append("optical flow")
+    if aids.uses("EKF2_AGP_CTRL", ~0) and aids.flight.topic("aux_global_position") is not None:
+        found.append("an auxiliary position")
+    return found
 
 
-def _fix_share(flight: Flight) -> float:
-    table = flight.topic("vehicle_gps_position")
-    if table is None or "fix_type" not in table or not len(table["fix_type"]):
-        return 0.0
-    return float(np.mean(table["fix_type"] >= _FIX_3D))
-
-
-def _horizontal_aids(flight: Flight) -> list[str]:
-    parameters = _parameters(flight)
-    aids = []
-    if int(parameters["EKF2_GPS_CTRL"]) & _GPS_CTRL_HORIZONTAL and _fix_share(flight) > 0.0:
-        aids.append("GNSS")
-    if int(parameters["EKF2_EV_CTRL"]) & _EV_CTRL_HORIZONTAL and _has_vision(flight.topic("vehicle_visual_odometry")):
-        aids.append("external vision")
-    if parameters["EKF2_OF_CTRL"] and flight.topic("vehicle_optical_flow") is not None:
-        aids.append("optical flow")
-    if int(parameters["EKF2_AGP_CTRL"]) and flight.topic("aux_global_position") is not None:
-        aids.append("an auxiliary position")
-    return aids
-
-
-def _has_vision(table: TopicTable | None) -> bool:
-    """Whether any message holds a position or a velocity."""
-    if table is None:
-        return False
-    columns = (table.get(f"{vector}[0]") for vector in ("position", "velocity"))
-    return any(column is not None and bool(np.any(np.isfinite(column))) for column in columns)
+def _unusable_aids(aids: _Aids) -> Iterator[tuple[str, str]]:
+    """Horizontal aids that are switched on and logged, but not given to the estimator: why, and the remedy."""
+    switched_on = {
+        "gnss": aids.uses("EKF2_GPS_CTRL", _HORIZONTAL),
+        "ev_pos": aids.uses("EKF2_EV_CTRL", _POSITION),
+        "ev_vel": aids.uses("EKF2_EV_CTRL", _VELOCITY),
+        "flow": bool(aids.parameters["EKF2_OF_CTRL"]),
+    }
+    topics = {"gnss": _GNSS, "ev_pos": _VISION, "ev_vel": _VISION, "flow": "vehicle_optical_flow"}
+    for sensor in (sensor for sensor, is_on in switched_on.items() if is_on):
+        why, remedy = aids.why_no_samples(topics[sensor], _WORDS[sensor])
+        if remedy != _LOG_MORE:
+            yield why, remedy
+        elif sensor in aids.given and _is_withheld(aids.given[sensor]):
+            yield _told(aids.given[sensor]), _DROPPED
 
 
 def _onboard_aids(flight: Flight) -> list[str]:
@@ -191,9 +283,47 @@ def _onboard_aids(flight: Flight) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-CHECKS: tuple[Callable[[Flight, VerdictThresholds], Check], ...] = (
+def samples_given(aids: _Aids) -> Check:
+    """How many samples of each sensor in use the estimator is given, and why not the others."""
+    name, parameters = "samples_given", aids.parameters
+    switched_on = {
+        "gnss": aids.uses("EKF2_GPS_CTRL", ~0),
+        "mag": parameters["EKF2_MAG_TYPE"] != _MAG_TYPE_NONE,
+        "baro": bool(parameters["EKF2_BARO_CTRL"]),
+        "range": parameters["EKF2_RNG_CTRL"] > 0,
+        "flow": bool(parameters["EKF2_OF_CTRL"]),
+        "airspeed": parameters["EKF2_ARSP_THR"] > 0.0,
+        "auxvel": True,
+    } | {sensor: aids.uses("EKF2_EV_CTRL", bits) for sensor, (_, bits) in _VISION_PARTS.items()}
+    used = [one for sensor, one in aids.given.items() if switched_on[sensor]]
+    if not used:
+        return Check(name, "does-not-apply", "the log holds no messages of a sensor in use")
+    withheld = [one for one in used if _is_withheld(one) and one.sensor != "gnss"]
+    if withheld:
+        return Check(name, "warning", "; ".join(map(_told, withheld)), _DROPPED, float(len(withheld)), 0.0)
+    counts = ", ".join(_count(one) for one in used)
+    return Check(name, "pass", f"the estimator is given {counts}", "", 0.0, 0.0)
+
+
+def _is_withheld(one: GivenSamples) -> bool:
+    """Whether the estimator is given none, though the sensor did measure."""
+    numbers = one.messages - sum(rows for reason, rows in one.refused if reason == NO_NUMBER)
+    return not one.given and numbers > 0
+
+
+def _told(one: GivenSamples) -> str:
+    why = one.refusals or "none arrives before the next of its kind"
+    return f"the estimator is given {one.given} of {one.messages} samples of {_WORDS[one.sensor]} ({why})"
+
+
+def _count(one: GivenSamples) -> str:
+    why = f" ({one.refusals})" if one.refused else ""
+    return f"{one.given} of {one.messages} of {_WORDS[one.sensor]}{why}"
+
+
+CHECKS: tuple[Callable[[_Aids], Check], ...] = (
     magnetometer,
-    magnetometer_mounting,
+    mounting,
     barometer,
     gnss,
     gnss_fix,
@@ -201,4 +331,5 @@ CHECKS: tuple[Callable[[Flight, VerdictThresholds], Check], ...] = (
     gnss_height_accuracy,
     gnss_speed_accuracy,
     horizontal_aid,
+    samples_given,
 )

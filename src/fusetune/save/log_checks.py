@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from fusetune.px4.ekf2_parameters import ALL_PARAMETERS, BASELINE_RELEASE, as_float32
+from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.flight import Flight
-from fusetune.px4.sensor_limits import NO_ADVANCE
+from fusetune.px4.sensor_limits import LACKS_FIELD, NO_ADVANCE
 from fusetune.save.log_facts import rate_hz
+from fusetune.save.parameter_checks import parameter_values
 from fusetune.save.verdict import Check, Status, VerdictThresholds
 
+_CHECK_SENSORS = "Check the SD card and the sensors"
+WHOLE_LOG = "Use the log as PX4 wrote it: what made or converted this file kept some fields only"
 _COPY_AGAIN = "Copy the log from the vehicle again; check the SD card"
 _IMU, _REPLAY_PROFILE_BIT, _DEFAULT_PROFILE_BIT = "sensor_combined", 0b10, 0b01
 _TIME_REASONS = ("impossible time stamp", NO_ADVANCE)
@@ -69,10 +72,11 @@ def _left_out(flight: Flight, limits: VerdictThresholds, name: str, what: str, *
     more = f" and {len(entries) - 5} topics more" if len(entries) > 5 else ""
     reason = f"{rows} {'message' if rows == 1 else 'messages'} left out ({places}{more})"
     share = max((entry.rows / max(entry.total, 1) for entry in entries if entry.topic == _IMU), default=0.0)
+    remedy = WHOLE_LOG if all(entry.reason.startswith(LACKS_FIELD) for entry in entries) else _CHECK_SENSORS
     if share > threshold:
         reason = f"{share:.1%} of the IMU samples have impossible {what}: {reason}"
-        return Check(name, "fail", reason, "Check the SD card and the sensors", share, threshold)
-    return Check(name, "warning", reason, "Check the SD card and the sensors", share, threshold)
+        return Check(name, "fail", reason, remedy, share, threshold)
+    return Check(name, "warning", reason, remedy, share, threshold)
 
 
 def firmware(flight: Flight, limits: VerdictThresholds) -> Check:
@@ -89,31 +93,6 @@ def firmware(flight: Flight, limits: VerdictThresholds) -> Check:
     reason = f"{flight.release_name} flew, the replay behaves like {baseline}: {how}"
     remedy = f"Parameters chosen here hold for {baseline}: update the firmware, or test them with care"
     return Check(name, "warning", reason, remedy)
-
-
-def parameter_values(flight: Flight, limits: VerdictThresholds) -> Check:
-    """Whether the estimator's parameters in the log are known and in their ranges."""
-    name = "parameter_values"
-    own = {key: value for key, value in flight.parameters.at_end().items() if key.startswith("EKF2_")}
-    if not own:
-        reason = "the log holds no parameters of the estimator: the defaults of the release are replayed"
-        return Check(name, "warning", reason, _COPY_AGAIN, 0.0)
-    odd = []
-    for key, value in sorted(own.items()):
-        facts = ALL_PARAMETERS.get(key)
-        if facts is None:
-            odd.append(f"{key} is no parameter of a PX4 release")
-            continue
-        low = -math.inf if facts.minimum is None else as_float32(facts.minimum)
-        high = math.inf if facts.maximum is None else as_float32(facts.maximum)
-        # defaults of older releases lie outside of what later ones allow
-        is_default = value in [default for _, default in facts.default_history]
-        if not math.isfinite(value) or not (low <= value <= high or is_default):
-            odd.append(f"{key} = {value:g} is outside {low:g} to {high:g}")
-    if odd:
-        reason = f"{'; '.join(odd[:5])}{f' and {len(odd) - 5} more' if len(odd) > 5 else ''}"
-        return Check(name, "warning", reason, "Mend the parameters, or copy the log again", float(len(odd)), 0.0)
-    return Check(name, "pass", f"{len(own)} parameters of the estimator are in their ranges", "", 0.0, 0.0)
 
 
 def logging_profile(flight: Flight, limits: VerdictThresholds) -> Check:

@@ -11,6 +11,7 @@ from typing import Any
 from fusetune.errors import UserError
 from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
+from fusetune.px4.logged_parameters import checked_history
 from fusetune.px4.release_layouts import canonical
 from fusetune.px4.ulog_reader import file_checksum, read_ulog
 from fusetune.save.flight_folder import METADATA_FILE, write_flight
@@ -80,7 +81,7 @@ def _judge(flight: Flight, thresholds: VerdictThresholds) -> Verdict:
 
 def _present_ekf2(flight: Flight) -> dict[str, float]:
     """EKF2 parameters at the end of the log under the names of the baseline release."""
-    return migrate(flight.parameters.at_end(), flight.release)
+    return migrate(checked_history(flight.parameters, flight.release)[0].at_end(), flight.release)
 
 
 def _metadata_of_unreadable(log: Path) -> dict[str, Any]:

@@ -134,7 +134,8 @@ def judge(flight: Flight, thresholds: VerdictThresholds | None = None) -> Verdic
         checks.append(check(flight, limits))
         if checks[-1].status == "fail":
             break
-    checks += [check(flight, limits) for check in (*aid_checks.CHECKS, *flight_checks.CHECKS)]
+    checks += aid_checks.checks(flight, limits)
+    checks += [check(flight, limits) for check in flight_checks.CHECKS]
     return Verdict(flight.name, tuple(checks))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, MAG, ReconstructedFlight
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
-from fusetune.ekf2.message_samples import sample_time
+from fusetune.px4.sample_times import measurement_time
 
 SENSORS = {"mag": (MAG, "EKF2_MAG_DELAY"), "baro_hgt": (BARO, "EKF2_BARO_DELAY")}
 """Aid source → topic of its measurements and the parameter of their delay."""
@@ -34,7 +34,7 @@ def measured_rows(
         if mask is None:
             continue
         rows = np.flatnonzero(innovations["source"] == AID_SOURCE_NAMES.index(source))
-        time = sample_time(reconstructed.flight.topics[topic, 0])
+        time = measurement_time(topic, reconstructed.flight.topics[topic, 0])
         order = np.argsort(time, kind="stable")
         wanted = innovations["timestamp_sample"][rows] + parameters[delay] * 1e3 + 0.5 * interval_us
         measured[rows] = mask[order[_nearest(time[order], wanted)]]

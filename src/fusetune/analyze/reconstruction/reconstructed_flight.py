@@ -18,7 +18,7 @@ from fusetune.analyze.reconstruction.magnetometer_by_state import add_noise_by_s
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.ekf2.parameters import complete
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count
-from fusetune.px4.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states
+from fusetune.px4.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states, why_no_state
 from fusetune.px4.release_layouts import ESTIMATOR_TOPICS
 
 RECONSTRUCTION_TOPICS = (*ESTIMATOR_TOPICS, "vehicle_attitude", "vehicle_imu", *LOGGED_STATE_TOPICS)
@@ -112,7 +112,10 @@ def _with_noise(
     step: Step, flight: Flight, measured: np.ndarray, start: LoggedState | None, topics: dict[TopicKey, TopicTable]
 ) -> Step:
     parameters = complete(flight.parameters.initial, {}, flight.release)
-    noise = add_noise_by_state(flight, measured, parameters, tuple(logged_states(flight)), start)
+    states = tuple(logged_states(flight))
+    if not states and flight.has("estimator_states"):
+        return replace(step, what=f"{step.what}; without its noise, since {why_no_state(flight)}")
+    noise = add_noise_by_state(flight, measured, parameters, states, start)
     if not noise.intervals:
         return step
     explained = f"{noise.explained} of {noise.intervals} intervals between logged states"
