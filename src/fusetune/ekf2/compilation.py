@@ -46,7 +46,7 @@ def ensure_compiled() -> None:
     """
     if _setting("DISABLE_JIT") or CHILD_MARK in os.environ:
         return
-    caches, folder = Path(_setting("CACHE_DIR")), _kernel_folder()
+    caches, folder = Path(_setting("CACHE_DIR")), kernel_folder()
     if _may_be_loaded(folder):
         return
     caches.mkdir(parents=True, exist_ok=True)
@@ -66,7 +66,8 @@ def _setting(name: str) -> Any:
     return getattr(config, name)
 
 
-def _kernel_folder() -> Path:
+def kernel_folder() -> Path:
+    """Where in the cache the kernels of this processor are."""
     entry = Path(__file__).with_name(ENTRY_SOURCE)
     return Path(_setting("CACHE_DIR")) / KernelLocator.get_suitable_cache_subpath(str(entry))
 
@@ -153,7 +154,7 @@ def main() -> None:
 
     with joined_without_optimising():
         compile_kernels()
-    folder = _kernel_folder()
+    folder = kernel_folder()
     with atomic_path(folder / RECORD_NAME) as temporary:
         temporary.write_text(json.dumps(_kernel_files(folder), indent=1) + "\n", encoding="utf-8")
 
