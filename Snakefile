@@ -25,6 +25,16 @@ wildcard_constraints:
     flight="|".join(map(re.escape, LOGS)),
 
 
+# What needs seconds of one core for all flights together runs beside Snakemake itself, wherever the flights are sent.
+localrules:
+    all,
+    design,
+    list_flights,
+    decide,
+    plot_summary,
+    build_report,
+
+
 rule all:
     default_target: True
     input:

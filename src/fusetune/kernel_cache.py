@@ -1,7 +1,10 @@
 """Where compiled kernels are kept.
 
 Numba's cache looks only at the file a kernel stands in, not at the files of what it calls: beside the sources it would
-hand out stale kernels. A folder named by a digest of the sources cannot.
+hand out stale kernels. A folder named by a digest of the sources cannot. Below it, `fusetune.kernel_locator` parts
+what is compiled for one processor from what is compiled for another.
+
+Kernels are machine code: they are loaded only from where nobody may write who may not write the package itself.
 """
 
 from __future__ import annotations
@@ -10,16 +13,25 @@ import os
 from pathlib import Path
 
 from fusetune.digest import source_digest
+from fusetune.write_access import others_may_write, others_may_write_below, take_write_access
+
+LOCATOR = "fusetune.kernel_locator.KernelLocator"
+PACKAGE = Path(__file__).resolve().parent
 
 
 def kernel_cache() -> Path:
-    """Folder for the kernels of these sources: below the checkout, or in the user's cache where there is none."""
-    checkout = Path(__file__).resolve().parents[2]
-    if (checkout / "Snakefile").is_file():
-        caches = checkout / ".cache"
-    else:
-        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fusetune"
-    return caches / "numba" / source_digest("ekf2")[:16]
+    """Folder for the kernels of these sources: below the checkout, or in the user's cache.
+
+    The user's cache serves where there is no checkout, where this user may not write there, and where more people may
+    than may write the package.
+    """
+    checkout, below = PACKAGE.parents[1], Path("numba") / source_digest("ekf2")[:16]
+    folder = checkout / ".cache" / below
+    existing = next(part for part in (folder, *folder.parents) if part.exists())
+    ours = os.access(existing, os.W_OK | os.X_OK) and not others_may_write(checkout, PACKAGE)
+    if (checkout / "Snakefile").is_file() and ours:
+        return folder
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fusetune" / below
 
 
 def use_kernel_cache() -> Path:
@@ -28,8 +40,31 @@ def use_kernel_cache() -> Path:
     Returns
     -------
     Path
-        The folder; Numba makes it when it stores a kernel.
+        The folder; it is made when there is something to keep.
     """
     folder = kernel_cache()
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    os.environ["NUMBA_CACHE_LOCATOR_CLASSES"] = LOCATOR
     return folder
+
+
+def others_may_write_kernels(folder: Path) -> bool:
+    """Whether what is in a folder of the cache in use could have been put there by others."""
+    return others_may_write_below(_top(), folder, PACKAGE)
+
+
+def keep_others_out(folder: Path) -> None:
+    """Take from others the right to write to a folder of the cache in use, and on the way to it.
+
+    Raises
+    ------
+    UserError
+        Something on the way belongs to another user.
+    """
+    take_write_access(_top(), folder, PACKAGE)
+
+
+def _top() -> Path:
+    """The first folder on the way to the cache in use that is there for caches alone."""
+    caches = Path(os.environ["NUMBA_CACHE_DIR"])
+    return caches.parents[1] if caches == kernel_cache() else caches

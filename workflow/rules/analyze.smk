@@ -13,6 +13,7 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
             f"replay_{number}"
         input:
             flight="results/save/{flight}",
+            present=ancient("results/save/present.json"),
             kernels=ancient(KERNELS_READY),
         output:
             update(replay_files(chunk)),
@@ -36,6 +37,8 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
 rule analyze_flight:
     input:
         flight="results/save/{flight}",
+        # what it says comes in as a parameter, so that only other values make anything again
+        present=ancient("results/save/present.json"),
         kernels=ancient(KERNELS_READY),
         replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
     output:

@@ -1,6 +1,7 @@
 rule decide:
     input:
         flights="results/save/flights.parquet",
+        present="results/save/present.json",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
         # asked for so that a set that is new is replayed and scored
         replays=of_replayable_flights([f"results/analyze/{{flight}}/{pset}.json" for pset in REPLAYED]),
@@ -34,7 +35,6 @@ rule decide:
     params:
         sets=SETS,
         present=PRESENT,
-        newest_flight=lambda wildcards: present_flight(),
         descriptions={pset.name: pset.description for pset in STUDY.sets},
         decision=SETTINGS["decision"],
         seed=SETTINGS["seed"],

@@ -1,6 +1,7 @@
 # Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
 import csv
-import json
+
+from fusetune.save import read_present
 
 REPLAY_PARTS = (
     "innovations.parquet",
@@ -34,12 +35,9 @@ def read_csv(path):
         return list(csv.DictReader(file))
 
 
-def replayable_rows():
-    return [row for row in read_csv(checkpoints.list_flights.get().output.csv) if row["status"] == "replayable"]
-
-
 def replayable_flights():
-    return [row["flight"] for row in replayable_rows()]
+    rows = read_csv(checkpoints.list_flights.get().output.csv)
+    return [row["flight"] for row in rows if row["status"] == "replayable"]
 
 
 def of_replayable_flights(patterns):
@@ -47,33 +45,13 @@ def of_replayable_flights(patterns):
     return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
-def present_flight():
-    """The flight whose parameters count as the vehicle's present ones; None where no flight can be replayed."""
-    rows = replayable_rows()
-    wanted = SETTINGS["present_flight"]
-    if wanted is None:
-        return max(rows, key=lambda row: (row["recorded"], row["flight"]), default={}).get("flight")
-    if wanted not in [row["flight"] for row in rows]:
-        raise WorkflowError(
-            f"{CONFIG_FILE}: present_flight is {wanted!r}, which is no flight that can be replayed. "
-            "See results/save/flights.csv."
-        )
-    return wanted
-
-
-def present_overrides():
-    """What the set `present` gives to the parameters that the study varies: the vehicle's present values."""
-    with open(f"results/save/{present_flight()}/metadata.json", encoding="utf-8") as file:
-        values = json.load(file)["ekf2_parameters"]
-    varied = {name for overrides in OVERRIDES.values() for name in overrides}
-    return {name: values[name] for name in sorted(varied & values.keys())}
-
-
 def overrides_in(name):
     """Values that a set gives to parameters; as flown means the log's own, without exception."""
     if name == AS_FLOWN:
         return {}
-    return present_overrides() if name == PRESENT else OVERRIDES[name]
+    if name == PRESENT:
+        return read_present(checkpoints.list_flights.get().output.present).parameters
+    return OVERRIDES[name]
 
 
 def overrides_of(names):

@@ -82,12 +82,18 @@ STUDY = told_in_one_line(load_study, SETTINGS["study"])
 MISSION = told_in_one_line(load_mission, SETTINGS["mission"])
 OVERRIDES = {pset.name: pset.overrides for pset in STUDY.sets}
 SETS = [PRESENT, *OVERRIDES]
+VARIED = sorted({name for overrides in OVERRIDES.values() for name in overrides})
 # The log's own parameters are replayed, too, to be compared with what the vehicle logged; they are not ranked.
 REPLAYED = [*SETS, AS_FLOWN]
 DEMONSTRATION = demonstration_flights()
 FAULTS = told_in_one_line(checked_faults)
 FLOWN_LOGS = told_in_one_line(discovered_logs)
 LOGS = FLOWN_LOGS or {flight: f"results/execute/{flight}.ulg" for flight in DEMONSTRATION}
+if SETTINGS["present_flight"] not in (None, *LOGS):
+    raise WorkflowError(
+        f"{CONFIG_FILE}: present_flight is {SETTINGS['present_flight']!r}, which is no flight in "
+        f"{SETTINGS['flights_dir']!r}. Name one of its logs without .ulg, or leave it empty for the newest."
+    )
 CONFIGURATION_FILES = [
     *map(str, workflow.configfiles),
     SETTINGS["study"],

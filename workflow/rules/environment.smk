@@ -22,6 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from snakemake.exceptions import WorkflowError
 
+from fusetune.cluster_jobs import cancel_queued_jobs
 from fusetune.digest import source_digest
 from fusetune.errors import UserError
 from fusetune.kernel_cache import use_kernel_cache
@@ -37,6 +38,20 @@ def unfinished_files():
             yield Path(name), marker
 
 
+def cancel_jobs_of_interrupted_run():
+    """Jobs that wait in Slurm's queue would start beside those of this run."""
+    try:
+        jobs = cancel_queued_jobs(STATE)
+    except UserError as error:
+        raise WorkflowError(str(error)) from None
+    if jobs:
+        numbers = ", ".join(job.number for job in jobs)
+        print(
+            f"Slurm still had jobs of an interrupted run ({numbers}); they are cancelled and made again.",
+            file=sys.stderr,
+        )
+
+
 def recover_from_interruption():
     """Let a run go on where a killed one stopped.
 
@@ -46,6 +61,7 @@ def recover_from_interruption():
     """
     if not workflow.is_main_process or not claim_run(STATE):
         return
+    cancel_jobs_of_interrupted_run()
     if not wait_for_jobs(STATE, 0.0):
         print("Waiting for the jobs that an interrupted run left at work ...", file=sys.stderr)
         if not wait_for_jobs(STATE, LONGEST_JOB_S):

@@ -20,6 +20,8 @@ checkpoint list_flights:
     input:
         folders=expand("results/save/{flight}", flight=LOGS),
     output:
+        # first, for by it Snakemake knows whether a job has the checkpoint behind it
+        present="results/save/present.json",
         table="results/save/flights.parquet",
         csv=report(
             "results/save/flights.csv",
@@ -33,6 +35,8 @@ checkpoint list_flights:
         "../envs/fusetune.yaml"
     params:
         code=DIGEST["save"],
+        varied=VARIED,
+        present_flight=SETTINGS["present_flight"],
     message:
         "Save: list which flights can be replayed"
     script:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
+from fusetune.save import read_present
 
 from job import keep_out, logged_job
 
@@ -19,7 +20,7 @@ with logged_job(snakemake.log[0]):
         Path(snakemake.output[0]).parent,
         sets=snakemake.params.sets,
         present=snakemake.params.present,
-        newest_flight=snakemake.params.newest_flight,
+        newest_flight=read_present(snakemake.input.present).flight,
         descriptions=snakemake.params.descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
         settings=DecisionSettings.from_mapping(snakemake.params.decision, seed=snakemake.params.seed),

@@ -1,8 +1,9 @@
-"""Put the verdicts of all flights into one table."""
+"""Put the verdicts of all flights into one table, and write down what the vehicle flies now."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusetune.save import write_flights_table
+from fusetune.save import find_present, write_flights_table, write_present
 
 from job import keep_out, logged_job
 
@@ -11,4 +12,7 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    write_flights_table(snakemake.input.folders, snakemake.output.table, snakemake.output.csv)
+    params, folders = snakemake.params, [Path(folder) for folder in snakemake.input.folders]
+    rows = write_flights_table(folders, snakemake.output.table, snakemake.output.csv)
+    present = find_present(rows, {folder.name: folder for folder in folders}, params.varied, params.present_flight)
+    write_present(snakemake.output.present, present)

@@ -6,11 +6,13 @@ Importing it decides where compiled kernels are kept (see `fusetune.kernel_cache
 import os
 import sys
 
-from fusetune.kernel_cache import use_kernel_cache
+from fusetune.kernel_cache import LOCATOR, use_kernel_cache
 
 if "NUMBA_CACHE_DIR" not in os.environ:
-    _folder = use_kernel_cache()
-    if "numba" in sys.modules:
-        from numba.core import config
+    use_kernel_cache()
+os.environ["NUMBA_CACHE_LOCATOR_CLASSES"] = LOCATOR
+if "numba" in sys.modules:
+    from numba.core import config
 
-        config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
+    config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]  # type: ignore[attr-defined]
+    config.CACHE_LOCATOR_CLASSES = LOCATOR  # type: ignore[attr-defined]

@@ -9,36 +9,56 @@ process that compiled this way, so it is a child that does it; everybody else lo
 from __future__ import annotations
 
 import fcntl
+import hashlib
+import json
 import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from numba.core import codegen, compiler, config, types
 
+from fusetune.files import atomic_path
+from fusetune.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
+from fusetune.kernel_locator import KernelLocator
+
 LOCK_NAME = "compile.lock"
-ENTRY = "replay.run_estimator"
+RECORD_NAME = "compiled.json"
 ENTRY_SOURCE = "replay.py"
 CHILD_MARK = "FUSETUNE_COMPILING"
 
 
+@cache
 def ensure_compiled() -> None:
-    """Make sure the kernel cache holds the estimator; of several processes one compiles and the others wait.
+    """Make sure the kernel cache holds the estimator for this processor; one process compiles and others wait.
 
-    Does nothing where Numba is switched off. If the child fails, the caller compiles the usual, slower way.
+    Kernels that have lost or changed a byte, or that others could have written, are made again. Does nothing where
+    Numba is switched off. If the child fails, the caller compiles the usual, slower way.
+
+    Raises
+    ------
+    UserError
+        The cache belongs to another user.
     """
-    if _setting("DISABLE_JIT") or CHILD_MARK in os.environ or _is_cached():
+    if _setting("DISABLE_JIT") or CHILD_MARK in os.environ:
         return
-    folder = Path(_setting("CACHE_DIR"))
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / LOCK_NAME).open("w") as lock:
+    caches, folder = Path(_setting("CACHE_DIR")), kernel_folder()
+    if _may_be_loaded(folder):
+        return
+    caches.mkdir(parents=True, exist_ok=True)
+    with (caches / LOCK_NAME).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not _is_cached():
-            environment = os.environ | {"NUMBA_CACHE_DIR": str(folder)}
-            subprocess.run([sys.executable, "-m", __name__], env=environment, check=False)
+        if not _may_be_loaded(folder):
+            keep_others_out(folder)
+            for file in folder.iterdir():
+                file.unlink()  # Numba would stumble over a damaged one
+            print("Compiling the estimator for this processor ...", file=sys.stderr)
+            environment = os.environ | {"NUMBA_CACHE_DIR": str(caches), "NUMBA_CACHE_LOCATOR_CLASSES": LOCATOR}
+            subprocess.run([sys.executable, "-m", __name__], env=environment, umask=0o022, check=False)
 
 
 def _setting(name: str) -> Any:
@@ -46,11 +66,27 @@ def _setting(name: str) -> Any:
     return getattr(config, name)
 
 
-def _is_cached() -> bool:
-    """Whether the entry is in the cache; Numba takes an index for stale whose source file has another time stamp."""
-    folder = Path(_setting("CACHE_DIR") or ".")
-    written = Path(__file__).with_name(ENTRY_SOURCE).stat().st_mtime
-    return any(index.stat().st_mtime >= written for index in folder.glob(f"*/{ENTRY}-*.nbi"))
+def kernel_folder() -> Path:
+    """Where in the cache the kernels of this processor are."""
+    entry = Path(__file__).with_name(ENTRY_SOURCE)
+    return Path(_setting("CACHE_DIR")) / KernelLocator.get_suitable_cache_subpath(str(entry))
+
+
+def _kernel_files(folder: Path) -> dict[str, str]:
+    """Digest of each of Numba's files in a folder."""
+    files = sorted(file for file in folder.glob("*") if file.suffix in (".nbi", ".nbc"))
+    return {file.name: hashlib.blake2b(file.read_bytes()).hexdigest() for file in files}
+
+
+def _may_be_loaded(folder: Path) -> bool:
+    """Whether a folder holds the kernels as they were compiled, byte for byte, and others cannot have written them."""
+    if others_may_write_kernels(folder):
+        return False
+    try:
+        recorded = json.loads((folder / RECORD_NAME).read_text(encoding="utf-8"))
+        return bool(recorded) and recorded == _kernel_files(folder)
+    except (OSError, ValueError):
+        return False
 
 
 @contextmanager
@@ -118,6 +154,9 @@ def main() -> None:
 
     with joined_without_optimising():
         compile_kernels()
+    folder = kernel_folder()
+    with atomic_path(folder / RECORD_NAME) as temporary:
+        temporary.write_text(json.dumps(_kernel_files(folder), indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -14,20 +14,36 @@ if TYPE_CHECKING:
     from fusetune.save.flight_folder import load_flight
     from fusetune.save.flights_table import write_flights_table
     from fusetune.save.log_folder import save_log
+    from fusetune.save.present import Present, find_present, read_present, write_present
     from fusetune.save.verdict import Verdict, VerdictThresholds, judge
 
 # Arrow's own allocators hold on to several times the size of a small log. It reads this once, when it is loaded.
 os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 
-__all__ = ["Verdict", "VerdictThresholds", "judge", "load_flight", "save_log", "write_flights_table"]
+__all__ = [
+    "Present",
+    "Verdict",
+    "VerdictThresholds",
+    "find_present",
+    "judge",
+    "load_flight",
+    "read_present",
+    "save_log",
+    "write_flights_table",
+    "write_present",
+]
 
 _MODULES = {
+    "Present": "present",
     "Verdict": "verdict",
     "VerdictThresholds": "verdict",
+    "find_present": "present",
     "judge": "verdict",
     "load_flight": "flight_folder",
+    "read_present": "present",
     "save_log": "log_folder",
     "write_flights_table": "flights_table",
+    "write_present": "present",
 }
 
 

@@ -46,11 +46,15 @@ _DUPLICATE = "duplicate"
 
 def write_flights_table(
     folders: Sequence[str | os.PathLike[str]], table: str | os.PathLike[str], csv: str | os.PathLike[str]
-) -> None:
+) -> list[dict[str, Any]]:
     """Put the verdicts of saved flights into one table, in the order given, as Parquet and as CSV.
 
     Of flights whose logs have equal bytes the first by name stays; the others are refused, so that no flight counts
     twice. Which is first depends on neither the order given nor that of the jobs.
+
+    Returns
+    -------
+    The rows of the table.
 
     Raises
     ------
@@ -64,6 +68,7 @@ def write_flights_table(
         pq.write_table(rows, temporary)
     with atomic_path(csv) as temporary:
         pa_csv.write_csv(rows.drop_columns(["advice"]), temporary)
+    return found
 
 
 def _row(folder: Path) -> dict[str, Any]:

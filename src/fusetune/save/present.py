@@ -1,0 +1,87 @@
+"""What the vehicle flies now: its parameters at the end of one flight, the newest unless told otherwise."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fusetune.errors import UserError
+from fusetune.files import atomic_path
+from fusetune.save.flight_folder import read_metadata
+
+
+@dataclass(frozen=True)
+class Present:
+    """Where the present values come from, and those that the study varies.
+
+    Attributes
+    ----------
+    flight : None where no flight can be replayed
+    checksum : of the flight's log
+    parameters : name → value, sorted by name; those of the study's parameters that the log knows
+    """
+
+    flight: str | None
+    checksum: str | None
+    parameters: dict[str, float]
+
+
+def find_present(
+    rows: Sequence[Mapping[str, Any]],
+    folders: Mapping[str, str | os.PathLike[str]],
+    varied: Collection[str],
+    wanted: str | None,
+) -> Present:
+    """Find the flight whose parameters count as the present ones.
+
+    Parameters
+    ----------
+    rows : `flight`, `status` and `recorded` of every flight
+    folders : of the saved flights, by name
+    varied : names of the parameters that the study varies
+    wanted : name of the flight; None for the one recorded last, of several the last by name
+
+    Raises
+    ------
+    UserError
+        The wanted flight cannot be replayed.
+    """
+    replayable = [row for row in rows if row["status"] == "replayable"]
+    if wanted is None:
+        if not replayable:
+            return Present(None, None, {})
+        wanted = str(max(replayable, key=lambda row: (row["recorded"], row["flight"]))["flight"])
+    elif wanted not in [row["flight"] for row in replayable]:
+        raise UserError(
+            "present_flight",
+            f"{wanted!r} is no flight that can be replayed",
+            "Name one that results/save/flights.csv calls replayable, or none for the newest",
+        )
+    metadata = read_metadata(folders[wanted])
+    values = metadata["ekf2_parameters"]
+    return Present(wanted, metadata["checksum"], {name: values[name] for name in sorted(set(varied) & values.keys())})
+
+
+def write_present(file: str | os.PathLike[str], present: Present) -> None:
+    """Write what was found as JSON."""
+    with atomic_path(file) as temporary:
+        temporary.write_text(json.dumps(asdict(present), indent=1) + "\n", encoding="utf-8")
+
+
+def read_present(file: str | os.PathLike[str]) -> Present:
+    """Read what `write_present` wrote.
+
+    Raises
+    ------
+    UserError
+        There is none, or it cannot be read.
+    """
+    try:
+        return Present(**json.loads(Path(file).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        reason = f"does not say what the vehicle flies now ({error})"
+        raise UserError(file, reason, "Delete it and run the pipeline again") from error
