@@ -9,13 +9,13 @@ import numpy as np
 from fusetune.px4.ekf2_parameters import complete
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.save.log_facts import rate_hz
+from fusetune.save.logging_advice import log_more, slowness
 from fusetune.save.magnetometer_mounting import magnetometer_mounting
 from fusetune.save.verdict import Check, VerdictThresholds
 
 _FIX_3D = 3
 _MAG_TYPE_NONE = 5
 _GPS_CTRL_HORIZONTAL, _GPS_CTRL_ALTITUDE, _EV_CTRL_HORIZONTAL, _EV_CTRL_HEIGHT = 0b101, 0b010, 0b101, 0b010
-_LOG_MORE = "Log with SDLOG_PROFILE bit 1 (estimator replay) set"
 _BETTER_SKY = "Wait for a fix before take-off, with a free sky"
 _ONBOARD_AIDS = {
     "cs_gnss_pos": "GNSS",
@@ -35,10 +35,10 @@ def magnetometer(flight: Flight, limits: VerdictThresholds) -> Check:
     threshold = limits.low_magnetometer_rate_hz
     if rate is None:
         reason = "no magnetometer samples: the heading comes from other sources only"
-        return Check("magnetometer", "warning", reason, _LOG_MORE, 0.0, threshold)
+        return Check("magnetometer", "warning", reason, log_more(flight, "vehicle_magnetometer"), 0.0, threshold)
     if rate < threshold:
-        reason = f"the magnetometer is logged at only {rate:.1f} Hz"
-        return Check("magnetometer", "warning", reason, _LOG_MORE, rate, threshold)
+        reason = slowness(flight, "vehicle_magnetometer", "magnetometer", rate)
+        return Check("magnetometer", "warning", reason, log_more(flight, "vehicle_magnetometer"), rate, threshold)
     return Check("magnetometer", "pass", f"the magnetometer is logged at {rate:.1f} Hz", "", rate, threshold)
 
 
@@ -50,9 +50,8 @@ def barometer(flight: Flight, limits: VerdictThresholds) -> Check:
     if rate is not None and rate >= threshold:
         return Check("barometer", "pass", f"the barometer is logged at {rate:.1f} Hz", "", rate, threshold)
     if rate is not None:
-        return Check(
-            "barometer", "warning", f"the barometer is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold
-        )
+        reason = slowness(flight, "vehicle_air_data", "barometer", rate)
+        return Check("barometer", "warning", reason, log_more(flight, "vehicle_air_data"), rate, threshold)
     others = []
     if int(parameters["EKF2_GPS_CTRL"]) & _GPS_CTRL_ALTITUDE and _fix_share(flight) > 0.0:
         others.append("GNSS")
@@ -60,13 +59,13 @@ def barometer(flight: Flight, limits: VerdictThresholds) -> Check:
         others.append("external vision")
     if parameters["EKF2_RNG_CTRL"] > 0 and flight.has("distance_sensor"):
         others.append("range finder")
+    remedy = log_more(flight, "vehicle_air_data")
     if not others:
-        return Check("barometer", "fail", "nothing in the log measures the height", _LOG_MORE, 0.0, threshold)
+        return Check("barometer", "fail", "nothing in the log measures the height", remedy, 0.0, threshold)
     if not parameters["EKF2_BARO_CTRL"]:
         return Check("barometer", "does-not-apply", "EKF2_BARO_CTRL switches the barometer off")
-    return Check(
-        "barometer", "warning", f"no barometer samples; height from {', '.join(others)}", _LOG_MORE, 0.0, threshold
-    )
+    reason = f"no barometer samples; height from {', '.join(others)}"
+    return Check("barometer", "warning", reason, remedy, 0.0, threshold)
 
 
 def gnss(flight: Flight, limits: VerdictThresholds) -> Check:
@@ -78,7 +77,8 @@ def gnss(flight: Flight, limits: VerdictThresholds) -> Check:
     if rate is None:
         return Check("gnss", "does-not-apply", "the log holds no GNSS samples")
     if rate < threshold:
-        return Check("gnss", "warning", f"GNSS is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
+        remedy = log_more(flight, "vehicle_gps_position")
+        return Check("gnss", "warning", f"GNSS is logged at only {rate:.1f} Hz", remedy, rate, threshold)
     return Check("gnss", "pass", f"GNSS is logged at {rate:.1f} Hz", "", rate, threshold)
 
 
@@ -141,7 +141,7 @@ def horizontal_aid(flight: Flight, limits: VerdictThresholds) -> Check:
     onboard = _onboard_aids(flight)
     if onboard:
         reason = f"the vehicle was aided by {', '.join(onboard)}, whose samples the log lacks: no horizontal aiding"
-        return Check(name, "warning", reason, _LOG_MORE, 0.0, 1.0)
+        return Check(name, "warning", reason, log_more(flight, ""), 0.0, 1.0)
     receiver = flight.topic("vehicle_gps_position") is not None
     if receiver and int(_parameters(flight)["EKF2_GPS_CTRL"]) & _GPS_CTRL_HORIZONTAL:
         reason = "not replayable with GNSS: it never has a 3D fix, and nothing else aids the horizontal position"
