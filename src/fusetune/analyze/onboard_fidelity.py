@@ -21,7 +21,15 @@ from fusetune.analyze.trust_grade import TRUST_TOPICS, grade_flight
 from fusetune.analyze.trust_settings import TrustSettings
 from fusetune.files import atomic_path
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
+from fusetune.px4.estimator_samples import is_complete, logged_share
 from fusetune.px4.flight import Flight
+from fusetune.px4.logger_settings import (
+    ESTIMATOR_REPLAY_BIT,
+    SET_LOG_EVERY_SAMPLE,
+    SET_LOG_FROM_BOOT,
+    logging_profile_of,
+    logs_from_boot,
+)
 from fusetune.px4.release_layouts import canonical
 
 AS_FLOWN = "as_flown"
@@ -161,6 +169,18 @@ def _compare_axis(source: str, axis: int, ours: Innovations, theirs: Innovations
     )
 
 
+def _why_slow(flight: Flight, topic: str, what: str, rate_hz: float) -> str:
+    if is_complete(logged_share(flight, topic)):
+        return f"the {what} itself gives only {rate_hz:.1f} Hz; every sample is in the log"
+    if logging_profile_of(flight.parameters.at_end()) & ESTIMATOR_REPLAY_BIT:
+        return f"the log holds the {what} at only {rate_hz:.1f} Hz though the profile for estimator replay is set"
+    return f"the log holds the {what} at only {rate_hz:.1f} Hz ({SET_LOG_EVERY_SAMPLE})"
+
+
+def _late_advice(flight: Flight) -> str:
+    return "" if logs_from_boot(flight.parameters.at_end()) else f" ({SET_LOG_FROM_BOOT})"
+
+
 def _reasons(flight: Flight) -> Sequence[str]:
     """What keeps a replay of this log from repeating the flight, in the order in which it usually matters."""
     reasons = []
@@ -177,14 +197,14 @@ def _reasons(flight: Flight) -> Sequence[str]:
     ):
         rate = logged_rate_hz(flight.topic(topic))
         if rate is not None and rate < full:
-            reasons.append(f"the log holds the {what} at only {rate:.1f} Hz (SDLOG_PROFILE bit 1 logs every sample)")
+            reasons.append(_why_slow(flight, topic, what, rate))
     land = flight.topic("vehicle_land_detected")
     if imu is not None and land is not None and "landed" in land and (land["landed"] == 0).any():
         take_off = float(land["timestamp"][land["landed"] == 0][0]) - float(imu["timestamp"][0])
         if take_off * 1e-6 < MID_AIR_START_S:
             reasons.append(
                 f"the log starts {max(take_off, 0) * 1e-6:.0f} s before take-off, so the replayed filter has to align "
-                "in the air (SDLOG_MODE 1 logs from boot)"
+                f"in the air{_late_advice(flight)}"
             )
     if flight.release is not None and flight.release[:2] != BASELINE_RELEASE:
         baseline = "v{}.{}".format(*BASELINE_RELEASE)

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from fusetune.execute.vehicle import Vehicle
 from fusetune.px4.ekf2_parameters import PARAMETERS, check_value
 from fusetune.px4.flight import ParameterHistory, ParameterValue
+from fusetune.px4.logger_settings import DEFAULT_SET_BIT, FROM_BOOT, PROFILE_FOR_REPLAY, WHEN_ARMED
 
 SYSTEM_PARAMETERS: dict[str, ParameterValue] = {
     "MAV_TYPE": 2,
-    "SDLOG_MODE": 2,
-    "SDLOG_PROFILE": 3,
+    "SDLOG_MODE": FROM_BOOT,
+    "SDLOG_PROFILE": PROFILE_FOR_REPLAY,
     "SENS_BARO_QNH": 1013.25,
     "SENS_IMU_MODE": 1,
     "SENS_MAG_MODE": 1,
@@ -22,8 +23,8 @@ SYSTEM_PARAMETERS: dict[str, ParameterValue] = {
 }
 """What is set on the vehicle beside EKF2."""
 SYSTEM_DEFAULTS: dict[str, ParameterValue] = SYSTEM_PARAMETERS | {
-    "SDLOG_MODE": 0,
-    "SDLOG_PROFILE": 1,
+    "SDLOG_MODE": WHEN_ARMED,
+    "SDLOG_PROFILE": DEFAULT_SET_BIT,
     "SYS_AUTOSTART": 0,
 }
 

@@ -106,6 +106,8 @@ class Flight:
     """Topics that were logged but whose definition the log lacks."""
     left_out: tuple[LeftOut, ...] = ()
     replaced_parameters: tuple[ReplacedParameter, ...] = ()
+    beyond_limits: tuple[str, ...] = ()
+    """Topics that were logged but are beyond what a log may ask for (`fusetune.px4.reading_limits`)."""
 
     def topic(self, name: str, instance: int = 0) -> TopicTable | None:
         """Columns of one topic instance, or `None` where the log has none."""

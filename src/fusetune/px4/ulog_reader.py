@@ -22,16 +22,20 @@ from fusetune.px4.flight import (
     TopicKey,
     TopicTable,
 )
-from fusetune.px4.ulog_definitions import is_padding
-from fusetune.px4.ulog_records import DATA_HEAD_BYTES, HEADER_BYTES, Scan, Scanner, Subscription
-from fusetune.px4.ulog_times import STORED_TOPICS, impossible_rows, newest_before
+from fusetune.px4.reading_limits import ReadingLimits, is_used, within_limits
+from fusetune.px4.release_layouts import ESTIMATOR_TOPICS
+from fusetune.px4.ulog_definitions import MessageLayout, is_padding
+from fusetune.px4.ulog_records import DATA_HEAD_BYTES, HEADER_BYTES, Scan, Scanner
+from fusetune.px4.ulog_times import STORED_TOPICS, ImpossibleRows, clock_of, impossible_rows, newest_before
 from fusetune.px4.ulog_values import LoggedValues, logged_values
+from fusetune.time_limit import Deadline, TimeLimitError
 
 _MAGIC = b"ULog\x01\x12\x35"
 _NEWEST_VERSION = 1
 _FLAG_BITS = struct.Struct("<HB8s8s3Q")
 _DATA_APPENDED = 1
 _LATEST_START_US = 1 << 62
+_IMU = ("sensor_combined", 0)
 _COPY_AGAIN = "Copy the log from the vehicle once more; what the logger did not write cannot be recovered"
 
 
@@ -42,34 +46,65 @@ class _Messages(NamedTuple):
     places: np.ndarray
 
 
-def read_ulog(path: str | os.PathLike[str]) -> Flight:
+def read_ulog(
+    path: str | os.PathLike[str], limits: ReadingLimits | None = None, deadline: Deadline | None = None
+) -> Flight:
     """Read a ULog file.
 
     Records that cannot be made sense of are passed over and noted in `Flight.corruption`; a topic whose definition is
     damaged is missing, and noted in `Flight.undefined_topics`. Messages whose time stamps cannot be are left out, and
-    counted in `Flight.left_out`. Topic columns have the dtypes of the log, except that `bool` fields are NumPy
-    booleans and 64-bit time stamps (`timestamp*`) are int64.
+    counted in `Flight.left_out`. Topics beyond the limits are named in `Flight.beyond_limits`. Topic columns have the
+    dtypes of the log, except that `bool` fields are NumPy booleans and 64-bit time stamps (`timestamp*`) are int64.
+
+    Parameters
+    ----------
+    limits
+        How many tables the log may have and how long reading it may take.
+    deadline
+        Of work that reading is a part of, in place of the limits' own.
 
     Raises
     ------
     UserError
-        The file cannot be opened, is empty, is no ULog, or holds no message that can be read.
+        The file cannot be opened, is empty, is no ULog, holds no message that can be read, or takes too long.
     """
-    file = Path(path)
+    limits = limits or ReadingLimits()
+    deadline = deadline or Deadline(limits.time_limit_s)
+    try:
+        return _read(Path(path), limits, deadline)
+    except TimeLimitError as error:
+        raise takes_too_long(path, deadline) from error
+
+
+def _is_input(key: TopicKey) -> bool:
+    return key[0] in ESTIMATOR_TOPICS
+
+
+def takes_too_long(path: str | os.PathLike[str], deadline: Deadline) -> UserError:
+    """The error for a log that the time was not enough for."""
+    reason = f"takes longer than {deadline.seconds:g} s: it is very large, or made of what no vehicle logs"
+    return UserError(path, reason, "If the log is sound, raise reading.time_limit_s in the configuration")
+
+
+def _read(file: Path, limits: ReadingLimits, deadline: Deadline) -> Flight:
     content = _content(file)
-    scanner = Scanner(content)
+    scanner = Scanner(content, deadline)
     notes = _scan_sections(file, content, scanner)
     scan = scanner.finish()
-    values = logged_values(content, scan)
+    values = logged_values(content, scan, deadline)
     notes += _damage(scan, values, len(content))
-    messages = _messages(content, scan)
+    messages, beyond = _messages(content, scan, limits, deadline)
     if not messages:
-        raise UserError(file, "holds no message that can be read", _COPY_AGAIN)
-    left_out = _without_impossible_rows(messages)
+        reason = "holds too many topics, and none that is used" if beyond else "holds no message that can be read"
+        raise UserError(file, reason, _COPY_AGAIN)
+    times, places = _times(messages), _places(messages)
+    clock = clock_of(times, places, _IMU, trusted=lambda key: is_used(key[0]))
+    left_out = _without_impossible_rows(messages, impossible_rows(times, places, clock, _is_input))
     if not messages:
         raise UserError(file, "holds no message whose time stamp can be", _COPY_AGAIN)
     times, places = _times(messages), _places(messages)
-    start, note = _start(content, times)
+    start, note = _start(content, times, clock)
+    deadline.check()
     return Flight(
         name=file.stem,
         topics={key: one.table for key, one in messages.items()},
@@ -85,6 +120,7 @@ def read_ulog(path: str | os.PathLike[str]) -> Flight:
         corruption=(*notes, *note),
         undefined_topics=tuple(sorted(set(scan.undefined_topics.values()))),
         left_out=left_out,
+        beyond_limits=beyond,
     )
 
 
@@ -100,6 +136,8 @@ def file_checksum(path: str | os.PathLike[str]) -> str:
 
 
 def _bytes_of(file: Path) -> bytes:
+    if file.exists() and not (file.is_file() or file.is_dir()):
+        raise UserError(file, "cannot be opened: it is no file", "Put a file in its place")
     try:
         return file.read_bytes()
     except OSError as error:
@@ -164,24 +202,30 @@ def _damage(scan: Scan, values: LoggedValues, size: int) -> list[str]:
     return notes
 
 
-def _messages(content: bytes, scan: Scan) -> dict[TopicKey, _Messages]:
-    found: dict[TopicKey, _Messages] = {}
+def _messages(
+    content: bytes, scan: Scan, limits: ReadingLimits, deadline: Deadline
+) -> tuple[dict[TopicKey, _Messages], tuple[str, ...]]:
+    """Tables of all topic instances within the limits, and the names of the topics beyond."""
+    found: dict[TopicKey, list[np.ndarray]] = {}
     for subscription in scan.subscriptions.values():
-        if not len(subscription.places):
-            continue
-        key = (subscription.topic, subscription.instance)
-        messages = _Messages(_table(content, subscription), subscription.places)
-        found[key] = _appended(found[key], messages) if key in found else messages
-    return dict(sorted(found.items()))
+        if len(subscription.places):
+            found.setdefault((subscription.topic, subscription.instance), []).append(subscription.places)
+    kept = within_limits({key: scan.definitions.size(key[0]).columns for key in found}, limits)
+    messages = {}
+    for key in sorted(kept):
+        deadline.check()
+        # data appended after a crash may be under another message id
+        places = found[key][0] if len(found[key]) == 1 else np.sort(np.concatenate(found[key]))
+        messages[key] = _Messages(_table(content, scan.definitions.layout(key[0]), places), places)
+    return messages, tuple(sorted({topic for topic, _ in found.keys() - kept}))
 
 
-def _table(content: bytes, subscription: Subscription) -> TopicTable:
-    """Columns of all messages of a subscription."""
-    layout = subscription.layout
+def _table(content: bytes, layout: MessageLayout, places: np.ndarray) -> TopicTable:
+    """Columns of all messages of a topic instance."""
     width = layout.dtype.itemsize
     # every place of the file seen as the begin of a message: taking the right ones copies each message once
     anywhere = np.ndarray((len(content) - width - DATA_HEAD_BYTES + 1,), f"V{width}", content, DATA_HEAD_BYTES, (1,))
-    rows = anywhere[subscription.places].view(layout.dtype)
+    rows = anywhere[places].view(layout.dtype)
     return {
         name: _column(name, rows[name], is_bool=name in layout.booleans)
         for name in layout.dtype.names or ()
@@ -197,16 +241,6 @@ def _column(name: str, values: np.ndarray, *, is_bool: bool) -> np.ndarray:
     return np.ascontiguousarray(values)
 
 
-def _appended(first: _Messages, second: _Messages) -> _Messages:
-    """Both parts of a topic that was subscribed twice (data appended after a crash), in the order of the file."""
-    if first.table.keys() != second.table.keys():
-        return max(first, second, key=lambda messages: len(messages.places))
-    places = np.concatenate([first.places, second.places])
-    order = np.argsort(places)
-    table = {name: np.concatenate([first.table[name], second.table[name]])[order] for name in first.table}
-    return _Messages(table, places[order])
-
-
 def _times(messages: Mapping[TopicKey, _Messages]) -> dict[TopicKey, np.ndarray]:
     """Time stamps of all topics that live by the clock of this flight."""
     return {key: one.table["timestamp"] for key, one in messages.items() if key[0] not in STORED_TOPICS}
@@ -216,25 +250,27 @@ def _places(messages: Mapping[TopicKey, _Messages]) -> dict[TopicKey, np.ndarray
     return {key: one.places for key, one in messages.items() if key[0] not in STORED_TOPICS}
 
 
-def _without_impossible_rows(messages: dict[TopicKey, _Messages]) -> tuple[LeftOut, ...]:
+def _without_impossible_rows(
+    messages: dict[TopicKey, _Messages], wrong: Mapping[TopicKey, ImpossibleRows]
+) -> tuple[LeftOut, ...]:
     """Take messages out whose time cannot be; what was taken out."""
-    wrong = impossible_rows(_times(messages), _places(messages))
-    for key, rows in wrong.items():
+    for key, (rows, _) in wrong.items():
         table, places = messages[key]
         messages[key] = _Messages({name: values[~rows] for name, values in table.items()}, places[~rows])
         if rows.all():
             del messages[key]
-    return tuple(LeftOut(*key, int(rows.sum()), len(rows), "impossible time stamp") for key, rows in wrong.items())
+    return tuple(LeftOut(*key, int(rows.sum()), len(rows), reason) for key, (rows, reason) in wrong.items())
 
 
-def _start(content: bytes, times: Mapping[TopicKey, np.ndarray]) -> tuple[int, list[str]]:
+def _start(content: bytes, times: Mapping[TopicKey, np.ndarray], clock: TopicKey | None) -> tuple[int, list[str]]:
     """Start of the log, and a note where the header's is impossible and the first time of the data takes its place."""
     (start,) = struct.unpack_from("<Q", content, 8)
     newest = max((int(one.max()) for one in times.values()), default=0)
     if start <= newest or (not times and start < _LATEST_START_US):
         return start, []
-    fastest = max(times.values(), key=len, default=np.zeros(1, np.int64))
-    return int(fastest.min()), [f"the time at which the log began is damaged ({start} µs)"]
+    known = None if clock is None else times.get(clock)
+    first = max(times.values(), key=len, default=np.zeros(1, np.int64)) if known is None else known
+    return int(first.min()), [f"the time at which the log began is damaged ({start} µs)"]
 
 
 def _parameters(

@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fusetune.px4.ulog_definitions import Field, MessageLayout, message_layout, parse_format, topic_name
+from fusetune.px4.ulog_definitions import Definitions, MessageSize, topic_name
+from fusetune.time_limit import Deadline
 
 HEADER_BYTES = 16
 SYNC_MAGIC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
@@ -32,7 +33,8 @@ _TOPIC = re.compile(rb"[A-Za-z]\w{0,99}")
 _MOST_PADDING = 64
 _MOST_STRANGE_RECORDS = 8
 _SMALLEST_SEARCH, _LARGEST_SEARCH = 256, 1 << 20
-_BLOCK_BYTES = 1 << 18
+_FIRST_BLOCK_BYTES, _LARGEST_BLOCK_BYTES = 1 << 12, 1 << 18
+"""A subscription changes what a block looks for, so blocks begin small behind each."""
 _NO_LENGTH = 1 << 20
 
 _KNOWN_KIND = np.zeros(256, np.bool_)
@@ -63,7 +65,7 @@ class Subscription:
 
     topic: str
     instance: int
-    layout: MessageLayout
+    size: MessageSize
     places: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     """Where each of its records begins, ascending."""
 
@@ -72,6 +74,7 @@ class Subscription:
 class Scan:
     """What a file is made of."""
 
+    definitions: Definitions = field(default_factory=Definitions)
     subscriptions: dict[int, Subscription] = field(default_factory=dict)
     records: list[Record] = field(default_factory=list)
     data_begin: int = HEADER_BYTES
@@ -103,14 +106,14 @@ class _Block:
 class Scanner:
     """Goes through the sections of a file and puts together its `Scan`."""
 
-    def __init__(self, content: bytes) -> None:
+    def __init__(self, content: bytes, deadline: Deadline | None = None) -> None:
         self._content = content
+        self._deadline = deadline or Deadline()
         self._bytes = np.frombuffer(content, np.uint8)
-        self._formats: dict[str, tuple[Field, ...]] = {}
-        self._layouts: dict[str, MessageLayout] = {}
         self._shortest = np.full(0x10000, _NO_LENGTH, np.int32)
         self._longest = np.zeros(0x10000, np.int32)
         self._block: _Block | None = None
+        self._block_bytes = _FIRST_BLOCK_BYTES
         self._runs: list[tuple[np.ndarray, np.ndarray]] = []
         self._in_definitions = True
         self._scan = Scan()
@@ -119,6 +122,7 @@ class Scanner:
         """Scan one section of the file: the bytes from `begin` to before `stop`."""
         position, self._block = begin, None
         while position < stop:
+            self._deadline.check()
             behind = self._behind_data(position, stop)
             position = behind if behind > position else self._step(position, stop)
 
@@ -150,7 +154,8 @@ class Scanner:
 
     def _data_in(self, begin: int, stop: int) -> _Block:
         """All that looks like a data record of a topic known so far and begins in the block from `begin` on."""
-        block_stop = min(begin + _BLOCK_BYTES, stop)
+        block_stop = min(begin + self._block_bytes, stop)
+        self._block_bytes = min(2 * self._block_bytes, _LARGEST_BLOCK_BYTES)
         last = min(block_stop, stop - DATA_HEAD_BYTES + 1)
         content = self._bytes
         places = np.flatnonzero(content[begin + 2 : max(last, begin) + 2] == _DATA) + begin
@@ -280,8 +285,7 @@ class Scanner:
             self._scan.data_begin = record.begin - _HEAD_BYTES
         try:
             if kind == "F":
-                name, fields = parse_format(self._content[record.begin : record.end])
-                self._formats.setdefault(name, fields)
+                self._scan.definitions.add(self._content[record.begin : record.end])
             elif kind == "A":
                 self._subscribe(record)
             elif kind not in "SRB":
@@ -299,15 +303,14 @@ class Scanner:
                 raise ValueError(f"message id {message_id} has two topics")
             return
         try:
-            layout = self._layouts.get(topic) or message_layout(topic, self._formats)
+            size = self._scan.definitions.size(topic)
+            padding = self._scan.definitions.padding(topic)
         except ValueError:
             self._scan.undefined_topics[message_id] = topic
             raise
-        self._layouts[topic] = layout
         self._scan.undefined_topics.pop(message_id, None)
-        subscription = Subscription(topic, instance, layout)
-        self._scan.subscriptions[message_id] = subscription
-        shortest = layout.dtype.itemsize + 2
+        self._scan.subscriptions[message_id] = Subscription(topic, instance, size)
+        shortest = size.size - padding + 2
         self._shortest[message_id] = shortest
-        self._longest[message_id] = min(layout.longest + 2, shortest + _MOST_PADDING)
-        self._block = None
+        self._longest[message_id] = min(size.size + 2, shortest + _MOST_PADDING)
+        self._block, self._block_bytes = None, _FIRST_BLOCK_BYTES

@@ -4,12 +4,16 @@ Two rules tell them, both from how a logger works. It writes messages soon after
 be much younger than the data that follow it in the file. And the messages of one topic come in order, so a single one
 that stands out of those before and behind it is wrong. Old messages are no error: when logging starts, the last message
 of every slow topic is written, whatever its age. The mission alone keeps the time of the flight that stored it.
+
+The clock of a flight is a topic that is logged often, whose time advances, and which most of the other topics agree
+with. Topics without time stamps of their own, with those of another clock, or with one that runs backward, outnumber
+the IMU in some logs. They are left out where they stand in the future, or are needed; else they stay as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from typing import TypeVar
+from collections.abc import Callable, Hashable, Mapping
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,11 +21,22 @@ _MOST_OUT_OF_LINE_US = 1_000_000
 _LATEST_US = 1 << 62
 _MOST_AHEAD_US = 5_000_000
 _FEWEST_CLOCK_ROWS = 100
-"""A topic with fewer messages is no clock for the others."""
+"""A topic with fewer messages is no clock for the others, and too few to tell that it has another clock."""
+_SMALL_TOPIC_ROWS = 4096
+_MOST_CANDIDATES, _MOST_VOTERS, _MOST_ROWS_ASKED = 8, 64, 64
+_SMALLEST_FORWARD_SHARE, _SMALLEST_ADVANCING_SHARE = 0.9, 0.5
+IMPOSSIBLE, ANOTHER_CLOCK = "impossible time stamp", "time stamps of another clock, or none"
 STORED_TOPICS = frozenset({"mission"})
 """Topics that outlive a restart of the autopilot with their time stamps."""
 
 Key = TypeVar("Key", bound=Hashable)
+
+
+class ImpossibleRows(NamedTuple):
+    """Rows of a topic instance whose time cannot be, (rows,) bool, and why."""
+
+    rows: np.ndarray
+    reason: str
 
 
 def out_of_line(timestamps: np.ndarray) -> np.ndarray:
@@ -47,32 +62,102 @@ def out_of_line(timestamps: np.ndarray) -> np.ndarray:
     return wrong
 
 
-def impossible_rows(timestamps: Mapping[Key, np.ndarray], places: Mapping[Key, np.ndarray]) -> dict[Key, np.ndarray]:
+def clock_of(
+    timestamps: Mapping[Key, np.ndarray],
+    places: Mapping[Key, np.ndarray],
+    preferred: Key,
+    trusted: Callable[[Key], bool] = lambda _: True,
+) -> Key | None:
+    """The topic instance by whose time stamps the others are judged; None where none is fit for it.
+
+    Parameters
+    ----------
+    timestamps, places
+        As `impossible_rows`.
+    preferred
+        Of topics that as many others agree with, the one to take.
+    trusted
+        Whose agreement counts, where there are any such topics.
+    """
+    fit = [key for key, values in timestamps.items() if len(values) >= _FEWEST_CLOCK_ROWS and _advances(values)]
+    fit.sort(key=lambda key: (key != preferred, -len(timestamps[key])))
+    voters = [key for key in fit if trusted(key)][:_MOST_VOTERS] or fit[:_MOST_VOTERS]
+
+    def votes(key: Key) -> int:
+        return sum(not _by_another_clock(timestamps, places, one, key) for one in voters)
+
+    # of equal ones the first: the preferred one, then the one that is logged most often
+    return max(fit[:_MOST_CANDIDATES], key=votes, default=None)
+
+
+def _advances(timestamps: np.ndarray) -> bool:
+    """Whether time goes forward all in all, as damage of single messages leaves it."""
+    steps = np.diff(np.clip(timestamps, 0, _LATEST_US))
+    forward, advancing = float(np.mean(steps >= 0)), float(np.mean(steps > 0))
+    return forward >= _SMALLEST_FORWARD_SHARE and advancing >= _SMALLEST_ADVANCING_SHARE
+
+
+def _by_another_clock(
+    timestamps: Mapping[Key, np.ndarray], places: Mapping[Key, np.ndarray], key: Key, clock: Key
+) -> bool:
+    """Whether most messages of a topic are of another time than what lies beside them in the file."""
+    asked = np.unique(np.linspace(0, len(timestamps[key]) - 1, _MOST_ROWS_ASKED).astype(np.int64))
+    beside = np.minimum(np.searchsorted(places[clock], places[key][asked]), len(places[clock]) - 1)
+    apart = np.abs(np.clip(timestamps[key][asked], 0, _LATEST_US) - np.clip(timestamps[clock][beside], 0, _LATEST_US))
+    return bool(np.mean(apart > _MOST_AHEAD_US) > 0.5)
+
+
+def impossible_rows(
+    timestamps: Mapping[Key, np.ndarray],
+    places: Mapping[Key, np.ndarray],
+    clock: Key | None,
+    needed: Callable[[Key], bool] = lambda _: False,
+) -> dict[Key, ImpossibleRows]:
     """Rows with impossible time stamps, of each topic instance that has any.
 
     Parameters
     ----------
     timestamps, places
         Of each topic instance: µs since boot, (rows,) int64, and where in the file each message lies, ascending.
+    clock
+        As `clock_of` tells.
+    needed
+        Topics that are of no use with the time stamps of another clock.
     """
-    if not timestamps:
-        return {}
     wrong = {key: out_of_line(values) for key, values in timestamps.items()}
-    reference = max(timestamps, key=lambda key: len(timestamps[key]))
-    # behind the last message of the fastest topic nothing follows that would tell; its neighbour does
-    if len(timestamps[reference]) > 1:
-        wrong[reference][-1] |= timestamps[reference][-1] > timestamps[reference][-2] + _MOST_AHEAD_US
-    kept = ~wrong[reference]
-    clock, clock_places = timestamps[reference][kept], places[reference][kept]
-    if len(clock) < _FEWEST_CLOCK_ROWS:
-        return {key: rows for key, rows in wrong.items() if rows.any()}
-    newest = int(clock.max()) + _MOST_AHEAD_US
+    if clock is None:
+        return _any_of(wrong, IMPOSSIBLE)
+    # behind the last message of the clock nothing follows that would tell; its neighbour does
+    wrong[clock][-1] |= timestamps[clock][-1] > timestamps[clock][-2] + _MOST_AHEAD_US
+    kept = ~wrong[clock]
+    now, now_places = timestamps[clock][kept], places[clock][kept]
+    newest = int(now.max()) + _MOST_AHEAD_US
+    strangers = {}
     for key, values in timestamps.items():
-        if key == reference or _in_order(values, newest):
+        if key == clock:
             continue
-        following = np.minimum(np.searchsorted(clock_places, places[key], side="right"), len(clock) - 1)
-        wrong[key] |= values > clock[following] + _MOST_AHEAD_US
-    return {key: rows for key, rows in wrong.items() if rows.any()}
+        is_stranger = len(values) >= _FEWEST_CLOCK_ROWS and _is_stranger(timestamps, places, key, clock)
+        if is_stranger and (needed(key) or int(np.median(values)) > newest):
+            strangers[key] = np.ones(len(values), np.bool_)
+        elif not _in_order(values, newest):
+            following = np.minimum(np.searchsorted(now_places, places[key], side="right"), len(now) - 1)
+            wrong[key] |= values > now[following] + _MOST_AHEAD_US
+    return _any_of(wrong, IMPOSSIBLE) | _any_of(strangers, ANOTHER_CLOCK)
+
+
+def _is_stranger(timestamps: Mapping[Key, np.ndarray], places: Mapping[Key, np.ndarray], key: Key, clock: Key) -> bool:
+    """Whether a topic of many messages does not live by the clock of the flight."""
+    values = timestamps[key]
+    if values[0] == values[-1] and np.all(values == values[0]):
+        first, last = np.searchsorted(places[clock], places[key][[0, -1]])
+        passed = timestamps[clock][min(last, len(places[clock]) - 1)] - timestamps[clock][first - (first > 0)]
+        if passed > _MOST_OUT_OF_LINE_US:
+            return True
+    return _by_another_clock(timestamps, places, key, clock)
+
+
+def _any_of(wrong: Mapping[Key, np.ndarray], reason: str) -> dict[Key, ImpossibleRows]:
+    return {key: ImpossibleRows(rows, reason) for key, rows in wrong.items() if rows.any()}
 
 
 def _in_order(timestamps: np.ndarray, newest: int) -> bool:
@@ -86,8 +171,15 @@ def newest_before(
     result = np.full(len(query_places), start, np.int64)
     if not len(query_places):
         return result
-    for key, values in timestamps.items():
-        rows = np.searchsorted(places[key], query_places) - 1
+    # small topics are put together, so that thousands of them cost no more than one; large ones would take the memory
+    small = [key for key, values in timestamps.items() if len(values) < _SMALL_TOPIC_ROWS]
+    parts = [(places[key], values) for key, values in timestamps.items() if len(values) >= _SMALL_TOPIC_ROWS]
+    if small:
+        together = np.concatenate([places[key] for key in small])
+        order = np.argsort(together)
+        parts.append((together[order], np.concatenate([timestamps[key] for key in small])[order]))
+    for part_places, values in parts:
+        rows = np.searchsorted(part_places, query_places) - 1
         reached = rows >= 0
         newest = np.maximum.accumulate(values)
         result[reached] = np.maximum(result[reached], newest[rows[reached]])

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from fusetune.px4.flight import ParameterValue
 from fusetune.px4.ulog_records import Record, Scan
+from fusetune.time_limit import Deadline
 
 _LEVELS = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "NOTICE", "INFO", "DEBUG")
 _CODES = {
@@ -61,10 +62,11 @@ class LoggedValues:
     """Records whose content is not what their kind says."""
 
 
-def logged_values(content: bytes, scan: Scan) -> LoggedValues:
+def logged_values(content: bytes, scan: Scan, deadline: Deadline | None = None) -> LoggedValues:
     """Interpret the records that a scan found."""
-    values = LoggedValues()
+    values, deadline = LoggedValues(), deadline or Deadline()
     for record in scan.records:
+        deadline.check()
         try:
             _interpret(values, chr(record.kind), content[record.begin : record.end], record, scan)
         except (ValueError, IndexError, struct.error):

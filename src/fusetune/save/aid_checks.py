@@ -15,12 +15,14 @@ from fusetune.px4.flight import Flight, LeftOut, row_count
 from fusetune.px4.sensor_limits import LACKS_FIELD
 from fusetune.save.log_checks import WHOLE_LOG
 from fusetune.save.log_facts import rate_hz
+from fusetune.save.logging_advice import log_more, slowness
 from fusetune.save.magnetometer_mounting import magnetometer_mounting
 from fusetune.save.verdict import Check, VerdictThresholds
 
 _FIX_3D = 3
 _MAG_TYPE_NONE = 5
 _GNSS, _VISION = "vehicle_gps_position", "vehicle_visual_odometry"
+_MAG, _BARO = "vehicle_magnetometer", "vehicle_air_data"
 _POSITION, _ALTITUDE, _VELOCITY, _YAW = 0b0001, 0b0010, 0b0100, 0b1000
 """Bits of EKF2_GPS_CTRL and EKF2_EV_CTRL."""
 
@@ -40,7 +42,6 @@ _WORDS = {
     "auxvel": "landing target",
 } | {sensor: f"external vision's {part}" for sensor, (part, _) in _VISION_PARTS.items()}
 _DROPPED = "Mend what the sensor's driver reports, or switch the sensor off"
-_LOG_MORE = "Log with SDLOG_PROFILE bit 1 (estimator replay) set"
 _BETTER_SKY = "Wait for a fix before take-off, with a free sky"
 _ONBOARD_AIDS = {
     "cs_gnss_pos": "GNSS",
@@ -81,7 +82,7 @@ class _Aids:
         """Why there are no messages of a topic, and the remedy."""
         entry = self.lacks_fields(topic)
         if entry is None:
-            return f"no {words} samples", _LOG_MORE
+            return f"no {words} samples", log_more(self.flight, topic)
         return f"no {words} samples that can be used (each {entry.reason})", WHOLE_LOG
 
     @property
@@ -118,11 +119,11 @@ def magnetometer(aids: _Aids) -> Check:
         return Check(name, "does-not-apply", "EKF2_MAG_TYPE switches the magnetometer off")
     rate = rate_hz(aids.flight.topic("vehicle_magnetometer"))
     if rate is None:
-        why, remedy = aids.why_no_samples("vehicle_magnetometer", "magnetometer")
+        why, remedy = aids.why_no_samples(_MAG, "magnetometer")
         return Check(name, "warning", f"{why}: the heading comes from other sources only", remedy, 0.0, threshold)
     if rate < threshold:
-        reason = f"the magnetometer is logged at only {rate:.1f} Hz"
-        return Check(name, "warning", reason, _LOG_MORE, rate, threshold)
+        reason = slowness(aids.flight, _MAG, "magnetometer", rate)
+        return Check(name, "warning", reason, log_more(aids.flight, _MAG), rate, threshold)
     return Check(name, "pass", f"the magnetometer is logged at {rate:.1f} Hz", "", rate, threshold)
 
 
@@ -138,7 +139,8 @@ def barometer(aids: _Aids) -> Check:
     if rate is not None and rate >= threshold:
         return Check(name, "pass", f"the barometer is logged at {rate:.1f} Hz", "", rate, threshold)
     if rate is not None:
-        return Check(name, "warning", f"the barometer is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
+        reason = slowness(aids.flight, _BARO, "barometer", rate)
+        return Check(name, "warning", reason, log_more(aids.flight, _BARO), rate, threshold)
     others = []
     if aids.uses("EKF2_GPS_CTRL", _ALTITUDE) and aids.usable_fixes:
         others.append("GNSS")
@@ -146,10 +148,11 @@ def barometer(aids: _Aids) -> Check:
         others.append("external vision")
     if aids.parameters["EKF2_RNG_CTRL"] > 0 and aids.is_given("range"):
         others.append("range finder")
-    why, remedy = aids.why_no_samples("vehicle_air_data", "barometer")
+    why, remedy = aids.why_no_samples(_BARO, "barometer")
     if not others:
         said = "nothing in the log measures the height"
-        return Check(name, "fail", said if remedy == _LOG_MORE else f"{said} ({why})", remedy, 0.0, threshold)
+        reason = f"{said} ({why})" if aids.lacks_fields(_BARO) else said
+        return Check(name, "fail", reason, remedy, 0.0, threshold)
     if not aids.parameters["EKF2_BARO_CTRL"]:
         return Check(name, "does-not-apply", "EKF2_BARO_CTRL switches the barometer off")
     return Check(name, "warning", f"{why}; height from {', '.join(others)}", remedy, 0.0, threshold)
@@ -163,7 +166,7 @@ def gnss(aids: _Aids) -> Check:
     rate = rate_hz(aids.flight.topic(_GNSS))
     if rate is None:
         why, remedy = aids.why_no_samples(_GNSS, "GNSS")
-        if remedy == _LOG_MORE:
+        if not aids.lacks_fields(_GNSS):
             return Check(name, "does-not-apply", "the log holds no GNSS samples")
         return Check(name, "warning", why, remedy, 0.0, threshold)
     one = aids.given["gnss"]
@@ -171,7 +174,8 @@ def gnss(aids: _Aids) -> Check:
     if refused > (1.0 - aids.limits.low_gnss_fix_share) * one.messages:
         return Check(name, "warning", f"{_told(one)}, at {rate:.1f} Hz", _DROPPED, float(one.given), threshold)
     if rate < threshold:
-        return Check(name, "warning", f"GNSS is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
+        reason = f"GNSS is logged at only {rate:.1f} Hz"
+        return Check(name, "warning", reason, log_more(aids.flight, _GNSS), rate, threshold)
     return Check(name, "pass", f"GNSS is logged at {rate:.1f} Hz", "", rate, threshold)
 
 
@@ -239,7 +243,7 @@ def horizontal_aid(aids: _Aids) -> Check:
         return Check(name, "warning", reason, unusable[0][1], 0.0, 1.0)
     if onboard:
         reason = f"{flown}, whose samples the log lacks: no horizontal aiding"
-        return Check(name, "warning", reason, _LOG_MORE, 0.0, 1.0)
+        return Check(name, "warning", reason, log_more(aids.flight, ""), 0.0, 1.0)
     reason = "nothing in the log aids the horizontal position: only height, heading and tilt can be judged"
     return Check(name, "warning", reason, "Log GNSS, optical flow or external vision", 0.0, 1.0)
 
@@ -268,9 +272,8 @@ def _unusable_aids(aids: _Aids) -> Iterator[tuple[str, str]]:
     }
     topics = {"gnss": _GNSS, "ev_pos": _VISION, "ev_vel": _VISION, "flow": "vehicle_optical_flow"}
     for sensor in (sensor for sensor, is_on in switched_on.items() if is_on):
-        why, remedy = aids.why_no_samples(topics[sensor], _WORDS[sensor])
-        if remedy != _LOG_MORE:
-            yield why, remedy
+        if aids.lacks_fields(topics[sensor]):
+            yield aids.why_no_samples(topics[sensor], _WORDS[sensor])
         elif sensor in aids.given and _is_withheld(aids.given[sensor]):
             yield _told(aids.given[sensor]), _DROPPED
 

@@ -7,11 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from fusetune.px4.flight import Flight
-from fusetune.save.log_checks import ONE_ESTIMATOR
 from fusetune.save.log_facts import airborne_intervals
+from fusetune.save.logging_advice import ONE_ESTIMATOR, log_from_boot
 from fusetune.save.verdict import Check, Status, VerdictThresholds
 
-_FROM_BOOT = "Set SDLOG_MODE = 2, so that the log begins when the autopilot starts"
 _ONE_ESTIMATOR = f"Set {ONE_ESTIMATOR}, so that one estimator runs on one IMU"
 _SAVED_BY_EKF2 = ("EKF2_MAG_DECL", "EKF2_MAGBIAS_X", "EKF2_MAGBIAS_Y", "EKF2_MAGBIAS_Z")
 """Parameters that the estimator itself stores."""
@@ -50,11 +49,11 @@ def log_start(flight: Flight, limits: VerdictThresholds) -> Check:
         return Check(name, "does-not-apply", "no take-off in the log")
     lead = (intervals[0][0] - int(flight.topics["sensor_combined", 0]["timestamp"].min())) * 1e-6
     if lead <= 0.0:
-        return Check(name, "warning", "the log begins in the air", _FROM_BOOT, lead, threshold)
+        return Check(name, "warning", "the log begins in the air", log_from_boot(flight), lead, threshold)
     said = f"the log begins {lead:.1f} s before take-off"
     if lead < threshold:
         reason = f"{said}: the filter aligns and learns its biases in flight"
-        return Check(name, "warning", reason, _FROM_BOOT, lead, threshold)
+        return Check(name, "warning", reason, log_from_boot(flight), lead, threshold)
     return Check(name, "pass", said, "", lead, threshold)
 
 

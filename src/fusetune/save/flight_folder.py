@@ -26,6 +26,7 @@ from fusetune.px4.flight import (
     ParameterValue,
     TopicTable,
 )
+from fusetune.time_limit import Deadline
 
 METADATA_FILE = "metadata.json"
 _FORMAT = 2
@@ -33,17 +34,30 @@ _BYTES_KEY = "base64"
 _RUN_AGAIN = "Delete the folder and run the pipeline again"
 
 
-def write_flight(folder: str | os.PathLike[str], flight: Flight, extra: dict[str, Any] | None = None) -> None:
+def write_flight(
+    folder: str | os.PathLike[str],
+    flight: Flight,
+    extra: dict[str, Any] | None = None,
+    deadline: Deadline | None = None,
+) -> None:
     """Write a flight to a folder, which must exist.
 
     Parameters
     ----------
     extra
         Further entries of `metadata.json`.
+    deadline
+        By which it has to be done.
+
+    Raises
+    ------
+    TimeLimitError
+        It is not, by then; what was written stays.
     """
-    target = Path(folder)
+    target, deadline = Path(folder), deadline or Deadline()
     entries = []
     for (topic, instance), table in sorted(flight.topics.items()):
+        deadline.check()
         file = f"{topic}_{instance}.parquet"
         _write_table(target / file, table)
         entries.append({"topic": topic, "instance": instance, "rows": len(table["timestamp"]), "file": file})
@@ -96,6 +110,7 @@ def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None =
         corruption=tuple(document["corruption"]),
         undefined_topics=tuple(document["undefined_topics"]),
         left_out=tuple(LeftOut(*entry) for entry in document["left_out"]),
+        beyond_limits=tuple(document.get("beyond_limits", ())),
     )
 
 
@@ -156,6 +171,7 @@ def _metadata(flight: Flight) -> dict[str, Any]:
         "corruption": list(flight.corruption),
         "undefined_topics": list(flight.undefined_topics),
         "left_out": [list(entry) for entry in flight.left_out],
+        "beyond_limits": list(flight.beyond_limits),
         "info": {key: _storable(value) for key, value in sorted(flight.info.items())},
         "multi_info": flight.multi_info,
         "parameters": {

@@ -7,10 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from fusetune.px4.flight import Flight, TopicTable, field_names
-from fusetune.save.verdict import Check, VerdictThresholds
+from fusetune.save.logging_advice import FASTER_CARD, log_more
+from fusetune.save.verdict import Check, Status, VerdictThresholds
 
-_LOG_MORE = "Log with SDLOG_PROFILE bit 1 (estimator replay) set"
-_FASTER_CARD = "Use a faster SD card, or log fewer topics"
+_CHECK_IMU_DRIVER = "Use the IMU driver of a PX4 release; integration times are microseconds, as time stamps are"
+_SHORTEST_INTERVAL_S = 2e-4
+"""Half of the interval of PX4's fastest gyroscope."""
 _CLIPPING_SINCE = (1, 11, 0)
 _NEEDED = ("gyro_rad", "accelerometer_m_s2")
 _INTEGRATION_TIMES = ("gyro_integral_dt", "accelerometer_integral_dt")
@@ -20,7 +22,12 @@ def imu_present(flight: Flight) -> Check:
     """Whether there are IMU samples that can be integrated at all."""
     imu = flight.topic("sensor_combined")
     if imu is None or len(imu["timestamp"]) < 2:
-        return Check("imu_present", "fail", "the log holds no IMU samples (topic sensor_combined)", _LOG_MORE)
+        return Check(
+            "imu_present",
+            "fail",
+            "the log holds no IMU samples (topic sensor_combined)",
+            log_more(flight, "sensor_combined"),
+        )
     missing = [name for name in _NEEDED if len(field_names(imu, name)) != 3]
     missing += [name for name in _INTEGRATION_TIMES if name not in imu]
     if missing:
@@ -54,10 +61,10 @@ def imu_rate(flight: Flight, limits: VerdictThresholds) -> Check:
     rate = 1e6 / float(np.median(forward)) if len(forward) else 0.0
     if rate < limits.min_imu_rate_hz:
         reason = f"the IMU is logged at {rate:.0f} Hz, too slow to integrate (at least {limits.min_imu_rate_hz:.0f} Hz)"
-        return Check("imu_rate", "fail", reason, _LOG_MORE, rate, limits.min_imu_rate_hz)
+        return Check("imu_rate", "fail", reason, log_more(flight, "sensor_combined"), rate, limits.min_imu_rate_hz)
     if rate < limits.low_imu_rate_hz:
         reason = f"the IMU is logged at only {rate:.0f} Hz"
-        return Check("imu_rate", "warning", reason, _LOG_MORE, rate, limits.low_imu_rate_hz)
+        return Check("imu_rate", "warning", reason, log_more(flight, "sensor_combined"), rate, limits.low_imu_rate_hz)
     return Check("imu_rate", "pass", f"the IMU is logged at {rate:.0f} Hz", "", rate, limits.min_imu_rate_hz)
 
 
@@ -82,7 +89,7 @@ def imu_gaps(flight: Flight, limits: VerdictThresholds) -> Check:
     if count:
         gaps = "a gap" if count == 1 else f"{count} gaps"
         reason = f"the IMU samples have {gaps} of up to {longest:.2f} s"
-        return Check("imu_gaps", "warning", reason, _FASTER_CARD, longest, limits.high_imu_gap_s)
+        return Check("imu_gaps", "warning", reason, FASTER_CARD, longest, limits.high_imu_gap_s)
     return Check("imu_gaps", "pass", f"no gap longer than {longest:.3f} s", "", longest, limits.high_imu_gap_s)
 
 
@@ -99,19 +106,31 @@ def imu_clipping(flight: Flight, limits: VerdictThresholds) -> Check:
 
 
 def imu_coverage(flight: Flight, limits: VerdictThresholds) -> Check:
-    """Share of the time that IMU samples integrate over; the rest was lost by the logger."""
-    imu = _imu(flight)
+    """Share of the time that IMU samples integrate over; the rest was lost by the logger.
+
+    Of the accelerometer's and the gyroscope's integration times the sum counts that is farther from the time passed.
+    """
+    name, imu = "imu_coverage", _imu(flight)
     duration = _duration_s(imu)
-    integrated = float(np.sum(imu["gyro_integral_dt"][1:], dtype=np.float64)) * 1e-6
-    coverage = integrated / duration if duration > 0.0 else 0.0
+    sums = [float(np.sum(imu[column][1:], dtype=np.float64)) * 1e-6 for column in _INTEGRATION_TIMES]
+    coverage = max((total / duration for total in sums), key=lambda share: abs(share - 1.0)) if duration > 0.0 else 0.0
+    interval_s = float(np.median(imu["gyro_integral_dt"])) * 1e-6
     said = f"IMU samples cover {coverage:.0%} of the time"
+    if coverage > limits.high_imu_coverage:
+        status: Status = "fail" if coverage > limits.max_imu_coverage else "warning"
+        reason = f"the integration times of the IMU do not fit its time stamps: {said}"
+        threshold = limits.max_imu_coverage if status == "fail" else limits.high_imu_coverage
+        return Check(name, status, reason, _CHECK_IMU_DRIVER, coverage, threshold)
+    if interval_s < _SHORTEST_INTERVAL_S:
+        reason = f"the integration times of the IMU are not in microseconds ({interval_s * 1e6:g}): {said}"
+        return Check(name, "fail", reason, _CHECK_IMU_DRIVER, coverage, limits.min_imu_coverage)
     if coverage < limits.min_imu_coverage:
         reason = f"{said} (at least {limits.min_imu_coverage:.0%})"
-        return Check("imu_coverage", "fail", reason, _FASTER_CARD, coverage, limits.min_imu_coverage)
+        return Check(name, "fail", reason, FASTER_CARD, coverage, limits.min_imu_coverage)
     if coverage < limits.low_imu_coverage:
         reason = f"{said}: the logger lost samples"
-        return Check("imu_coverage", "warning", reason, _FASTER_CARD, coverage, limits.low_imu_coverage)
-    return Check("imu_coverage", "pass", said, "", coverage, limits.low_imu_coverage)
+        return Check(name, "warning", reason, FASTER_CARD, coverage, limits.low_imu_coverage)
+    return Check(name, "pass", said, "", coverage, limits.low_imu_coverage)
 
 
 def _imu(flight: Flight) -> TopicTable:

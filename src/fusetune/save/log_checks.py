@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
+from fusetune.px4.estimator_samples import is_complete, logged_share
 from fusetune.px4.flight import Flight
+from fusetune.px4.logger_settings import ESTIMATOR_REPLAY_BIT, MODES, logging_mode_of, logging_profile_of
 from fusetune.px4.sensor_limits import LACKS_FIELD, NO_ADVANCE
+from fusetune.px4.ulog_times import ANOTHER_CLOCK, IMPOSSIBLE
 from fusetune.save.log_facts import rate_hz
+from fusetune.save.logging_advice import FASTER_CARD, next_flight_settings
 from fusetune.save.parameter_checks import parameter_values
 from fusetune.save.verdict import Check, Status, VerdictThresholds
 
 _CHECK_SENSORS = "Check the SD card and the sensors"
 WHOLE_LOG = "Use the log as PX4 wrote it: what made or converted this file kept some fields only"
 _COPY_AGAIN = "Copy the log from the vehicle again; check the SD card"
-_IMU, _REPLAY_PROFILE_BIT, _DEFAULT_PROFILE_BIT = "sensor_combined", 0b10, 0b01
-_TIME_REASONS = ("impossible time stamp", NO_ADVANCE)
-_VERBOSE_SINCE = (1, 16, 0)
-_MODES = {
-    0: "while armed",
-    1: "from boot to disarming",
-    2: "from boot to shutdown",
-    3: "by a switch",
-    4: "from first arming to shutdown",
-}
-ONE_ESTIMATOR = "EKF2_MULTI_IMU = 0 and EKF2_MULTI_MAG = 0 with SENS_IMU_MODE = 1 and SENS_MAG_MODE = 1"
+_IMU = "sensor_combined"
+_TIME_REASONS = (IMPOSSIBLE, ANOTHER_CLOCK, NO_ADVANCE)
+_THINNED_TOPICS = {"magnetometer": "vehicle_magnetometer", "barometer": "vehicle_air_data"}
+"""What PX4's default profile logs seldom."""
 _DEVIATIONS = (
     ((1, 13, 99), "its EKF2 took the height from one source at a time and had its own logic for heading and GNSS"),
     ((1, 14, 99), "its EKF2 had another error state and fused the magnetometer's heading on its own"),
@@ -52,6 +48,17 @@ def definitions(flight: Flight, limits: VerdictThresholds) -> Check:
     return Check(name, status, reason, _COPY_AGAIN, float(len(missing)), 0.0)
 
 
+def tables(flight: Flight, limits: VerdictThresholds) -> Check:
+    """Whether all topics became tables, or only those that are used."""
+    name, beyond = "tables", flight.beyond_limits
+    if not beyond:
+        return Check(name, "pass", "all topics became tables", "", 0.0, 0.0)
+    shown = f"{', '.join(beyond[:5])}{' …' if len(beyond) > 5 else ''}"
+    reason = f"the log has more topics than it may: {len(beyond)} of them did not become tables ({shown})"
+    remedy = "Log fewer topics, or raise reading.max_tables and reading.max_columns in the configuration"
+    return Check(name, "warning", reason, remedy, float(len(beyond)), 0.0)
+
+
 def time_stamps(flight: Flight, limits: VerdictThresholds) -> Check:
     """Messages that were left out because their time cannot be."""
     return _left_out(flight, limits, "time_stamps", "time stamps", is_time=True)
@@ -76,6 +83,8 @@ def _left_out(flight: Flight, limits: VerdictThresholds, name: str, what: str, *
     if share > threshold:
         reason = f"{share:.1%} of the IMU samples have impossible {what}: {reason}"
         return Check(name, "fail", reason, remedy, share, threshold)
+    if all(entry.reason == ANOTHER_CLOCK for entry in entries):
+        remedy = "Let what publishes it use the autopilot's time"
     return Check(name, "warning", reason, remedy, share, threshold)
 
 
@@ -98,43 +107,39 @@ def firmware(flight: Flight, limits: VerdictThresholds) -> Check:
 def logging_profile(flight: Flight, limits: VerdictThresholds) -> Check:
     """Whether the log holds every sample that the estimator had."""
     name, settings = "logging_profile", flight.parameters.at_end()
-    profile = _whole(settings.get("SDLOG_PROFILE"))
-    rates = {
-        "magnetometer": (rate_hz(flight.topic("vehicle_magnetometer")), limits.low_magnetometer_rate_hz),
-        "barometer": (rate_hz(flight.topic("vehicle_air_data")), limits.low_barometer_rate_hz),
-    }
-    full = all(rate is None or rate >= threshold for rate, threshold in rates.values())
-    if full and (flight.has("ekf2_timestamps") or profile & _REPLAY_PROFILE_BIT):
+    profile = logging_profile_of(settings)
+    shares = {what: logged_share(flight, topic) for what, topic in _THINNED_TOPICS.items()}
+    told = {what: share for what, share in shares.items() if share is not None}
+    if told and all(is_complete(share) for share in told.values()):
+        return Check(name, "pass", f"every sample of {' and '.join(told)} is in the log", "", float(profile))
+    rates = {what: rate_hz(flight.topic(topic)) for what, topic in _THINNED_TOPICS.items()}
+    full = all(rate is None or rate >= getattr(limits, f"low_{what}_rate_hz") for what, rate in rates.items())
+    for_replay = bool(profile & ESTIMATOR_REPLAY_BIT)
+    if full and not told and (flight.has("ekf2_timestamps") or for_replay):
         return Check(name, "pass", "logged with the profile for estimator replay", "", float(profile))
-    shown = ", ".join(f"{what} {rate:.1f} Hz" for what, (rate, _) in rates.items() if rate is not None)
+    shown = ", ".join(f"{what} {rate:.1f} Hz" for what, rate in rates.items() if rate is not None)
     known = "" if "SDLOG_PROFILE" not in settings else f"SDLOG_PROFILE = {profile}, "
-    if full and shown:
+    if full and not told and shown:
         return Check(name, "pass", f"logged at the sensors' rates ({known}{shown})", "", float(profile))
-    mode = settings.get("SDLOG_MODE")
-    when = "" if mode is None else f"; logged {_MODES.get(_whole(mode), 'otherwise')} (SDLOG_MODE = {mode:g})"
+    remedy = next_flight_settings(flight)
+    if told:
+        lost = ", ".join(f"{1.0 - share:.0%} of the {what}'s" for what, share in told.items() if not is_complete(share))
+        reason = f"the log lacks samples that the estimator had ({lost})"
+        return Check(name, "warning", reason, FASTER_CARD if for_replay else remedy, float(profile))
+    if for_replay:
+        reason = f"few samples though the profile for estimator replay is set ({known}{shown or 'none'})"
+        remedy = "Check the drivers and rates of these sensors, and that the SD card keeps up"
+        return Check(name, "warning", reason, remedy, float(profile))
+    mode = logging_mode_of(settings)
+    when = "" if mode is None else f"; logged {MODES.get(mode, 'otherwise')} (SDLOG_MODE = {mode})"
     reason = f"logged with a thinned profile ({known}{shown or 'no magnetometer and barometer'}{when})"
-    return Check(name, "warning", reason, next_flight_settings(flight), float(profile))
-
-
-def next_flight_settings(flight: Flight) -> str:
-    """The parameters that make the log of the next flight replayable to the last sample."""
-    profile = _whole(flight.parameters.at_end().get("SDLOG_PROFILE")) | _REPLAY_PROFILE_BIT | _DEFAULT_PROFILE_BIT
-    advice = [f"SDLOG_PROFILE = {profile} (adds the set for estimator replay)", "SDLOG_MODE = 2 (log from boot)"]
-    if len(flight.instances("estimator_status")) > 1 or flight.has("estimator_selector_status"):
-        advice.append(f"{ONE_ESTIMATOR} (one estimator on one IMU)")
-    if flight.release is None or flight.release >= _VERBOSE_SINCE:
-        advice.append("EKF2_LOG_VERBOSE = 1")
-    return f"For the next flight set {'; '.join(advice)}; then restart"
-
-
-def _whole(value: float | None) -> int:
-    """A whole parameter; 0 where it is missing or damaged."""
-    return int(value) if value is not None and math.isfinite(value) else 0
+    return Check(name, "warning", reason, remedy, float(profile))
 
 
 CHECKS: tuple[Callable[[Flight, VerdictThresholds], Check], ...] = (
     readable,
     definitions,
+    tables,
     time_stamps,
     sensor_values,
     firmware,

@@ -32,8 +32,8 @@ _HARDWARE_KEYS = ("ver_hw", "ver_hw_subtype", "sys_mcu", "sys_uuid")
 class FlightTimes:
     """How long a flight was; seconds, by the clock of the autopilot."""
 
-    imu_s: float
-    """From the first IMU sample to the last."""
+    duration_s: float
+    """From the first IMU sample to the last; of a log without them, from its start to its last message."""
     airborne_s: float | None
     """Time that the land detector calls airborne within that; `None` where the log has no land detector."""
 
@@ -64,7 +64,7 @@ def flight_times(flight: Flight) -> FlightTimes:
     """Times of a canonical or a raw flight."""
     imu = flight.topic("sensor_combined")
     if imu is None or not len(imu["timestamp"]):
-        return FlightTimes(0.0, None)
+        return FlightTimes(flight.duration_s, None)
     duration = int(imu["timestamp"].max()) - int(imu["timestamp"].min())
     intervals = airborne_intervals(flight)
     airborne = None if intervals is None else sum(end - begin for begin, end in intervals) * 1e-6
@@ -103,6 +103,6 @@ def log_facts(flight: Flight) -> dict[str, Any]:
         "versions": _readable_info(flight, _VERSION_KEYS),
         "hardware": _readable_info(flight, _HARDWARE_KEYS),
         "recorded": recorded_at(flight),
-        "duration_s": round(times.imu_s, 6),
+        "duration_s": round(times.duration_s, 6),
         "airborne_s": None if times.airborne_s is None else round(times.airborne_s, 6),
     }

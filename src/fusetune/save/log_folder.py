@@ -12,22 +12,27 @@ from fusetune.errors import UserError
 from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
 from fusetune.px4.logged_parameters import checked_history
+from fusetune.px4.reading_limits import ReadingLimits
 from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import file_checksum, read_ulog
+from fusetune.px4.ulog_reader import file_checksum, read_ulog, takes_too_long
 from fusetune.save.flight_folder import METADATA_FILE, write_flight
 from fusetune.save.log_facts import log_facts
 from fusetune.save.verdict import Verdict, VerdictThresholds, judge, unreadable
+from fusetune.time_limit import Deadline, TimeLimitError
 
 VERDICT_FILE = "verdict.json"
 
 
 def save_log(
-    log: str | os.PathLike[str], folder: str | os.PathLike[str], thresholds: VerdictThresholds | None = None
+    log: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    thresholds: VerdictThresholds | None = None,
+    limits: ReadingLimits | None = None,
 ) -> Verdict:
     """Save a log: tables, `metadata.json` and `verdict.json`, which `metadata.json` repeats.
 
-    The folder appears as a whole or not at all; one of an earlier run is replaced. A log that cannot be read gets a
-    folder that says why, and no error is raised.
+    The folder appears as a whole or not at all; one of an earlier run is replaced. A log that cannot be read, or not
+    in time, gets a folder that says why, and no error is raised.
 
     Parameters
     ----------
@@ -37,18 +42,20 @@ def save_log(
         Folder of the flight.
     thresholds
         From where on a flight can be replayed.
+    limits
+        How many tables the log may have, and how long all this may take.
 
     Raises
     ------
     UserError
         The folder cannot be written.
     """
-    target = Path(folder)
+    target, limits = Path(folder), limits or ReadingLimits()
     partial = target.with_name(f".{target.name}.partial")
     try:
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir(parents=True)
-        verdict = _write(Path(log), partial, thresholds or VerdictThresholds())
+        verdict = _write(Path(log), partial, thresholds or VerdictThresholds(), limits)
         shutil.rmtree(target, ignore_errors=True)
         os.replace(partial, target)
     except OSError as error:
@@ -56,23 +63,33 @@ def save_log(
     return verdict
 
 
-def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
+def _write(log: Path, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits) -> Verdict:
+    deadline = Deadline(limits.time_limit_s)
     try:
-        flight = read_ulog(log)
-    except UserError as error:
-        verdict = unreadable(log.stem, error)
+        verdict = _write_readable(log, folder, thresholds, limits, deadline)
+    except (UserError, TimeLimitError) as error:
+        told = error if isinstance(error, UserError) else takes_too_long(log, deadline)
+        verdict = unreadable(log.stem, told)
+        for table in folder.glob("*.parquet"):
+            table.unlink()
         _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
-    else:
-        verdict = _judge(flight, thresholds)
-        extra = {"file": log.name, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
-        write_flight(folder, flight, extra | log_facts(flight))
     _write_json(folder / VERDICT_FILE, verdict.document())
     return verdict
 
 
-def _judge(flight: Flight, thresholds: VerdictThresholds) -> Verdict:
+def _write_readable(
+    log: Path, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits, deadline: Deadline
+) -> Verdict:
+    flight = read_ulog(log, limits, deadline)
+    verdict = _judge(flight, thresholds, deadline)
+    extra = {"file": log.name, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
+    write_flight(folder, flight, extra | log_facts(flight), deadline)
+    return verdict
+
+
+def _judge(flight: Flight, thresholds: VerdictThresholds, deadline: Deadline) -> Verdict:
     try:
-        return judge(canonical(flight), thresholds)
+        return judge(canonical(flight), thresholds, deadline)
     except (LookupError, ValueError, TypeError, ArithmeticError) as error:
         # damage can take any field away from any topic
         reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight
+from fusetune.time_limit import Deadline
 
 Status = Literal["pass", "warning", "fail", "does-not-apply"]
 
@@ -36,6 +37,25 @@ class VerdictThresholds:
     max_left_out_share: float = 0.01
     """Share of the IMU samples that are impossible: with more the damage is not one of single bits."""
     high_clipping_share: float = 0.001
+    low_gravity_share: float = 0.9
+    """Of the specific force, averaged over a second (median), in standard gravity: what flies sees gravity."""
+    high_gravity_share: float = 1.3
+    min_gravity_share: float = 0.5
+    max_gravity_share: float = 2.0
+    high_imu_coverage: float = 1.02
+    """Integration times cannot add up to more than the time that passed."""
+    max_imu_coverage: float = 1.2
+    high_stuck_imu_s: float = 0.5
+    """Noise moves the sums of an accelerometer or gyroscope from one row to the next."""
+    high_stuck_aid_s: float = 5.0
+    """Barometers repeat values over a second where the pressure stands still; nothing does so for longer in the air."""
+    max_stuck_share: float = 0.5
+    """Share of the time in which a sensor is stuck: with more the flight says nothing about the filter."""
+    high_repeated_share: float = 0.05
+    """Share of the IMU rows that repeat the row before."""
+    low_field_strength_ga: float = 0.15
+    """The earth's field has 0.22 to 0.67 Gs at the ground (IGRF-13); an uncalibrated sensor may be off by as much."""
+    high_field_strength_ga: float = 1.5
     low_magnetometer_rate_hz: float = 10.0
     max_field_scatter_left: float = 0.1
     """Share of the field's scatter left by another mounting of the magnetometer, below which it sits otherwise.
@@ -117,25 +137,33 @@ class Verdict:
         }
 
 
-def judge(flight: Flight, thresholds: VerdictThresholds | None = None) -> Verdict:
+def judge(flight: Flight, thresholds: VerdictThresholds | None = None, deadline: Deadline | None = None) -> Verdict:
     """Judge a flight that could be read, in the layout of `fusetune.px4.release_layouts.canonical`.
 
     Of the checks of the IMU those after a failed one are left out, since they would only say the same again; without
     IMU samples nothing but the log itself is judged.
-    """
-    from fusetune.save import aid_checks, flight_checks, imu_checks, log_checks
 
-    limits = thresholds or VerdictThresholds()
+    Raises
+    ------
+    TimeLimitError
+        The deadline passed.
+    """
+    from fusetune.save import aid_checks, flight_checks, imu_checks, log_checks, sensor_checks
+
+    limits, deadline = thresholds or VerdictThresholds(), deadline or Deadline()
     checks = [check(flight, limits) for check in log_checks.CHECKS]
     checks.append(imu_checks.imu_present(flight))
     if checks[-1].status == "fail":
         return Verdict(flight.name, tuple(checks))
-    for check in imu_checks.CHECKS:
+    for check in (*imu_checks.CHECKS, *sensor_checks.IMU_CHECKS):
+        deadline.check()
         checks.append(check(flight, limits))
         if checks[-1].status == "fail":
             break
     checks += aid_checks.checks(flight, limits)
-    checks += [check(flight, limits) for check in flight_checks.CHECKS]
+    for check in (*sensor_checks.AID_CHECKS, *flight_checks.CHECKS):
+        deadline.check()
+        checks.append(check(flight, limits))
     return Verdict(flight.name, tuple(checks))
 
 
