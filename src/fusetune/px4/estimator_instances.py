@@ -31,6 +31,15 @@ def primary_instance_at(flight: Flight, timestamps: np.ndarray) -> np.ndarray:
     return np.asarray(selector["primary_instance"], np.int64)[np.maximum(rows, 0)]
 
 
+def instance_switches(flight: Flight) -> np.ndarray:
+    """Times (µs) at which another instance became the primary one."""
+    selector = flight.topic("estimator_selector_status")
+    if selector is None:
+        return np.zeros(0, np.int64)
+    changed = np.flatnonzero(np.diff(np.asarray(selector["primary_instance"], np.int64))) + 1
+    return np.asarray(selector["timestamp"], np.int64)[changed]
+
+
 def magnetometer_instance(flight: Flight) -> int:
     """Instance of `vehicle_magnetometer` that the primary estimator instance used.
 
