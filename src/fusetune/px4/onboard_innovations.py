@@ -107,7 +107,7 @@ class _Series:
     variances: TopicTable
     ratios: TopicTable
     control_flags: tuple[np.ndarray, np.ndarray] | None
-    """Control mode flags as last logged before each row, and as first logged after it."""
+    """Control mode flags as last logged up to each row, and as first logged from it on."""
     old: bool
     has_mag_heading: bool
 
@@ -163,9 +163,10 @@ def _control_flags(flight: Flight, instance: int, times: np.ndarray) -> tuple[np
     status = flight.topic("estimator_status", instance)
     if status is None or "control_mode_flags" not in status or not row_count(status):
         return None
-    after = np.searchsorted(status["timestamp"], times, side="right")
+    before = np.searchsorted(status["timestamp"], times, side="right") - 1
+    after = np.searchsorted(status["timestamp"], times, side="left")
     flags = status["control_mode_flags"].astype(np.int64)
-    return flags[np.maximum(after - 1, 0)], flags[np.minimum(after, len(flags) - 1)]
+    return flags[np.maximum(before, 0)], flags[np.minimum(after, len(flags) - 1)]
 
 
 def _aid_source(name: str, source: _Source, series: _Series, gates: dict[str, float]) -> TopicTable | None:
