@@ -236,7 +236,7 @@ def _print_vehicle(logs: Path) -> None:
     collected: list[list[float]] = []
     for stem in DEFAULT_PROFILE:
         for log in sorted(logs.glob(f"{stem}*.ulg")):
-            flight = canonical(read_ulog(log), follow_primary=True)
+            flight = canonical(read_ulog(log))
             grade = grade_flight(flight)
             sizes = [grade.repaired.innovation_ratio.get(name, float("nan")) for name in groups]
             raw = [grade.as_logged.innovation_ratio.get(name, float("nan")) for name in groups]

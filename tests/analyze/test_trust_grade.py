@@ -4,41 +4,107 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fusetune.analyze.as_flown_figures import AsFlownFigures
+from fusetune.analyze.onboard_fidelity import FIDELITY_TOPICS
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
-from fusetune.analyze.replay_flight import prepare
+from fusetune.analyze.replay_flight import REPLAY_TOPICS, prepare
 from fusetune.analyze.replay_settings import IN_USE
+from fusetune.analyze.score_flight import SCORE_TOPICS
 from fusetune.analyze.trust_grade import GNSS, distance, grade_flight, grade_of, with_half_the_gnss, without_repair
-from fusetune.analyze.trust_settings import TrustSettings
+from fusetune.analyze.trust_settings import FIGURES, TrustSettings
+from fusetune.analyze.trust_words import limits_in_words, not_compared_in_words
 from fusetune.errors import UserError
-from fusetune.px4.estimator_instances import instance_shares, primary_magnetometer, rows_of_primary
+from fusetune.px4.estimator_instances import instance_shares, of_one_instance, primary_magnetometer, rows_of_primary
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.release_layouts import canonical
 
 SETTINGS = TrustSettings()
-PERFECT = AsFlownFigures({"horizontal_velocity": 1.0}, 0.0, 0.0, 1.0, 60.0)
+PERFECT = AsFlownFigures({"horizontal_velocity": 1.0}, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 60.0, {"height": (0, 0)})
+NOTHING = AsFlownFigures({}, None, None, None, None, None, None, 60.0, {})
+
+
+def changed(**figures):
+    return dataclasses.replace(PERFECT, **figures)
 
 
 @pytest.mark.parametrize(
     ("figures", "grade"),
     [
         (PERFECT, "A"),
-        (dataclasses.replace(PERFECT, innovation_ratio={"horizontal_velocity": 1.0, "heading": 1.5}), "B"),
-        (dataclasses.replace(PERFECT, innovation_ratio={"heading": 1 / 1.5}), "B"),
-        (dataclasses.replace(PERFECT, velocity_m_s=0.3), "C"),
-        (dataclasses.replace(PERFECT, heading_deg=11.0), "D"),
-        (dataclasses.replace(PERFECT, flags_equal=0.8), "C"),
-        (dataclasses.replace(PERFECT, velocity_m_s=float("nan")), "D"),
-        (AsFlownFigures({}, None, None, 1.0, 60.0), "D"),
+        (changed(innovation_ratio={"horizontal_velocity": 1.0, "heading": 1.5}), "B"),
+        (changed(innovation_ratio={"heading": 1 / 1.5}), "B"),
+        (changed(velocity_m_s=0.3), "C"),
+        (changed(heading_deg=11.0), "D"),
+        (changed(height_m=0.5), "B"),
+        (changed(vertical_velocity_m_s=0.7), "D"),
+        (changed(resets={"height": (2, 2), "vertical velocity": (3, 2)}), "B"),
+        (changed(resets={"height": (144, 0), "vertical velocity": (0, 0)}), "D"),
+        (changed(flags_equal=0.8), "C"),
+        (changed(height_flags_equal=0.46), "D"),
+        (changed(velocity_m_s=float("nan")), "D"),
+        (dataclasses.replace(NOTHING, flags_equal=1.0), "D"),
     ],
 )
 def test_worst_figure_decides(figures, grade):
-    assert grade_of(figures, SETTINGS)[0] == grade
+    assert grade_of(figures, SETTINGS).grade == grade
+
+
+@pytest.mark.parametrize(
+    ("figures", "grade", "missing"),
+    [
+        # all that can be said of many a simulation with hardware in the loop
+        (dataclasses.replace(NOTHING, velocity_m_s=0.0, heading_deg=0.0), "C", 6),
+        (changed(innovation_ratio={}), "B", 1),
+        (changed(heading_deg=None), "B", 1),
+        (changed(velocity_m_s=None), "C", 1),
+        (changed(height_m=None, vertical_velocity_m_s=None), "C", 2),
+        (changed(resets={}), "C", 1),
+        (changed(velocity_m_s=None, heading_deg=None, resets={"height": (144, 0)}), "D", 2),
+        (NOTHING, "D", len(FIGURES)),
+    ],
+)
+def test_what_could_not_be_compared_limits_the_grade(figures, grade, missing):
+    graded = grade_of(figures, SETTINGS)
+    assert graded.grade == grade
+    assert len(graded.not_compared) == missing
+    assert not set(graded.not_compared) & graded.figure_grades.keys()
+
+
+@given(st.sets(st.sampled_from(FIGURES)))
+def test_a_figure_less_never_betters_the_grade(names):
+    less = changed(
+        **{name: None for name in names if name not in ("innovation_factor", "height_resets")},
+        **({"innovation_ratio": {}} if "innovation_factor" in names else {}),
+        **({"resets": {}} if "height_resets" in names else {}),
+    )
+    graded = grade_of(less, SETTINGS)
+    assert set(graded.not_compared) == names
+    assert graded.grade >= grade_of(PERFECT, SETTINGS).grade
+    assert (graded.grade == "A") == (not names)
+
+
+def test_the_reason_names_the_resets_and_what_could_not_be_compared():
+    figures = changed(velocity_m_s=None, resets={"height": (144, 0), "vertical velocity": (1, 1)})
+    assert limits_in_words(figures, ["height_resets"]) == [
+        "the replay resets its height 144 times where the vehicle did so 0 times"
+    ]
+    assert not_compared_in_words(["velocity_m_s"]) == "the log does not let horizontal velocity be compared"
+    assert not_compared_in_words(["velocity_m_s", "heading_deg", "flags_equal"]) == (
+        "the log does not let horizontal velocity, heading and flags be compared"
+    )
+    worst = changed(innovation_ratio={"heading": 0.5, "vision_position": 1.8}, resets={"vertical velocity": (1, 4)})
+    assert limits_in_words(worst, FIGURES)[:3] == [
+        "the replay resets its vertical velocity once where the vehicle did so 4 times",
+        "the replay takes its height from the vehicle's sources in only 100% of the time",
+        "innovations of heading are 0.5 times the vehicle's",
+    ]
 
 
 def test_distance_is_one_at_the_limits_of_b():
-    limit = AsFlownFigures({"heading": 1.6}, 0.15, 4.0, 0.9, 60.0)
+    limit = AsFlownFigures({"heading": 1.6}, 0.15, 4.0, 1.0, 0.225, 0.9, 0.9, 60.0, {})
     assert distance(PERFECT, SETTINGS) == 0.0
     assert distance(limit, SETTINGS) == pytest.approx(1.0)
 
@@ -46,6 +112,9 @@ def test_distance_is_one_at_the_limits_of_b():
 def test_limits_must_rise():
     with pytest.raises(UserError, match="Expected three rising numbers"):
         TrustSettings.from_mapping({"heading_deg": [4, 2, 10]})
+    with pytest.raises(UserError, match="names 'speed'"):
+        TrustSettings.from_mapping({"needed_for_b": ["speed"]})
+    assert TrustSettings.from_mapping({"needed_for_a": []}).needed_for_a == ()
 
 
 @pytest.fixture(scope="module")
@@ -142,8 +211,47 @@ def test_estimator_topics_follow_the_primary_instance():
     assert instance_shares(two_instances()) == {0: 0.5, 1: 0.5}
 
 
-def test_canonical_follows_the_primary_instance_when_asked():
-    flight = two_instances()
-    followed = canonical(flight, follow_primary=True).topics["vehicle_magnetometer", 0]
-    assert len(np.unique(followed["device_id"])) == 2
-    assert len(np.unique(canonical(flight).topics["vehicle_magnetometer", 0]["device_id"])) == 1
+def test_flight_of_one_instance_has_what_that_one_used():
+    one = of_one_instance(two_instances())
+    assert canonical(one).topics["vehicle_magnetometer", 0]["device_id"].tolist() == [11] * 10
+    assert {instance for name, instance in one.topics if name.startswith("estimator_")} == {0}
+
+
+def with_two_imus(flight):
+    """`vehicle_imu` of two devices at 200 Hz; the second instance of the estimator uses the second."""
+    time = np.arange(1_000_000, 11_000_000, 5_000)
+    rows = len(time)
+    columns = {f"delta_angle[{axis}]": np.zeros(rows, np.float32) for axis in range(3)}
+    columns |= {f"delta_velocity[{axis}]": np.zeros(rows, np.float32) for axis in range(3)}
+    columns |= {"delta_angle_dt": np.full(rows, 5000, np.uint16), "delta_velocity_dt": np.full(rows, 5000, np.uint16)}
+    topics = dict(flight.topics)
+    for instance, device in ((0, 101), (1, 102)):
+        used = np.full(10, device)
+        topics["estimator_status", instance] = topics["estimator_status", instance] | {"accel_device_id": used}
+        imu = columns | {"timestamp": time + instance, "timestamp_sample": time + instance}
+        topics["vehicle_imu", instance] = imu | {"accel_device_id": np.full(rows, device, np.uint32)}
+    gyro = {f"gyro_rad[{axis}]": np.zeros(10, np.float32) for axis in range(3)}
+    force = {f"accelerometer_m_s2[{axis}]": np.zeros(10, np.float32) for axis in range(3)}
+    slow = {"timestamp": 1_000_000 * np.arange(1, 11), "gyro_integral_dt": np.full(10, 5000, np.uint32)}
+    topics["sensor_combined", 0] = slow | gyro | force
+    return flight.with_topics(topics)
+
+
+def test_replay_scores_and_grade_of_a_flight_see_the_same_sensors_where_instances_switch():
+    """Each step reads topics of its own; what two of them read is the same table."""
+    flight = with_two_imus(two_instances())
+    shapes = [
+        canonical(flight.with_topics({key: one for key, one in flight.topics.items() if key[0] in topics}))
+        for topics in (REPLAY_TOPICS, SCORE_TOPICS, FIDELITY_TOPICS)
+    ]
+    for shape in shapes:
+        time = shape.topics["sensor_combined", 0]["timestamp"]
+        assert len(time) == 2000
+        # instance 1, whose IMU is stamped 1 µs later, is primary from 6 s on
+        np.testing.assert_array_equal(time % 5, time >= 6_000_000)
+    for topic, instance in {key for shape in shapes for key in shape.topics}:
+        tables = [shape.topics[topic, instance] for shape in shapes if (topic, instance) in shape.topics]
+        for other in tables[1:]:
+            assert tables[0].keys() == other.keys()
+            for column, values in tables[0].items():
+                np.testing.assert_array_equal(values, other[column], err_msg=f"{topic} {column}")

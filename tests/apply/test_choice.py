@@ -13,7 +13,7 @@ from fusetune.apply.wording import _for_the_pick
 
 def one(name: str, difference: float, upper: float, p_family: float = 0.01, **changes) -> RankedSet:
     values = {
-        "name": name, "status": "candidate", "reasons": (), "score": difference, "difference": difference,
+        "name": name, "is_present": False, "reasons": (), "score": difference, "difference": difference,
         "lower": 2 * difference - upper, "upper": upper, "p_value": 0.01, "p_holm": 0.2, "p_family": p_family,
         "p_best": 0.5, "flights": 6, "flights_better": 6, "equal_to_present": False,
         "improvement_percent": 100.0 * (1.0 - math.exp(difference)), "behind_best": 0.0, "behind_best_error": 0.05,
@@ -22,7 +22,7 @@ def one(name: str, difference: float, upper: float, p_family: float = 0.01, **ch
     return RankedSet(**(values | changes))
 
 
-PRESENT = one("a", 0.0, 0.0, status="present")
+PRESENT = one("a", 0.0, 0.0, is_present=True)
 FLIGHTS = [flight(str(number), [0.0, -0.2, -0.1]) for number in range(6)]
 
 

@@ -107,7 +107,8 @@ def test_vetoes(tmp_path: Path, made: MadeSet, reason: str) -> None:
     decision = run(tmp_path, {"present": MadeSet(error=0.1), "tempting": made})
     assert decision["chosen"] == "present"
     assert any(reason in one for one in ranked(decision, "tempting")["reasons"])
-    assert "tempting" in decision["paragraph"] or ranked(decision, "tempting")["status"] == "not_scored"
+    assert "tempting" in decision["paragraph"]
+    assert ranked(decision, "tempting")["status"] == ("not scored" if made.status == "diverged" else "not eligible")
 
 
 def test_a_set_that_fails_on_one_flight_is_not_eligible_but_shown(tmp_path: Path) -> None:
@@ -122,7 +123,7 @@ def test_a_set_that_fails_on_one_flight_is_not_eligible_but_shown(tmp_path: Path
     decide(folders, table, tmp_path / "apply", sets=list(sets))
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
     one = ranked(decision, "tempting")
-    assert (one["status"], one["flights"], decision["status"]) == ("vetoed", 5, "keep")
+    assert (one["status"], one["flights"], decision["status"]) == ("not eligible", 5, "keep")
     assert "flight_2: starts aiding 28.0 s later" in one["reasons"][0]
 
 
@@ -211,15 +212,59 @@ def test_a_flight_whose_replay_cannot_be_trusted_does_not_count(tmp_path: Path) 
     sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
     folders, table = make_study(tmp_path, sets)
     for folder, grade, compared in zip(folders, "ABCDDA", ({"x": "A"},) * 4 + ({}, {"x": "A"}), strict=True):
-        fidelity = {"grade": grade, "trust": {"figure_grades": compared}}
+        reason = "the replay resets its height 144 times" if grade == "D" else ""
+        fidelity = {"grade": grade, "trust": {"figure_grades": compared, "reason": reason}}
         (folder / "fidelity.json").write_text(json.dumps(fidelity))
     decide(folders, table, tmp_path / "apply", sets=list(sets))
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
     # The fourth has a D; the fifth, too, but only because its log holds nothing to compare with.
     assert [row["scored"] for row in decision["flights"]] == [True, True, True, False, True, True]
-    assert "trust grade D" in decision["flights"][3]["reason"]
+    assert decision["flights"][3]["reason"] == (
+        "its replay has trust grade D (the replay resets its height 144 times), and the decision takes none below C"
+    )
+    assert "1 replayed flight does not count, as its replay has a trust grade below C." in decision["paragraph"]
+    assert "could not be scored" not in decision["paragraph"]
     with pytest.raises(UserError, match="lowest_grade"):
         DecisionSettings.from_mapping({"lowest_grade": "E"})
+
+
+def test_flights_that_have_no_say_are_told_by_what_keeps_them_out(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
+    folders, table = make_study(tmp_path / "long", sets, 5)
+    short, _ = make_study(tmp_path / "short", sets, 2, landing_s=12.0)
+    for number, folder in enumerate(short):
+        (folder / "scoring.json").write_text(
+            (folder / "scoring.json").read_text().replace(f'"flight_{number}"', f'"short_{number}"')
+        )
+    for folder in folders[:2]:
+        fidelity = {"grade": "D", "trust": {"figure_grades": {"velocity_m_s": "D"}}}
+        (folder / "fidelity.json").write_text(json.dumps(fidelity))
+    decide([*folders, *short], table, tmp_path / "apply", sets=list(sets), newest_flight="flight_4")
+    text = json.loads((tmp_path / "apply" / "decision.json").read_text())["paragraph"]
+    assert "2 replayed flights could not be scored." in text
+    assert "2 replayed flights do not count, as their replays have trust grades below C." in text
+    for folder in folders:
+        (folder / "fidelity.json").write_text(json.dumps(fidelity))
+    decide(folders, table, tmp_path / "apply", sets=list(sets))
+    text = json.loads((tmp_path / "apply" / "decision.json").read_text())["paragraph"]
+    assert "none of the 5 replayed flights has a say (flight_0: its replay has trust grade D, and" in text
+
+
+def test_a_set_has_one_part_in_files_and_page(tmp_path: Path) -> None:
+    sets = {
+        "present": MadeSet(error=0.1),
+        "same": MadeSet(error=0.1, own=0.0),
+        "restless": MadeSet(error=0.05, resets_s=(40.0,)),
+        "worse": MadeSet(error=0.2),
+        "able": MadeSet(error=0.099, own=0.6),
+    }
+    decision = run(tmp_path, sets)
+    expected = {"present": "flies now", "restless": "not eligible", "worse": "not eligible", "able": "eligible"}
+    table = pd.read_csv(tmp_path / "apply" / "ranking.csv").set_index("name")
+    for name, status in expected.items():
+        assert ranked(decision, name)["status"] == table.loc[name, "status"] == status
+    assert "so not eligible: worse." in decision["paragraph"]
+    assert "Ruled out, and so not eligible: restless" in decision["paragraph"]
 
 
 def test_leaving_out_flights_is_reported(tmp_path: Path) -> None:

@@ -56,5 +56,14 @@ def test_many_flights_are_flipped_at_random_but_alike_for_the_same_seed() -> Non
     assert family_p_values(differences[:, :1], 5)[0] == pytest.approx(one_sided, abs=0.03)
 
 
-def test_one_flight_proves_nothing() -> None:
-    assert family_p_values(np.array([[-1.0, -2.0]]), 0).tolist() == [1.0, 1.0]
+def test_of_one_flight_nothing_is_known() -> None:
+    assert np.isnan(family_p_values(np.array([[-1.0, -2.0]]), 0)).all()
+
+
+def test_equal_within_rounding_is_no_luck_and_no_merit() -> None:
+    generator = np.random.default_rng(4)
+    one = generator.normal(-0.05, 0.05, (8, 1))
+    rounding = np.full((8, 1), -3e-17)
+    found = family_p_values(np.hstack([one, rounding]), 0)
+    assert found[1] == 1.0
+    assert found[0] == family_p_values(one, 0)[0]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fusetune.px4.estimator_instances import of_one_instance
 from fusetune.px4.flight import Flight, ParameterHistory, TopicTable
 from fusetune.px4.release_layouts import canonical
 from fusetune.px4.ulog_reader import read_ulog
@@ -146,7 +147,9 @@ def test_primary_estimator_instance_decides_on_the_magnetometer() -> None:
         ("estimator_status", 2): {"timestamp": TIME, "mag_device_id": np.array([0, 22, 22, 22], np.uint32)},
     }
     flight = Flight("multi", topics)
-    assert canonical(flight).topics["vehicle_magnetometer", 0]["device_id"][0] == 22
+    followed = canonical(flight).topics["vehicle_magnetometer", 0]
+    assert followed["device_id"].tolist() == [11, 22, 22, 22]
+    assert canonical(of_one_instance(flight)).topics["vehicle_magnetometer", 0]["device_id"].tolist() == [22] * 4
     assert flight.topics["vehicle_magnetometer", 0]["device_id"][0] == 11
 
 
@@ -224,6 +227,94 @@ def test_old_height_slot_belongs_to_the_active_height_source() -> None:
     assert flight.topic("estimator_aid_src_gnss_hgt") is None
 
 
+HDG, MAG_3D, GNSS_YAW, EV_YAW = 1 << 4, 1 << 5, 1 << 22, 1 << 13
+
+
+def heading_flight(old: bool, release: int | None, flags: list[int], values: list[float]) -> Flight:
+    """A log whose one field of heading innovations is written while the given control flags are set."""
+    rows = len(values)
+    time = np.arange(rows, dtype=np.int64) * 200_000 + 1_000_000
+    innovation, variance = np.array(values, np.float32), np.full(rows, 0.04, np.float32)
+    topics: dict[tuple[str, int], TopicTable] = {
+        ("estimator_status", 0): {"timestamp": time - 50_000, "control_mode_flags": np.array(flags, np.uint32)}
+    }
+    if old:
+        columns = {"heading_innov": innovation, "heading_innov_var": variance}
+        topics["ekf2_innovations", 0] = {"timestamp": time, **columns}
+    else:
+        topics["estimator_innovations", 0] = {"timestamp": time, "heading": innovation}
+        topics["estimator_innovation_variances", 0] = {"timestamp": time, "heading": variance}
+    info = {} if release is None else {"ver_sw_release": (1 << 24) | (release << 16) | 255}
+    return Flight("made", topics, info=info)
+
+
+@pytest.mark.parametrize(("old", "release"), [(True, 8), (True, 10), (False, 11), (False, 13), (False, 14)])
+@pytest.mark.parametrize(
+    ("flag", "source"), [(HDG, "mag_heading"), (GNSS_YAW, "gnss_yaw"), (EV_YAW, "ev_yaw"), (MAG_3D, None)]
+)
+def test_heading_innovations_belong_to_the_sensor_in_use(old: bool, release: int, flag: int, source: str) -> None:
+    flight = canonical(heading_flight(old, release, [flag] * 3, [0.01, 0.02, 0.03]))
+    for name in ("mag_heading", "gnss_yaw", "ev_yaw"):
+        aid = flight.topic(f"estimator_aid_src_{name}")
+        if name != source:
+            assert aid is None, name
+            continue
+        assert aid is not None
+        np.testing.assert_allclose(aid["innovation"], [0.01, 0.02, 0.03])
+        # ν² / (2.6² · 0.04), 2.6 being the default of EKF2_HDG_GATE
+        np.testing.assert_allclose(aid["test_ratio"], np.square([0.01, 0.02, 0.03]) / (2.6**2 * 0.04), rtol=1e-5)
+        assert aid["fused"].all()
+
+
+def test_from_v1_15_on_heading_is_no_heading_while_the_magnetometer_is_fused() -> None:
+    for flag, made in ((HDG, False), (MAG_3D, False), (EV_YAW, True)):
+        flight = canonical(heading_flight(False, 15, [flag] * 3, [0.01, 0.02, 0.03]))
+        assert not flight.has("estimator_aid_src_mag_heading")
+        assert flight.has("estimator_aid_src_ev_yaw") == made
+
+
+def test_the_sensor_of_the_heading_may_change_in_flight() -> None:
+    """The row between two messages of the status that disagree, and a value left by the other sensor, are nobody's."""
+    flags = [HDG, HDG, HDG, EV_YAW, EV_YAW, EV_YAW]
+    flight = canonical(heading_flight(False, 13, flags, [0.1, 0.2, 0.3, 0.3, 0.4, 0.5]))
+    magnetic, vision = (flight.topic(f"estimator_aid_src_{name}") for name in ("mag_heading", "ev_yaw"))
+    assert magnetic is not None
+    assert vision is not None
+    np.testing.assert_allclose(magnetic["innovation"], [0.1, 0.2])
+    np.testing.assert_allclose(vision["innovation"], [0.4, 0.5])
+
+
+def test_a_heading_without_status_is_nobodys() -> None:
+    flight = heading_flight(False, 13, [HDG] * 3, [0.1, 0.2, 0.3])
+    del flight.topics["estimator_status", 0]
+    assert not any(name.startswith("estimator_aid_src_") for name, _ in canonical(flight).topics)
+
+
+def test_old_velocity_and_position_slots_belong_to_the_source_in_use() -> None:
+    gnss, vision_position, vision_velocity = 1 << 2, 1 << 12, 1 << 24
+    flags = [
+        gnss,
+        gnss,
+        vision_position | vision_velocity,
+        vision_position | vision_velocity,
+        gnss | vision_position,
+        0,
+    ]
+    old: TopicTable = {"timestamp": np.arange(6, dtype=np.int64) * 200_000 + 1_000_000}
+    for axis in range(6):
+        old[f"vel_pos_innov[{axis}]"] = np.arange(6, dtype=np.float32) + 1.0
+        old[f"vel_pos_innov_var[{axis}]"] = np.ones(6, np.float32)
+    status = {"timestamp": old["timestamp"], "control_mode_flags": np.array(flags, np.uint32)}
+    flight = canonical(Flight("v1.10", {("ekf2_innovations", 0): old, ("estimator_status", 0): status}))
+    found = {
+        name: aid["innovation[0]"].tolist()
+        for name in ("gnss_vel", "gnss_pos", "ev_vel", "ev_pos")
+        if (aid := flight.topic(f"estimator_aid_src_{name}")) is not None
+    }
+    # With GNSS and vision both in use the position is either's; its velocity is that of GNSS.
+    assert found == {"gnss_vel": [1.0, 2.0, 5.0], "gnss_pos": [1.0, 2.0], "ev_vel": [3.0, 4.0], "ev_pos": [3.0, 4.0]}
+
+
 def test_every_shared_log_has_the_v1_16_fields(shared_logs: Path) -> None:
     needed = {
         "sensor_combined": ("gyro_rad[2]", "gyro_integral_dt", "accelerometer_m_s2[2]", "accelerometer_clipping"),
@@ -252,5 +343,6 @@ def test_magnetometer_of_the_log_that_switches_instances(shared_logs: Path, shar
     name = "Chainplain__log_9_2024-10-14-15-00-06"
     rows = pq.read_table(shared_reference / name / "asflown.innovations.parquet").to_pandas()
     observed = rows[(rows.source == "mag") & (rows.axis == 0)].observation.to_numpy()
-    used = canonical(read_ulog(shared_logs / f"{name}.ulg")).topics["vehicle_magnetometer", 0]["magnetometer_ga[0]"]
+    one = of_one_instance(read_ulog(shared_logs / f"{name}.ulg"))
+    used = canonical(one).topics["vehicle_magnetometer", 0]["magnetometer_ga[0]"]
     assert np.all(np.abs(observed[:, np.newaxis] - used).min(axis=1) < 1e-6)

@@ -38,7 +38,10 @@ AS_FLOWN = "as_flown"
 FIDELITY_TOPICS = (*dict.fromkeys((*TRUST_TOPICS, "sensor_gps")),)
 """What the comparison and the grade read of a flight."""
 
-JUDGED_SOURCES = ("gnss_vel", "gnss_pos", "gnss_hgt", "baro_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt")
+JUDGED_SOURCES = (
+    "gnss_vel", "gnss_pos", "gnss_hgt", "gnss_yaw", "baro_hgt", "rng_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt",
+    "ev_yaw", "optical_flow",
+)  # fmt: skip
 MATCH_TOLERANCE_US = 30_000
 MIN_SAMPLES = 8
 WARM_UP_US = 10_000_000
@@ -99,7 +102,7 @@ def write_flight_fidelity(
     prepared : PreparedFlight, optional
         What these replays shared.
     """
-    flight = canonical(flight, follow_primary=True)
+    flight = canonical(flight)
     result = judge_onboard_fidelity(
         flight, analyze_folder / f"{AS_FLOWN}.innovations.parquet", analyze_folder / "onboard.innovations.parquet"
     )

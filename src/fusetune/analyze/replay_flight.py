@@ -28,6 +28,7 @@ from fusetune.ekf2.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import Gap, ReplayResult, replay
 from fusetune.errors import UserError
+from fusetune.px4.estimator_instances import of_one_instance
 from fusetune.px4.flight import Flight
 from fusetune.px4.logged_state import Handover, logged_handovers
 from fusetune.px4.release_layouts import canonical
@@ -96,11 +97,11 @@ def prepare(
 ) -> PreparedFlight:
     """Reconstruct the sensor stream of a canonical flight and choose how its replays start.
 
-    `None` leaves the stream as it was logged, of one estimator instance, and starts cold.
+    `None` leaves the stream as it was logged, and starts cold.
     """
     chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
     reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction, chosen.state)
-    handovers = () if reconstruction is None else logged_handovers(flight)
+    handovers = logged_handovers(flight)
     return PreparedFlight(flight, build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps), handovers)
 
 
@@ -139,7 +140,7 @@ def replay_flight(
         For further replays.
     """
     settings = settings or ReplaySettings()
-    flight = canonical(flight, follow_primary=settings.reconstruction is not None)
+    flight = canonical(flight)
     gaps = plan_gaps(flight, airborne_intervals(flight, {}), settings.withholding) if settings.withholding else ()
     prepared = prepare(flight, settings.reconstruction, settings.start, gaps)
     for name, overrides in sets.items():
@@ -181,8 +182,10 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: Repl
     if not set_files:
         raise UserError(sets_folder, "holds no parameter set", "Put one SET.json with a params object per set there")
     settings = settings or ReplaySettings()
-    flight = canonical(read_ulog(log), follow_primary=settings.reconstruction is not None)
-    prepared = prepare(flight, settings.reconstruction, settings.start)
+    flight = read_ulog(log)
+    # as PX4's own replay does where nothing is asked for: one estimator instance, from its sensors
+    flown = flight if settings.reconstruction is not None else of_one_instance(flight)
+    prepared = prepare(canonical(flown), settings.reconstruction, settings.start)
     for file in set_files:
         params, overrides = _read_set(file)
         # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.

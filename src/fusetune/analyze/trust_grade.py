@@ -1,8 +1,9 @@
 """How far the replay of one flight can be trusted: a grade from A to D, and what costs most.
 
 The parameters that flew are replayed and compared with what the vehicle's own estimator logged, as the log is and after
-reconstruction. Each figure of the comparison has a grade; the worst is the flight's. What a cause costs is measured by
-switching it: a repair is left out, the start made cold, every second GNSS sample dropped.
+reconstruction. Each figure of the comparison has a grade; the worst is the flight's, and what could not be compared
+limits it. What a cause costs is measured by switching it: a repair is left out, the start made cold, every second GNSS
+sample dropped.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +27,8 @@ from fusetune.analyze.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.scoring_window import Cut, subtract
 from fusetune.analyze.sources import AID_SOURCES, HORIZONTAL_AIDING
 from fusetune.analyze.start_choice import START_TOPICS, Start, choose_start
-from fusetune.analyze.trust_settings import FIGURES, TrustSettings
+from fusetune.analyze.trust_settings import FALLING, FIGURES, TrustSettings
+from fusetune.analyze.trust_words import limits_in_words, not_compared_in_words
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import ReplayResult
@@ -95,28 +98,50 @@ class TrustGrade:
     grade: str
     words: str
     reason: str
-    """What costs most of what could not be repaired; empty for an A."""
+    """What limits the grade, and what costs most of what could not be repaired; empty for an A."""
     start: str
     as_logged_grade: str
     as_logged: AsFlownFigures
     repaired: AsFlownFigures
     figure_grades: dict[str, str]
+    not_compared: tuple[str, ...]
+    """Figures that the log does not let be compared."""
     causes: tuple[Cause, ...]
     instances: tuple[InstanceFigures, ...]
 
 
-def grade_of(figures: AsFlownFigures, settings: TrustSettings) -> tuple[str, dict[str, str]]:
-    """The worst grade of the figures, and each one's; D where there is none to compare."""
+class Graded(NamedTuple):
+    """Grade of some figures, that of each, and which could not be compared."""
+
+    grade: str
+    figure_grades: dict[str, str]
+    not_compared: tuple[str, ...]
+
+
+_NO_PREDICTION = ("height_resets", *FALLING)
+"""Alone these say nothing of how well the filter predicts."""
+
+
+def grade_of(figures: AsFlownFigures, settings: TrustSettings) -> Graded:
+    """The worst grade of the figures, limited by those that could not be compared; D where there is none to compare."""
     grades = {}
     for name in FIGURES:
         value = getattr(figures, name)
         if value is not None:
             limits = getattr(settings, name)
-            missed = sum(value < limit if name == "flags_equal" else value > limit for limit in limits)
+            missed = sum(value < limit if name in FALLING else value > limit for limit in limits)
             grades[name] = GRADES[missed if math.isfinite(value) else 3]
-    # flags alone say nothing of how well the filter predicts
-    decisive = [grade for name, grade in grades.items() if name != "flags_equal"]
-    return (max(grades.values()) if decisive else "D"), grades
+    missing = tuple(name for name in FIGURES if name not in grades)
+    if all(name in _NO_PREDICTION for name in grades):
+        return Graded("D", grades, missing)
+    return Graded(max(_best_without(missing, settings), *grades.values()), grades, missing)
+
+
+def _best_without(missing: tuple[str, ...], settings: TrustSettings) -> str:
+    """The best grade that can be given without these figures."""
+    if any(name in settings.needed_for_b for name in missing):
+        return "C"
+    return "B" if any(name in settings.needed_for_a for name in missing) else "A"
 
 
 def distance(figures: AsFlownFigures, settings: TrustSettings) -> float:
@@ -124,12 +149,12 @@ def distance(figures: AsFlownFigures, settings: TrustSettings) -> float:
     shares = []
     if figures.innovation_factor is not None:
         shares.append(math.log(figures.innovation_factor) / math.log(settings.innovation_factor[1]))
-    if figures.velocity_m_s is not None:
-        shares.append(figures.velocity_m_s / settings.velocity_m_s[1])
-    if figures.heading_deg is not None:
-        shares.append(figures.heading_deg / settings.heading_deg[1])
-    if figures.flags_equal is not None:
-        shares.append((1.0 - figures.flags_equal) / (1.0 - settings.flags_equal[1]))
+    for name in ("velocity_m_s", "heading_deg", "height_m", "vertical_velocity_m_s"):
+        if getattr(figures, name) is not None:
+            shares.append(getattr(figures, name) / getattr(settings, name)[1])
+    for name in FALLING:
+        if getattr(figures, name) is not None:
+            shares.append((1.0 - getattr(figures, name)) / (1.0 - getattr(settings, name)[1]))
     return float(np.mean(shares)) if shares else math.nan
 
 
@@ -152,27 +177,36 @@ def grade_flight(
     comparison = _Comparison(flight, settings)
     repaired = comparison.figures(prepared)
     raw = comparison.figures(prepare(flight))
-    grade, figure_grades = grade_of(repaired, settings)
+    graded = grade_of(repaired, settings)
     causes: tuple[Cause, ...] = ()
     if settings.causes and math.isfinite(distance(repaired, settings)):
         causes = tuple(sorted(_causes(comparison, prepared, replay, repaired), key=lambda c: -c.cost))
-    reason = ""
-    if not figure_grades or (grade == "D" and not repaired.innovation_ratio and repaired.velocity_m_s is None):
-        reason = "the log holds nothing of the vehicle's own estimator that could be compared"
-    elif grade != "A":
-        reason = next((cause.cause for cause in causes if not cause.repaired and cause.cost > 0.0), "")
     return TrustGrade(
-        grade=grade,
-        words=GRADE_WORDS[grade],
-        reason=reason,
+        grade=graded.grade,
+        words=GRADE_WORDS[graded.grade],
+        reason=_reason(graded, repaired, causes, settings),
         start=f"{prepared.start.mode}: {prepared.start.why}",
         as_logged_grade=grade_of(raw, settings)[0],
         as_logged=raw,
         repaired=repaired,
-        figure_grades=figure_grades,
+        figure_grades=graded.figure_grades,
+        not_compared=graded.not_compared,
         causes=causes,
         instances=_instances(flight),
     )
+
+
+def _reason(graded: Graded, figures: AsFlownFigures, causes: tuple[Cause, ...], settings: TrustSettings) -> str:
+    """Why the grade is no A: the figures that have it, those that could not be compared, and the largest cause."""
+    if graded.grade == "A":
+        return ""
+    if all(name in _NO_PREDICTION and grade != "D" for name, grade in graded.figure_grades.items()):
+        return "the log holds nothing of the vehicle's own estimator that could be compared"
+    parts = limits_in_words(figures, [name for name, one in graded.figure_grades.items() if one == graded.grade])
+    if graded.not_compared and _best_without(graded.not_compared, settings) == graded.grade:
+        parts.append(not_compared_in_words(graded.not_compared))
+    parts += [cause.cause for cause in causes if not cause.repaired and cause.cost > 0.0][:1]
+    return "; ".join(parts)
 
 
 class _Comparison:
@@ -201,8 +235,9 @@ class _Comparison:
         else:
             sources = [AID_SOURCE_NAMES.index(name) for name in HORIZONTAL_AIDING if name in AID_SOURCE_NAMES]
             fused = result.innovations["fused"] & np.isin(result.innovations["source"], sources)
-            first = result.innovations["timestamp_sample"][fused]
-            begin = (int(first.min()) if len(first) else 0) + settle_us + COLD_WARM_UP_US
+            # a filter without horizontal aid settles from its start
+            times = result.innovations["timestamp_sample"][fused] if fused.any() else result.states["timestamp_sample"]
+            begin = int(times.min(initial=2**62)) + settle_us + COLD_WARM_UP_US
         return subtract(airborne_intervals(self.flight, {}), [Cut(-(2**62), begin, "warm-up")])
 
 

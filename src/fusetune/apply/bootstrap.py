@@ -1,5 +1,6 @@
 """Paired hierarchical bootstrap: flights are redrawn, and in each drawn flight its blocks, alike for all sets."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,12 +10,17 @@ from scipy.special import ndtr, stdtr, stdtrit
 
 from fusetune.analyze.likelihood import profile_nll
 from fusetune.apply.evidence import AIMS, AimEvidence, FlightEvidence
+from fusetune.apply.rounding import EQUAL_WITHIN
 
 Array = npt.NDArray[np.float64]
 
 
 FEWEST_FLIGHTS = 3
 """With fewer flights what differs between them says little, and the blocks speak for themselves."""
+
+FEWEST_REDRAWN = 5
+"""With fewer units no draw lies as far out as Student's quantiles: of 4, one in 256 has one unit only, and the tail of
+a 95 % interval is 1.2e-4."""
 
 
 @dataclass(frozen=True)
@@ -118,60 +124,97 @@ def spread_of_flights(draws: Array, differences: Array) -> Array:
     return np.asarray(centre + (draws - centre) * (flights / spread))
 
 
-def expanded_interval(differences: Array, flights: int, confidence: float) -> Interval:
-    """Percentile interval, widened for the small number of flights.
+def units_redrawn(flights: Sequence[FlightEvidence], aim: str | None = None) -> int:
+    """How many things were redrawn whose differences show the spread: flights, or of a single flight its blocks.
 
-    The plain percentile interval is as narrow as if the spread of a few flights were known. Its tails are moved
-    to Φ(−√(F/(F−1)) t), with t the quantile of Student's distribution with F − 1 degrees of freedom.
+    A flight whose blocks alone must show it has as many as the kind of prediction that has fewest.
 
     Parameters
     ----------
-    differences : (D,) redrawn mean differences
-    flights : F; with one flight only its blocks speak and nothing can be widened
+    aim : of this kind of prediction alone, on the flights that have it
+    """
+    having = [one for one in flights if aim is None or one.aim(aim) is not None]
+    if len(having) != 1:
+        return len(having)
+    parts = [part for part in having[0].aims if aim is None or part.name == aim]
+    return min(int(np.count_nonzero(part.n.any(axis=1))) for part in parts)
+
+
+def standard_error(draws: Array, units: int) -> float | None:
+    """Standard error of a mean difference from its redrawn means (D,); None where nothing shows its spread.
+
+    The spread of redrawn means is that of the population, too small by √((n − 1)/n) for n units.
+    """
+    draws = draws[np.isfinite(draws)]
+    if units < 2 or not draws.size:
+        return None
+    spread = float(np.std(draws))
+    return spread * math.sqrt(units / (units - 1.0)) if spread > EQUAL_WITHIN else None
+
+
+def expanded_interval(draws: Array, units: int, confidence: float) -> Interval | None:
+    """Interval of a mean difference, widened for the small number of units; None where nothing shows its spread.
+
+    The plain percentile interval is as narrow as if the spread of a few flights were known. Its tails are moved
+    to Φ(−√(n/(n−1)) t), with t the quantile of Student's distribution with n − 1 degrees of freedom. With fewer than
+    `FEWEST_REDRAWN` units, no draw lies there, and the interval is Student's own around the mean of the draws.
+
+    Parameters
+    ----------
+    draws : (D,) redrawn mean differences; those that are not finite are left out
+    units : n, from `units_redrawn`
 
     References
     ----------
     Hesterberg, "What Teachers Should Know About the Bootstrap", The American Statistician 69(4), 2015.
     """
+    error = standard_error(draws, units)
+    if error is None:
+        return None
+    draws = draws[np.isfinite(draws)]
     tail = 0.5 * (1.0 - confidence)
-    if flights > 1:
-        tail = float(ndtr(np.sqrt(flights / (flights - 1.0)) * stdtrit(flights - 1, tail)))
-    lower, upper = np.quantile(differences, [tail, 1.0 - tail])
+    quantile = float(stdtrit(units - 1, tail))
+    if units < FEWEST_REDRAWN:
+        centre = float(draws.mean())
+        return Interval(centre + quantile * error, centre - quantile * error)
+    tail = float(ndtr(np.sqrt(units / (units - 1.0)) * quantile))
+    lower, upper = np.quantile(draws, [tail, 1.0 - tail])
     return Interval(float(lower), float(upper))
 
 
-def interval_over_flights(draws: Array, differences: Array, confidence: float) -> Interval:
+def interval_over_flights(draws: Array, differences: Array, units: int, confidence: float) -> Interval | None:
     """Interval of a mean difference from its redrawn means (D,) and the differences on the flights (F,)."""
-    return expanded_interval(spread_of_flights(draws, differences), differences.size, confidence)
+    return expanded_interval(spread_of_flights(draws, differences), units, confidence)
 
 
-def p_value(difference: float, differences: Array, flights: int) -> float:
+def p_value(difference: float, draws: Array, units: int) -> float | None:
     """Two-sided p-value of a mean difference against 0: Student's t with the bootstrap's standard error.
 
-    With one flight the normal distribution stands in for Student's; 1 where the draws do not vary around 0.
+    1 where there is no difference beyond rounding, None where nothing shows how far it spreads.
     """
-    error = float(np.std(differences))
-    if flights > 1:
-        error *= np.sqrt(flights / (flights - 1.0))
-    if error == 0.0:
-        return 1.0 if difference == 0.0 else 0.0
-    statistic = -abs(difference) / error
-    tail = stdtr(flights - 1, statistic) if flights > 1 else ndtr(statistic)
-    return float(min(2.0 * tail, 1.0))
+    if abs(difference) <= EQUAL_WITHIN:
+        return 1.0
+    error = standard_error(draws, units)
+    if error is None or not np.isfinite(difference):
+        return None
+    return float(min(2.0 * stdtr(units - 1, -abs(difference) / error), 1.0))
 
 
-def holm(p_values: Sequence[float]) -> list[float]:
-    """Holm's adjusted p-values in the order of the arguments: they hold for all candidates together."""
-    order = np.argsort(p_values, kind="stable")
-    adjusted = np.empty(len(p_values))
+def holm(p_values: Sequence[float | None]) -> list[float | None]:
+    """Holm's adjusted p-values in the order of the arguments: they hold for all candidates together.
+
+    One that is not known stays so; it counts as a candidate like the others.
+    """
+    known = [1.0 if one is None else one for one in p_values]
+    adjusted: list[float | None] = [None] * len(known)
     largest = 0.0
-    for rank, index in enumerate(order):
-        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[index]))
-        adjusted[index] = largest
-    return [float(value) for value in adjusted]
+    for rank, index in enumerate(np.argsort(known, kind="stable")):
+        largest = max(largest, min(1.0, (len(known) - rank) * known[index]))
+        adjusted[index] = None if p_values[index] is None else float(largest)
+    return adjusted
 
 
 def probability_best(scores: Array) -> Array:
     """Share of draws in which each set has the lowest score, (D, S) → (S,); equal sets share a draw."""
-    best = scores == scores.min(axis=1, keepdims=True)
+    best = scores <= scores.min(axis=1, keepdims=True) + EQUAL_WITHIN
     return (best / best.sum(axis=1, keepdims=True)).mean(axis=0)

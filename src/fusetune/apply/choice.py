@@ -50,10 +50,10 @@ def choose(
     Notes
     -----
     Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. It is
-    proved better where its interval lies wholly below 0 and the difference holds in spite of the number of
-    candidates (`DecisionSettings.multiplicity`). The proved set with the lowest score is chosen, or one that is proved,
-    within one standard error of it, hardly worse (`DecisionSettings.equivalence_percent`) and nearer to the present
-    parameters.
+    proved better where its interval is known and lies wholly below 0, and the difference holds in spite of the number
+    of candidates (`DecisionSettings.multiplicity`). The proved set with the lowest score is chosen, or one that is
+    proved, within one standard error of it, hardly worse (`DecisionSettings.equivalence_percent`) and nearer to the
+    present parameters.
     """
     exploratory = len(evidence) < settings.minimum_flights
     eligible = [one for one in ranked if one.is_eligible]
@@ -67,7 +67,7 @@ def choose(
         return Choice("keep", present, best, None, exploratory, validated)
     first = min(proved, key=lambda one: (one.score, one.name))
     hardly = math.log1p(0.01 * settings.equivalence_percent)
-    near = [one for one in proved if one.score - first.score <= min(one.behind_best_error, hardly)]
+    near = [one for one in proved if one.score - first.score <= min(one.behind_best_error or 0.0, hardly)]
     pick = min([first, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
     return Choice("change", pick.name, best, pick, exploratory, validated)
 

@@ -2,7 +2,8 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -93,6 +94,16 @@ def rms_by_variable(name: str, index: dict[tuple[str, str, str, str], list[float
     return rms
 
 
+def is_known(row: Mapping[str, Any]) -> bool:
+    """Whether a figure of the metrics has a value and bounds to hold it against."""
+    return all(row[name] is not None and math.isfinite(row[name]) for name in ("lower", "value", "upper"))
+
+
+def is_inside(row: Mapping[str, Any]) -> bool:
+    """Whether a figure of the metrics lies inside its bounds."""
+    return bool(row["lower"] <= row["value"] <= row["upper"])
+
+
 def paper_entries(
     sets: Sequence[str], flights: Sequence[AnalyzedFlight], metrics: pa.Table, values: dict[str, Criteria]
 ) -> list[PaperEntry]:
@@ -102,7 +113,7 @@ def paper_entries(
     rows = [row for row in metrics.filter(wanted).to_pylist() if row["axis"] == "all" and row["flight"] in names]
     entries = []
     for name in sets:
-        inside = [row["lower"] <= row["value"] <= row["upper"] for row in rows if row["set"] == name]
+        inside = [is_inside(row) for row in rows if row["set"] == name and is_known(row)]
         consistent = bool(np.mean(inside) >= 0.5) if inside else None
         rate = values[name]["break_rate_gate"]
         rate = 0.0 if math.isnan(rate) else rate

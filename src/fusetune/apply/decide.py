@@ -136,8 +136,13 @@ def _decision(
         "rule": asdict(settings) | {"main_source": settings.main_source},
         "leave_one_out": asdict(choice.leave_one_out) if choice.leave_one_out else None,
         "weights": _weights(flights),
-        "ranking": [asdict(one) for one in ranked],
+        "ranking": [_figures_of(one) for one in ranked],
     }
+
+
+def _figures_of(one: RankedSet) -> dict[str, Any]:
+    """All that the ranking says of a set, its part in the decision first."""
+    return {"name": one.name, "status": one.status, **asdict(one)}
 
 
 def _weights(flights: Sequence[AnalyzedFlight]) -> dict[str, dict[str, float]]:
@@ -193,20 +198,23 @@ def _paper_mode(
 def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, Criteria]) -> None:
     rows = []
     for position, one in enumerate(ranked, start=1):
-        row: dict[str, Any] = {"rank": position, **asdict(one), **_flat_aims(one), **values[one.name]}
-        del row["aims"]
+        row: dict[str, Any] = {"rank": position, **_figures_of(one), **_flat_aims(one), **values[one.name]}
+        del row["aims"], row["is_present"]
         row["reasons"] = "; ".join(one.reasons)
-        rows.append(row)
-    table = pa.Table.from_pylist([_rounded(row, keep_nan=True) for row in rows])
+        rows.append(_rounded(row))
+    table = pa.Table.from_pylist(rows)
+    # A column in which nothing is known is one of figures all the same.
+    schema = [pa.field(one.name, pa.float64()) if pa.types.is_null(one.type) else one for one in table.schema]
+    table = table.cast(pa.schema(schema))
     with atomic_path(folder / "ranking.parquet") as temporary:
         pq.write_table(table, temporary)
     with atomic_path(folder / "ranking.csv") as temporary:
         pa.csv.write_csv(table, temporary)
 
 
-def _flat_aims(one: RankedSet) -> dict[str, float]:
+def _flat_aims(one: RankedSet) -> dict[str, float | None]:
     return {
-        f"{aim}_{figure}": getattr(one.aims[aim], figure) if aim in one.aims else math.nan
+        f"{aim}_{figure}": getattr(one.aims[aim], figure) if aim in one.aims else None
         for aim in AIMS
         for figure in ("difference", "lower", "upper")
     }
@@ -244,18 +252,16 @@ def _file_origin(choice: Choice, decision: dict[str, Any], newest: AnalyzedFligh
     if newest is not None:
         lines.append(f"previous values from flight {newest.name}, firmware {newest.summary['firmware']}")
     if choice.exploratory:
-        lines.append(f"exploratory: only {decision['flights_scored']} scored flight(s)")
+        lines.append(f"exploratory: flights in the decision: {decision['flights_scored']}")
     return tuple(lines)
 
 
-def _rounded(value: Any, keep_nan: bool = False) -> Any:
-    """Round every float to nine significant digits: the last bits may differ between machines."""
+def _rounded(value: Any) -> Any:
+    """Round every float to nine significant digits: the last bits may differ between machines. None where none is."""
     if isinstance(value, float):
-        if not math.isfinite(value):
-            return value if keep_nan else None
-        return float(f"{value:.{_SIGNIFICANT_DIGITS}g}")
+        return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {key: _rounded(item, keep_nan) for key, item in value.items()}
+        return {key: _rounded(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_rounded(item, keep_nan) for item in value]
+        return [_rounded(item) for item in value]
     return value

@@ -6,7 +6,7 @@ without GNSS. Each has columns (source, axis and, unaided, horizon), and each co
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,8 @@ class AimEvidence:
     def column_scores(self) -> Array:
         """(S, A) scale-profiled NLL of every column, nat."""
         n = self.n.sum(axis=0)
-        return profile_nll(self.sum_nis.sum(axis=1) / n, self.sum_log_variance.sum(axis=1) / n)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return profile_nll(self.sum_nis.sum(axis=1) / n, self.sum_log_variance.sum(axis=1) / n)
 
     @property
     def scores(self) -> Array:
@@ -78,9 +79,27 @@ class FlightEvidence:
         return next((aim for aim in self.aims if aim.name == name), None)
 
 
+NOT_SCORED, DISTRUSTED, WITHOUT_SAMPLES = "not scored", "distrusted", "without samples"
+"""Why a flight has no evidence: it could not be scored, its replay is not trusted, or nothing in it is judged by."""
+
+
+@dataclass(frozen=True)
+class NoEvidence:
+    """Why a flight has no evidence.
+
+    Attributes
+    ----------
+    kind : `NOT_SCORED`, `DISTRUSTED` or `WITHOUT_SAMPLES`
+    reason : in words
+    """
+
+    kind: str
+    reason: str
+
+
 @dataclass(frozen=True)
 class AnalyzedFlight:
-    """What the analyze room says about one flight: its summary, and the evidence or the reason why there is none.
+    """What the analyze room says about one flight: its summary, and the evidence or why there is none.
 
     `metrics` are its figures, columns of `METRICS_SCHEMA`.
     """
@@ -90,7 +109,12 @@ class AnalyzedFlight:
     summary: dict[str, Any]
     metrics: pa.Table
     evidence: FlightEvidence | None
-    reason: str
+    without: NoEvidence | None = None
+
+    @property
+    def reason(self) -> str:
+        """Why there is no evidence, in words; empty where there is."""
+        return self.without.reason if self.without else ""
 
 
 @dataclass(frozen=True)
@@ -125,8 +149,9 @@ def _read_flight(
     folder: Path, metrics: pa.Table, settings: DecisionSettings, present: str, whiteness: Mapping[str, float]
 ) -> AnalyzedFlight:
     summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
-    evidence, reason = _evidence_of(folder, summary, settings, present, whiteness)
-    return AnalyzedFlight(summary["flight"], folder, summary, metrics, evidence, reason)
+    found = _evidence_of(folder, summary, settings, present, whiteness)
+    evidence, without = (None, found) if isinstance(found, NoEvidence) else (found, None)
+    return AnalyzedFlight(summary["flight"], folder, summary, metrics, evidence, without)
 
 
 def _evidence_of(
@@ -135,29 +160,35 @@ def _evidence_of(
     settings: DecisionSettings,
     present: str,
     whiteness: Mapping[str, float],
-) -> tuple[FlightEvidence | None, str]:
-    """The evidence, or why there is none."""
+) -> FlightEvidence | NoEvidence:
     if summary["status"] != "scored":
-        return None, summary["reason"]
-    grade = trust_grade(folder)
+        return NoEvidence(NOT_SCORED, summary["reason"])
+    grade, why = trust_grade(folder)
     if grade is not None and grade > settings.lowest_grade:
-        return None, f"its replay has trust grade {grade}, and the decision takes none below {settings.lowest_grade}"
+        because = f" ({why})" if why else ""
+        words = (
+            f"its replay has trust grade {grade}{because}, and the decision takes none below {settings.lowest_grade}"
+        )
+        return NoEvidence(DISTRUSTED, words)
     aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
     unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
     evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings)
     if evidence is None or present not in evidence.sets:
-        return None, f"the flight has no samples of {', '.join(settings.sources)} to score"
-    return evidence, ""
+        return NoEvidence(WITHOUT_SAMPLES, f"the flight has nothing of {', '.join(settings.sources)} to judge by")
+    return evidence
 
 
-def trust_grade(folder: Path) -> str | None:
-    """How far the replay of a flight can be trusted, "A" to "D"; None where there was nothing to compare it with."""
+def trust_grade(folder: Path) -> tuple[str | None, str]:
+    """How far the replay of a flight can be trusted, "A" to "D", and why no further.
+
+    The grade is None where there was nothing to compare the replay with.
+    """
     path = folder / "fidelity.json"
     if not path.is_file():
-        return None
+        return None, ""
     fidelity = json.loads(path.read_text(encoding="utf-8"))
-    compared = fidelity.get("trust", {}).get("figure_grades")
-    return str(fidelity["grade"]) if compared else None
+    trust = fidelity.get("trust", {})
+    return (str(fidelity["grade"]) if trust.get("figure_grades") else None), trust.get("reason", "")
 
 
 def white_shares(metrics: pa.Table, present: str) -> dict[str, float]:
@@ -201,8 +232,15 @@ def flight_evidence(
         return None
     total = sum(weight for _, _, weight in parts.values())
     sets = [name for name in next(iter(parts.values()))[0].sets if all(name in part[0].sets for part in parts.values())]
-    aims = tuple(_aim(name, *parts[name], sets, total) for name in AIMS if name in parts)
-    return FlightEvidence(flight, tuple(sets), aims)
+    aims = [_aim(name, *parts[name], sets, total) for name in AIMS if name in parts]
+    # An error of exactly 0, or one that is no number, has no logarithm: such a set has no score.
+    able = np.all([np.isfinite(aim.scores) for aim in aims], axis=0)
+    named = tuple(name for name, one in zip(sets, able, strict=True) if one)
+    return FlightEvidence(flight, named, tuple(_of_sets(aim, able) for aim in aims)) if named else None
+
+
+def _of_sets(aim: AimEvidence, rows: npt.NDArray[np.bool_]) -> AimEvidence:
+    return replace(aim, sum_nis=aim.sum_nis[rows], sum_log_variance=aim.sum_log_variance[rows])
 
 
 def _weights(sums: _Sums, weight_of: Mapping[str, float]) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from fusetune.apply.evidence import FlightEvidence
+from fusetune.apply.rounding import EQUAL_WITHIN, without_rounding
 
 FEWEST_FLIGHTS = 3
 
@@ -24,15 +25,16 @@ class LeaveOneOut:
     ----------
     chosen : flight that was left out → set chosen from the others, the present one if none beat it
     differences : flight that was left out → score there of the set chosen, less that of the present set
-    difference, lower, upper : their mean and its interval by Student's t; below 0 the choice holds
+    difference, lower, upper : their mean and its interval by Student's t, None where they do not differ; below 0 the
+        choice holds
     stays : number of flights without which the same set as from all flights is chosen
     """
 
     chosen: dict[str, str]
     differences: dict[str, float]
     difference: float
-    lower: float
-    upper: float
+    lower: float | None
+    upper: float | None
     stays: int
 
 
@@ -50,19 +52,20 @@ def leave_one_out(
         return None
     names = [present, *(name for name in eligible if name != present)]
     scores = np.array([flight.scores[[flight.sets.index(name) for name in names]] for flight in flights])
-    scores -= scores[:, :1]
+    scores = without_rounding(scores - scores[:, :1])
     total = scores.sum(axis=0)
     best = names[int(np.argmin(total))]
     picks = [int(np.argmin(total - row)) for row in scores]
     differences = np.array([row[pick] for row, pick in zip(scores, picks, strict=True)])
     mean = float(differences.mean())
-    error = float(differences.std(ddof=1)) / np.sqrt(len(flights))
-    reach = float(stdtrit(len(flights) - 1, 0.5 + 0.5 * confidence)) * error
+    spread = float(differences.std(ddof=1))
+    reach = float(stdtrit(len(flights) - 1, 0.5 + 0.5 * confidence)) * spread / np.sqrt(len(flights))
+    known = spread > EQUAL_WITHIN
     return LeaveOneOut(
         chosen={flight.flight: names[pick] for flight, pick in zip(flights, picks, strict=True)},
         differences={flight.flight: float(value) for flight, value in zip(flights, differences, strict=True)},
         difference=mean,
-        lower=mean - reach,
-        upper=mean + reach,
+        lower=mean - reach if known else None,
+        upper=mean + reach if known else None,
         stays=sum(names[pick] == best for pick in picks),
     )

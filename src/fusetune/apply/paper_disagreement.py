@@ -8,7 +8,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusetune.apply.bootstrap import bootstrap_scores, interval_over_flights
+from fusetune.apply.bootstrap import bootstrap_scores, interval_over_flights, units_redrawn
+from fusetune.apply.criteria import is_inside, is_known
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, white_shares
 from fusetune.apply.paper_mode import (
     PAPER_VARIABLES,
@@ -19,6 +20,7 @@ from fusetune.apply.paper_mode import (
     root_sum,
 )
 from fusetune.apply.ranking import RankedSet
+from fusetune.apply.rounding import without_rounding
 from fusetune.apply.settings import DecisionSettings
 
 WANDERING = 0.6
@@ -27,7 +29,7 @@ WANDERING = 0.6
 
 def is_same_set(one: str, other: str, ranked: Sequence[RankedSet]) -> bool:
     """Whether two sets are one, by name or because both gave the present set's results on every flight."""
-    as_now = {entry.name for entry in ranked if entry.status == "present" or entry.equal_to_present}
+    as_now = {entry.name for entry in ranked if entry.is_present or entry.equal_to_present}
     return one == other or {one, other} <= as_now
 
 
@@ -56,7 +58,7 @@ def why(
     entry = next(one for one in ranked if one.name == first)
     worse = [f"worse than the present set in its {aim} predictions beyond doubt" for aim in entry.worse_aims]
     scored = [flight.name for flight in flights if flight.evidence is not None]
-    present = next(one.name for one in ranked if one.status == "present")
+    present = next(one.name for one in ranked if one.is_present)
     case = Disagreement(
         first=paper_view(first, scored, metrics),
         chosen=paper_view(chosen, scored, metrics),
@@ -116,7 +118,7 @@ def paper_view(name: str, flights: Sequence[str], metrics: pa.Table) -> PaperVie
     nis = [
         row
         for row in kept.filter(pc.equal(kept["metric"], "mean_nis")).to_pylist()
-        if row["source"] == "gnss_vel" and row["axis"] == "all"
+        if row["source"] == "gnss_vel" and row["axis"] == "all" and is_known(row)
     ]
     return PaperView(
         name=name,
@@ -127,7 +129,7 @@ def paper_view(name: str, flights: Sequence[str], metrics: pa.Table) -> PaperVie
             for flight in flights
         },
         relative_nis=float(np.mean([row["value"] for row in nis])) / len(VELOCITY_VARIABLES) if nis else math.nan,
-        flights_inside=sum(row["lower"] <= row["value"] <= row["upper"] for row in nis),
+        flights_inside=sum(map(is_inside, nis)),
         flights=len(nis),
     )
 
@@ -145,15 +147,18 @@ def _by_flight(
 
 @dataclass(frozen=True)
 class LogRatio:
-    """By how much the logarithm of a prediction error of the paper's set exceeds that of the decision's set."""
+    """By how much the logarithm of a prediction error of the paper's set exceeds that of the decision's set.
+
+    The interval is None where nothing shows the spread of the difference.
+    """
 
     difference: float
-    lower: float
-    upper: float
+    lower: float | None
+    upper: float | None
 
     @property
     def is_certain(self) -> bool:
-        return self.lower > 0.0 or self.upper < 0.0
+        return self.lower is not None and self.upper is not None and (self.lower > 0.0 or self.upper < 0.0)
 
 
 @dataclass(frozen=True)
@@ -196,9 +201,13 @@ def _log_ratios(
     for name, found in scores.items():
         if found:
             draws = redrawn.total if name == "score" else redrawn.aims[name]
-            each = np.array([row[flight.sets.index(one)] - row[flight.sets.index(other)] for flight, row in found])
-            interval = interval_over_flights(draws[:, 0] - draws[:, 1], each, settings.confidence)
-            ratios[name] = LogRatio(float(each.mean()), interval.lower, interval.upper)
+            each = without_rounding(
+                [row[flight.sets.index(one)] - row[flight.sets.index(other)] for flight, row in found]
+            )
+            units = units_redrawn(both, None if name == "score" else name)
+            interval = interval_over_flights(draws[:, 0] - draws[:, 1], each, units, settings.confidence)
+            lower, upper = (interval.lower, interval.upper) if interval else (None, None)
+            ratios[name] = LogRatio(float(each.mean()), lower, upper)
     return ratios
 
 
@@ -277,10 +286,13 @@ def _consistency(case: Disagreement) -> list[str]:
 
 
 def _prediction(where: str, ratio: LogRatio, case: Disagreement) -> str:
-    change, low, high = (100.0 * math.expm1(value) for value in (ratio.difference, ratio.lower, ratio.upper))
-    span = _minus(f"{case.confidence:.0%} interval {low:+.1f} % to {high:+.1f} %")
+    change = 100.0 * math.expm1(ratio.difference)
+    span = "how far chance could do that is not known"
+    if ratio.lower is not None and ratio.upper is not None:
+        low, high = (100.0 * math.expm1(value) for value in (ratio.lower, ratio.upper))
+        span = _minus(f"{case.confidence:.0%} interval {low:+.1f} % to {high:+.1f} %")
     size = f"{abs(change):.1f} % {'larger' if change >= 0.0 else 'smaller'}"
-    chance = "" if ratio.is_certain else ", which may be chance"
+    chance = "" if ratio.is_certain or ratio.lower is None else ", which may be chance"
     names = f"the errors of “{case.first.name}” are {size} than those of “{case.chosen.name}”"
     return f"{where}, {names} ({span}){chance}."
 

@@ -16,41 +16,52 @@ from fusetune.apply.bootstrap import (
     p_value,
     probability_best,
     spread_of_flights,
+    standard_error,
+    units_redrawn,
 )
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
+from fusetune.apply.rounding import without_rounding
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.sign_flips import family_p_values
 
 Array = npt.NDArray[np.float64]
 
 
+PRESENT, ELIGIBLE, SAME, NOT_ELIGIBLE, NOT_SCORED = "flies now", "eligible", "same as now", "not eligible", "not scored"
+"""Parts that a set can have in the decision, as the tables, the page and the files name them."""
+
+
 @dataclass(frozen=True)
 class AimComparison:
-    """A set against the present one in one kind of prediction: mean difference of the score and its interval."""
+    """A set against the present one in one kind of prediction: mean difference of the score and its interval.
+
+    The interval is None where nothing shows the spread of the difference.
+    """
 
     difference: float
-    lower: float
-    upper: float
+    lower: float | None
+    upper: float | None
     flights: int
 
     @property
     def is_worse(self) -> bool:
         """Worse than the present set beyond doubt."""
-        return self.lower > 0.0
+        return self.lower is not None and self.lower > 0.0
 
 
 @dataclass(frozen=True)
 class RankedSet:
-    """One set in the ranking.
+    """One set in the ranking. What nothing shows the spread of is not known: None.
 
     Attributes
     ----------
-    status : "present", "candidate", "vetoed" or "not_scored"
+    is_present : whether it is the set that flies now
+    reasons : what is held against it, or why it was not scored
     score : mean over the flights, nat; lower is better
     difference, lower, upper : score less that of the present set, and its interval; below 0 is better
     p_value, p_holm : of the difference against 0, alone and by Holm's correction for all candidates
     p_family : that the best of the candidates is so much better by luck, see `fusetune.apply.sign_flips`
-    p_best : share of bootstrap draws in which no eligible set scores lower
+    p_best : share of bootstrap draws in which no set that may be flown scores lower
     flights, flights_better : flights behind the score, and on how many of them it beats the present set
     equal_to_present : same results on every flight
     improvement_percent : by how much smaller its typical prediction error is than the present set's
@@ -60,23 +71,34 @@ class RankedSet:
     """
 
     name: str
-    status: str
+    is_present: bool
     reasons: tuple[str, ...]
     score: float
     difference: float
-    lower: float
-    upper: float
-    p_value: float
-    p_holm: float
-    p_family: float
-    p_best: float
+    lower: float | None
+    upper: float | None
+    p_value: float | None
+    p_holm: float | None
+    p_family: float | None
+    p_best: float | None
     flights: int
     flights_better: int
     equal_to_present: bool
     improvement_percent: float
     behind_best: float
-    behind_best_error: float
+    behind_best_error: float | None
     aims: dict[str, AimComparison]
+
+    @property
+    def status(self) -> str:
+        """Its part in the decision."""
+        if self.is_present:
+            return PRESENT
+        if not self.flights:
+            return NOT_SCORED
+        if self.reasons or self.worse_aims:
+            return NOT_ELIGIBLE
+        return SAME if self.equal_to_present else ELIGIBLE
 
     @property
     def worse_aims(self) -> tuple[str, ...]:
@@ -84,14 +106,21 @@ class RankedSet:
         return tuple(name for name, aim in self.aims.items() if aim.is_worse)
 
     @property
+    def is_vetoed(self) -> bool:
+        """Whether it was scored, and ruled out by something other than its score."""
+        return bool(self.reasons) and self.flights > 0 and not self.is_present
+
+    @property
     def is_eligible(self) -> bool:
         """Whether the set may be chosen, if the evidence is for it."""
-        return self.status == "candidate" and not self.equal_to_present and not self.worse_aims
+        return self.status == ELIGIBLE
 
 
 def is_proved(candidate: RankedSet, settings: DecisionSettings) -> bool:
     """Better than the present set beyond doubt, by itself and as one of many candidates."""
     p_value = {"holm": candidate.p_holm, "sign_flips": candidate.p_family, "none": 0.0}[settings.multiplicity]
+    if candidate.upper is None or p_value is None:
+        return False
     return candidate.upper < 0.0 and p_value <= 1.0 - settings.confidence
 
 
@@ -102,7 +131,7 @@ def rank(
     vetoed: Mapping[str, Sequence[str]],
     settings: DecisionSettings,
 ) -> list[RankedSet]:
-    """Rank all sets; the eligible ones by score, then the vetoed, then those never scored.
+    """Rank all sets by score; those that were vetoed after the others, then those never scored.
 
     Parameters
     ----------
@@ -129,10 +158,8 @@ def rank(
         # A set that failed on some flights: its figures come from the others, for information.
         redrawn = bootstrap_scores(by_set[name], [name, present], settings.draws, settings.seed)
         ranked.append(_compared(name, present, by_set[name], [name, present], redrawn, vetoed, False, settings))
-    ranked += [_never_scored(name, vetoed) for name in sets if not by_set[name]]
-    order = {"present": 0, "candidate": 0, "vetoed": 1, "not_scored": 2}
-    present_first = {True: 0, False: 1}
-    return sorted(ranked, key=lambda one: (order[one.status], one.score, present_first[one.name == present], one.name))
+    ranked += [_never_scored(name, present, vetoed) for name in sets if not by_set[name]]
+    return sorted(ranked, key=lambda one: (not one.flights, one.is_vetoed, one.score, not one.is_present, one.name))
 
 
 def _compared(
@@ -147,28 +174,29 @@ def _compared(
 ) -> RankedSet:
     own = np.array([one.scores[one.sets.index(name)] for one in evidence])
     base = np.array([one.scores[one.sets.index(present)] for one in evidence])
-    difference = float(np.mean(own - base))
-    differences = spread_of_flights(_differences(redrawn.total, sets, name, present), own - base)
-    interval = expanded_interval(differences, len(evidence), settings.confidence)
-    reasons = tuple(vetoed.get(name, ()))
+    found = without_rounding(own - base)
+    difference = float(np.mean(found))
+    draws = spread_of_flights(_differences(redrawn.total, sets, name, present), found)
+    units = units_redrawn(evidence)
+    interval = expanded_interval(draws, units, settings.confidence)
     return RankedSet(
         name=name,
-        status="present" if name == present else "vetoed" if reasons else "candidate",
-        reasons=reasons,
+        is_present=name == present,
+        reasons=tuple(vetoed.get(name, ())),
         score=float(np.mean(own)),
         difference=difference,
-        lower=interval.lower,
-        upper=interval.upper,
-        p_value=1.0 if name == present else p_value(difference, differences, len(evidence)),
+        lower=interval.lower if interval else None,
+        upper=interval.upper if interval else None,
+        p_value=p_value(difference, draws, units),
         p_holm=1.0,
         p_family=1.0,
         p_best=0.0,
         flights=len(evidence),
-        flights_better=int(np.count_nonzero(own < base)),
+        flights_better=int(np.count_nonzero(found < 0.0)),
         equal_to_present=equal,
         improvement_percent=improvement_percent(difference),
         behind_best=math.nan,
-        behind_best_error=math.nan,
+        behind_best_error=None,
         aims=_aims(name, present, evidence, sets, redrawn, settings),
     )
 
@@ -190,13 +218,31 @@ def _aims(
         flights = [(one, part) for one in evidence if (part := one.aim(aim)) is not None]
         if not flights:
             continue
-        found = np.array(
+        found = without_rounding(
             [part.scores[one.sets.index(name)] - part.scores[one.sets.index(present)] for one, part in flights]
         )
-        draws = _differences(redrawn.aims[aim], sets, name, present)
-        interval = interval_over_flights(draws, found, settings.confidence)
-        compared[aim] = AimComparison(float(np.mean(found)), interval.lower, interval.upper, len(flights))
+        draws = _aim_differences(aim, [one for one, _ in flights], redrawn, sets, name, present, settings)
+        interval = interval_over_flights(draws, found, units_redrawn(evidence, aim), settings.confidence)
+        lower, upper = (interval.lower, interval.upper) if interval else (None, None)
+        compared[aim] = AimComparison(float(np.mean(found)), lower, upper, len(flights))
     return compared
+
+
+def _aim_differences(
+    aim: str,
+    flights: Sequence[FlightEvidence],
+    redrawn: Redrawn,
+    sets: Sequence[str],
+    name: str,
+    present: str,
+    settings: DecisionSettings,
+) -> Array:
+    """Redrawn mean differences in one kind of prediction, on the flights that have it."""
+    if len(flights) > 1:
+        return _differences(redrawn.aims[aim], sets, name, present)
+    # Drawn several times among others, one flight would seem to be as many.
+    alone = bootstrap_scores(flights, [name, present], settings.draws, settings.seed)
+    return _differences(alone.aims[aim], [name, present], name, present)
 
 
 def improvement_percent(difference: float) -> float:
@@ -216,49 +262,71 @@ def _with_family(
     settings: DecisionSettings,
 ) -> list[RankedSet]:
     """Add what depends on the other sets: the corrections for their number, P(best), the distance to the best."""
-    candidates = [one for one in ranked if one.status == "candidate" and not one.equal_to_present]
+    candidates = [one for one in ranked if not (one.is_present or one.is_vetoed or one.equal_to_present)]
     adjusted = dict(zip((one.name for one in candidates), holm([one.p_value for one in candidates]), strict=True))
     family = _family_p_values([one.name for one in candidates if one.is_eligible], present, evidence, settings)
-    eligible = [one.name for one in ranked if one.status in ("present", "candidate")]
-    if not eligible:
-        return ranked
-    best = probability_best(scores[:, [complete.index(name) for name in eligible]])
-    shares = dict(zip(eligible, best, strict=True))
+    able = [one.name for one in ranked if one.status != NOT_ELIGIBLE]
+    best = probability_best(scores[:, [complete.index(name) for name in able]])
+    units = units_redrawn(evidence)
+    shares = dict(zip(able, best.tolist(), strict=True))
     ranked = [
         replace(
             one,
             p_holm=adjusted.get(one.name, 1.0),
             p_family=family.get(one.name, 1.0),
-            p_best=float(shares.get(one.name, 0.0)),
+            p_best=shares.get(one.name, 0.0) if units > 1 else None,
         )
         for one in ranked
     ]
-    able = [one for one in ranked if one.status == "present" or one.is_eligible]
+    return _with_distance_to_the_best(ranked, complete, scores, units, settings)
+
+
+def _with_distance_to_the_best(
+    ranked: list[RankedSet], complete: Sequence[str], scores: Array, units: int, settings: DecisionSettings
+) -> list[RankedSet]:
+    able = [one for one in ranked if one.is_present or one.is_eligible]
     proved = [one for one in able if one.is_eligible and is_proved(one, settings)]
     lead = min(proved or able, key=lambda one: (one.score, one.name))
-    return [
-        replace(
-            one,
-            behind_best=one.score - lead.score,
-            behind_best_error=float(np.std(_differences(scores, complete, one.name, lead.name))),
-        )
-        for one in ranked
-    ]
+
+    def error(name: str) -> float | None:
+        if name == lead.name:
+            return 0.0
+        draws = _differences(scores, complete, name, lead.name)
+        return float(np.std(draws)) if standard_error(draws, units) is not None else None
+
+    return [replace(one, behind_best=one.score - lead.score, behind_best_error=error(one.name)) for one in ranked]
 
 
 def _family_p_values(
     names: Sequence[str], present: str, evidence: Sequence[FlightEvidence], settings: DecisionSettings
-) -> dict[str, float]:
+) -> dict[str, float | None]:
     if not names:
         return {}
     rows = [one.scores[[one.sets.index(name) for name in (present, *names)]] for one in evidence]
     differences = np.array([row[1:] - row[0] for row in rows])
-    return dict(zip(names, family_p_values(differences, settings.seed).tolist(), strict=True))
+    found = family_p_values(differences, settings.seed).tolist()
+    return {name: value if math.isfinite(value) else None for name, value in zip(names, found, strict=True)}
 
 
-def _never_scored(name: str, vetoed: Mapping[str, Sequence[str]]) -> RankedSet:
+def _never_scored(name: str, present: str, vetoed: Mapping[str, Sequence[str]]) -> RankedSet:
     nan = math.nan
-    reasons = tuple(vetoed.get(name, ())) or ("scored on no flight",)
     return RankedSet(
-        name, "not_scored", reasons, nan, nan, nan, nan, 1.0, 1.0, 1.0, 0.0, 0, 0, False, nan, nan, nan, {}
+        name=name,
+        is_present=name == present,
+        reasons=tuple(vetoed.get(name, ())) or ("scored on no flight",),
+        score=nan,
+        difference=nan,
+        lower=None,
+        upper=None,
+        p_value=None,
+        p_holm=None,
+        p_family=None,
+        p_best=None,
+        flights=0,
+        flights_better=0,
+        equal_to_present=False,
+        improvement_percent=nan,
+        behind_best=nan,
+        behind_best_error=None,
+        aims={},
     )

@@ -11,6 +11,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.apply.rounding import without_rounding
+
 Array = npt.NDArray[np.float64]
 
 MOST_ENUMERATED = 12
@@ -29,8 +31,9 @@ def family_p_values(differences: Array, seed: int) -> Array:
 
     Returns
     -------
-    (C,) one-sided p-values that hold for all candidates together (single-step max-t). 1 with fewer than two flights,
-    and for candidates that are clearly worse: those are not rivals, and do not count in the family either.
+    (C,) one-sided p-values that hold for all candidates together (single-step max-t). NaN, not known, with fewer than
+    two flights. 1 for candidates that are equal to the present set, and for those that are clearly worse: they are not
+    rivals, and do not count in the family either.
 
     References
     ----------
@@ -38,9 +41,10 @@ def family_p_values(differences: Array, seed: int) -> Array:
     Ability", Journal of Business & Economic Statistics 23(4), 2005 (leaving out clearly worse candidates).
     """
     flights, candidates = differences.shape
-    p_values = np.ones(candidates)
     if flights < 2:
-        return p_values
+        return np.full(candidates, np.nan)
+    differences = without_rounding(differences)
+    p_values = np.ones(candidates)
     found = _statistics(differences.mean(axis=0), np.square(differences).sum(axis=0), flights)
     rivals = (found <= math.sqrt(2.0 * math.log(math.log(max(flights, 3))))) & (differences != 0.0).any(axis=0)
     if not rivals.any():

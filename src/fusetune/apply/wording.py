@@ -1,9 +1,9 @@
 """The decision in words that a pilot understands."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from fusetune.apply.choice import Choice
-from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight
+from fusetune.apply.evidence import AIDED, DISTRUSTED, NOT_SCORED, UNAIDED, WITHOUT_SAMPLES, AnalyzedFlight
 from fusetune.apply.ranking import RankedSet, improvement_percent, is_proved
 from fusetune.apply.settings import DecisionSettings
 
@@ -22,24 +22,46 @@ def paragraph(
         f"Fly the set “{choice.chosen}”." if choice.status == "change" else "Keep the parameters that fly now.",
         f"{_count(len(ranked), 'parameter set')} {'was' if len(ranked) == 1 else 'were'} replayed on "
         f"{_count(len(scored), 'flight')} ({minutes:.1f} minutes scored) and judged by {_basis(scored)}.",
-        _comparison(choice, settings),
+        _comparison(choice, ranked, settings),
         _left_out(choice),
+        *_not_eligible(ranked),
+        *_not_counted(flights, settings),
     ]
-    worse = [one.name for one in ranked if one.status == "candidate" and one.worse_aims]
-    if worse:
-        sentences.append(f"Worse than now beyond doubt in one of these ways, and so not eligible: {_names(worse)}.")
-    vetoed = [one.name for one in ranked if one.status == "vetoed"]
-    if vetoed:
-        sentences.append(f"Ruled out: {_names(vetoed)} (the table says why).")
-    left_out = [flight.name for flight in flights if flight.evidence is None]
-    if left_out:
-        sentences.append(f"{_count(len(left_out), 'replayed flight')} could not be scored.")
     if choice.exploratory:
         sentences.append(
             f"This is exploratory: {_count(len(scored), 'flight')} cannot speak for the next one; "
             f"fly and add at least {settings.minimum_flights} before relying on it."
         )
     return " ".join(filter(None, sentences))
+
+
+def _not_eligible(ranked: Sequence[RankedSet]) -> Iterator[str]:
+    worse = [one.name for one in ranked if one.worse_aims and not one.is_vetoed]
+    if worse:
+        yield f"Worse than now beyond doubt in one of these ways, and so not eligible: {_names(worse)}."
+    vetoed = [one.name for one in ranked if one.is_vetoed]
+    if vetoed:
+        yield f"Ruled out, and so not eligible: {_names(vetoed)} (the table says why)."
+    never = [one.name for one in ranked if not one.flights]
+    if never:
+        yield f"Scored on no flight: {_names(never)} (the table says why)."
+
+
+def _not_counted(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) -> Iterator[str]:
+    """Flights that had no say, by what kept them out."""
+    lowest = settings.lowest_grade
+    for kind, one, more in (
+        (NOT_SCORED, "could not be scored", "could not be scored"),
+        (
+            DISTRUSTED,
+            f"does not count, as its replay has a trust grade below {lowest}",
+            f"do not count, as their replays have trust grades below {lowest}",
+        ),
+        (WITHOUT_SAMPLES, "has nothing that sets are judged by", "have nothing that sets are judged by"),
+    ):
+        count = sum(flight.without is not None and flight.without.kind == kind for flight in flights)
+        if count:
+            yield f"{_count(count, 'replayed flight')} {one if count == 1 else more}."
 
 
 def _names(names: Sequence[str]) -> str:
@@ -57,34 +79,42 @@ def _basis(flights: Sequence[AnalyzedFlight]) -> str:
     return " and ".join(ways)
 
 
-def _comparison(choice: Choice, settings: DecisionSettings) -> str:
+def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionSettings) -> str:
     best = choice.best
     if best is None:
-        return "No other set was eligible for comparison."
+        same = [one.name for one in ranked if one.equal_to_present]
+        if same and len(same) == len(ranked) - 1:
+            return "All other sets gave the same results as these."
+        return "No other set was eligible for comparison." if len(ranked) > 1 else "There was no other set to compare."
     if choice.pick is not None:
         return _for_the_pick(choice.pick, best, settings)
-    low, high = improvement_percent(best.upper), improvement_percent(best.lower)
-    wins = f"better on {best.flights_better} of {best.flights} flights"
     if best.difference >= 0.0:
-        percent, span = f"{-best.improvement_percent:.1f} %", _span(-high, -low, settings.confidence)
-        return f"No other set did better; the nearest, “{best.name}”, has prediction errors {percent} larger ({span})."
-    span = _span(low, high, settings.confidence)
-    found = f"The best candidate, “{best.name}”, had errors {best.improvement_percent:.1f} % smaller ({span}; {wins}), "
+        size = f"{-best.improvement_percent:.1f} % larger"
+        if best.difference == 0.0:
+            return f"No other set did better; the nearest, “{best.name}”, has the same prediction errors."
+        span = _larger(best.lower, best.upper, settings.confidence)
+        return f"No other set did better; the nearest, “{best.name}”, has prediction errors {size} ({span})."
+    wins = f"better on {best.flights_better} of {_count(best.flights, 'flight')}"
+    found = f"The best candidate, “{best.name}”, had errors {best.improvement_percent:.1f} % smaller "
+    if best.upper is None:
+        return f"{found}({wins}), but {UNKNOWN_INTERVAL}: nothing in these flights shows how it varies."
+    found += f"({_smaller(best.lower, best.upper, settings.confidence)}; {wins}), "
     if best.upper >= 0.0:
         return (
             f"{found}but that interval includes no difference at all, so these flights do not show that a change "
             "would help."
         )
     p_value = best.p_holm if settings.multiplicity == "holm" else best.p_family
+    known = "that cannot be told from one flight" if p_value is None else f"p = {p_value:.2g}"
     return (
         f"{found}but the best of several candidates is favoured by chance, and after allowing for that "
-        f"(p = {p_value:.2g}) the difference is not certain enough for a change."
+        f"({known}) the difference is not certain enough for a change."
     )
 
 
 def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) -> str:
-    span = _span(improvement_percent(pick.upper), improvement_percent(pick.lower), settings.confidence)
-    wins = f"better on {pick.flights_better} of {pick.flights} flights"
+    span = _smaller(pick.lower, pick.upper, settings.confidence)
+    wins = f"better on {pick.flights_better} of {_count(pick.flights, 'flight')}"
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
     if pick.name != best.name and is_proved(best, settings):
         text += (
@@ -110,6 +140,23 @@ def _left_out(choice: Choice) -> str:
     )
 
 
+UNKNOWN_INTERVAL = "how far chance could do that is not known"
+
+
+def _smaller(lower: float | None, upper: float | None, confidence: float) -> str:
+    """Interval of a difference of scores as a reduction of the errors."""
+    if lower is None or upper is None:
+        return UNKNOWN_INTERVAL
+    return _span(improvement_percent(upper), improvement_percent(lower), confidence)
+
+
+def _larger(lower: float | None, upper: float | None, confidence: float) -> str:
+    """Interval of a difference of scores as a growth of the errors."""
+    if lower is None or upper is None:
+        return UNKNOWN_INTERVAL
+    return _span(-improvement_percent(lower), -improvement_percent(upper), confidence)
+
+
 def _span(low: float, high: float, confidence: float) -> str:
     return f"{confidence:.0%} interval {low:+.1f} % to {high:+.1f} %".replace("-", "−")
 
@@ -119,10 +166,9 @@ def _no_evidence(flights: Sequence[AnalyzedFlight]) -> str:
         return "Keep the parameters that fly now: no flight could be replayed, so nothing speaks for a change."
     reasons = "; ".join(f"{flight.name}: {flight.reason}" for flight in flights[:5])
     more = f"; and {len(flights) - 5} more" if len(flights) > 5 else ""
-    return (
-        "Keep the parameters that fly now: none of the "
-        f"{_count(len(flights), 'replayed flight')} could be scored ({reasons}{more})."
-    )
+    if len(flights) == 1:
+        return f"Keep the parameters that fly now: the one replayed flight has no say ({reasons})."
+    return f"Keep the parameters that fly now: none of the {len(flights)} replayed flights has a say ({reasons}{more})."
 
 
 def _count(number: int, noun: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusetune.px4.flight import Flight, TopicTable, merge_tables, row_count, select_rows, stacked
+from fusetune.px4.flight import Flight, TopicKey, TopicTable, merge_tables, row_count, select_rows, stacked
 
 FULL_IMU_RATE_HZ = 100.0
 """From this rate on `vehicle_imu` can be replayed; by default it is logged twice a second."""
@@ -29,6 +29,32 @@ def primary_instance_at(flight: Flight, timestamps: np.ndarray) -> np.ndarray:
         return np.zeros(len(timestamps), np.int64)
     rows = np.searchsorted(selector["timestamp"], timestamps, side="right") - 1
     return np.asarray(selector["primary_instance"], np.int64)[np.maximum(rows, 0)]
+
+
+def of_one_instance(flight: Flight) -> Flight:
+    """The flight as if the instance that was primary for most of it had flown alone.
+
+    For comparisons with replays of PX4, which run one estimator from the sensors of one instance.
+    """
+    chosen = primary_instance(flight)
+    topics: dict[TopicKey, TopicTable] = {}
+    for (name, instance), table in flight.topics.items():
+        if name == "estimator_selector_status" or name == "vehicle_imu":
+            continue
+        if not name.startswith("estimator_"):
+            topics[name, instance] = table
+        elif instance == chosen:
+            topics[name, 0] = table
+    return flight.with_topics(topics)
+
+
+def instance_switches(flight: Flight) -> np.ndarray:
+    """Times (µs) at which another instance became the primary one."""
+    selector = flight.topic("estimator_selector_status")
+    if selector is None:
+        return np.zeros(0, np.int64)
+    changed = np.flatnonzero(np.diff(np.asarray(selector["primary_instance"], np.int64))) + 1
+    return np.asarray(selector["timestamp"], np.int64)[changed]
 
 
 def magnetometer_instance(flight: Flight) -> int:
@@ -145,9 +171,13 @@ def _device_in_use(flight: Flight, name: str, times: np.ndarray) -> np.ndarray |
     used = np.zeros(len(times), np.int64)
     for instance in np.unique(primary):
         status = flight.topic("estimator_status", int(instance))
-        if status is None or name not in status or not row_count(status):
+        if status is None or name not in status:
             return None
-        rows = np.maximum(np.searchsorted(status["timestamp"], times, side="right") - 1, 0)
+        ids = np.asarray(status[name], np.int64)
+        told = ids != 0
+        if not told.any():
+            return None
+        rows = np.maximum(np.searchsorted(status["timestamp"][told], times, side="right") - 1, 0)
         here = primary == instance
-        used[here] = np.asarray(status[name], np.int64)[rows[here]]
+        used[here] = ids[told][rows[here]]
     return used

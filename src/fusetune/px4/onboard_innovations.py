@@ -20,8 +20,11 @@ _SAME_PUBLICATION_US = 2000
 _CS_GNSS, _CS_FLOW, _CS_MAG_HDG, _CS_MAG_3D = 1 << 2, 1 << 3, 1 << 4, 1 << 5
 _CS_BARO_HGT, _CS_RNG_HGT, _CS_GNSS_HGT = 1 << 9, 1 << 10, 1 << 11
 _CS_EV_POS, _CS_EV_YAW, _CS_EV_HGT, _CS_BETA, _CS_AIRSPEED = 1 << 12, 1 << 13, 1 << 14, 1 << 15, 1 << 19
-_CS_EV_VEL = 1 << 24
+_CS_GNSS_YAW, _CS_EV_VEL = 1 << 22, 1 << 24
 """Bits of `estimator_status.control_mode_flags`, the same from v1.8 on."""
+
+_NO_MAG_HEADING_FROM = (1, 15)
+"""From this release on no heading of the magnetometer is fused: `heading` then holds its largest field innovation."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class _Source:
     gate: str = ""
     old_fields: tuple[str, ...] = ()
     """The same in `ekf2_innovations`."""
+    unless: int = 0
+    """Bits while which something that is no aid source of its own is written to the same fields."""
 
 
 def _vector(name: str, length: int) -> tuple[str, ...]:
@@ -41,6 +46,7 @@ def _vector(name: str, length: int) -> tuple[str, ...]:
 
 
 _VELOCITY, _POSITION, _HEIGHT = _vector("vel_pos_innov", 6)[:3], _vector("vel_pos_innov", 6)[3:5], ("vel_pos_innov[5]",)
+_HEADING, _OLD_HEADING = ("heading",), ("heading_innov",)
 
 _SOURCES = {
     "gnss_vel": _Source((*_vector("gps_hvel", 2), "gps_vvel"), _CS_GNSS, "EKF2_GPS_V_GATE", _VELOCITY),
@@ -48,11 +54,13 @@ _SOURCES = {
     "gnss_hgt": _Source(("gps_vpos",), _CS_GNSS_HGT, "EKF2_GPS_P_GATE", _HEIGHT),
     "baro_hgt": _Source(("baro_vpos",), _CS_BARO_HGT, "EKF2_BARO_GATE", _HEIGHT),
     "rng_hgt": _Source(("rng_vpos",), _CS_RNG_HGT, "EKF2_RNG_GATE", _HEIGHT),
-    "ev_vel": _Source((*_vector("ev_hvel", 2), "ev_vvel"), _CS_EV_VEL, "EKF2_EVV_GATE"),
+    "ev_vel": _Source((*_vector("ev_hvel", 2), "ev_vvel"), _CS_EV_VEL, "EKF2_EVV_GATE", _VELOCITY),
     "ev_pos": _Source(_vector("ev_hpos", 2), _CS_EV_POS, "EKF2_EVP_GATE", _POSITION),
     "ev_hgt": _Source(("ev_vpos",), _CS_EV_HGT, "EKF2_EVP_GATE", _HEIGHT),
     "mag": _Source(_vector("mag_field", 3), _CS_MAG_HDG | _CS_MAG_3D, "EKF2_MAG_GATE", _vector("mag_innov", 3)),
-    "mag_heading": _Source(("heading",), _CS_MAG_HDG | _CS_EV_YAW, "EKF2_HDG_GATE", ("heading_innov",)),
+    "mag_heading": _Source(_HEADING, _CS_MAG_HDG, "EKF2_HDG_GATE", _OLD_HEADING, _CS_MAG_3D),
+    "gnss_yaw": _Source(_HEADING, _CS_GNSS_YAW, "EKF2_HDG_GATE", _OLD_HEADING, _CS_MAG_3D),
+    "ev_yaw": _Source(_HEADING, _CS_EV_YAW, "EKF2_HDG_GATE", _OLD_HEADING, _CS_MAG_3D),
     "optical_flow": _Source(_vector("flow", 2), _CS_FLOW, "EKF2_OF_GATE", _vector("flow_innov", 2)),
     "airspeed": _Source(("airspeed",), _CS_AIRSPEED, "EKF2_TAS_GATE", ("airspeed_innov",)),
     "sideslip": _Source(("beta",), _CS_BETA, "EKF2_BETA_GATE", ("beta_innov",)),
@@ -60,6 +68,10 @@ _SOURCES = {
     "aux_vel": _Source(_vector("aux_hvel", 2), old_fields=_vector("aux_vel_innov", 2)),
     "gravity": _Source(_vector("gravity", 3)),
 }
+"""Fields that several sources name hold the innovations of whichever of them is in use, and of none of them in between.
+
+`heading` does so in all releases. From v1.14 on it holds the largest of the field innovations while the magnetometer is
+fused in three dimensions."""
 
 
 def aid_source_tables(flight: Flight) -> dict[TopicKey, TopicTable]:
@@ -94,8 +106,10 @@ class _Series:
     innovations: TopicTable
     variances: TopicTable
     ratios: TopicTable
-    control_flags: np.ndarray | None
+    control_flags: tuple[np.ndarray, np.ndarray] | None
+    """Control mode flags as last logged up to each row, and as first logged from it on."""
     old: bool
+    has_mag_heading: bool
 
     def columns(self, source: _Source) -> tuple[str, ...]:
         return source.old_fields if self.old else source.fields
@@ -120,7 +134,8 @@ def _modern_series(flight: Flight, instance: int) -> _Series | None:
     time = innovations["timestamp"]
     sampled = innovations.get("timestamp_sample", time)
     flags = _control_flags(flight, instance, time)
-    return _Series(time, sampled, innovations, variances, ratio_columns, flags, old=False)
+    has_mag_heading = flight.release is None or flight.release[:2] < _NO_MAG_HEADING_FROM
+    return _Series(time, sampled, innovations, variances, ratio_columns, flags, False, has_mag_heading)
 
 
 def _old_series(flight: Flight, instance: int) -> _Series | None:
@@ -129,7 +144,7 @@ def _old_series(flight: Flight, instance: int) -> _Series | None:
         return None
     variances = {name.replace("_innov_var", "_innov"): table[name] for name in table if "_innov_var" in name}
     time = table["timestamp"]
-    return _Series(time, time, table, variances, {}, _control_flags(flight, instance, time), old=True)
+    return _Series(time, time, table, variances, {}, _control_flags(flight, instance, time), True, True)
 
 
 def _matching_rows(left: TopicTable, right: TopicTable) -> tuple[np.ndarray, np.ndarray]:
@@ -144,12 +159,14 @@ def _matching_rows(left: TopicTable, right: TopicTable) -> tuple[np.ndarray, np.
     return rows, np.abs(others[rows] - times) <= _SAME_PUBLICATION_US
 
 
-def _control_flags(flight: Flight, instance: int, times: np.ndarray) -> np.ndarray | None:
+def _control_flags(flight: Flight, instance: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     status = flight.topic("estimator_status", instance)
     if status is None or "control_mode_flags" not in status or not row_count(status):
         return None
-    rows = np.maximum(np.searchsorted(status["timestamp"], times, side="right") - 1, 0)
-    return status["control_mode_flags"][rows].astype(np.int64)
+    before = np.searchsorted(status["timestamp"], times, side="right") - 1
+    after = np.searchsorted(status["timestamp"], times, side="left")
+    flags = status["control_mode_flags"].astype(np.int64)
+    return flags[np.maximum(before, 0)], flags[np.minimum(after, len(flags) - 1)]
 
 
 def _aid_source(name: str, source: _Source, series: _Series, gates: dict[str, float]) -> TopicTable | None:
@@ -182,27 +199,40 @@ def _aid_source(name: str, source: _Source, series: _Series, gates: dict[str, fl
 
 
 def _new_sample_rows(innovation: np.ndarray, variance: np.ndarray, belongs: np.ndarray) -> np.ndarray:
-    """Rows with an innovation variance whose values are not merely repeated from the row before."""
-    usable = belongs & np.all(np.isfinite(innovation) & np.isfinite(variance) & (variance > 0.0), axis=1)
+    """Rows with an innovation variance whose values are not merely repeated from the usable row before.
+
+    What another source wrote to the same fields is repeated as well, until this one has a sample.
+    """
+    usable = np.all(np.isfinite(innovation) & np.isfinite(variance) & (variance > 0.0), axis=1)
     rows = np.flatnonzero(usable)
     both = np.hstack([innovation, variance])[rows]
     changed = np.ones(len(rows), np.bool_)
     changed[1:] = np.any(both[1:] != both[:-1], axis=1)
-    return rows[changed]
+    return rows[changed & belongs[rows]]
 
 
 def _belongs(name: str, source: _Source, series: _Series) -> np.ndarray:
-    """Rows whose values are of this source: the old topic has one slot for all position and height sources."""
-    shared = series.old and source.old_fields in (_VELOCITY, _POSITION, _HEIGHT)
-    if not shared or series.control_flags is None:
-        return np.full(len(series.timestamp), not shared or name in ("gnss_vel", "gnss_pos", "baro_hgt"))
-    belongs = (series.control_flags & source.active) != 0
-    if name == "ev_pos":
-        belongs &= (series.control_flags & _CS_GNSS) == 0
-    return belongs
+    """Rows whose values are of this source; where several share the fields, those in which it alone is in use.
+
+    A row between two messages of the status that do not agree on who that is belongs to none, nor does any where the
+    log holds no status.
+    """
+    if name == "mag_heading" and not series.has_mag_heading:
+        return np.zeros(len(series.timestamp), np.bool_)
+    columns = series.columns(source)
+    rivals = [other for other in _SOURCES.values() if other is not source and series.columns(other) == columns]
+    if not rivals:
+        return np.ones(len(series.timestamp), np.bool_)
+    if series.control_flags is None:
+        return np.zeros(len(series.timestamp), np.bool_)
+    writers = source.active | source.unless
+    for other in rivals:
+        writers |= other.active
+    before, after = series.control_flags
+    return ((before & writers) == source.active) & ((after & writers) == source.active)
 
 
 def _active(source: _Source, series: _Series, rows: np.ndarray) -> np.ndarray:
     if not source.active or series.control_flags is None:
         return np.ones(len(rows), np.bool_)
-    return (series.control_flags[rows] & source.active) != 0
+    return (series.control_flags[0][rows] & source.active) != 0

@@ -42,12 +42,13 @@ ESTIMATOR_TOPICS = (
 """Topics of any release that the canonical inputs of the estimator are made from."""
 
 
-def canonical(flight: Flight, *, follow_primary: bool = False) -> Flight:
+def canonical(flight: Flight) -> Flight:
     """The flight with every topic that the estimator and the metrics read in the layout of v1.16.
 
-    Other topics, and columns that v1.16 does not have, stay as they are; the flight given is not changed. Where a log
-    holds several magnetometers, instance 0 becomes the one that the primary estimator used; where it holds several
-    GNSS receivers (before v1.12), instance 0 becomes the first that ever has a 3D fix.
+    Other topics, and columns that v1.16 does not have, stay as they are; the flight given is not changed. Of several
+    IMUs and magnetometers, instance 0 becomes, of each time, the one that the estimator instance used that was primary
+    then (see `fusetune.px4.estimator_instances`); of several GNSS receivers (before v1.12) the first that ever has a 3D
+    fix. A flight has no other form than this one; `of_one_instance` gives the flight of one estimator instance to it.
     `estimator_aid_src_*`, `estimator_status_flags` and `estimator_states` are made from the topics that came before
     them (see `fusetune.px4.onboard_innovations` and `fusetune.px4.estimator_layouts`). Samples that cannot be, see
     `fusetune.px4.sensor_limits`, are left out and counted in `Flight.left_out`; parameters that cannot be, see
@@ -71,8 +72,7 @@ def canonical(flight: Flight, *, follow_primary: bool = False) -> Flight:
     )
     topics = dict(topics)
     _put_first(topics, "vehicle_magnetometer", magnetometer_instance(sound))
-    if follow_primary:
-        _follow_primary(sound, topics)
+    _follow_primary(sound, topics)
     _put_first(topics, "vehicle_gps_position", _gnss_instance(sound))
     topics |= estimator_tables(sound)
     topics |= aid_source_tables(sound)

@@ -8,6 +8,7 @@ import pandas as pd
 from scipy.special import bdtr
 
 from fusetune.apply.evidence import AIDED, AIMS, UNAIDED
+from fusetune.apply.rounding import without_rounding
 from fusetune.report.results import Results
 
 Array = npt.NDArray[np.float64]
@@ -52,6 +53,12 @@ def aim_changes(results: Results, aim: str) -> pd.DataFrame:
     )
     frame["status"] = ranking["status"].to_numpy()
     return frame[frame["change"].notna()]
+
+
+def known_ends(changes: pd.DataFrame, suffix: str = "") -> tuple[pd.Series, pd.Series]:
+    """Ends of the intervals, or the change itself where no interval is known."""
+    change = changes[f"change{suffix}"]
+    return changes[f"lower{suffix}"].fillna(change), changes[f"upper{suffix}"].fillna(change)
 
 
 def told_aims(results: Results) -> tuple[str, ...]:
@@ -99,7 +106,7 @@ def flight_changes(results: Results, column: str = "score") -> pd.DataFrame:
         return pd.DataFrame()
     scores = per_flight.pivot(index="flight", columns="set", values=column)
     names = [name for name in results.shown if name in scores.columns and name != results.present]
-    differences = scores[names].to_numpy() - scores[[results.present]].to_numpy()
+    differences = without_rounding(scores[names].to_numpy() - scores[[results.present]].to_numpy())
     return pd.DataFrame(percent_change(differences), index=scores.index, columns=names)
 
 

@@ -15,11 +15,12 @@ from fusetune.report.comparison import (
     SCORE,
     aim_changes,
     flight_changes,
+    known_ends,
     robust_reach,
     told_aims,
 )
 from fusetune.report.figures import PRESENT_COLOUR, empty_figure, label_sets, new_figure
-from fusetune.report.results import Results
+from fusetune.report.results import OUT, Results
 from fusetune.report.set_styles import SetStyle, set_styles, status_colour
 
 Limits = tuple[float, float]
@@ -60,18 +61,18 @@ def _row_label(name: str, results: Results) -> str:
 
 def _forest(axes: Axes, results: Results, aim: str, names: list[str]) -> None:
     changes = aim_changes(results, aim).reindex(names)
-    able = (changes["status"] == "candidate").to_numpy()
-    left, right = robust_reach(changes["lower"], changes["upper"], able)
+    able = (~changes["status"].isin(OUT)).to_numpy()
+    left, right = robust_reach(*known_ends(changes), able)
     axes.axvspan(left, 0.0, color=GOOD_COLOUR, alpha=0.07, linewidth=0)
     for row, (name, one) in enumerate(changes.iterrows()):
         if not math.isfinite(one["change"]):
             continue
         colour = status_colour(results, str(name))
-        low, high = max(one["lower"], left), min(one["upper"], right)
-        if low < high:
+        low, high = max(left, one["lower"]), min(right, one["upper"])
+        if math.isfinite(one["lower"]) and low < high:
             axes.plot([low, high], [row, row], color=colour, linewidth=2.0, solid_capstyle="butt")
         if left <= one["change"] <= right:
-            hollow = one["status"] == "vetoed"
+            hollow = one["status"] in OUT
             axes.plot(one["change"], row, "o", color=colour, markersize=5, fillstyle="none" if hollow else "full")
         else:
             _beyond(axes, row, one["change"], left, right)
@@ -162,10 +163,10 @@ def pareto(results: Results) -> Figure:
 
 
 def _pareto_limits(both: pd.DataFrame) -> tuple[Limits, Limits]:
-    able = (both["status_aided"] == "candidate").to_numpy()
+    able = (~both["status_aided"].isin(OUT)).to_numpy()
     return (
-        robust_reach(both["lower_aided"], both["upper_aided"], able),
-        robust_reach(both["lower_unaided"], both["upper_unaided"], able),
+        robust_reach(*known_ends(both, "_aided"), able),
+        robust_reach(*known_ends(both, "_unaided"), able),
     )
 
 
@@ -190,7 +191,7 @@ def _cross(axes: Axes, one: pd.Series, style: SetStyle, label: str, limits: tupl
         label += minus(f", outside: {x:+.0f} %, {y:+.0f} %")
     axes.plot([one["lower_aided"], one["upper_aided"]], [y, y], color=style.colour, linewidth=1.0, alpha=0.75)
     axes.plot([x, x], [one["lower_unaided"], one["upper_unaided"]], color=style.colour, linewidth=1.0, alpha=0.75)
-    fill = "none" if one["status_aided"] == "vetoed" else "full"
+    fill = "none" if one["status_aided"] in OUT else "full"
     axes.plot(x, y, style.marker, color=style.colour, markersize=6, fillstyle=fill, label=label, linestyle="none")
 
 

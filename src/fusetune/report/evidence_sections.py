@@ -10,6 +10,7 @@ from fusetune.apply.evidence import AIDED, UNAIDED
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, signed, table
 from fusetune.report.ranking_tables import (
+    NOT_KNOWN,
     criteria_table,
     interval_text,
     objections_table,
@@ -19,8 +20,6 @@ from fusetune.report.ranking_tables import (
 )
 from fusetune.report.results import Results
 from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY, Withheld, drift_summary
-
-NOT_KNOWN = "not known"
 
 
 def evidence_section(results: Results, figures: Path) -> str:
@@ -127,7 +126,7 @@ def holds_section(results: Results) -> str:
     if validated is None:
         if not results.flights:
             return ""
-        return section(title, paragraph("With fewer than three scored flights none can be left out to see."))
+        return section(title, paragraph("With fewer than three flights in the decision none can be left out to see."))
     chosen, worth = validated["chosen"], validated["differences"]
     rows = [(flight, set_name(name, results), _worth(worth[flight])) for flight, name in sorted(chosen.items())]
     rows.append((Cell("mean", "quiet"), Cell(""), signed(float(percent_change(validated["difference"])))))

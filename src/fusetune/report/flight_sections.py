@@ -34,37 +34,34 @@ _AS_FLOWN_GROUPS = (
 def flights_section(results: Results, flights_table: Path) -> str:
     """Every log with its verdict."""
     verdicts = pd.read_parquet(flights_table).to_dict("records")
-    judged = {row["flight"]: row for row in results.decision["flights"]}
-    rows = [_flight_row(verdict, results, judged) for verdict in sorted(verdicts, key=lambda one: str(one["flight"]))]
+    rows = [_flight_row(verdict, results) for verdict in sorted(verdicts, key=lambda one: str(one["flight"]))]
     head = ("flight", "verdict", "scored s", "airborne s", "firmware", "reason")
     count, decide = len(rows), results.decision["flights_scored"]
-    text = f"{count} log{'s' if count != 1 else ''}, {len(results.flights)} scored, {decide} in the decision."
+    text = f"{count} log{'s' if count != 1 else ''}, {len(results.scored)} scored, {decide} in the decision."
     return section("The flights", paragraph(text), table(head, rows), advice_table(verdicts))
 
 
-def _flight_row(
-    verdict: Mapping[Hashable, Any], results: Results, judged: dict[str, dict[str, Any]]
-) -> tuple[Cell | str, ...]:
+def _flight_row(verdict: Mapping[Hashable, Any], results: Results) -> tuple[Cell | str, ...]:
     name = verdict["flight"]
-    summary = results.scoring.get(name)
-    scored = summary is not None and summary["status"] == "scored"
-    decides = scored and judged.get(name, {"scored": True})["scored"]
-    reason = verdict.get("reason") or ""
-    if summary is not None and not scored:
-        reason = summary["reason"]
-    elif scored and not decides:
-        reason = judged[name]["reason"]
-    words = "not scored" if summary is not None else str(verdict["status"])
-    if scored:
-        words = "scored" if decides else "not counted"
+    decides, scored = name in results.flights, name in results.scored
+    analysed = name in results.scoring
+    reason = results.reason(name) if analysed and not decides else verdict.get("reason") or ""
+    words = _part(name, results) if analysed else str(verdict["status"])
     return (
         Cell(str(name)),
         Cell(words, "short good" if decides else "short bad"),
-        number(summary["scored_s"] if scored and summary else None),
+        number(results.scoring[name]["scored_s"] if scored else None),
         number(verdict.get("airborne_s")),
         Cell(str(verdict.get("firmware") or "unknown"), "short"),
         str(reason),
     )
+
+
+def _part(name: str, results: Results) -> str:
+    """What became of an analysed flight."""
+    if name in results.flights:
+        return "scored"
+    return "not counted" if name in results.scored else "not scored"
 
 
 def innovations_section(results: Results, figures: Path) -> str:
@@ -94,7 +91,7 @@ def innovations_section(results: Results, figures: Path) -> str:
         "consistency.svg": "Dotted: the paper's χ² bounds, which take samples as independent; band: those with the "
         "effective number of samples (the median flight's). A filled dot lies inside its own flight's bounds of the "
         "second kind. Left of the bounds the filter claims more noise than there is, right of them less.",
-        "breaks.svg": "Share of samples beyond 3 σ, 5 σ and the gate, on the scored part of all flights.",
+        "breaks.svg": "Share of samples beyond 3 σ, 5 σ and the gate, on the scored part of the flights that decide.",
     }
     parts += [figure(figures / name, caption) for name, caption in captions.items()]
     return section("The innovations", *parts)
@@ -170,12 +167,13 @@ def single_flights_section(results: Results, flight_figures: dict[str, Path]) ->
     """One picture and the cuts per flight, closed until asked for."""
     parts = []
     for name, summary in results.scoring.items():
-        words = f"{summary['scored_s']:.0f} s scored" if summary["status"] == "scored" else summary["reason"]
+        decides = name in results.flights
+        words = f"{summary['scored_s']:.0f} s scored" if decides else f"{_part(name, results)}: {results.reason(name)}"
         inside = [_cuts(summary), _set_troubles(summary)]
         if name in flight_figures:
             caption = "Grey: not scored (ground, warm-up, cuts). The dashed line is the gate."
             inside.insert(0, figure(flight_figures[name], caption))
-        parts.append(details(f"{name} – {words}", *inside, kind="good" if summary["status"] == "scored" else "bad"))
+        parts.append(details(f"{name} – {words}", *inside, kind="good" if decides else "bad"))
     return section("Flight by flight", *parts) if parts else ""
 
 

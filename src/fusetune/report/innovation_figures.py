@@ -79,7 +79,7 @@ def boxes(results: Results, pooled: Sequence[PooledSamples], *, normalised: bool
     if not pooled:
         return empty_figure("No innovations were scored.")
     what = "Innovations divided by their standard deviation" if normalised else "Innovations"
-    title = f"{what}, all scored flights: box 25–75 %, whiskers 5–95 %"
+    title = f"{what}, flights that decide: box 25–75 %, whiskers 5–95 %"
     figure, panels = panel_grid(len(pooled), results.shown, 0.17, title)
     for axes, samples in zip(panels, pooled, strict=True):
         _boxes(axes, samples, results, normalised)
@@ -88,7 +88,7 @@ def boxes(results: Results, pooled: Sequence[PooledSamples], *, normalised: bool
 
 def _boxes(axes: Axes, samples: PooledSamples, results: Results, normalised: bool) -> None:
     values = samples.normalised if normalised else samples.innovation
-    vetoed = {name for name in results.shown if results.status(name) == "vetoed"}
+    vetoed = {name for name in results.shown if results.is_ruled_out(name)}
     reach = 0.0
     for row, name in enumerate(results.shown):
         if name not in values:

@@ -68,13 +68,14 @@ def build_report(
         provenance_section(results),
     )
     product = results.decision["provenance"]["product"]
+    count = results.decision["flights_scored"]
+    flights = "no flight" if not count else f"{count} flight{'s' if count > 1 else ''}"
     page = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>EKF2 parameters: the decision</title><style>{STYLE_SHEET.read_text(encoding='utf-8')}</style>"
         "</head><body>"
-        f"<header><h1>Which EKF2 parameters to fly</h1><p>{product}, from "
-        f"{results.decision['flights_scored']} flights</p></header>"
+        f"<header><h1>Which EKF2 parameters to fly</h1><p>{product}, from {flights}</p></header>"
         + "\n".join(sections)
         + f"<script>{_PRINT}</script></body></html>\n"
     )

@@ -1,16 +1,16 @@
 """Tables of the ranking: figures of each set, signs per flight, reasons against sets, all other criteria."""
 
+import math
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.report.comparison import AIM_WORDS, flight_changes, percent_change, sign_counts, told_aims
 from fusetune.report.markup import Cell, number, paragraph, signed, table
-from fusetune.report.results import Results, worse_aims
+from fusetune.report.results import OUT, Results, worse_aims
 
 _MOST_REASONS = 4
-_OUT = ("vetoed", "not_scored")
-_STATUS_WORDS = {"present": "flies now", "candidate": "eligible", "vetoed": "not eligible", "not_scored": "not scored"}
+NOT_KNOWN = "not known"
 
 
 def set_name(name: str, results: Results) -> Cell:
@@ -36,31 +36,41 @@ def ranking_table(results: Results) -> str:
                 signed(None if is_present else _percent(one["difference"])),
                 Cell("–" if is_present else interval_text(one["lower"], one["upper"]), "number"),
                 *(signed(None if is_present else _percent(one[f"{aim}_difference"])) for aim in aims),
-                number(None if is_present else one["p_value"], 2),
-                number(None if is_present else one[corrected], 2),
-                Cell(f"{100.0 * one['p_best']:.0f} %", "number"),
+                _probability(None if is_present else one["p_value"], is_present),
+                _probability(None if is_present else one[corrected], is_present),
+                _share(one["p_best"]),
                 number(one["score"], 4),
             )
         )
     note = (
         "change: of the prediction error against the present set, by the score that decides and in each way of "
         "predicting. p: probability of such a difference by chance, alone and with all sets in the running. P(best): "
-        "share of redrawn studies in which no eligible set does better. score: scale-profiled NLL, lower is better."
+        "share of redrawn studies in which no eligible set does better. score: scale-profiled NLL, lower is better. "
+        "What so few flights do not show is not known."
     )
     return table(head, rows, "Ranking, best first") + paragraph(note, "note")
 
 
-def interval_text(lower: float, upper: float) -> str:
-    """Ends of an interval of score differences, in percent."""
+def interval_text(lower: float | None, upper: float | None) -> str:
+    """Ends of an interval of score differences, in percent; "not known" where there is none."""
+    if lower is None or upper is None or not (math.isfinite(lower) and math.isfinite(upper)):
+        return NOT_KNOWN
     return f"{signed(_percent(lower)).text} … {signed(_percent(upper)).text}"
 
 
 def _status(one: Mapping[Hashable, Any]) -> Cell:
-    words = _STATUS_WORDS[one["status"]]
-    if one["status"] == "candidate" and worse_aims(one):
-        words = _STATUS_WORDS["vetoed"]
-    equal = " (same results as now)" if one["equal_to_present"] else ""
-    return Cell(words + equal, "short bad" if words.startswith("not") else "short")
+    return Cell(one["status"], "short bad" if one["status"] in OUT else "short")
+
+
+def _probability(value: float | None, is_present: bool) -> Cell:
+    known = is_present or (value is not None and math.isfinite(value))
+    return number(value, 2) if known else Cell(NOT_KNOWN, "number quiet")
+
+
+def _share(value: float | None) -> Cell:
+    if value is None or not math.isfinite(value):
+        return Cell(NOT_KNOWN, "number quiet")
+    return Cell(f"{100.0 * value:.0f} %", "number")
 
 
 def sign_table(results: Results) -> str:
@@ -103,7 +113,7 @@ def objections_table(results: Results) -> str:
     rows = []
     vetoes = {one["name"]: one["reasons"] for one in results.decision["ranking"]}
     for one in results.ranking.to_dict("records"):
-        reasons = _first_few(vetoes[one["name"]]) if one["status"] in _OUT else []
+        reasons = _first_few(vetoes[one["name"]])
         if one["name"] != results.present:
             reasons += [
                 f"{AIM_WORDS[aim]} its errors are {_percent(one[f'{aim}_difference']):.1f} % larger than now (interval "

@@ -14,7 +14,11 @@ import pandas as pd
 from fusetune.analyze.onboard import ONBOARD
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.apply.evidence import AIMS
+from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.parquet import read_table
+
+OUT = (NOT_ELIGIBLE, NOT_SCORED)
+"""Parts in the decision of sets that cannot be chosen."""
 
 MOST_SETS_SHOWN = 14
 """Box plots and tables of more sets than this are unreadable: the best and the present one are shown."""
@@ -26,7 +30,7 @@ class Results:
 
     Attributes
     ----------
-    metrics : long table of all flights
+    metrics : long table of the flights that decide
     ranking, per_flight : tables of the apply room
     shown : sets that plots show, in order of the ranking, the present one first
     scoring : summary of each analysed flight, by name
@@ -42,18 +46,29 @@ class Results:
     present: str
 
     @property
-    def flights(self) -> tuple[str, ...]:
-        """Scored flights by name."""
+    def scored(self) -> tuple[str, ...]:
+        """Scored flights by name, those too that have no say in the decision."""
         return tuple(name for name, summary in self.scoring.items() if summary["status"] == "scored")
 
+    @property
+    def flights(self) -> tuple[str, ...]:
+        """Flights that decide, by name: what the figures and tables that compare the sets are made of."""
+        return tuple(name for name in self.scored if name in self.decision["weights"])
+
+    def reason(self, name: str) -> str:
+        """Why an analysed flight has no say in the decision; empty where it has."""
+        if name in self.flights:
+            return ""
+        judged = {row["flight"]: row["reason"] for row in self.decision["flights"]}
+        return str(judged.get(name) or self.scoring[name]["reason"])
+
     def status(self, name: str) -> str:
-        """Part of a set in the decision: "present", "candidate", "vetoed" or "not_scored"."""
+        """Part of a set in the decision, as `fusetune.apply.ranking` names it."""
         return str(self._ranked[name]["status"])
 
     def is_ruled_out(self, name: str) -> bool:
         """Whether a set cannot be chosen: vetoed, not scored, or worse than the present one in a kind of prediction."""
-        row = self._ranked[name]
-        return name != self.present and (row["status"] != "candidate" or bool(worse_aims(row)))
+        return self.status(name) in OUT
 
     @cached_property
     def _ranked(self) -> dict[str, dict[Hashable, Any]]:
@@ -76,7 +91,8 @@ def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results
         summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
         scoring[summary["flight"]] = summary
         folders[summary["flight"]] = folder
-        metrics.append(pd.read_parquet(folder / "metrics.parquet"))
+        if summary["flight"] in decision["weights"]:
+            metrics.append(pd.read_parquet(folder / "metrics.parquet"))
     present = decision["present"]
     return Results(
         decision=decision,
@@ -120,7 +136,7 @@ class PooledSamples:
 
 
 def pooled_samples(results: Results) -> list[PooledSamples]:
-    """Scored innovations (unit of the source) and innovations divided by √S, over all scored flights."""
+    """Scored innovations (unit of the source) and innovations divided by √S, over the flights that decide."""
     values: dict[tuple[str, int], dict[str, list[npt.NDArray[np.float64]]]] = {}
     normalised: dict[tuple[str, int], dict[str, list[npt.NDArray[np.float64]]]] = {}
     for flight in results.flights:

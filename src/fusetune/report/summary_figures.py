@@ -48,5 +48,5 @@ def plot_summary(analyze_folders: Sequence[Path], apply_folder: Path, figure_fol
     }
     with figure_style():
         for name in SUMMARY_FIGURES:
-            figure = drawings[name]() if results.flights else empty_figure("No flight could be scored.")
+            figure = drawings[name]() if results.flights else empty_figure("No flight has a say in the decision.")
             save_svg(figure, Path(figure_folder) / name)

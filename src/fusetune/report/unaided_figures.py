@@ -53,7 +53,7 @@ def _absolute(
         style = styles[name]
         axes.plot(
             curve.index, curve["mean"], color=style.colour, marker=style.marker, markersize=3.5, linewidth=style.width,
-            alpha=0.45 if results.status(name) == "vetoed" else 1.0, label=_label(name, results),
+            alpha=0.45 if results.is_ruled_out(name) else 1.0, label=_label(name, results),
         )  # fmt: skip
         if float(curve["mean"].max()) <= hopeless:
             reach = max(reach, float(curve["mean"].max()))
@@ -72,12 +72,12 @@ def _relative(axes: Axes, results: Results, summary: pd.DataFrame, styles: dict[
     step = float(np.min(np.diff(horizons))) if len(horizons) > 1 else horizons[0]
     offsets = np.linspace(-0.5, 0.5, len(others)) * _DODGE * step if len(others) > 1 else np.zeros(1)
     shown = summary.loc[summary.index.get_level_values("set").isin(others)]
-    able = [results.status(name) == "candidate" for name in shown.index.get_level_values("set")]
+    able = [not results.is_ruled_out(name) for name in shown.index.get_level_values("set")]
     bottom, top = robust_reach(shown["change_low"], shown["change_high"], able)
     for name, offset in zip(others, offsets, strict=True):
         curve, style = _curve(summary, name), styles[name]
         time = curve.index.to_numpy(np.float64) + offset
-        alpha = 0.45 if results.status(name) == "vetoed" else 1.0
+        alpha = 0.45 if results.is_ruled_out(name) else 1.0
         axes.vlines(time, curve["change_low"], curve["change_high"], color=style.colour, linewidth=1.2, alpha=alpha)
         axes.plot(time, curve["change"], style.marker, color=style.colour, markersize=4, alpha=alpha)
     axes.axhline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
