@@ -1,6 +1,9 @@
 # Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
 import csv
-import json
+
+from fusetune.checksum_file import check_checksum
+from fusetune.documents import read_document
+from fusetune.errors import FOLDER_AGAIN, RUN_AGAIN
 
 REPLAY_PARTS = (
     "innovations.parquet",
@@ -30,6 +33,7 @@ def replay_files(names):
 
 
 def read_csv(path):
+    told_in_one_line(check_checksum, path, RUN_AGAIN)
     with open(path, encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
@@ -63,8 +67,9 @@ def present_flight():
 
 def present_overrides():
     """What the set `present` gives to the parameters that the study varies: the vehicle's present values."""
-    with open(f"results/save/{present_flight()}/metadata.json", encoding="utf-8") as file:
-        values = json.load(file)["ekf2_parameters"]
+    folder = f"results/save/{present_flight()}"
+    metadata = told_in_one_line(read_document, f"{folder}/metadata.json", remedy=FOLDER_AGAIN.format(folder=folder))
+    values = metadata["ekf2_parameters"]
     varied = {name for overrides in OVERRIDES.values() for name in overrides}
     return {name: values[name] for name in sorted(varied & values.keys())}
 

@@ -70,9 +70,9 @@ def checked_faults():
     return faults
 
 
-def told_in_one_line(function, *arguments):
+def told_in_one_line(function, *arguments, **options):
     try:
-        return function(*arguments)
+        return function(*arguments, **options)
     except UserError as error:
         raise WorkflowError(str(error)) from None
 

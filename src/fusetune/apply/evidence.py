@@ -4,7 +4,6 @@ Two kinds of prediction are judged, the aims. *Aided*: one step ahead, all senso
 without GNSS. Each has columns (source, axis and, unaided, horizon), and each column a scale-profiled NLL.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import pyarrow.compute as pc
 from fusetune.analyze.likelihood import profile_nll
 from fusetune.analyze.sources import AXES
 from fusetune.apply.settings import DecisionSettings
+from fusetune.documents import read_document
 from fusetune.parquet import read_table
 
 Array = npt.NDArray[np.float64]
@@ -124,7 +124,7 @@ def read_flights(folders: Sequence[Path], settings: DecisionSettings, present: s
 def _read_flight(
     folder: Path, metrics: pa.Table, settings: DecisionSettings, present: str, whiteness: Mapping[str, float]
 ) -> AnalyzedFlight:
-    summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
+    summary = read_document(folder / "scoring.json")
     evidence, reason = _evidence_of(folder, summary, settings, present, whiteness)
     return AnalyzedFlight(summary["flight"], folder, summary, metrics, evidence, reason)
 
@@ -155,7 +155,7 @@ def trust_grade(folder: Path) -> str | None:
     path = folder / "fidelity.json"
     if not path.is_file():
         return None
-    fidelity = json.loads(path.read_text(encoding="utf-8"))
+    fidelity = read_document(path)
     compared = fidelity.get("trust", {}).get("figure_grades")
     return str(fidelity["grade"]) if compared else None
 

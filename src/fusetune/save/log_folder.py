@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from pathlib import Path
 from typing import Any
 
-from fusetune.errors import UserError
+from fusetune.checksum_file import check_checksum, has_checksum
+from fusetune.documents import write_document
+from fusetune.errors import RUN_AGAIN, UserError
 from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
@@ -57,15 +58,17 @@ def save_log(
 
 def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
     try:
+        if has_checksum(log):
+            check_checksum(log, RUN_AGAIN)
         flight = read_ulog(log)
     except UserError as error:
         verdict = unreadable(log.stem, error)
-        _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
+        write_document(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
     else:
         verdict = _judge(flight, thresholds)
         extra = {"file": log.name, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
         write_flight(folder, flight, extra | log_facts(flight))
-    _write_json(folder / VERDICT_FILE, verdict.document())
+    write_document(folder / VERDICT_FILE, verdict.document())
     return verdict
 
 
@@ -89,7 +92,3 @@ def _metadata_of_unreadable(log: Path) -> dict[str, Any]:
     except (UserError, OSError):
         checksum, size = "", 0
     return {"name": log.stem, "file": log.name, "checksum": checksum, "size_bytes": size}
-
-
-def _write_json(file: Path, document: dict[str, Any]) -> None:
-    file.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
