@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fusetune.documents import read_document, write_document
@@ -14,7 +14,8 @@ from fusetune.errors import UserError
 DOCUMENT = {"flight": "höhe 7", "grade": "B", "figures": [1.5, None, 1e-300], "deep": {"b": {}, "a": [{}]}}
 JSON_VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
-    lambda part: st.lists(part) | st.dictionaries(st.text(), part),
+    lambda part: st.lists(part, max_size=3) | st.dictionaries(st.text(), part, max_size=3),
+    max_leaves=6,
 )
 
 
@@ -28,8 +29,8 @@ def test_what_was_written_is_read_and_is_plain_json(tmp_path: Path, form: dict[s
     assert plain == DOCUMENT
 
 
-@settings(max_examples=25)
-@given(document=st.dictionaries(st.text().filter(lambda key: key != "digest"), JSON_VALUES, min_size=1))
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+@given(document=st.dictionaries(st.text().filter(lambda key: key != "digest"), JSON_VALUES, min_size=1, max_size=3))
 def test_any_document_comes_back(tmp_path_factory: pytest.TempPathFactory, document: dict[str, Any]) -> None:
     file = tmp_path_factory.getbasetemp() / "any.json"
     for lines in (False, True):

@@ -27,6 +27,13 @@ SCORE_PARTS = (
 )
 
 
+ANALYZED_FILES = [
+    *(f"results/analyze/{{flight}}/{pset}.{part}" for pset in REPLAYED for part in REPLAY_PARTS),
+    *(f"results/analyze/{{flight}}/{part}" for part in SCORE_PARTS),
+]
+"""What the analysis of a flight leaves, of all sets."""
+
+
 def replay_files(names):
     """Files of the replays of some sets on a flight."""
     return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=REPLAY_PARTS)
