@@ -4,13 +4,16 @@ from snakemake.utils import min_version
 min_version("9.27")
 
 
-configfile: "config/config.yaml"
-
-
 report: "workflow/report/workflow.rst"
 
 
 include: "workflow/rules/environment.smk"
+include: "workflow/rules/configuration_files.smk"
+
+
+configfile: "config/config.yaml"
+
+
 include: "workflow/rules/configuration.smk"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/design.smk"

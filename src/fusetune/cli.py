@@ -79,8 +79,8 @@ def _add_simulate(commands: Commands) -> None:
 
 
 def _simulate(options: argparse.Namespace) -> None:
-    from fusetune.design.config_file import read_yaml
     from fusetune.design.mission import load_mission
+    from fusetune.design.yaml_reader import read_yaml
     from fusetune.execute import simulate
     from fusetune.execute.faults import parse_faults
     from fusetune.execute.vehicle import load_vehicle

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import os
 
+RUN_AGAIN = "Delete it and run the pipeline again"
+"""What mends a damaged file of results."""
+FOLDER_AGAIN = "Delete the whole folder {folder} and run the pipeline again"
+"""What mends a file in the folder of a saved flight: the pipeline knows the folder, not the files in it."""
+
 
 class UserError(Exception):
     """Bad input, told so that the user can mend it.

@@ -1,15 +1,15 @@
 """Flights made for tests: files as the save room and the replay write them, with innovations of known statistics."""
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from tests.analyze.made_gaps import UNITS, gap_starts, write_gaps
 
+from fusetune.documents import write_document
 from fusetune.ekf2 import state
+from fusetune.parquet import write_table
 from fusetune.px4.flight import Flight, ParameterHistory
 from fusetune.save.flight_folder import write_flight
 
@@ -131,10 +131,10 @@ def write_set(folder: Path, name: str, made: MadeSet, time: np.ndarray, unit: np
             "fused": np.concatenate(columns["fused"]) & (ratio <= 1.0),
         }
     )
-    pq.write_table(table, folder / f"{name}.innovations.parquet")
-    pq.write_table(_local_position(made), folder / f"{name}.local_position.parquet")
-    pq.write_table(_states(), folder / f"{name}.states.parquet")
-    pq.write_table(_flags(made), folder / f"{name}.status_flags.parquet")
+    write_table(table, folder / f"{name}.innovations.parquet")
+    write_table(_local_position(made), folder / f"{name}.local_position.parquet")
+    write_table(_states(), folder / f"{name}.states.parquet")
+    write_table(_flags(made), folder / f"{name}.status_flags.parquet")
     summary = {
         "set": name,
         "overrides": made.overrides,
@@ -143,7 +143,7 @@ def write_set(folder: Path, name: str, made: MadeSet, time: np.ndarray, unit: np
         "reason": "" if made.status == "ok" else "the covariance is not finite",
         "filter_fault_flags_max": made.fault_flags,
     }
-    (folder / f"{name}.json").write_text(json.dumps(summary))
+    write_document(folder / f"{name}.json", summary)
 
 
 def true_position(time_us: np.ndarray) -> np.ndarray:

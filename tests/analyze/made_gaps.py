@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
+
+from fusetune.parquet import write_table
 
 GAP_S = 9.0
 HORIZONS_S = (3.0, 6.0, 9.0)
@@ -70,8 +71,8 @@ def write_gaps(folder: Path, name: str, drift: float, unit: np.ndarray, start_us
         "innovation": error,
         "innovation_variance": np.full(error.size, drift**2),
     }
-    pq.write_table(pa.table(predictions), folder / f"{name}.withheld.parquet")
-    pq.write_table(_ends(starts["gnss"], drift, unit, start_us, true_position), folder / f"{name}.gaps.parquet")
+    write_table(pa.table(predictions), folder / f"{name}.withheld.parquet")
+    write_table(_ends(starts["gnss"], drift, unit, start_us, true_position), folder / f"{name}.gaps.parquet")
 
 
 def _ends(starts_s: np.ndarray, drift: float, unit: np.ndarray, start_us: int, true_position) -> pa.Table:

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
 from fusetune.analyze.onboard_fidelity import judge_onboard_fidelity
+from fusetune.parquet import write_table
 from fusetune.px4.flight import Flight
 
 START = 10_000_000
@@ -18,7 +18,7 @@ def write_rows(path, times, innovation):
         "innovation": innovation, "innovation_variance": np.full(n, 0.04),
         "innovation_rejected": np.zeros(n, bool), "fused": np.ones(n, bool),
     }  # fmt: skip
-    pq.write_table(pa.table(columns), path)
+    write_table(pa.table(columns), path)
     return path
 
 

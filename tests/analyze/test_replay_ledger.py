@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 from fusetune.analyze.replay_files import replay_files
 from fusetune.analyze.replay_ledger import ReplayLedger
+from fusetune.documents import read_document, write_document
 
 SETS = {"low": {"EKF2_ACC_NOISE": 0.2}, "high": {"EKF2_ACC_NOISE": 0.9}}
 
@@ -18,7 +18,7 @@ def flight(tmp_path: Path) -> Path:
     folder = tmp_path / "flight"
     folder.mkdir()
     metadata = {"format": 2, "topics": [], "checksum": "of the log"}
-    (folder / "metadata.json").write_text(json.dumps(metadata), encoding="utf-8")
+    write_document(folder / "metadata.json", metadata)
     return folder
 
 
@@ -51,8 +51,8 @@ def test_other_settings_outdate_all(flight: Path) -> None:
 
 def test_another_log_outdates_all(flight: Path) -> None:
     replay(flight)
-    metadata = flight / "metadata.json"
-    metadata.write_text(metadata.read_text(encoding="utf-8").replace("of the log", "of another"), encoding="utf-8")
+    metadata = read_document(flight / "metadata.json")
+    write_document(flight / "metadata.json", metadata | {"checksum": "of another"})
     assert ledger(flight).outdated(SETS) == SETS
 
 

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
 from fusetune.analyze.metrics_table import MetricsTable
@@ -12,6 +11,7 @@ from fusetune.analyze.scoring_window import ScoringWindow
 from fusetune.analyze.set_files import AxisSamples, SetRecord
 from fusetune.analyze.true_errors import Truth
 from fusetune.analyze.withheld_scores import add_true_drift, add_withheld_metrics, paired_gaps, withheld_rows
+from fusetune.parquet import write_table
 
 SECOND = 1_000_000
 WINDOW = ScoringWindow(((0, 100 * SECOND),), (), {}, 0)
@@ -42,7 +42,7 @@ def write(folder: Path, name: str, starts_s: list[int], errors: list[float], var
         "innovation": np.array(errors),
         "innovation_variance": np.full(count, variance),
     }
-    pq.write_table(pa.table(table), folder / f"{name}.withheld.parquet")
+    write_table(pa.table(table), folder / f"{name}.withheld.parquet")
 
 
 def test_only_gaps_that_all_sets_have_and_that_lie_in_the_window_are_paired(tmp_path: Path) -> None:
@@ -95,7 +95,7 @@ def test_growth_of_the_true_error_over_a_gap(tmp_path: Path) -> None:
         columns |= {f"{name}_{moment}": np.zeros(3) for name in ("y", "z", "vy", "vz")} | {
             f"vx_{moment}": np.full(3, 2.0)
         }
-    pq.write_table(pa.table(columns), tmp_path / "present.gaps.parquet")
+    write_table(pa.table(columns), tmp_path / "present.gaps.parquet")
     time = np.arange(101, dtype=np.int64) * SECOND
     course = np.column_stack([2.0 * time * 1e-6, 0.0 * time, 0.0 * time])
     speed = np.column_stack([np.full(time.size, 2.0), 0.0 * time, 0.0 * time])

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 from tests.analyze.made_flight import MadeSet, make_flight
 
 from fusetune.analyze.score_flight import score_saved_flight
+from fusetune.parquet import write_table
 
 
 def make_study(
@@ -42,5 +42,5 @@ def make_study(
     table = root / "flights.parquet"
     columns = ("flight", "status", "reason", "firmware", "checksum", "duration_s", "airborne_s")
     types = dict.fromkeys(columns[:5], pa.string()) | dict.fromkeys(columns[5:], pa.float64())
-    pq.write_table(pa.Table.from_pylist(rows, schema=pa.schema(list(types.items()))), table)
+    write_table(pa.Table.from_pylist(rows, schema=pa.schema(list(types.items()))), table)
     return folders, table

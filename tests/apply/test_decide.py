@@ -5,13 +5,16 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 import pytest
 from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
+from fusetune.documents import read_document, write_document
 from fusetune.errors import UserError
+from fusetune.parquet import write_table
 from fusetune.px4.params_file import read_params
 
 OUTPUTS = (
@@ -114,12 +117,13 @@ def test_vetoes(tmp_path: Path, made: MadeSet, reason: str) -> None:
 def test_a_set_that_fails_on_one_flight_is_not_eligible_but_shown(tmp_path: Path) -> None:
     sets = {"present": MadeSet(error=0.1), "tempting": MadeSet(error=0.05)}
     folders, table = make_study(tmp_path, sets)
-    summary = json.loads((folders[2] / "scoring.json").read_text())
+    summary = read_document(folders[2] / "scoring.json")
     summary["sets"]["tempting"] |= {"status": "excluded", "reason": "starts aiding 28.0 s later than the present set"}
-    (folders[2] / "scoring.json").write_text(json.dumps(summary))
+    write_document(folders[2] / "scoring.json", summary)
     for name in ("scores.parquet", "withheld.parquet"):
         scores = pd.read_parquet(folders[2] / name)
-        scores[scores["set"] != "tempting"].to_parquet(folders[2] / name)
+        left = pa.Table.from_pandas(scores[scores["set"] != "tempting"], preserve_index=False)
+        write_table(left, folders[2] / name)
     decide(folders, table, tmp_path / "apply", sets=list(sets))
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
     one = ranked(decision, "tempting")
@@ -173,9 +177,9 @@ def test_provenance_names_every_log_and_configuration_file(tmp_path: Path) -> No
 def test_previous_values_are_those_of_the_newest_flight(tmp_path: Path) -> None:
     sets = {"present": MadeSet(error=0.13), "better": MadeSet(error=0.1, overrides=QUIET)}
     folders, table = make_study(tmp_path, sets)
-    summary = json.loads((folders[1] / "scoring.json").read_text())
+    summary = read_document(folders[1] / "scoring.json")
     summary["sets"]["present"]["parameters"]["EKF2_ACC_NOISE"] = 0.5
-    (folders[1] / "scoring.json").write_text(json.dumps(summary))
+    write_document(folders[1] / "scoring.json", summary)
     decide(folders, table, tmp_path / "apply", sets=list(sets), newest_flight="flight_1")
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
     assert decision["changes"][0]["previous"] == 0.5
@@ -214,7 +218,7 @@ def test_a_flight_whose_replay_cannot_be_trusted_does_not_count(tmp_path: Path) 
     for folder, grade, compared in zip(folders, "ABCDDA", ({"x": "A"},) * 4 + ({}, {"x": "A"}), strict=True):
         reason = "the replay resets its height 144 times" if grade == "D" else ""
         fidelity = {"grade": grade, "trust": {"figure_grades": compared, "reason": reason}}
-        (folder / "fidelity.json").write_text(json.dumps(fidelity))
+        write_document(folder / "fidelity.json", fidelity)
     decide(folders, table, tmp_path / "apply", sets=list(sets))
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
     # The fourth has a D; the fifth, too, but only because its log holds nothing to compare with.

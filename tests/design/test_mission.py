@@ -94,3 +94,29 @@ def test_return_ends_the_plan_with_return_to_launch(tmp_path: Path) -> None:
 def test_shipped_mission_loads(project_root: Path) -> None:
     turns = [waypoint.turn for waypoint in load_mission(project_root / "config/missions/survey.yaml").waypoints]
     assert {"fly_by", "fly_over"} == set(turns)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ("name: survey", "name: CON", "'CON' is a device"),
+        ("name: survey", 'name: "survey\\n"', "name is 'survey\\n'"),
+        ("alt: 488.0", "alt: .nan", "home.alt is nan"),
+        ("alt: 488.0", "alt: .inf", "home.alt is inf"),
+        ("alt: 488.0", "alt: true", "home.alt is true"),
+        ("alt: 488.0", "alt: 0477", "base 8"),
+        ("alt: 488.0", "alt: 4:48", "base 60"),
+    ],
+)
+def test_what_cannot_be_meant_is_told_with_its_place(
+    tmp_path: Path, project_root: Path, old: str, new: str, part: str
+) -> None:
+    text = (project_root / "config/missions/survey.yaml").read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "mission.yaml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(UserError) as error:
+        load_mission(path)
+    assert str(path) in str(error.value)
+    assert part in str(error.value)
+    assert "\n" not in str(error.value)

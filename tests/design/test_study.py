@@ -152,3 +152,57 @@ def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
 def test_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot be read"):
         load_study(tmp_path / "nothing.yaml")
+
+
+LIST = "name: s\nkind: list\nsets:\n"
+
+
+def a_set(name: str, value: str = "0.3") -> str:
+    return f"- name: {name}\n  parameters: {{EKF2_ACC_NOISE: {value}}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (LIST + a_set('"a\\n"'), ("sets[0].name", "'a\\n'")),
+        (LIST + a_set("nul.txt"), ("sets[0].name", "'nul.txt'")),
+        (LIST + a_set("CON"), ("sets[0].name", "'CON'", "Windows")),
+        (LIST + a_set("scoring"), ("sets[0].name", "'scoring'")),
+        (LIST + a_set("Fidelity"), ("sets[0].name", "'Fidelity'")),
+        (LIST + a_set("Present"), ("sets[0].name", "'Present'")),
+        (LIST + a_set("AS_FLOWN"), ("sets[0].name", "'AS_FLOWN'")),
+        (LIST + a_set("a") + a_set("A"), ("sets[1].name", "duplicate", "case")),
+        (LIST + a_set("a", ".nan"), ("sets[0].parameters.EKF2_ACC_NOISE is nan", "finite")),
+        (LIST + a_set("a", "-.inf"), ("sets[0].parameters.EKF2_ACC_NOISE is -inf", "finite")),
+        (LIST + a_set("a", "1e999"), ("sets[0].parameters.EKF2_ACC_NOISE is inf", "finite")),
+        (LIST + a_set("a", "9" * 400), ("sets[0].parameters.EKF2_ACC_NOISE", "400 digits")),
+        (LIST + a_set("a", "true"), ("sets[0].parameters.EKF2_ACC_NOISE is true", "number")),
+        (LIST + a_set("a", "yes"), ("sets[0].parameters.EKF2_ACC_NOISE is true", "number")),
+        (LIST + a_set("a", '"0.3"'), ("sets[0].parameters.EKF2_ACC_NOISE is '0.3'", "number")),
+        (LIST + "".join(a_set(f"s{number}") for number in range(2001)), ("2001 sets", "at most 2000")),
+    ],
+)
+def test_names_and_numbers_that_cannot_be_used_are_told_with_their_place(
+    tmp_path: Path, text: str, parts: tuple[str, ...]
+) -> None:
+    message = message_of(tmp_path, text)
+    assert "\n" not in message
+    for part in parts:
+        assert part in message
+
+
+def test_a_grid_beyond_all_bounds_is_refused_before_it_is_made(tmp_path: Path) -> None:
+    """Five axes of a hundred values are 10¹⁰ sets."""
+    values = ", ".join(str(0.001 + number / 1000) for number in range(100))
+    parameters = ("ACC_NOISE", "GYR_NOISE", "BARO_NOISE", "MAG_NOISE", "GPS_V_NOISE")
+    axes = "".join(f"  EKF2_{name}: [{values}]\n" for name in parameters)
+    message = message_of(tmp_path, f"name: s\nkind: grid\nvary:\n{axes}")
+    assert "10000000000 sets" in message
+    assert "Vary fewer" in message
+
+
+def test_descriptions_of_several_lines_become_one(tmp_path: Path) -> None:
+    head = LIST.replace("kind", "description: |\n  first\n  second\nkind")
+    study = load_study(write(tmp_path, head + a_set("a") + "  description: |\n   x\n   y\n"))
+    assert study.description == "first second"
+    assert study.sets[0].description == "x y"

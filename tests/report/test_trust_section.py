@@ -1,9 +1,9 @@
 """The section on trust: one row per flight, from the files that the analyze room writes."""
 
-import json
 from pathlib import Path
 from typing import Any
 
+from fusetune.documents import write_document
 from fusetune.report.trust_section import trust_section
 
 TRUST: dict[str, Any] = {
@@ -26,7 +26,7 @@ def write(folder: Path, name: str, **changes: Any) -> Path:
     content = {"flight": name, "reasons": ["the log starts late"], "median_relative_rms": None, "axes": []} | changes
     target = folder / name
     target.mkdir()
-    (target / "fidelity.json").write_text(json.dumps(content))
+    write_document(target / "fidelity.json", content)
     return target
 
 

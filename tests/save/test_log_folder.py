@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from fusetune.checksum_file import write_checksum
 from fusetune.errors import UserError
 from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory
 from fusetune.px4.ulog_reader import read_ulog
@@ -211,3 +212,34 @@ def test_remedies_of_what_did_not_pass_are_in_the_table(tmp_path: Path, log: Pat
 def test_thresholds_decide(tmp_path: Path, log: Path) -> None:
     strict = VerdictThresholds.from_mapping({"min_imu_duration_s": 60})
     assert "at least 60 s" in save_log(log, tmp_path / "made", strict).reasons[0]
+
+
+@pytest.mark.parametrize("name", ["metadata.json", "sensor_combined_0.parquet"])
+def test_a_file_of_a_saved_flight_that_is_damaged_or_gone_asks_for_a_new_folder(
+    tmp_path: Path, log: Path, name: str
+) -> None:
+    """The pipeline sees the folder only, so taking away one file in it would not make it anew."""
+    folder = tmp_path / "made"
+    save_log(log, folder)
+    content = bytearray((folder / name).read_bytes())
+    content[40] ^= 1
+    (folder / name).write_bytes(content)
+    for _ in range(2):
+        with pytest.raises(UserError) as raised:
+            load_flight(folder)
+        assert Path(raised.value.file) == folder / name
+        assert f"Delete the whole folder {folder} and" in str(raised.value)
+        (folder / name).unlink(missing_ok=True)
+
+
+def test_a_log_that_is_not_that_of_its_checksum_is_refused(tmp_path: Path, log: Path) -> None:
+    copy = tmp_path / "copy.ulg"
+    copy.write_bytes(log.read_bytes())
+    write_checksum(copy)
+    assert save_log(copy, tmp_path / "saved").status == save_log(log, tmp_path / "made").status
+    content = bytearray(copy.read_bytes())
+    content[-9] ^= 1
+    copy.write_bytes(content)
+    verdict = save_log(copy, tmp_path / "saved")
+    assert verdict.status == "refused"
+    assert "damaged" in verdict.reasons[0]

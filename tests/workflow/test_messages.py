@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from tests.workflow.conftest import CONFIG, MISSION, STUDY, Workspace
+
+from fusetune.design.study import load_study
+from fusetune.errors import UserError
 
 
 def sets_of(*parameters: dict[str, Any]) -> dict[str, Any]:
@@ -31,6 +37,15 @@ def sets_of(*parameters: dict[str, Any]) -> dict[str, Any]:
             CONFIG | {"demonstration": {"vehicle": "config/quadrotor.yaml", "faults": {"flight_9": []}}},
             ("config.yaml", "demonstration.faults", "flight_1_low"),
         ),
+        (
+            "config.yaml",
+            CONFIG
+            | {"demonstration": {"vehicle": "config/quadrotor.yaml", "faults": {"flight_1_low": [{"kind": "x"}]}}},
+            ("config.yaml", "demonstration.faults.flight_1_low", "gnss_outage"),
+        ),
+        ("config.yaml", CONFIG | {"scoring": {"settle_s": math.nan}}, ("config.yaml", "scoring.settle_s", "finite")),
+        ("config.yaml", CONFIG | {"__use_yte__": True}, ("config.yaml", "unknown key '__use_yte__'")),
+        ("quadrotor.yaml", {"name": "x"}, ("quadrotor.yaml", "limits", "missing")),
     ],
 )
 def test_broken_configuration(
@@ -43,6 +58,42 @@ def test_broken_configuration(
     message = next(line for line in result.stdout.splitlines() if expected[0] in line and ": " in line)
     for part in expected:
         assert part in message, result.stdout
+
+
+def test_a_key_of_the_configuration_that_stands_twice(workspace: Workspace) -> None:
+    """Snakemake itself takes the last of the two."""
+    with open(workspace.folder / "config" / "config.yaml", "a", encoding="utf-8") as file:
+        file.write("seed: 1\nseed: 2\n")
+    result = workspace.run("--dry-run")
+    assert result.returncode != 0
+    assert "config/config.yaml: line" in result.stdout
+    assert "'seed' stands twice" in result.stdout
+
+
+@pytest.mark.parametrize(("setting", "part"), [("seed=nan", "seed is nan"), ("sets_per_jop=4", "'sets_per_jop'")])
+def test_a_broken_value_on_the_command_line(workspace: Workspace, setting: str, part: str) -> None:
+    result = workspace.run("--dry-run", "--config", setting)
+    assert result.returncode != 0
+    assert "--config: " in result.stdout
+    assert part in result.stdout
+
+
+def test_no_set_can_be_named_so_that_its_files_replace_others(demonstration: Workspace, tmp_path: Path) -> None:
+    """Of every file that the rooms write beside those of sets, each part up to a dot is tried as the name of a set."""
+    results = demonstration.folder / "results"
+    names = ("present", "as_flown", "low", "high")
+    folders = [results / "design", *(results / "analyze").iterdir()]
+    files = {file.name for folder in folders for file in folder.iterdir() if file.suffix != ".plan"}
+    of_sets = {file for file in files if file.split(".")[0] in names}
+    endings = {file.partition(".")[2] for file in of_sets}
+    clashing = {own.removesuffix(f".{end}") for own in files - of_sets for end in endings if own.endswith(f".{end}")}
+    assert {"scoring", "fidelity", "onboard"} <= clashing
+    for name in sorted(clashing, key=len):
+        for spelled in (name, name.upper()):
+            sets = [{"name": spelled, "parameters": {"EKF2_ACC_NOISE": 0.3}}]
+            (tmp_path / "study.yaml").write_text(yaml.safe_dump(STUDY | {"sets": sets}), encoding="utf-8")
+            with pytest.raises(UserError, match=spelled):
+                load_study(tmp_path / "study.yaml")
 
 
 def test_an_unknown_present_flight_is_named(demonstration: Workspace) -> None:

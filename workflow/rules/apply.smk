@@ -2,9 +2,11 @@ rule decide:
     input:
         flights="results/save/flights.parquet",
         present="results/save/present.json",
+        # what the input functions read: where it is missing, the checkpoint has to run again
+        listed="results/save/flights.csv",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
-        # asked for so that a set that is new is replayed and scored
-        replays=of_replayable_flights([f"results/analyze/{{flight}}/{pset}.json" for pset in REPLAYED]),
+        # asked for so that a set that is new is replayed and scored, and a file that was taken away is made again
+        replays=of_replayable_flights(ANALYZED_FILES),
         configuration=CONFIGURATION_FILES,
     output:
         "results/apply/ranking.parquet",

@@ -1,6 +1,8 @@
 # Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
 import csv
 
+from fusetune.checksum_file import check_checksum
+from fusetune.errors import RUN_AGAIN
 from fusetune.save import read_present
 
 REPLAY_PARTS = (
@@ -25,12 +27,20 @@ SCORE_PARTS = (
 )
 
 
+ANALYZED_FILES = [
+    *(f"results/analyze/{{flight}}/{pset}.{part}" for pset in REPLAYED for part in REPLAY_PARTS),
+    *(f"results/analyze/{{flight}}/{part}" for part in SCORE_PARTS),
+]
+"""What the analysis of a flight leaves, of all sets."""
+
+
 def replay_files(names):
     """Files of the replays of some sets on a flight."""
     return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=REPLAY_PARTS)
 
 
 def read_csv(path):
+    told_in_one_line(check_checksum, path, RUN_AGAIN)
     with open(path, encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
@@ -50,7 +60,7 @@ def overrides_in(name):
     if name == AS_FLOWN:
         return {}
     if name == PRESENT:
-        return read_present(checkpoints.list_flights.get().output.present).parameters
+        return told_in_one_line(read_present, checkpoints.list_flights.get().output.present).parameters
     return OVERRIDES[name]
 
 

@@ -1,13 +1,13 @@
 # What the user asked for: settings, parameter sets, mission and logs, checked before anything runs.
 import re
 
-from fusetune.design.config_file import read_yaml, validate
 from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study
+from fusetune.execute.vehicle import load_vehicle
 
 PRESENT = "present"
 AS_FLOWN = "as_flown"
-CONFIG_FILE = str((workflow.configfiles or ["config/config.yaml"])[-1])
+CONFIG_FILE = configuration_files()[-1]
 
 
 def with_defaults(values, schema):
@@ -18,12 +18,6 @@ def with_defaults(values, schema):
         elif "default" in part:
             values.setdefault(key, part["default"])
     return values
-
-
-def checked_settings():
-    schema = read_yaml(PROJECT / "workflow" / "schemas" / "config.schema.yaml")
-    validate(config, schema, CONFIG_FILE)
-    return with_defaults(dict(config), schema)
 
 
 def discovered_logs():
@@ -70,14 +64,17 @@ def checked_faults():
     return faults
 
 
-def told_in_one_line(function, *arguments):
-    try:
-        return function(*arguments)
-    except UserError as error:
-        raise WorkflowError(str(error)) from None
+def check_demonstration():
+    """Check what jobs would read of the demonstration, so that no job has to fail of it."""
+    load_vehicle(SETTINGS["demonstration"]["vehicle"])
+    if FAULTS:
+        from fusetune.execute.faults import parse_faults
+
+        for flight, faults in FAULTS.items():
+            parse_faults(faults, f"{CONFIG_FILE}: demonstration.faults.{flight}")
 
 
-SETTINGS = told_in_one_line(checked_settings)
+SETTINGS = with_defaults(ASKED, CONFIG_SCHEMA)
 STUDY = told_in_one_line(load_study, SETTINGS["study"])
 MISSION = told_in_one_line(load_mission, SETTINGS["mission"])
 OVERRIDES = {pset.name: pset.overrides for pset in STUDY.sets}
@@ -99,5 +96,7 @@ CONFIGURATION_FILES = [
     SETTINGS["study"],
     SETTINGS["mission"],
 ]
+if not FLOWN_LOGS and workflow.is_main_process:
+    told_in_one_line(check_demonstration)
 if not FLOWN_LOGS:
     CONFIGURATION_FILES.append(SETTINGS["demonstration"]["vehicle"])

@@ -79,7 +79,7 @@ def recover_from_interruption():
 recover_from_interruption()
 
 # Changed sources run again what depends on them.
-BASE = ("errors.py", "files.py", "parquet.py", "px4")
+BASE = ("checksum_file.py", "documents.py", "errors.py", "files.py", "parquet.py", "px4")
 REPLAY_SOURCES = (
     "ekf2",
     "save",

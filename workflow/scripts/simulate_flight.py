@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from fusetune.checksum_file import write_checksum
 from fusetune.design.mission import load_mission
 from fusetune.execute import simulate
 from fusetune.execute.faults import parse_faults
@@ -22,3 +23,4 @@ with logged_job(snakemake.log[0]):
         parse_faults(snakemake.params.faults, "config/config.yaml"),
         snakemake.output[0],
     )
+    write_checksum(snakemake.output[0])

@@ -7,13 +7,13 @@ there is no local origin, and innovations mean nothing.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
+from fusetune.documents import read_document
 from fusetune.errors import UserError
 from fusetune.parquet import read_table
 
@@ -26,6 +26,7 @@ NOT_AN_AID = ("fake_pos", "fake_hgt", "gravity")
 MIN_SAMPLES = 10
 NLL_CAP = 50.0
 """A single sample weighs no more than this in the sum that orders sets, so that one outlier decides nothing."""
+REMEDY = "Make the folder again: fusetune replay"
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def order_agreement(results: list[ReplayFidelity]) -> float:
 
 def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
     """Compare one set of two folders."""
-    ref, rep = (load_innovations(folder / f"{name}.innovations.parquet") for folder in (reference, replay))
+    ref, rep = (_innovations(_read(folder, f"{name}.innovations.parquet")) for folder in (reference, replay))
     start = comparison_start(ref)
     # An innovation that is no number, as of a vision system that measures no height, cannot be repeated.
     usable = (ref.variance > 0) & np.isfinite(ref.innovation)
@@ -152,7 +153,15 @@ def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
 
 def load_innovations(path: Path) -> Innovations:
     """Read a `<set>.innovations.parquet`; innovations of reconstructed samples are left out."""
-    table = read_table(path)
+    return _innovations(read_table(path))
+
+
+def _read(folder: Path, name: str, columns: list[str] | None = None) -> pa.Table:
+    """A table of one of the folders compared, which another program may have written."""
+    return read_table(folder / name, columns, remedy=REMEDY, sealed=False)
+
+
+def _innovations(table: pa.Table) -> Innovations:
     if "measured" in table.column_names:
         table = table.filter(table["measured"])
 
@@ -245,7 +254,7 @@ def _state_fidelity(reference: Path, replay: Path, name: str, start: int) -> tup
     """RMS difference of velocity (m/s), attitude (deg) and gyro bias (rad/s) at common times."""
     columns = ["timestamp_sample"] + [f"states_{i}" for i in range(13)]
     ref, rep = (
-        np.column_stack([read_table(folder / f"{name}.states.parquet", columns=[c])[c].to_numpy() for c in columns])
+        np.column_stack([_read(folder, f"{name}.states.parquet", [c])[c].to_numpy() for c in columns])
         for folder in (reference, replay)
     )
     _, i, j = np.intersect1d(ref[:, 0], rep[:, 0], return_indices=True)
@@ -263,7 +272,7 @@ def _state_fidelity(reference: Path, replay: Path, name: str, start: int) -> tup
 
 def _flags_fidelity(reference: Path, replay: Path, name: str, start: int) -> tuple[float, tuple[str, ...]]:
     """Share of time after `start` in which all control status flags agree, and the names of those that do not."""
-    ref, rep = (read_table(folder / f"{name}.status_flags.parquet") for folder in (reference, replay))
+    ref, rep = (_read(folder, f"{name}.status_flags.parquet") for folder in (reference, replay))
     names = [column for column in ref.column_names if column.startswith("cs_") and column in rep.column_names]
     ref_t, rep_t = ref["timestamp"].to_numpy(), rep["timestamp"].to_numpy()
     if not len(ref_t) or not len(rep_t):
@@ -283,4 +292,4 @@ def _flags_fidelity(reference: Path, replay: Path, name: str, start: int) -> tup
 
 
 def _resets(folder: Path, name: str) -> object:
-    return json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))["resets"]
+    return read_document(folder / f"{name}.json", remedy=REMEDY, sealed=False)["resets"]

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.files import atomic_path
+from fusetune.parquet import write_table
 from fusetune.px4.estimator_instances import rows_of_primary
 from fusetune.px4.flight import Flight, TopicTable
 
@@ -95,4 +95,4 @@ def write_onboard(path: Path, samples: dict[SourceAxis, AxisSamples]) -> None:
         }
     )
     with atomic_path(path) as temporary:
-        pq.write_table(table, temporary)
+        write_table(table, temporary)

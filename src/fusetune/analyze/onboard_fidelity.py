@@ -6,7 +6,6 @@ time; the vehicle logs them seldom (twice a second in the default profile), so e
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from fusetune.analyze.replay_flight import PreparedFlight
 from fusetune.analyze.replay_settings import ReplaySettings
 from fusetune.analyze.trust_grade import TRUST_TOPICS, grade_flight
 from fusetune.analyze.trust_settings import TrustSettings
+from fusetune.documents import write_document
 from fusetune.files import atomic_path
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.estimator_samples import is_complete, logged_share
@@ -109,7 +109,7 @@ def write_flight_fidelity(
     grade = grade_flight(flight, replay, trust, prepared)
     document = asdict(result) | {"grade": grade.grade, "trust": asdict(grade)}
     with atomic_path(analyze_folder / "fidelity.json") as path:
-        path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        write_document(path, document)
 
 
 def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> OnboardFidelity:

@@ -5,7 +5,6 @@ Beside them `.withheld` and `.gaps` hold what the filter predicted while a senso
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +12,13 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from fusetune.analyze.withheld_gaps import gap_table, prediction_table
+from fusetune.documents import write_document
 from fusetune.ekf2.replay import ReplayResult
 from fusetune.ekf2.replay_tables import flags_table, innovation_table, local_position_table, state_table
 from fusetune.files import atomic_path
+from fusetune.parquet import write_table
 
 TABLES = {
     "innovations": innovation_table,
@@ -63,19 +63,17 @@ def write_replay(
         table = to_table(result)
         if name == "innovations" and measured is not None and not measured.all():
             table = table.append_column("measured", pa.array(measured))
-        write_table(table, folder / f"{identity.set}.{name}.parquet")
+        write_replay_table(table, folder / f"{identity.set}.{name}.parquet")
     with atomic_path(folder / f"{identity.set}.json") as path:
-        path.write_text(json.dumps(_summary(identity, result), indent=1) + "\n", encoding="utf-8")
+        write_document(path, _summary(identity, result))
 
 
-def write_table(table: pa.Table, target: Path) -> None:
+def write_replay_table(table: pa.Table, target: Path) -> None:
     """Write a Parquet file that is either whole or not there."""
     with atomic_path(target) as path:
         # Figures hardly ever repeat: a dictionary of them, and their extremes, would only take time.
         texts = [field.name for field in table.schema if pa.types.is_dictionary(field.type)]
-        pq.write_table(
-            table, path, compression="zstd", compression_level=1, use_dictionary=texts, write_statistics=False
-        )
+        write_table(table, path, compression="zstd", compression_level=1, use_dictionary=texts, write_statistics=False)
 
 
 def _why_not_started(result: ReplayResult) -> str:

@@ -1,13 +1,11 @@
 """Scores all parameter sets of one flight on the same samples and writes the figures."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from fusetune.analyze.activity import inactive_parameters, same_results
 from fusetune.analyze.block_scores import BLOCK_SCHEMA, block_rows
@@ -48,7 +46,9 @@ from fusetune.analyze.withheld_scores import (
     paired_gaps,
     withheld_rows,
 )
+from fusetune.documents import write_document
 from fusetune.files import atomic_path
+from fusetune.parquet import write_table
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
@@ -337,6 +337,6 @@ def _write(
     }
     for name, content in tables.items():
         with atomic_path(folder / name) as temporary:
-            pq.write_table(content, temporary)
+            write_table(content, temporary)
     with atomic_path(folder / "scoring.json") as temporary:
-        temporary.write_text(json.dumps(summary, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        write_document(temporary, summary, sort_keys=True)

@@ -1,6 +1,5 @@
 """Reads what the replay of one (flight, parameter set) wrote: innovations, status flags, local position, summary."""
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.sources import AID_SOURCES
-from fusetune.errors import UserError
+from fusetune.documents import read_document
 from fusetune.parquet import read_table
 
 SourceAxis = tuple[str, int]
@@ -72,17 +71,13 @@ def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.
     UserError
         If the file is missing or damaged.
     """
-    try:
-        table = read_table(path, columns)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise UserError(path, f"cannot be read: {error}", "Delete it and run the pipeline again.") from error
+    table = read_table(path, columns)
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
 def read_set(folder: Path, name: str) -> SetRecord:
     """Read `<folder>/<name>.*`; the states are read only where truth is compared (`true_errors`)."""
-    with open(folder / f"{name}.json", encoding="utf-8") as file:
-        summary = json.load(file)
+    summary = read_document(folder / f"{name}.json")
     parameters = {key: float(value) for key, value in summary.get("params", {}).items()}
     return SetRecord(
         name=name,
@@ -104,10 +99,7 @@ def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxi
     ----------
     parameters : of this set; where the table has no test ratio, it follows from the source's gate
     """
-    try:
-        table = read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise UserError(path, f"cannot be read: {error}", "Delete it and run the pipeline again.") from error
+    table = read_table(path)
     if "measured" in table.column_names:
         table = table.filter(table["measured"]).drop_columns("measured")
     if table.num_rows == 0:

@@ -1,6 +1,5 @@
 """Decides over all flights and writes the ranking, the decision and the parameter files."""
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -9,7 +8,6 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.csv
-import pyarrow.parquet as pq
 
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
@@ -17,13 +15,15 @@ from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
-from fusetune.apply.provenance import flight_rows, provenance
+from fusetune.apply.provenance import file_hash, flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
+from fusetune.documents import write_document
 from fusetune.errors import UserError
 from fusetune.files import atomic_path
+from fusetune.parquet import write_table
 
 _SIGNIFICANT_DIGITS = 9
 
@@ -85,10 +85,10 @@ def decide(
     _write_ranking(output, ranked, values)
     _write_per_flight(output, flights)
     firmware = newest.summary["firmware"] if newest else "unknown"
-    write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
+    written = write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
+    decision["parameter_files"] = {file.name: file_hash(file) for file in written}
     with atomic_path(output / "decision.json") as temporary:
-        content = json.dumps(_rounded(decision), indent=1, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(content + "\n", encoding="utf-8")
+        write_document(temporary, _rounded(decision), allow_nan=False)
 
 
 def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: Path) -> AnalyzedFlight | None:
@@ -207,7 +207,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
     schema = [pa.field(one.name, pa.float64()) if pa.types.is_null(one.type) else one for one in table.schema]
     table = table.cast(pa.schema(schema))
     with atomic_path(folder / "ranking.parquet") as temporary:
-        pq.write_table(table, temporary)
+        write_table(table, temporary)
     with atomic_path(folder / "ranking.csv") as temporary:
         pa.csv.write_csv(table, temporary)
 
@@ -233,7 +233,7 @@ def _write_per_flight(folder: Path, flights: Sequence[AnalyzedFlight]) -> None:
     figures = ["score", *(f"{aim}_score" for aim in AIMS)]
     schema = pa.schema([("flight", pa.string()), ("set", pa.string()), *((name, pa.float64()) for name in figures)])
     with atomic_path(folder / "per_flight.parquet") as temporary:
-        pq.write_table(pa.Table.from_pylist(rows, schema=schema), temporary)
+        write_table(pa.Table.from_pylist(rows, schema=schema), temporary)
 
 
 def _reason(choice: Choice) -> str:

@@ -4,7 +4,6 @@ Two kinds of prediction are judged, the aims. *Aided*: one step ahead, all senso
 without GNSS. Each has columns (source, axis and, unaided, horizon), and each column a scale-profiled NLL.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ import pyarrow.compute as pc
 from fusetune.analyze.likelihood import profile_nll
 from fusetune.analyze.sources import AXES
 from fusetune.apply.settings import DecisionSettings
+from fusetune.documents import read_document
 from fusetune.parquet import read_table
 
 Array = npt.NDArray[np.float64]
@@ -148,7 +148,7 @@ def read_flights(folders: Sequence[Path], settings: DecisionSettings, present: s
 def _read_flight(
     folder: Path, metrics: pa.Table, settings: DecisionSettings, present: str, whiteness: Mapping[str, float]
 ) -> AnalyzedFlight:
-    summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
+    summary = read_document(folder / "scoring.json")
     found = _evidence_of(folder, summary, settings, present, whiteness)
     evidence, without = (None, found) if isinstance(found, NoEvidence) else (found, None)
     return AnalyzedFlight(summary["flight"], folder, summary, metrics, evidence, without)
@@ -186,7 +186,7 @@ def trust_grade(folder: Path) -> tuple[str | None, str]:
     path = folder / "fidelity.json"
     if not path.is_file():
         return None, ""
-    fidelity = json.loads(path.read_text(encoding="utf-8"))
+    fidelity = read_document(path)
     trust = fidelity.get("trust", {})
     return (str(fidelity["grade"]) if trust.get("figure_grades") else None), trust.get("reason", "")
 

@@ -36,8 +36,8 @@ def parameter_changes(overrides: dict[str, float], previous: dict[str, float]) -
 
 def write_parameter_files(
     folder: Path, changes: Sequence[ParameterChange], reason: str, firmware: str, origin: Sequence[str]
-) -> None:
-    """Write `best_params.params` and `rollback.params`.
+) -> list[Path]:
+    """Write `best_params.params` and `rollback.params`; returns the two files.
 
     Parameters
     ----------
@@ -52,11 +52,14 @@ def write_parameter_files(
     forward = [_entry(change, change.value, (_was(change), reason, *_reboot(change))) for change in changes]
     back = [_entry(change, change.previous, (f"back from {_number(change.value, change)}",)) for change in changes]
     kept = () if changes else ("The present parameters are kept: there is nothing to load.",)
+    written = []
     for name, entries, purpose in (
         ("best_params.params", forward, "fusetune: parameters to load"),
         ("rollback.params", back, "fusetune: the values before, to go back"),
     ):
         write_params(folder / name, entries, _header(firmware, (purpose, *origin, *kept)))
+        written.append(folder / name)
+    return written
 
 
 def _header(firmware: str, comments: tuple[str, ...]) -> ParamsHeader:

@@ -1,4 +1,4 @@
-"""Reading a YAML configuration file so that every mistake is told with its file, key and what was expected.
+"""Checking a configuration file so that every mistake is told with its file, key and what was expected.
 
 Imports nothing heavier than PyYAML and jsonschema: the workflow reads configuration files whenever it starts.
 """
@@ -6,19 +6,24 @@ Imports nothing heavier than PyYAML and jsonschema: the workflow reads configura
 from __future__ import annotations
 
 import difflib
+import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib import resources
+from itertools import islice
 from typing import Any
 
 import jsonschema
 import yaml
 
+from fusetune.design.yaml_reader import describe
 from fusetune.errors import UserError
 
 MOST_PROBLEMS_SHOWN = 8
+MOST_PROBLEMS_SOUGHT = 100
+LONGEST_PROBLEM = 400
 
 _JSON_TYPE_NAMES = {
     "object": "a mapping (keys and values)",
@@ -31,72 +36,26 @@ _JSON_TYPE_NAMES = {
 }
 
 
-class _Loader(yaml.SafeLoader):
-    """Safe YAML that refuses a key written twice, reads ``1e-3`` as the number it is and leaves dates as texts."""
-
-    yaml_implicit_resolvers = {  # noqa: RUF012 - PyYAML's own way of telling a loader what plain texts mean
-        first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith(":timestamp")]
-        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-    }
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        first_line: dict[str, int] = {}
-        for key_node, _ in node.value:
-            key = str(key_node.value)
-            line = key_node.start_mark.line + 1
-            if key in first_line:
-                raise _DuplicateKey(key, first_line[key], line)
-            first_line[key] = line
-        return super().construct_mapping(node, deep)
+LARGEST_INTEGER = 2**53
+"""Up to here a float holds every whole number."""
 
 
-# YAML 1.1 asks for a dot in a float, so PyYAML takes 1e-3 for a text.
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(?:\d+(?:\.\d*)?|\.\d+)[eE][-+]?\d+$"),
-    list("-+.0123456789"),
+def _matches_whole(
+    validator: Any, pattern: str, instance: object, schema: Mapping[str, Any]
+) -> Iterator[jsonschema.ValidationError]:
+    """A pattern whose ``$`` is the end of the text, as in JSON Schema; Python's stands before a last line feed, too."""
+    if isinstance(instance, str) and not re.fullmatch(pattern, instance):
+        yield jsonschema.ValidationError(f"{instance!r} does not match {pattern!r}")
+
+
+_Validator = jsonschema.validators.extend(
+    jsonschema.Draft202012Validator,
+    validators={"pattern": _matches_whole},
+    # 8.0 is whole to JSON Schema, and no use where Python counts
+    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine(
+        "integer", lambda checker, value: isinstance(value, int) and not isinstance(value, bool)
+    ),
 )
-
-
-class _DuplicateKey(Exception):
-    def __init__(self, key: str, first_line: int, line: int) -> None:
-        super().__init__(key, first_line, line)
-        self.key, self.first_line, self.line = key, first_line, line
-
-
-def read_yaml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a YAML file whose top level is a mapping.
-
-    Raises
-    ------
-    UserError
-        The file is missing, is no UTF-8 text, is no YAML, holds a key twice, or its top level is no mapping.
-    """
-    try:
-        with open(path, encoding="utf-8") as stream:
-            document = yaml.load(stream, Loader=_Loader)
-    except OSError as error:
-        raise UserError(path, f"cannot be read: {error.strerror}", "Check the path and the permissions") from error
-    except UnicodeDecodeError as error:
-        raise UserError(path, "is not a UTF-8 text", "Save the file as UTF-8") from error
-    except _DuplicateKey as error:
-        reason = f"the key {error.key!r} stands twice, in lines {error.first_line} and {error.line}"
-        raise UserError(path, reason, "Keep one of the two") from error
-    except yaml.YAMLError as error:
-        raise UserError(path, f"is not valid YAML: {_yaml_problem(error)}", "Mend the syntax at that place") from error
-    if not isinstance(document, dict):
-        raise UserError(
-            path,
-            f"its top level is {_describe(document)}; expected a mapping (keys and values)",
-            "Start from one of the examples in config/",
-        )
-    return document
-
-
-def _yaml_problem(error: yaml.YAMLError) -> str:
-    mark = getattr(error, "problem_mark", None)
-    problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-    return f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else str(problem)
 
 
 @cache
@@ -115,17 +74,16 @@ def validate(document: Mapping[str, Any], schema: Mapping[str, Any], path: str |
     UserError
         Names every key at fault with what was found and what was expected.
     """
-    validator = jsonschema.Draft202012Validator(schema)
-    errors = sorted(validator.iter_errors(document), key=lambda error: [str(part) for part in error.absolute_path])
-    problems = [problem for error in errors for problem in _problems(error)]
-    raise_problems(
-        path, problems, "Mend the named keys; config/README.md and the examples beside it show what may stand there"
-    )
+    remedy = "Mend the named keys; config/README.md and the examples beside it show what may stand there"
+    raise_problems(path, islice(_number_problems(document, ()), MOST_PROBLEMS_SOUGHT), remedy)
+    found = islice(_Validator(schema).iter_errors(document), MOST_PROBLEMS_SOUGHT)
+    errors = sorted(found, key=lambda error: [str(part) for part in error.absolute_path])
+    raise_problems(path, (problem for error in errors for problem in _problems(error)), remedy)
 
 
 def raise_problems(path: str | os.PathLike[str], problems: Iterable[str], remedy: str) -> None:
     """Raise one `UserError` that tells all problems found in a file; do nothing where there is none."""
-    found = list(dict.fromkeys(problems))
+    found = list(dict.fromkeys(_shortened(problem) for problem in problems))
     if not found:
         return
     shown = found[:MOST_PROBLEMS_SHOWN]
@@ -134,9 +92,28 @@ def raise_problems(path: str | os.PathLike[str], problems: Iterable[str], remedy
     raise UserError(path, "; ".join(shown), remedy)
 
 
+def _shortened(problem: str) -> str:
+    line = " ".join(problem.split())
+    return line if len(line) <= LONGEST_PROBLEM else f"{line[:LONGEST_PROBLEM]}…"
+
+
+def _number_problems(value: object, place: tuple[str | int, ...]) -> Iterator[str]:
+    """Numbers that no setting can mean, wherever they stand."""
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from _number_problems(part, (*place, str(key)))
+    elif isinstance(value, list):
+        for index, part in enumerate(value):
+            yield from _number_problems(part, (*place, index))
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield f"{key_path(place)} is {value}; expected a finite number"
+    elif isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        yield f"{key_path(place)} is a number of {len(str(abs(value)))} digits; expected at most {LARGEST_INTEGER}"
+
+
 def nearest(name: str, candidates: Iterable[str]) -> str:
     """A hint ``" (did you mean 'X'?)"`` for a name that is not among the candidates; empty where none is near."""
-    matches = difflib.get_close_matches(name, list(candidates), n=1, cutoff=0.6)
+    matches = difflib.get_close_matches(name[:100], list(candidates), n=1, cutoff=0.6)
     return f" (did you mean {matches[0]!r}?)" if matches else ""
 
 
@@ -157,7 +134,8 @@ def _problems(error: jsonschema.ValidationError) -> list[str]:
         known = list(schema.get("properties", {}))
         unknown = [str(key) for key in _keys(error.instance) if key not in known]
         return [
-            f"{prefix}unknown key {key!r}{nearest(key, known)}; expected one of {', '.join(known)}" for key in unknown
+            f"{prefix}unknown key {describe(key)}{nearest(key, known)}; expected one of {', '.join(known)}"
+            for key in unknown[:MOST_PROBLEMS_SHOWN]
         ]
     if error.validator == "required":
         missing = [key for key in _keys(error.validator_value) if key not in _keys(error.instance)]
@@ -165,8 +143,8 @@ def _problems(error: jsonschema.ValidationError) -> list[str]:
     if error.validator == "not":
         return [f"{prefix}{schema.get('description', 'is not allowed here')}"]
     if error.validator == "propertyNames":
-        return [f"{prefix}the key {error.instance!r} is not a valid name; expected {_expected(schema)}"]
-    return [f"{place or 'top level'} is {_describe(error.instance)}; expected {_expected(schema)}"]
+        return [f"{prefix}the key {describe(error.instance)} is not a valid name; expected {_expected(schema)}"]
+    return [f"{place or 'top level'} is {describe(error.instance)}; expected {_expected(schema)}"]
 
 
 def _keys(value: object) -> list[str]:
@@ -210,17 +188,3 @@ def _bounds(schema: Mapping[str, Any]) -> str:
     if "pattern" in schema:
         parts.append(f" of the form {schema['pattern']}")
     return ",".join(parts)
-
-
-def _describe(value: object) -> str:
-    """A value that was found, short enough for a message."""
-    if value is None:
-        return "empty"
-    if isinstance(value, dict):
-        return "a mapping with the keys " + ", ".join(str(key) for key in value) if value else "an empty mapping"
-    if isinstance(value, list):
-        return f"a list of {len(value)}"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}…"

@@ -12,7 +12,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from fusetune.design.config_file import load_schema, raise_problems, read_yaml, validate
+from fusetune.design.config_file import load_schema, raise_problems, validate
+from fusetune.design.names import name_problem, one_line
+from fusetune.design.yaml_reader import read_yaml
 
 Turn = Literal["fly_by", "fly_over"]
 LandingMode = Literal["land", "return"]
@@ -95,6 +97,8 @@ def load_mission(path: str | os.PathLike[str]) -> Mission:
     document = read_yaml(path)
     validate(document, load_schema("fusetune.design", "mission"), path)
     mission = _mission_of(document)
+    problem = name_problem(mission.name)
+    raise_problems(path, [f"name: {problem}"] if problem else [], "Choose another name")
     raise_problems(path, _place_problems(mission), "Mend the named waypoints")
     return mission
 
@@ -108,7 +112,7 @@ def _mission_of(document: Mapping[str, Any]) -> Mission:
         waypoints=tuple(Waypoint(**{"speed_m_s": speed, **entry}) for entry in document["waypoints"]),
         landing=Landing(**document["landing"]),
         speed_m_s=speed,
-        description=document.get("description", "").strip(),
+        description=one_line(document.get("description", "")),
     )
 
 

@@ -97,10 +97,11 @@ def write_sets_table(study: Study, path: str | os.PathLike[str]) -> None:
     """Write the sets as a Parquet table, one row per set and parameter, in the order of the study."""
     # Imported here: everything else of this room is also read when the workflow starts, and that must stay quick.
     import pyarrow as pa
-    import pyarrow.parquet as pq
+
+    from fusetune.parquet import write_table
 
     rows = [(one.name, name, float(value)) for one in study.sets for name, value in sorted(one.overrides.items())]
     schema = pa.schema([("set", pa.string()), ("parameter", pa.string()), ("value", pa.float64())])
     table = pa.Table.from_pylist([dict(zip(schema.names, row, strict=True)) for row in rows], schema)
     with atomic_path(path) as temporary:
-        pq.write_table(table, temporary)
+        write_table(table, temporary)

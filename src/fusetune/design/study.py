@@ -8,16 +8,26 @@ grid leave the sets before them as they are, with the same names: only what is n
 from __future__ import annotations
 
 import itertools
+import math
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fusetune.design.config_file import load_schema, raise_problems, read_yaml, validate
+from fusetune.design.config_file import load_schema, raise_problems, validate
+from fusetune.design.names import name_problem, one_line
 from fusetune.design.parameter_check import parameter_problem, typed_values
+from fusetune.design.yaml_reader import read_yaml
 
-RESERVED_SET_NAMES = ("present", "as_flown", "onboard", "sets")
-"""Names the product gives itself: the parameters as logged, the vehicle's own estimator, the table of sets."""
+RESERVED_SET_NAMES = ("present", "as_flown", "onboard", "sets", "scoring", "fidelity")
+"""Names the product gives itself, and files of its own that those of a set so called would replace.
+
+The vehicle's present parameters, those as logged, its own estimator; `sets.parquet`, `scoring.json`, `fidelity.json`.
+"""
+
+MOST_SETS = 2000
+"""More sets than this are a slip of the pen: each is replayed on every flight."""
 
 LONGEST_SET_NAME = 120
 REMEDY = "Mend the named keys; the examples in config/studies/ show studies of every kind"
@@ -60,17 +70,18 @@ def load_study(path: str | os.PathLike[str]) -> Study:
     """
     document = read_yaml(path)
     validate(document, load_schema("fusetune.design", "study"), path)
+    raise_problems(path, _size_problems(document), "Vary fewer parameters, or give them fewer values")
     raise_problems(path, _parameter_problems(document), REMEDY)
     sets = tuple(_SETS_OF_KIND[document["kind"]](document))
     raise_problems(path, _name_problems(sets), REMEDY)
-    return Study(document["name"], document["kind"], sets, document.get("description", "").strip())
+    return Study(document["name"], document["kind"], sets, one_line(document.get("description", "")))
 
 
 def _listed_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
     fixed = document.get("fixed", {})
     for entry in document["sets"]:
         overrides = typed_values({**fixed, **entry["parameters"]})
-        yield ParameterSet(entry["name"], overrides, entry.get("description", "").strip())
+        yield ParameterSet(entry["name"], overrides, one_line(entry.get("description", "")))
 
 
 def _one_at_a_time_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
@@ -109,6 +120,13 @@ def _value_text(value: float) -> str:
     return format(value, ".9g").replace("+", "").replace("-", "m").replace(".", "p")
 
 
+def _size_problems(document: Mapping[str, Any]) -> Iterable[str]:
+    lengths = [len(values) for values in document.get("vary", {}).values()]
+    sets = math.prod(lengths) if document["kind"] == "grid" else sum(lengths) + len(document.get("sets", ()))
+    if sets > MOST_SETS:
+        yield f"it makes {sets} sets; expected at most {MOST_SETS}"
+
+
 def _parameter_problems(document: Mapping[str, Any]) -> Iterable[str]:
     for place, name, value in _parameters_with_places(document):
         problem = parameter_problem(name, value)
@@ -117,7 +135,7 @@ def _parameter_problems(document: Mapping[str, Any]) -> Iterable[str]:
     for name in set(document.get("fixed", {})) & set(document.get("vary", {})):
         yield f"vary.{name}: the parameter is fixed too; expected it in only one of fixed and vary"
     for name, values in document.get("vary", {}).items():
-        for value in {value for value in values if values.count(value) > 1}:
+        for value in (value for value, count in Counter(values).items() if count > 1):
             yield f"vary.{name}: the value {value:g} stands more than once"
 
 
@@ -138,7 +156,10 @@ def _name_problems(sets: tuple[ParameterSet, ...]) -> Iterable[str]:
         name = parameter_set.name
         # File systems that ignore case would keep only one of two such sets.
         folded = name.casefold()
-        if name in RESERVED_SET_NAMES:
+        problem = name_problem(name)
+        if problem:
+            yield f"sets[{index}].name: {problem}"
+        if folded in RESERVED_SET_NAMES:
             yield f"sets[{index}].name: {name!r} is a name the product uses itself; expected another name"
         if folded in seen:
             yield f"sets[{index}].name: duplicate set name {name!r}; expected names that differ in more than case"

@@ -8,8 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fusetune.design.config_file import load_schema, raise_problems, read_yaml, validate
+from fusetune.design.config_file import load_schema, raise_problems, validate
+from fusetune.design.names import one_line
 from fusetune.design.parameter_check import parameter_problem, typed_values
+from fusetune.design.yaml_reader import read_yaml
 
 
 @dataclass(frozen=True)
@@ -222,5 +224,5 @@ def _vehicle_of(document: Mapping[str, Any]) -> Vehicle:
             }
         ),
         parameters=typed_values(document.get("parameters", {})),
-        description=document.get("description", "").strip(),
+        description=one_line(document.get("description", "")),
     )

@@ -1,6 +1,5 @@
 """One picture per flight: track, height, test ratios over time, and where fusion broke."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from fusetune.analyze.attitude import interpolate
 from fusetune.analyze.ground_truth import Truth, read_truth
 from fusetune.analyze.set_files import AxisSamples, SourceAxis, read_columns, read_innovations
 from fusetune.analyze.sources import AID_SOURCES
+from fusetune.documents import read_document
 from fusetune.px4.flight import Flight
 from fusetune.report.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
@@ -41,7 +41,7 @@ class _FlightData:
     """What the panels draw: replays of the sets and, of the flight itself, start and truth."""
 
     def __init__(self, flight_folder: Path, analyze_folder: Path, sets: Sequence[str], present: str) -> None:
-        self.summary: dict[str, Any] = json.loads((analyze_folder / "scoring.json").read_text(encoding="utf-8"))
+        self.summary: dict[str, Any] = read_document(analyze_folder / "scoring.json")
         topics = ("vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth")
         flight: Flight = load_flight(flight_folder, topics=topics)
         self.start = flight.start_timestamp

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from fusetune.analyze.sources import AID_SOURCES
+from fusetune.parquet import read_table
 from fusetune.report.advice import advice_table
 from fusetune.report.innovation_figures import rms_table
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
@@ -33,7 +34,7 @@ _AS_FLOWN_GROUPS = (
 
 def flights_section(results: Results, flights_table: Path) -> str:
     """Every log with its verdict."""
-    verdicts = pd.read_parquet(flights_table).to_dict("records")
+    verdicts = read_table(flights_table).to_pandas().to_dict("records")
     rows = [_flight_row(verdict, results) for verdict in sorted(verdicts, key=lambda one: str(one["flight"]))]
     head = ("flight", "verdict", "scored s", "airborne s", "firmware", "reason")
     count, decide = len(rows), results.decision["flights_scored"]

@@ -1,6 +1,5 @@
 """What the report reads: the decision, and the figures and samples of all flights."""
 
-import json
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +14,7 @@ from fusetune.analyze.onboard import ONBOARD
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.apply.evidence import AIMS
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
+from fusetune.documents import read_document
 from fusetune.parquet import read_table
 
 OUT = (NOT_ELIGIBLE, NOT_SCORED)
@@ -84,20 +84,20 @@ def worse_aims(row: Mapping[Hashable, Any]) -> list[str]:
 def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results:
     """Read the results of the rooms; nothing is searched for, only what is named is read."""
     apply_folder = Path(apply_folder)
-    decision = json.loads((apply_folder / "decision.json").read_text(encoding="utf-8"))
-    ranking = pd.read_parquet(apply_folder / "ranking.parquet")
+    decision = read_document(apply_folder / "decision.json")
+    ranking = read_table(apply_folder / "ranking.parquet").to_pandas()
     scoring, folders, metrics = {}, {}, []
     for folder in sorted(map(Path, analyze_folders), key=lambda path: path.name):
-        summary = json.loads((folder / "scoring.json").read_text(encoding="utf-8"))
+        summary = read_document(folder / "scoring.json")
         scoring[summary["flight"]] = summary
         folders[summary["flight"]] = folder
         if summary["flight"] in decision["weights"]:
-            metrics.append(pd.read_parquet(folder / "metrics.parquet"))
+            metrics.append(read_table(folder / "metrics.parquet").to_pandas())
     present = decision["present"]
     return Results(
         decision=decision,
         ranking=ranking,
-        per_flight=pd.read_parquet(apply_folder / "per_flight.parquet"),
+        per_flight=read_table(apply_folder / "per_flight.parquet").to_pandas(),
         metrics=_categorical(pd.concat(metrics, ignore_index=True) if metrics else _empty_metrics()),
         scoring=scoring,
         folders=folders,

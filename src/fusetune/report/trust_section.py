@@ -1,10 +1,10 @@
 """How far the replay of each flight can be trusted, in words: the replay of its own parameters against its own log."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from fusetune.documents import read_document
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
 
 GRADE_KINDS = {"A": "good", "B": "good", "C": "", "D": "bad"}
@@ -25,7 +25,7 @@ INTRODUCTION = (
 def trust_section(analyze_folders: Sequence[Path]) -> str:
     """Table of all flights, and the figures of each behind a click; empty where no flight was compared."""
     found = [file for folder in analyze_folders if (file := Path(folder) / "fidelity.json").exists()]
-    flights = [json.loads(file.read_text(encoding="utf-8")) for file in found]
+    flights = [read_document(file) for file in found]
     if not flights:
         return ""
     head = ("flight", "grade", "as logged", "in words", "repaired", "what remains")

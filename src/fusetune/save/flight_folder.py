@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import math
 import os
 from collections.abc import Collection
@@ -12,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
-from fusetune.errors import UserError
-from fusetune.parquet import read_table
+from fusetune.documents import read_document, write_document
+from fusetune.errors import FOLDER_AGAIN, UserError
+from fusetune.parquet import read_table, write_table
 from fusetune.px4.flight import (
     Dropout,
     Flight,
@@ -31,7 +30,6 @@ from fusetune.time_limit import Deadline
 METADATA_FILE = "metadata.json"
 _FORMAT = 2
 _BYTES_KEY = "base64"
-_RUN_AGAIN = "Delete the folder and run the pipeline again"
 
 
 def write_flight(
@@ -59,12 +57,10 @@ def write_flight(
     for (topic, instance), table in sorted(flight.topics.items()):
         deadline.check()
         file = f"{topic}_{instance}.parquet"
-        _write_table(target / file, table)
+        _write_topic(target / file, table)
         entries.append({"topic": topic, "instance": instance, "rows": len(table["timestamp"]), "file": file})
     document = _metadata(flight) | (extra or {}) | {"topics": entries}
-    # one line per entry: readable, and without the indentation that the encoder is slow at
-    lines = (f"{json.dumps(key)}: {_json_text(value)}" for key, value in document.items())
-    (target / METADATA_FILE).write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    write_document(target / METADATA_FILE, document, lines=True, allow_nan=False)
 
 
 def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None = None) -> Flight:
@@ -85,7 +81,7 @@ def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None =
     source = Path(folder)
     document = read_metadata(source)
     wanted = [entry for entry in document["topics"] if topics is None or entry["topic"] in topics]
-    tables = {(entry["topic"], entry["instance"]): _read_table(source / entry["file"]) for entry in wanted}
+    tables = {(entry["topic"], entry["instance"]): _read_topic(source / entry["file"]) for entry in wanted}
     parameters = document["parameters"]
     return Flight(
         name=document["name"],
@@ -114,10 +110,6 @@ def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None =
     )
 
 
-def _json_text(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-
 def read_metadata(folder: str | os.PathLike[str]) -> dict[str, Any]:
     """`metadata.json` of a saved flight.
 
@@ -127,32 +119,37 @@ def read_metadata(folder: str | os.PathLike[str]) -> dict[str, Any]:
         There is none, or it cannot be read.
     """
     file = Path(folder) / METADATA_FILE
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UserError(file, f"is not the metadata of a saved flight ({error})", _RUN_AGAIN) from error
-    if not isinstance(document, dict) or document.get("format") != _FORMAT or "topics" not in document:
-        raise UserError(file, "is not the metadata of a readable flight", _RUN_AGAIN)
+    document = read_flight_document(file)
+    if document.get("format") != _FORMAT or "topics" not in document:
+        raise UserError(file, "is not the metadata of a readable flight", _remedy(file))
     return document
 
 
-def _write_table(file: Path, table: TopicTable) -> None:
+def read_flight_document(file: str | os.PathLike[str]) -> dict[str, Any]:
+    """A JSON file of a saved flight.
+
+    Raises
+    ------
+    UserError
+        There is none, or it is damaged.
+    """
+    return read_document(file, remedy=_remedy(Path(file)))
+
+
+def _remedy(file: Path) -> str:
+    return FOLDER_AGAIN.format(folder=file.parent)
+
+
+def _write_topic(file: Path, table: TopicTable) -> None:
     # hundreds of small files with thousands of short columns: what is done per file and column counts, not the bytes
     arrays = {name: pa.array(values) for name, values in table.items()}
     schema = pa.schema([pa.field(name, array.type, nullable=False) for name, array in arrays.items()])
     rows = pa.Table.from_arrays(list(arrays.values()), schema=schema)
-    options = {"use_dictionary": False, "write_statistics": False, "store_schema": False}
-    sink = pa.BufferOutputStream()
-    pq.write_table(rows, sink, compression="lz4", **options)
-    with open(file, "wb", buffering=0) as target:
-        target.write(sink.getvalue())
+    write_table(rows, file, compression="lz4", use_dictionary=False, write_statistics=False, store_schema=False)
 
 
-def _read_table(file: Path) -> TopicTable:
-    try:
-        table = read_table(file)
-    except (OSError, pa.ArrowException) as error:
-        raise UserError(file, f"cannot be read ({error})", _RUN_AGAIN) from error
+def _read_topic(file: Path) -> TopicTable:
+    table = read_table(file, remedy=_remedy(file))
     return {
         name: np.ascontiguousarray(column.to_numpy())
         for name, column in zip(table.column_names, table.columns, strict=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,11 +9,11 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.csv as pa_csv
-import pyarrow.parquet as pq
 
-from fusetune.errors import UserError
+from fusetune.checksum_file import write_checksum
 from fusetune.files import atomic_path
-from fusetune.save.flight_folder import METADATA_FILE
+from fusetune.parquet import write_table
+from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
 from fusetune.save.log_folder import VERDICT_FILE
 
 SCHEMA = pa.schema(
@@ -65,14 +64,15 @@ def write_flights_table(
     _refuse_duplicates(found)
     rows = pa.Table.from_pylist(found, schema=SCHEMA)
     with atomic_path(table) as temporary:
-        pq.write_table(rows, temporary)
+        write_table(rows, temporary)
     with atomic_path(csv) as temporary:
         pa_csv.write_csv(rows.drop_columns(["advice"]), temporary)
+    write_checksum(csv)
     return found
 
 
 def _row(folder: Path) -> dict[str, Any]:
-    verdict, metadata = _read(folder / VERDICT_FILE), _read(folder / METADATA_FILE)
+    verdict, metadata = (read_flight_document(folder / name) for name in (VERDICT_FILE, METADATA_FILE))
     failed = [check for check in verdict["checks"] if check["status"] == "fail"]
     warned = [check for check in verdict["checks"] if check["status"] == "warning"]
     return {
@@ -115,11 +115,3 @@ def _refuse_duplicates(rows: list[dict[str, Any]]) -> None:
 def _compact(check: dict[str, Any]) -> str:
     figure = "" if check["figure"] is None else f" {check['figure']:.4g}"
     return f"{check['name']} {check['status']}{figure}"
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        return json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        reason = f"cannot be read ({error})"
-        raise UserError(file, reason, "Delete the folder and run the pipeline again") from error

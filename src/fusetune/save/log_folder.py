@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from pathlib import Path
 from typing import Any
 
-from fusetune.errors import UserError
+from fusetune.checksum_file import check_checksum, has_checksum
+from fusetune.documents import write_document
+from fusetune.errors import RUN_AGAIN, UserError
 from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
 from fusetune.px4.logged_parameters import checked_history
@@ -66,14 +67,16 @@ def save_log(
 def _write(log: Path, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits) -> Verdict:
     deadline = Deadline(limits.time_limit_s)
     try:
+        if has_checksum(log):
+            check_checksum(log, RUN_AGAIN)
         verdict = _write_readable(log, folder, thresholds, limits, deadline)
     except (UserError, TimeLimitError) as error:
         told = error if isinstance(error, UserError) else takes_too_long(log, deadline)
         verdict = unreadable(log.stem, told)
         for table in folder.glob("*.parquet"):
             table.unlink()
-        _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
-    _write_json(folder / VERDICT_FILE, verdict.document())
+        write_document(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
+    write_document(folder / VERDICT_FILE, verdict.document())
     return verdict
 
 
@@ -107,7 +110,3 @@ def _metadata_of_unreadable(log: Path) -> dict[str, Any]:
     except (UserError, OSError):
         checksum, size = "", 0
     return {"name": log.stem, "file": log.name, "checksum": checksum, "size_bytes": size}
-
-
-def _write_json(file: Path, document: dict[str, Any]) -> None:
-    file.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

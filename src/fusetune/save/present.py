@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
+from fusetune.documents import read_document, write_document
 from fusetune.errors import UserError
 from fusetune.files import atomic_path
 from fusetune.save.flight_folder import read_metadata
@@ -69,7 +68,7 @@ def find_present(
 def write_present(file: str | os.PathLike[str], present: Present) -> None:
     """Write what was found as JSON."""
     with atomic_path(file) as temporary:
-        temporary.write_text(json.dumps(asdict(present), indent=1) + "\n", encoding="utf-8")
+        write_document(temporary, asdict(present))
 
 
 def read_present(file: str | os.PathLike[str]) -> Present:
@@ -80,8 +79,9 @@ def read_present(file: str | os.PathLike[str]) -> Present:
     UserError
         There is none, or it cannot be read.
     """
+    document = read_document(file)
     try:
-        return Present(**json.loads(Path(file).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError) as error:
+        return Present(**document)
+    except TypeError as error:
         reason = f"does not say what the vehicle flies now ({error})"
         raise UserError(file, reason, "Delete it and run the pipeline again") from error
