@@ -8,16 +8,17 @@ heading, flags.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fusetune.analyze.onboard import onboard_samples
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
+from fusetune.analyze.sources import HORIZONTAL_AIDING
 from fusetune.ekf2 import state as S
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
-from fusetune.ekf2.recording import FLAG_COLUMNS
+from fusetune.ekf2.recording import FLAG_COLUMNS, RecordArrays, with_fields
 from fusetune.ekf2.replay import ReplayResult
 from fusetune.px4.estimator_instances import rows_of_primary
 from fusetune.px4.flight import Flight, TopicTable, row_count
@@ -101,6 +102,30 @@ def as_flown_figures(
         _flags_equal(result, flight, intervals),
         sum(stop - start for start, stop in intervals) * 1e-6,
     )
+
+
+def compared_rows(onboard: Mapping[SourceAxis, AxisSamples]) -> Callable[[RecordArrays], RecordArrays]:
+    """What `as_flown_figures` needs of a replay's rows, for `fusetune.ekf2.replay.replay` to keep.
+
+    Parameters
+    ----------
+    onboard : the vehicle's innovations
+    """
+    keys = {key for keys in GROUPS.values() for key in keys if key in onboard}
+    wanted = {source for source, _ in keys} | {*HORIZONTAL_AIDING} & {*AID_SOURCE_NAMES}
+    by_heading = "mag_heading" in wanted
+    wanted = wanted - {"mag_heading"} | ({"mag"} if by_heading else set())
+    sources = [AID_SOURCE_NAMES.index(name) for name in sorted(wanted)]
+
+    def keep(rows: RecordArrays) -> RecordArrays:
+        return RecordArrays(
+            innovations=rows.innovations[np.isin(rows.innovations["source"], sources)],
+            states=with_fields(rows.states if by_heading else rows.states[:0], ("timestamp_sample", "states")),
+            local_position=with_fields(rows.local_position, ("timestamp", "vx", "vy", "heading")),
+            flags=rows.flags,
+        )
+
+    return keep
 
 
 def rms(parts: list[np.ndarray]) -> float:
