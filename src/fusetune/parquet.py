@@ -1,4 +1,4 @@
-"""Parquet files that show when a byte of them has changed.
+"""Parquet files, as a whole or in pieces, that show when a byte of them has changed.
 
 The format's own checksums cover the values of each page, but neither the pages' headers nor the footer, and a changed
 bit there reads as other values, too. So each file carries a seal beside them: the SHA-256 of all its other bytes. It
@@ -11,11 +11,10 @@ Reading goes without PyArrow's data set machinery, whose import alone takes long
 from __future__ import annotations
 
 import hashlib
-import mmap
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -63,50 +62,78 @@ def read_table(
     UserError
         The file does not exist, is no Parquet file, or a byte of it has changed since it was written.
     """
+    with _opened(path, remedy, sealed) as parquet:
+        return parquet.read(columns=columns if columns is None else list(columns), use_threads=False)
+
+
+def read_schema(path: str | os.PathLike[str]) -> pa.Schema:
+    """Names and types of the columns of a Parquet file; raises what `read_table` does."""
+    with _opened(path) as parquet:
+        return parquet.schema_arrow
+
+
+def read_pieces(path: str | os.PathLike[str]) -> Iterator[pa.Table]:
+    """Read a Parquet file one row group at a time; raises what `read_table` does."""
+    with _opened(path) as parquet:
+        for number in range(parquet.num_row_groups):
+            yield parquet.read_row_group(number, use_threads=False)
+
+
+def seal(path: str | os.PathLike[str]) -> None:
+    """Put the seal into a Parquet file that has just been written."""
+    with open(path, "r+b") as file:
+        footer = _footer_start(file)
+        digest = _digest_around(file, footer, footer)
+        file.seek(footer)
+        tail = file.read()
+        file.seek(footer)
+        file.write(_SEAL_MARK + digest + tail)
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str], remedy: str = RUN_AGAIN, sealed: bool = True) -> Iterator[pq.ParquetFile]:
+    """A Parquet file whose seal has been found sound."""
     try:
-        content = _mapped(path)
-        _check_seal(memoryview(content), path, remedy, sealed)
-        with pq.ParquetFile(pa.BufferReader(pa.py_buffer(content)), page_checksum_verification=True) as parquet:
-            return parquet.read(columns=columns if columns is None else list(columns), use_threads=False)
+        _check_seal(path, remedy, sealed)
+        # memory-mapped, the pages of all that was read would count as this process's memory
+        with pq.ParquetFile(path, page_checksum_verification=True) as parquet:
+            yield parquet
     except OSError as error:
         raise UserError(path, f"cannot be read: {error.strerror or error}", remedy) from error
     except (pa.ArrowException, ValueError) as error:
         raise UserError(path, f"is no readable Parquet file: {error}", remedy) from error
 
 
-def seal(path: str | os.PathLike[str]) -> None:
-    """Put the seal into a Parquet file that has just been written."""
-    with open(path, "r+b") as file:
-        end = file.seek(-_TAIL_BYTES, os.SEEK_END) + _TAIL_BYTES
-        footer = end - _TAIL_BYTES - int.from_bytes(file.read(4), "little")
-        digest = hashlib.sha256()
-        file.seek(0)
-        left = footer
-        while left > 0:
-            chunk = file.read(min(left, 1 << 20))
-            digest.update(chunk)
-            left -= len(chunk)
-        tail = file.read()
-        digest.update(tail)
-        file.seek(footer)
-        file.write(_SEAL_MARK + digest.digest() + tail)
-
-
-def _mapped(path: str | os.PathLike[str]) -> bytes | mmap.mmap:
+def _check_seal(path: str | os.PathLike[str], remedy: str, sealed: bool) -> None:
     with open(path, "rb") as file:
-        if os.fstat(file.fileno()).st_size == 0:
-            return b""
-        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        footer = _footer_start(file)
+        file.seek(max(footer - _SEAL_BYTES, 0))
+        stamp = file.read(_SEAL_BYTES)
+        is_sealed = footer >= _SEAL_BYTES and stamp.startswith(_SEAL_MARK)
+        if is_sealed and stamp != _SEAL_MARK + _digest_around(file, footer - _SEAL_BYTES, footer):
+            raise UserError(path, "is damaged: its bytes are no longer those that were written", remedy)
+    if sealed and not is_sealed:
+        raise UserError(path, "is cut or damaged: it does not end with the checksum it was written with", remedy)
 
 
-def _check_seal(content: memoryview, path: str | os.PathLike[str], remedy: str, sealed: bool) -> None:
-    footer = len(content) - _TAIL_BYTES - int.from_bytes(content[-_TAIL_BYTES:-4], "little")
-    stamp = bytes(content[footer - _SEAL_BYTES : footer]) if footer >= _SEAL_BYTES else b""
-    if not stamp.startswith(_SEAL_MARK):
-        if sealed:
-            raise UserError(path, "is cut or damaged: it does not end with the checksum it was written with", remedy)
-        return
-    digest = hashlib.sha256(content[: footer - _SEAL_BYTES])
-    digest.update(content[footer:])
-    if stamp != _SEAL_MARK + digest.digest():
-        raise UserError(path, "is damaged: its bytes are no longer those that were written", remedy)
+def _footer_start(file: BinaryIO) -> int:
+    """Offset of the footer, as the end of the file says; below 0 where that cannot be."""
+    end = file.seek(0, os.SEEK_END)
+    if end < _TAIL_BYTES:
+        return -1
+    file.seek(end - _TAIL_BYTES)
+    return end - _TAIL_BYTES - int.from_bytes(file.read(4), "little")
+
+
+def _digest_around(file: BinaryIO, pages_end: int, footer: int) -> bytes:
+    """SHA-256 of a file without the bytes between the end of its pages and its footer."""
+    digest = hashlib.sha256()
+    file.seek(0)
+    while left := pages_end - file.tell():
+        chunk = file.read(min(left, 1 << 20))
+        if not chunk:
+            break
+        digest.update(chunk)
+    file.seek(footer)
+    digest.update(file.read())
+    return digest.digest()

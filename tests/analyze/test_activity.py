@@ -1,5 +1,6 @@
 """A parameter that cannot act on a flight is named with the reason."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,9 +51,10 @@ def test_a_vertical_floor_can_act_while_the_horizontal_one_cannot(tmp_path: Path
     )
     flight = load_flight(save)
     table = flight.topics["vehicle_gps_position", 0]
-    other, present = read_set(folder, "other"), read_set(folder, "present")
-    for record in (other, present):
-        record.samples["gnss_hgt", 0] = record.samples["baro_hgt", 0]
+    other, present = (
+        replace(record, samples={**record.samples, ("gnss_hgt", 0): record.samples["baro_hgt", 0]})
+        for record in (read_set(folder, "other"), read_set(folder, "present"))
+    )
     table["epv"] = np.full(table["timestamp"].size, 1.0, np.float32)
     assert "EKF2_GPS_P_NOISE" not in inactive_parameters(other, present, flight)
     table["epv"] += np.float32(0.1)
@@ -80,11 +82,14 @@ def test_velocity_parameters_need_velocity_and_not_only_position(tmp_path: Path)
     save, folder = make_flight(
         tmp_path, "flight", {"present": MadeSet(), "other": MadeSet(overrides={"EKF2_GPS_V_GATE": 3.0})}
     )
-    other, present = read_set(folder, "other"), read_set(folder, "present")
-    for record in (other, present):
-        record.parameters["EKF2_GPS_CTRL"] = 3.0
-        for axis in range(3):
-            del record.samples["gnss_vel", axis]
+    other, present = (
+        replace(
+            record,
+            parameters=record.parameters | {"EKF2_GPS_CTRL": 3.0},
+            samples={key: record.samples[key] for key in record.samples if key[0] != "gnss_vel"},
+        )
+        for record in (read_set(folder, "other"), read_set(folder, "present"))
+    )
     found = inactive_parameters(other, present, load_flight(save))
     assert found == {"EKF2_GPS_V_GATE": "no gnss_vel was fused on this flight (EKF2_GPS_CTRL is 3)"}
 

@@ -1,5 +1,6 @@
 """Resets, lost sources, faults and time without aid are counted in flight only."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from tests.analyze.made_flight import MadeSet, at, make_flight
 
 from fusetune.analyze.filter_events import filter_events
-from fusetune.analyze.set_files import SetRecord, read_set, reset_times
+from fusetune.analyze.set_files import AxisSamples, SetRecord, read_set
 
 FLIGHT = ((at(10.0), at(70.0)),)
 
@@ -45,8 +46,12 @@ def test_a_counter_that_wraps_or_jumps_counts_every_step(tmp_path: Path) -> None
     one = record(tmp_path, MadeSet())
     counter = np.zeros(one.local_position["timestamp"].size, dtype=np.uint8)
     counter[:300], counter[300:400], counter[400:] = 255, 0, 3
-    one.local_position["xy_reset_counter"] = counter
-    assert reset_times(one)["horizontal_position"].size == 1 + 3
+    one = replace(one, local_position={**one.local_position, "xy_reset_counter": counter})
+    assert one.reset_times["horizontal_position"].size == 1 + 3
+
+
+def with_samples(one: SetRecord, samples: AxisSamples) -> SetRecord:
+    return replace(one, samples={**one.samples, ("gnss_vel", 0): samples})
 
 
 def test_how_a_source_served_is_told_by_its_fused_samples(tmp_path: Path) -> None:
@@ -55,7 +60,7 @@ def test_how_a_source_served_is_told_by_its_fused_samples(tmp_path: Path) -> Non
     samples = one.samples["gnss_vel", 0]
     lost = (samples.timestamp_sample >= at(20.0)) & (samples.timestamp_sample < at(30.0))
     samples.fused[lost] = False
-    aid = filter_events(one, FLIGHT).aid["gnss_vel"]
+    aid = filter_events(with_samples(one, samples), FLIGHT).aid["gnss_vel"]
     assert aid.samples == 300
     assert aid.fused_share == pytest.approx(250 / 300)
     assert aid.longest_without_s == pytest.approx(10.2)
@@ -63,5 +68,6 @@ def test_how_a_source_served_is_told_by_its_fused_samples(tmp_path: Path) -> Non
 
 def test_a_source_that_was_never_fused_served_nothing(tmp_path: Path) -> None:
     one = record(tmp_path, MadeSet())
-    one.samples["gnss_vel", 0].fused[:] = False
-    assert "gnss_vel" not in filter_events(one, FLIGHT).aid
+    samples = one.samples["gnss_vel", 0]
+    samples.fused[:] = False
+    assert "gnss_vel" not in filter_events(with_samples(one, samples), FLIGHT).aid

@@ -16,8 +16,7 @@ from fusetune.analyze.reconstruction.attitude import (
 )
 from fusetune.analyze.reconstruction.between_samples import sensor_rate_hz
 from fusetune.analyze.reconstruction.magnetometer import _spline_is_nearer, interpolate_magnetometer
-from fusetune.analyze.replay_files import ReplayIdentity, write_replay
-from fusetune.analyze.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.replay_flight import PreparedFlight, prepare, write_replay
 from fusetune.analyze.set_files import read_set
 from fusetune.ekf2.parameters import complete
 from fusetune.errors import UserError
@@ -203,7 +202,7 @@ def test_only_measured_samples_are_scored(small, mended, tmp_path):
         assert logged - 12 <= measured[axis].sum() <= logged
         assert axis.sum() > 3 * logged
     assert measured[result.source_names() == "gnss_vel"].all()
-    write_replay(tmp_path, ReplayIdentity("s", {}, params, mended.description(result)), result, measured)
+    write_replay(mended, "s", {}, params, tmp_path)
     record = read_set(tmp_path, "s")
     mag = (result.source_names() == "mag") & (result.innovations["axis"] == 0) & measured
     assert len(record.samples["mag", 0].innovation) == mag.sum()

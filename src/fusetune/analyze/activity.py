@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fusetune.analyze.parameter_sources import OBSERVATION_NOISE, required_sources, switched_off
-from fusetune.analyze.set_files import SetRecord
+from fusetune.analyze.set_files import AxisSamples, SetRecord
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.px4.flight import Flight
 
@@ -56,10 +56,13 @@ def same_results(record: SetRecord, present: SetRecord) -> bool:
     """True where two replays agree in every innovation and variance: the sets are one on this flight."""
     if record.samples.keys() != present.samples.keys():
         return False
+    return all(_same_samples(record.samples[key], present.samples[key]) for key in record.samples)
+
+
+def _same_samples(one: AxisSamples, other: AxisSamples) -> bool:
     return all(
-        np.array_equal(one.innovation, present.samples[key].innovation, equal_nan=True)
-        and np.array_equal(one.innovation_variance, present.samples[key].innovation_variance, equal_nan=True)
-        for key, one in record.samples.items()
+        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+        for name in ("innovation", "innovation_variance")
     )
 
 
@@ -72,7 +75,7 @@ def _same_value(name: str, record: SetRecord, present: SetRecord) -> str:
 
 def _absent_source(name: str, record: SetRecord, present: SetRecord) -> str:
     sources = required_sources(name)
-    if not sources or (_fused_sources(record) | _fused_sources(present)).intersection(sources):
+    if not sources or (record.fused_sources | present.fused_sources).intersection(sources):
         return ""
     causes = [{switched_off(source, one.parameters) for source in sources} for one in (record, present)]
     # Only what keeps every one of the sources out, in both replays, is the cause.
@@ -81,16 +84,12 @@ def _absent_source(name: str, record: SetRecord, present: SetRecord) -> str:
     return f"no {' or '.join(sources)} was fused on this flight{why}"
 
 
-def _fused_sources(record: SetRecord) -> set[str]:
-    return {source for (source, _), samples in record.samples.items() if samples.fused.any()}
-
-
 def _below_receiver_accuracy(name: str, record: SetRecord, present: SetRecord, flight: Flight) -> str:
     table = flight.topic("vehicle_gps_position")
     if name not in _NOISE_FLOORS or table is None:
         return ""
     largest_floor = max(record.parameters[name], present.parameters.get(name, 0.0))
-    fused = _fused_sources(record) | _fused_sources(present)
+    fused = record.fused_sources | present.fused_sources
     reported = []
     for field, factor, source in _NOISE_FLOORS[name]:
         if source not in fused:
@@ -113,7 +112,7 @@ def _below_receiver_accuracy(name: str, record: SetRecord, present: SetRecord, f
 def _same_observation_variance(name: str, record: SetRecord, present: SetRecord) -> str:
     """A noise that is a floor, or that another figure overrides, leaves the observation variances as they were."""
     keys = [key for key in record.samples if key[0] in OBSERVATION_NOISE.get(name, ())]
-    keys = [key for key in keys if key in present.samples and present.samples[key].fused.any()]
+    keys = [key for key in keys if key in present.first_fused]
     if not keys:
         return ""
     for key in keys:
@@ -128,9 +127,10 @@ def _idle_gate(name: str, record: SetRecord, present: SetRecord) -> str:
         return ""
     largest = 0.0
     for one in (record, present):
-        for (source, _), samples in one.samples.items():
-            if AID_SOURCES[source].gate_parameter != name or not samples.fused.any():
+        for key in one.first_fused:
+            if AID_SOURCES[key[0]].gate_parameter != name:
                 continue
+            samples = one.samples[key]
             started = np.cumsum(samples.fused) > 0
             if samples.rejected[started].any():
                 return ""

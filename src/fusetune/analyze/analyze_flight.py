@@ -1,22 +1,23 @@
 """All that is made of one saved flight: replays of the parameter sets, their scores, and how far they can be trusted.
 
 One process does it all, for its start, the reading of the flight, its reconstruction and the loading of the compiled
-estimator together take longer than the work itself.
+estimator together take longer than the work itself. It takes one step after the other, each with the topics that it
+needs, so that memory is that of the largest step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusetune.analyze.onboard_fidelity import FIDELITY_TOPICS, write_flight_fidelity
+from fusetune.analyze.onboard_fidelity import FIDELITY_TOPICS, graded, write_flight_fidelity
 from fusetune.analyze.replay_flight import REPLAY_TOPICS, replay_flight
 from fusetune.analyze.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.score_flight import SCORE_TOPICS, score_flight
 from fusetune.analyze.settings import ScoringSettings
+from fusetune.analyze.trust_grade import TRUST_TOPICS, TrustGrade
 from fusetune.analyze.trust_settings import TrustSettings
-from fusetune.px4.flight import Flight
 from fusetune.save.flight_folder import load_flight
 
 
@@ -53,12 +54,27 @@ def analyze_flight(
         If the saved flight, or a file of a replay made before, is missing or damaged.
     """
     settings = settings or AnalysisSettings()
-    flight = load_flight(flight_folder, topics={*REPLAY_TOPICS, *SCORE_TOPICS, *FIDELITY_TOPICS})
-    prepared = replay_flight(_with_only(flight, REPLAY_TOPICS), replayed, output_folder, settings.replay)
-    score_flight(_with_only(flight, SCORE_TOPICS), output_folder, scored, present=present, settings=settings.scoring)
-    write_flight_fidelity(_with_only(flight, FIDELITY_TOPICS), output_folder, settings.replay, settings.trust, prepared)
+    grade = _replay_and_grade(flight_folder, output_folder, replayed, settings)
+    score_flight(
+        load_flight(flight_folder, topics=SCORE_TOPICS),
+        output_folder,
+        scored,
+        present=present,
+        settings=settings.scoring,
+    )
+    flight = load_flight(flight_folder, topics=FIDELITY_TOPICS)
+    write_flight_fidelity(flight, output_folder, settings.replay, settings.trust, grade)
 
 
-def _with_only(flight: Flight, topics: Collection[str]) -> Flight:
-    """What each step gets does not depend on what the others read."""
-    return flight.with_topics({key: table for key, table in flight.topics.items() if key[0] in topics})
+def _replay_and_grade(
+    flight_folder: Path,
+    output_folder: Path,
+    replayed: Mapping[str, Mapping[str, float]],
+    settings: AnalysisSettings,
+) -> TrustGrade:
+    """The grade is made of the same samples as the replays; nothing of them is in memory when the sets are scored."""
+    flight = load_flight(flight_folder, topics=REPLAY_TOPICS)
+    prepared = replay_flight(flight, replayed, output_folder, settings.replay)
+    compared = load_flight(flight_folder, topics={*TRUST_TOPICS} - {*REPLAY_TOPICS})
+    flight = flight.with_topics(dict(sorted((flight.topics | compared.topics).items())))
+    return graded(flight, settings.replay, settings.trust, prepared)

@@ -8,16 +8,17 @@ heading, height, their resets, flags.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fusetune.analyze.onboard import onboard_samples
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
+from fusetune.analyze.sources import HORIZONTAL_AIDING
 from fusetune.ekf2 import state as S
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
-from fusetune.ekf2.recording import FLAG_COLUMNS
+from fusetune.ekf2.recording import FLAG_COLUMNS, RecordArrays, with_fields
 from fusetune.ekf2.replay import ReplayResult
 from fusetune.px4.estimator_instances import instance_switches, rows_of_primary
 from fusetune.px4.flight import Flight, TopicTable, row_count
@@ -164,6 +165,30 @@ def _near(time: np.ndarray, others: np.ndarray) -> np.ndarray:
     after = np.minimum(np.searchsorted(others, time), len(others) - 1)
     before = np.maximum(after - 1, 0)
     return np.minimum(np.abs(others[after] - time), np.abs(others[before] - time)) <= NEAR_US
+
+
+def compared_rows(onboard: Mapping[SourceAxis, AxisSamples]) -> Callable[[RecordArrays], RecordArrays]:
+    """What `as_flown_figures` needs of a replay's rows, for `fusetune.ekf2.replay.replay` to keep.
+
+    Parameters
+    ----------
+    onboard : the vehicle's innovations
+    """
+    keys = {key for keys in GROUPS.values() for key in keys if key in onboard}
+    wanted = {source for source, _ in keys} | {*HORIZONTAL_AIDING} & {*AID_SOURCE_NAMES}
+    by_heading = "mag_heading" in wanted
+    wanted = wanted - {"mag_heading"} | ({"mag"} if by_heading else set())
+    sources = [AID_SOURCE_NAMES.index(name) for name in sorted(wanted)]
+
+    def keep(rows: RecordArrays) -> RecordArrays:
+        return RecordArrays(
+            innovations=rows.innovations[np.isin(rows.innovations["source"], sources)],
+            states=with_fields(rows.states if by_heading else rows.states[:0], ("timestamp_sample", "states")),
+            local_position=with_fields(rows.local_position, ("timestamp", "vx", "vy", "heading")),
+            flags=rows.flags,
+        )
+
+    return keep
 
 
 def rms(parts: list[np.ndarray]) -> float:

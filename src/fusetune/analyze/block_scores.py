@@ -5,7 +5,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.likelihood import gaussian_nll, student_t_nll, winsor_limit, winsorised
-from fusetune.analyze.measurement_alignment import PairedSamples
+from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet
 
 BLOCK_SCHEMA = pa.schema(
     [
@@ -37,16 +37,8 @@ def block_rows(flight: str, pairs: PairedSamples, edges: npt.NDArray[np.int64]) 
     starts = np.flatnonzero(np.r_[True, np.diff(block) != 0])
     counts = np.diff(np.r_[starts, block.size])
     sets = len(pairs.sets)
-    innovation, variance = pairs.innovation, pairs.innovation_variance
-    clipped = winsorised(innovation, winsor_limit(innovation))
-    sums = {
-        "sum_squared_innovation": np.square(innovation),
-        "sum_nis": np.square(innovation) / variance,
-        "sum_nis_winsorised": np.square(clipped) / variance,
-        "sum_log_variance": np.log(variance),
-        "sum_nll": gaussian_nll(innovation, variance),
-        "sum_nll_student_t": student_t_nll(innovation, variance),
-    }
+    limit = winsor_limit(pairs.innovation)
+    sums = [_sums(one, limit, starts) for one in pairs.each()]
     rows = sets * starts.size
     columns: dict[str, pa.Array] = {
         "flight": pa.array([flight] * rows, pa.string()),
@@ -56,6 +48,21 @@ def block_rows(flight: str, pairs: PairedSamples, edges: npt.NDArray[np.int64]) 
         "block": pa.array(np.tile(block[starts].astype(np.int32), sets)),
         "n": pa.array(np.tile(counts.astype(np.int64), sets)),
     }
-    for name, values in sums.items():
-        columns[name] = pa.array(np.add.reduceat(values, starts, axis=1).ravel())
+    for name in sums[0]:
+        columns[name] = pa.array(np.concatenate([one[name] for one in sums]))
     return pa.table(columns, schema=BLOCK_SCHEMA)
+
+
+def _sums(pairs: SamplesOfSet, limit: float, starts: npt.NDArray[np.int64]) -> dict[str, npt.NDArray[np.float64]]:
+    """Sums (B,) of one set over the blocks that begin at the rows `starts`."""
+    innovation, variance = pairs.innovation[0], pairs.innovation_variance[0]
+    clipped = winsorised(innovation, limit)
+    scores = {
+        "sum_squared_innovation": np.square(innovation),
+        "sum_nis": np.square(innovation) / variance,
+        "sum_nis_winsorised": np.square(clipped) / variance,
+        "sum_log_variance": np.log(variance),
+        "sum_nll": gaussian_nll(innovation, variance),
+        "sum_nll_student_t": student_t_nll(innovation, variance),
+    }
+    return {name: np.add.reduceat(values, starts) for name, values in scores.items()}

@@ -225,23 +225,23 @@ def _axis_fidelity(source: str, axis: int, ours: Innovations, theirs: Innovation
         variance_difference=float(np.median(np.abs(ours.variance / theirs.variance - 1.0))),
         fused_equal=float(np.mean(ours.fused == theirs.fused)),
         rejected_equal=float(np.mean(ours.rejected == theirs.rejected)),
-        nll_difference=abs(mean_nll(ours) - mean_nll(theirs)),
+        nll_difference=abs(mean_nll(ours.innovation, ours.variance) - mean_nll(theirs.innovation, theirs.variance)),
     )
 
 
-def _nll(rows: Innovations) -> np.ndarray:
+def _nll(innovation: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Gaussian negative log-likelihood of each innovation."""
-    return 0.5 * (rows.innovation**2 / rows.variance + np.log(2.0 * np.pi * rows.variance))
+    return 0.5 * (innovation**2 / variance + np.log(2.0 * np.pi * variance))
 
 
-def mean_nll(rows: Innovations) -> float:
+def mean_nll(innovation: np.ndarray, variance: np.ndarray) -> float:
     """Mean negative log-likelihood per sample."""
-    return float(np.mean(_nll(rows)))
+    return float(np.mean(_nll(innovation, variance)))
 
 
 def _total_nll(rows: Innovations) -> float:
     """Sum over sources and axes of the mean capped NLL."""
-    nll = np.minimum(_nll(rows), NLL_CAP)
+    nll = np.minimum(_nll(rows.innovation, rows.variance), NLL_CAP)
     total = 0.0
     for source in NLL_SOURCES:
         for axis in range(3):

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.scoring_window import Interval
-from fusetune.analyze.set_files import SetRecord, reset_times
+from fusetune.analyze.set_files import SetRecord
 
 AIDING_FLAGS = (
     "cs_gnss_pos",
@@ -77,7 +77,7 @@ def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEven
     ----------
     flight : flight time after the warm-up, µs: before it every filter resets and switches sources
     """
-    resets = {kind: int(np.count_nonzero(_inside(times, flight))) for kind, times in reset_times(record).items()}
+    resets = {kind: int(np.count_nonzero(_inside(times, flight))) for kind, times in record.reset_times.items()}
     time = record.flags.get("timestamp", np.zeros(0)).astype(np.int64)
     # The magnetometer changes between heading and three axes by itself; only its end is a loss.
     columns = {flag: record.flags[flag] for flag in AIDING_FLAGS if flag in record.flags}
@@ -102,9 +102,10 @@ def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEven
 def _source_aid(record: SetRecord, intervals: tuple[Interval, ...]) -> dict[str, SourceAid]:
     """Axis 0 speaks for its source: PX4 fuses or rejects all axes of a sample but for rare faults."""
     found = {}
-    for (source, axis), samples in record.samples.items():
-        if axis or not samples.fused.any():
+    for source, axis in record.first_fused:
+        if axis:
             continue
+        samples = record.samples[source, axis]
         time = samples.timestamp_sample
         inside = _inside(time, intervals)
         if not inside.any():

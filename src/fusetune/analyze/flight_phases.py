@@ -1,5 +1,6 @@
 """When the vehicle flew, and where the log has gaps: from the flight's own topics."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,9 @@ import numpy.typing as npt
 
 from fusetune.analyze.scoring_window import Interval
 from fusetune.px4.flight import Flight
+
+IMU_TOPICS = ("sensor_combined", "vehicle_imu")
+"""Topics that show gaps in the IMU samples; the first that a log holds."""
 
 
 def intervals_where(time: npt.NDArray[np.int64], active: npt.NDArray[np.bool_], last_time: int) -> tuple[Interval, ...]:
@@ -25,7 +29,7 @@ def intervals_where(time: npt.NDArray[np.int64], active: npt.NDArray[np.bool_], 
     return tuple((int(times[a]), int(times[b])) for a, b in zip(edges[::2], edges[1::2], strict=True))
 
 
-def airborne_intervals(flight: Flight, flags: dict[str, npt.NDArray[Any]]) -> tuple[Interval, ...]:
+def airborne_intervals(flight: Flight, flags: Mapping[str, npt.NDArray[Any]]) -> tuple[Interval, ...]:
     """Flight time, µs.
 
     Parameters
@@ -43,7 +47,7 @@ def airborne_intervals(flight: Flight, flags: dict[str, npt.NDArray[Any]]) -> tu
 
 def imu_gaps(flight: Flight, longer_than_s: float) -> tuple[Interval, ...]:
     """Gaps in the IMU samples of the log, µs: dropouts of the logger, among others."""
-    for topic in ("sensor_combined", "vehicle_imu"):
+    for topic in IMU_TOPICS:
         table = flight.topic(topic)
         if table is not None and table["timestamp"].size > 1:
             time = table["timestamp"].astype(np.int64)

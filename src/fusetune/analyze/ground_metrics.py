@@ -12,7 +12,7 @@ from fusetune.analyze.break_rate import beyond_gate, break_rate
 from fusetune.analyze.consistency import mean_nis, paper_bounds
 from fusetune.analyze.filter_events import FilterEvents
 from fusetune.analyze.innovation_metrics import rms_innovation, rms_norm
-from fusetune.analyze.measurement_alignment import PairedSamples, paired_samples
+from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet, each_of, paired_samples
 from fusetune.analyze.metrics_table import FEWEST_SAMPLES, MetricsTable, groups_of
 from fusetune.analyze.scoring_window import Cut, Interval, ScoringWindow, cuts_within, subtract
 from fusetune.analyze.set_files import SetRecord
@@ -70,6 +70,11 @@ def add_ground_metrics(
 
 
 def _add(table: MetricsTable, members: list[PairedSamples], axis: str, confidence: float) -> None:
+    table.add_metric_by_metric([_of_one_set(table.flight, one, axis, confidence) for one in each_of(members)])
+
+
+def _of_one_set(flight: str, members: list[SamplesOfSet], axis: str, confidence: float) -> MetricsTable:
+    table = MetricsTable(flight)
     first, n = members[0], members[0].time.size
     innovation = np.stack([one.innovation for one in members])
     variance = np.stack([one.innovation_variance for one in members])
@@ -79,6 +84,7 @@ def _add(table: MetricsTable, members: list[PairedSamples], axis: str, confidenc
     table.add_each(first.sets, first.source, axis, "ground_rms_innovation", rms, n)
     table.add_bounds(first.sets, first.source, axis, "ground_mean_nis", bounds, n)
     table.add_bounds(first.sets, first.source, axis, "ground_break_rate_gate", break_rate(broken, confidence), n)
+    return table
 
 
 def add_ground_events(table: MetricsTable, set_name: str, events: FilterEvents, ground: ScoringWindow) -> None:

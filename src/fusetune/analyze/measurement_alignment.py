@@ -4,7 +4,9 @@ The estimator stamps a sample with the time of the measurement less the source's
 another delay stamps the same measurement otherwise. Adding the delay back gives a time that names the measurement.
 """
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,18 +25,51 @@ class PairedSamples:
     """Samples of one source and axis that all named sets have in common; arrays (S, N), the sets first.
 
     `time` (N,) is the time of the measurement, µs. Rejected samples are among them: a set that rejects its worst
-    samples must not profit from it.
+    samples must not profit from it. Figures that are exact in single precision, as all of a replay are, are held so:
+    calculate with what `each` gives, which is one set at a time and in double precision.
     """
 
     source: str
     axis: int
     sets: tuple[str, ...]
     time: npt.NDArray[np.int64]
+    observation_variance: npt.NDArray[np.floating]
+    innovation: npt.NDArray[np.floating]
+    innovation_variance: npt.NDArray[np.floating]
+    test_ratio: npt.NDArray[np.floating]
+    rejected: npt.NDArray[np.bool_]
+
+    def each(self) -> Iterator[SamplesOfSet]:
+        """The same of each set alone."""
+        for number, name in enumerate(self.sets):
+            rows = slice(number, number + 1)
+            figures = {figure: getattr(self, figure)[rows].astype(np.float64) for figure in _FIGURES}
+            yield SamplesOfSet(self.source, self.axis, (name,), self.time, rejected=self.rejected[rows], **figures)
+
+
+@dataclass(frozen=True)
+class SamplesOfSet(PairedSamples):
+    """Paired samples of one set, arrays (1, N), in double precision."""
+
     observation_variance: npt.NDArray[np.float64]
     innovation: npt.NDArray[np.float64]
     innovation_variance: npt.NDArray[np.float64]
     test_ratio: npt.NDArray[np.float64]
-    rejected: npt.NDArray[np.bool_]
+
+
+_FIGURES = ("observation_variance", "innovation", "innovation_variance", "test_ratio")
+
+
+def each_of(members: Sequence[PairedSamples]) -> Iterator[list[SamplesOfSet]]:
+    """Several axes that share their sets, of one set at a time."""
+    return (list(one) for one in zip(*(member.each() for member in members), strict=True))
+
+
+def narrowed(values: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
+    """Values in single precision where that is what they are."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        single = values.astype(np.float32)
+    return single if np.array_equal(single, values, equal_nan=True) else values
 
 
 def measurement_time(samples: AxisSamples, source: str, parameters: dict[str, float]) -> npt.NDArray[np.int64]:
@@ -69,37 +104,33 @@ def paired_samples(
     once: before the local origin exists innovations mean nothing.
     """
     source, axis = key
-    using = [record for record in records if key in record.samples and record.samples[key].fused.any()]
+    using = sorted((one for one in records if key in one.first_fused), key=lambda record: record.name != present)
     if not using:
         return None
-    using.sort(key=lambda record: record.name != present)
-    samples = [record.samples[key] for record in using]
-    times = [measurement_time(s, source, r.parameters) for s, r in zip(samples, using, strict=True)]
-    reference = times[0]
+    reference = _times_of(using[0], key)
     if reference.size < 2:
         return None
     tolerance = _TOLERANCE * float(np.median(np.diff(reference)))
-    index = np.stack([match(reference, time, tolerance) for time in times])
-    started = max(int(time[np.argmax(s.fused)]) for time, s in zip(times, samples, strict=True))
-    common = window.contains(reference) & (reference >= started) & (index >= 0).all(axis=0)
-    for row, one in zip(index, samples, strict=True):
+    common = window.contains(reference)
+    index = []
+    for record in using:
+        time, one = _times_of(record, key), record.samples[key]
+        row = match(reference, time, tolerance)
         usable = np.isfinite(one.innovation) & np.isfinite(one.innovation_variance) & (one.innovation_variance > 0.0)
-        common &= usable[row]
+        common &= (row >= 0) & usable[row] & (reference >= time[np.argmax(one.fused)])
+        index.append(row.astype(np.int32))
     if not common.any():
         return None
-    index = index[:, common]
+    kept: dict[str, list[npt.NDArray]] = {name: [] for name in (*_FIGURES, "rejected")}
+    for record, rows in zip(using, index, strict=True):
+        one = record.samples[key]
+        for name, parts in kept.items():
+            values = getattr(one, name)[rows[common]]
+            parts.append(values if name == "rejected" else narrowed(values))
+    stacked = {name: np.stack(parts) for name, parts in kept.items()}
+    sets = tuple(record.name for record in using)
+    return PairedSamples(source=source, axis=axis, sets=sets, time=reference[common], **stacked)
 
-    def stacked(field: str) -> npt.NDArray:
-        return np.stack([getattr(one, field)[row] for one, row in zip(samples, index, strict=True)])
 
-    return PairedSamples(
-        source=source,
-        axis=axis,
-        sets=tuple(record.name for record in using),
-        time=reference[common],
-        observation_variance=stacked("observation_variance"),
-        innovation=stacked("innovation"),
-        innovation_variance=stacked("innovation_variance"),
-        test_ratio=stacked("test_ratio"),
-        rejected=stacked("rejected"),
-    )
+def _times_of(record: SetRecord, key: SourceAxis) -> npt.NDArray[np.int64]:
+    return measurement_time(record.samples[key], key[0], record.parameters)

@@ -1,6 +1,9 @@
 """The long table of figures: one row per flight, set, source, axis and metric."""
 
-from collections.abc import Iterator
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -14,7 +17,7 @@ from fusetune.analyze.consistency import Bounds, c_nis, effective_bounds, j_nis,
 from fusetune.analyze.error_figures import ErrorFigure
 from fusetune.analyze.filter_events import FilterEvents
 from fusetune.analyze.innovation_metrics import mean_innovation, rms_innovation, rms_norm
-from fusetune.analyze.measurement_alignment import PairedSamples
+from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet, each_of
 from fusetune.analyze.metrics_schema import METRICS_SCHEMA
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.source_whiteness import Whiteness
@@ -63,15 +66,27 @@ class MetricsTable:
         for i, name in enumerate(sets):
             self.add(name, source, axis, metric, bounds.value[i], counts[i], bounds.lower[i], bounds.upper[i])
 
+    def add_metric_by_metric(self, tables: Sequence[MetricsTable]) -> None:
+        """Append the rows of several tables, the first of each, then the second of each, and so on."""
+        for name, column in self._columns.items():
+            column += itertools.chain.from_iterable(zip(*(one._columns[name] for one in tables), strict=True))
+
     def finished(self) -> pa.Table:
         return pa.table({name: pa.array(v) for name, v in self._columns.items()}, schema=METRICS_SCHEMA)
 
 
 def add_axis_metrics(table: MetricsTable, pairs: PairedSamples, settings: ScoringSettings) -> None:
     """Append all figures of one source and axis for all its sets."""
-    source, axis, sets, n = pairs.source, AXES[pairs.axis], pairs.sets, pairs.time.size
-    if n < FEWEST_SAMPLES:
+    if pairs.time.size < FEWEST_SAMPLES:
         return
+    limit = likelihood.winsor_limit(pairs.innovation)
+    table.add_metric_by_metric([_axis_metrics(table.flight, one, limit, settings) for one in pairs.each()])
+
+
+def _axis_metrics(flight: str, pairs: SamplesOfSet, limit: float, settings: ScoringSettings) -> MetricsTable:
+    """The figures of one set; `limit` is that of `likelihood.winsor_limit` over all."""
+    table = MetricsTable(flight)
+    source, axis, sets, n = pairs.source, AXES[pairs.axis], pairs.sets, pairs.time.size
     innovation, variance = pairs.innovation, pairs.innovation_variance
     correlation = autocorrelation(innovation / np.sqrt(variance), lag_limit(n))
     independent = effective_samples(correlation, n)
@@ -88,17 +103,18 @@ def add_axis_metrics(table: MetricsTable, pairs: PairedSamples, settings: Scorin
         table.add_each(sets, source, axis, "lag1_correlation", correlation[:, 0], n)
         table.add_each(sets, source, axis, "ljung_box", statistic, n)
         table.add_each(sets, source, axis, "ljung_box_p", p_value, n)
-    for metric, value in _likelihoods(pairs).items():
+    for metric, value in _likelihoods(pairs, limit).items():
         table.add_each(sets, source, axis, metric, value, n)
-    for limit in (3, 5):
-        broken = beyond_standard_deviations(innovation, variance, limit)
-        table.add_bounds(sets, source, axis, f"break_rate_{limit}sd", break_rate(broken, settings.confidence), n)
+    for deviations in (3, 5):
+        broken = beyond_standard_deviations(innovation, variance, deviations)
+        table.add_bounds(sets, source, axis, f"break_rate_{deviations}sd", break_rate(broken, settings.confidence), n)
     table.add_bounds(sets, source, axis, "break_rate_gate", break_rate(beyond_gate(pairs), settings.confidence), n)
+    return table
 
 
-def _likelihoods(pairs: PairedSamples) -> dict[str, Array]:
+def _likelihoods(pairs: SamplesOfSet, limit: float) -> dict[str, Array]:
     innovation, variance = pairs.innovation, pairs.innovation_variance
-    clipped = likelihood.winsorised(innovation, likelihood.winsor_limit(innovation))
+    clipped = likelihood.winsorised(innovation, limit)
     log_variance = np.mean(np.log(variance), axis=-1)
     nis = np.mean(np.square(innovation) / variance, axis=-1)
     clipped_nis = np.mean(np.square(clipped) / variance, axis=-1)
@@ -119,7 +135,10 @@ def add_group_metrics(table: MetricsTable, pairs: dict[int, PairedSamples], sett
     pairs : by axis
     """
     for group, members in groups_of(pairs):
-        _add_group(table, group, members, settings)
+        limits = [likelihood.winsor_limit(one.innovation) for one in members]
+        table.add_metric_by_metric(
+            [_group_metrics(table.flight, group, one, limits, settings) for one in each_of(members)]
+        )
 
 
 def groups_of(pairs: dict[int, PairedSamples]) -> Iterator[tuple[str, list[PairedSamples]]]:
@@ -134,7 +153,10 @@ def groups_of(pairs: dict[int, PairedSamples]) -> Iterator[tuple[str, list[Paire
             yield group, members
 
 
-def _add_group(table: MetricsTable, group: str, members: list[PairedSamples], settings: ScoringSettings) -> None:
+def _group_metrics(
+    flight: str, group: str, members: list[SamplesOfSet], limits: list[float], settings: ScoringSettings
+) -> MetricsTable:
+    table = MetricsTable(flight)
     source, sets, n, dimension = members[0].source, members[0].sets, members[0].time.size, len(members)
     innovation = np.stack([one.innovation for one in members])
     variance = np.stack([one.innovation_variance for one in members])
@@ -147,7 +169,7 @@ def _add_group(table: MetricsTable, group: str, members: list[PairedSamples], se
     table.add_bounds(sets, source, group, "mean_nis_effective", effective, independent)
     table.add_each(sets, source, group, "j_nis", j_nis(nis, dimension), n)
     table.add_each(sets, source, group, "c_nis", c_nis(innovation, variance), n)
-    _add_group_likelihoods(table, group, members)
+    _add_group_likelihoods(table, group, members, limits)
     for metric, broken in (
         ("break_rate_3sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 3) for one in members]),
         ("break_rate_5sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 5) for one in members]),
@@ -155,13 +177,14 @@ def _add_group(table: MetricsTable, group: str, members: list[PairedSamples], se
     ):
         rate = break_rate(np.logical_or.reduce(broken), settings.confidence)
         table.add_bounds(sets, source, group, metric, rate, n)
+    return table
 
 
-def _add_group_likelihoods(table: MetricsTable, group: str, members: list[PairedSamples]) -> None:
+def _add_group_likelihoods(table: MetricsTable, group: str, members: list[SamplesOfSet], limits: list[float]) -> None:
     """Likelihoods of several axes: the sums of theirs, each axis winsorised and scaled by itself."""
     sums: dict[str, Array] = {}
-    for one in members:
-        for metric, value in _likelihoods(one).items():
+    for one, limit in zip(members, limits, strict=True):
+        for metric, value in _likelihoods(one, limit).items():
             sums[metric] = sums[metric] + value if metric in sums else value
     first = members[0]
     for metric, value in sums.items():

@@ -1,15 +1,15 @@
 """As flown: the innovations that the vehicle's own estimator logged, brought to the layout of a replay."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from fusetune.analyze.row_groups import tables_in_groups
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
 from fusetune.analyze.sources import AID_SOURCES
-from fusetune.files import atomic_path
-from fusetune.parquet import write_table
 from fusetune.px4.estimator_instances import rows_of_primary
 from fusetune.px4.flight import Flight, TopicTable
 
@@ -18,8 +18,49 @@ ONBOARD = "onboard"
 
 _FIELDS = ("observation_variance", "innovation", "innovation_variance", "test_ratio")
 
+ONBOARD_SCHEMA = pa.schema(
+    [
+        pa.field("source", pa.dictionary(pa.int32(), pa.string())),
+        pa.field("axis", pa.int32()),
+        pa.field("timestamp_sample", pa.int64()),
+        *(pa.field(name, pa.float64()) for name in _FIELDS),
+        pa.field("innovation_rejected", pa.bool_()),
+        pa.field("fused", pa.bool_()),
+    ]
+)
 
-def onboard_samples(flight: Flight, instance: int | None = None) -> dict[SourceAxis, AxisSamples]:
+
+class OnboardSamples(Mapping[SourceAxis, AxisSamples]):
+    """Innovations that the vehicle logged, by source and axis; made from the log's columns at each look-up."""
+
+    def __init__(self, flight: Flight, instance: int | None) -> None:
+        self._tables: dict[str, TopicTable] = {}
+        self._columns: dict[SourceAxis, str] = {}
+        for name, source in AID_SOURCES.items():
+            topic = f"estimator_aid_src_{name}"
+            table = rows_of_primary(flight, topic) if instance is None else flight.topic(topic, instance)
+            if table is None or table["timestamp"].size == 0:
+                continue
+            self._tables[name] = table
+            for axis in range(source.axes):
+                column = f"[{axis}]" if f"innovation[{axis}]" in table else ""
+                if f"innovation{column}" in table and f"innovation_variance{column}" in table:
+                    self._columns[name, axis] = column
+
+    def __getitem__(self, key: SourceAxis) -> AxisSamples:
+        return _axis_samples(self._tables[key[0]], self._columns[key])
+
+    def __iter__(self) -> Iterator[SourceAxis]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._columns
+
+
+def onboard_samples(flight: Flight, instance: int | None = None) -> OnboardSamples:
     """Innovations that the vehicle logged, from the canonical topics `estimator_aid_src_*`.
 
     Parameters
@@ -31,17 +72,7 @@ def onboard_samples(flight: Flight, instance: int | None = None) -> dict[SourceA
     -------
     Samples by source and axis; empty where the log holds none.
     """
-    samples: dict[SourceAxis, AxisSamples] = {}
-    for name, source in AID_SOURCES.items():
-        topic = f"estimator_aid_src_{name}"
-        table = rows_of_primary(flight, topic) if instance is None else flight.topic(topic, instance)
-        if table is None or table["timestamp"].size == 0:
-            continue
-        for axis in range(source.axes):
-            column = f"[{axis}]" if f"innovation[{axis}]" in table else ""
-            if f"innovation{column}" in table and f"innovation_variance{column}" in table:
-                samples[name, axis] = _axis_samples(table, column)
-    return samples
+    return OnboardSamples(flight, instance)
 
 
 def _axis_samples(table: TopicTable, column: str) -> AxisSamples:
@@ -68,31 +99,20 @@ def _axis_samples(table: TopicTable, column: str) -> AxisSamples:
     )
 
 
-def write_onboard(path: Path, samples: dict[SourceAxis, AxisSamples]) -> None:
+def write_onboard(path: Path, samples: Mapping[SourceAxis, AxisSamples]) -> None:
     """Write the vehicle's own innovations in the layout of `<set>.innovations.parquet`."""
-    columns: dict[str, list[npt.NDArray]] = {name: [] for name in ("timestamp_sample", *_FIELDS, "rejected", "fused")}
     keys = sorted(samples)
-    counts = [samples[key].timestamp_sample.size for key in keys]
     names = list(dict.fromkeys(source for source, _ in keys))
-    for key in keys:
-        for name, parts in columns.items():
-            parts.append(getattr(samples[key], name))
-    index = np.repeat(np.array([names.index(source) for source, _ in keys], dtype=np.int32), counts)
-    source = pa.DictionaryArray.from_arrays(pa.array(index), pa.array(names, pa.string()))
-    axes = np.repeat(np.array([axis for _, axis in keys], dtype=np.int32), counts)
-
-    def joined(name: str, dtype: type) -> pa.Array:
-        return pa.array(np.concatenate([np.zeros(0, dtype=dtype), *columns[name]]).astype(dtype))
-
-    table = pa.table(
-        {
-            "source": source,
-            "axis": pa.array(axes),
-            "timestamp_sample": joined("timestamp_sample", np.int64),
-            **{name: joined(name, np.float64) for name in _FIELDS},
-            "innovation_rejected": joined("rejected", np.bool_),
-            "fused": joined("fused", np.bool_),
-        }
-    )
-    with atomic_path(path) as temporary:
-        write_table(table, temporary)
+    with tables_in_groups(path, ONBOARD_SCHEMA) as write:
+        for source, axis in keys:
+            one = samples[source, axis]
+            index = np.full(one.timestamp_sample.size, names.index(source), np.int32)
+            columns = {
+                "source": pa.DictionaryArray.from_arrays(pa.array(index), pa.array(names, pa.string())),
+                "axis": pa.array(np.full(index.size, axis, np.int32)),
+                "timestamp_sample": pa.array(one.timestamp_sample),
+                **{name: pa.array(getattr(one, name)) for name in _FIELDS},
+                "innovation_rejected": pa.array(one.rejected),
+                "fused": pa.array(one.fused),
+            }
+            write(pa.table(columns, schema=ONBOARD_SCHEMA))

@@ -6,17 +6,18 @@ time; the vehicle logs them seldom (twice a second in the default profile), so e
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from fusetune.analyze.fidelity import Innovations, load_innovations, mean_nll
+from fusetune.analyze.fidelity import mean_nll
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
 from fusetune.analyze.replay_flight import PreparedFlight
 from fusetune.analyze.replay_settings import ReplaySettings
-from fusetune.analyze.trust_grade import TRUST_TOPICS, grade_flight
+from fusetune.analyze.set_files import AxisSamples, SourceAxis, read_innovations
+from fusetune.analyze.trust_grade import TRUST_TOPICS, TrustGrade, grade_flight
 from fusetune.analyze.trust_settings import TrustSettings
 from fusetune.documents import write_document
 from fusetune.files import atomic_path
@@ -84,7 +85,7 @@ def write_flight_fidelity(
     analyze_folder: Path,
     replay: ReplaySettings,
     trust: TrustSettings | None = None,
-    prepared: PreparedFlight | None = None,
+    grade: TrustGrade | None = None,
 ) -> None:
     """Compare the as-flown replay of a flight with its own log, grade it, and write `fidelity.json` beside it.
 
@@ -99,17 +100,24 @@ def write_flight_fidelity(
         `results/analyze/<flight>`, with `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
     replay, trust : settings
         As the replays of the flight are made, and the limits of the grades.
-    prepared : PreparedFlight, optional
-        What these replays shared.
+    grade : TrustGrade, optional
+        Of `graded`, where it has been made already.
     """
+    grade = grade or graded(flight, replay, trust)
     flight = canonical(flight)
     result = judge_onboard_fidelity(
         flight, analyze_folder / f"{AS_FLOWN}.innovations.parquet", analyze_folder / "onboard.innovations.parquet"
     )
-    grade = grade_flight(flight, replay, trust, prepared)
     document = asdict(result) | {"grade": grade.grade, "trust": asdict(grade)}
     with atomic_path(analyze_folder / "fidelity.json") as path:
         write_document(path, document)
+
+
+def graded(
+    flight: Flight, replay: ReplaySettings, trust: TrustSettings | None = None, prepared: PreparedFlight | None = None
+) -> TrustGrade:
+    """Grade of a flight as it was logged, with `TRUST_TOPICS`; all else as for `grade_flight`."""
+    return grade_flight(canonical(flight), replay, trust, prepared)
 
 
 def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> OnboardFidelity:
@@ -122,39 +130,49 @@ def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> Onb
     replayed, onboard : Path
         `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
     """
-    ours, theirs = load_innovations(replayed), load_innovations(onboard)
-    theirs = theirs.rows(theirs.timestamp >= _warm(ours))
+    ours, theirs = read_innovations(replayed, {}), read_innovations(onboard, {})
+    since = _warm(ours)
     axes = tuple(
         axis
         for source in JUDGED_SOURCES
         for number in range(3)
-        if (axis := _compare_axis(source, number, ours, theirs)) is not None
+        if (source, number) in ours
+        and (source, number) in theirs
+        and (axis := _compare_axis(source, number, ours[source, number], theirs[source, number], since)) is not None
     )
     median = float(np.median([axis.relative_rms for axis in axes])) if axes else None
     return OnboardFidelity(flight.name, median, axes, tuple(_reasons(flight)))
 
 
-def _warm(ours: Innovations) -> int:
+def _warm(ours: Mapping[SourceAxis, AxisSamples]) -> int:
     """Time (µs) from which the replay has settled: ten seconds after it first fuses an aid."""
-    fused = ours.timestamp[ours.fused & np.isin(ours.source, JUDGED_SOURCES)]
-    return int(fused.min()) + WARM_UP_US if len(fused) else int(ours.timestamp.max(initial=0)) + 1
+    first, last = [], [0]
+    for source, axis in ours:
+        samples = ours[source, axis]
+        last.append(int(samples.timestamp_sample.max(initial=0)))
+        if source in JUDGED_SOURCES and samples.fused.any():
+            first.append(int(samples.timestamp_sample[samples.fused].min()))
+    return min(first) + WARM_UP_US if first else max(last) + 1
 
 
-def _usable(rows: Innovations, source: str, axis: int) -> Innovations:
-    return rows.rows((rows.source == source) & (rows.axis == axis) & (rows.variance > 0) & np.isfinite(rows.innovation))
+def _usable(samples: AxisSamples, since: int = 0) -> AxisSamples:
+    usable = (samples.innovation_variance > 0) & np.isfinite(samples.innovation)
+    return samples.rows(usable & (samples.timestamp_sample >= since))
 
 
-def _compare_axis(source: str, axis: int, ours: Innovations, theirs: Innovations) -> OnboardAxis | None:
-    left, right = (_usable(rows, source, axis) for rows in (ours, theirs))
-    if not len(left.axis) or not len(right.axis):
+def _compare_axis(source: str, axis: int, ours: AxisSamples, theirs: AxisSamples, since: int) -> OnboardAxis | None:
+    left, right = _usable(ours), _usable(theirs, since)
+    left_time, right_time = left.timestamp_sample, right.timestamp_sample
+    if not len(left_time) or not len(right_time):
         return None
-    left = left.rows(np.argsort(left.timestamp, kind="stable"))
-    after = np.clip(np.searchsorted(left.timestamp, right.timestamp), 1, max(len(left.axis) - 1, 1))
-    after = np.minimum(after, len(left.axis) - 1)
+    left = left.rows(np.argsort(left_time, kind="stable"))
+    left_time = left.timestamp_sample
+    after = np.clip(np.searchsorted(left_time, right_time), 1, max(len(left_time) - 1, 1))
+    after = np.minimum(after, len(left_time) - 1)
     before = np.maximum(after - 1, 0)
-    nearer = np.abs(left.timestamp[before] - right.timestamp) <= np.abs(left.timestamp[after] - right.timestamp)
+    nearer = np.abs(left_time[before] - right_time) <= np.abs(left_time[after] - right_time)
     partner = np.where(nearer, before, after)
-    matched = np.abs(left.timestamp[partner] - right.timestamp) <= MATCH_TOLERANCE_US
+    matched = np.abs(left_time[partner] - right_time) <= MATCH_TOLERANCE_US
     if matched.sum() < MIN_SAMPLES:
         return None
     left, right = left.rows(partner[matched]), right.rows(matched)
@@ -165,10 +183,10 @@ def _compare_axis(source: str, axis: int, ours: Innovations, theirs: Innovations
         samples=int(matched.sum()),
         relative_rms=float(np.sqrt(np.mean((left.innovation - right.innovation) ** 2))) / rms,
         rms_ratio=float(np.sqrt(np.mean(left.innovation**2))) / rms,
-        variance_ratio=float(np.median(left.variance / right.variance)),
+        variance_ratio=float(np.median(left.innovation_variance / right.innovation_variance)),
         fused_equal=float(np.mean(left.fused == right.fused)),
         rejected_equal=float(np.mean(left.rejected == right.rejected)),
-        nll_difference=mean_nll(left) - mean_nll(right),
+        nll_difference=_mean_nll(left) - _mean_nll(right),
     )
 
 
@@ -182,6 +200,10 @@ def _why_slow(flight: Flight, topic: str, what: str, rate_hz: float) -> str:
 
 def _late_advice(flight: Flight) -> str:
     return "" if logs_from_boot(flight.parameters.at_end()) else f" ({SET_LOG_FROM_BOOT})"
+
+
+def _mean_nll(samples: AxisSamples) -> float:
+    return mean_nll(samples.innovation, samples.innovation_variance)
 
 
 def _reasons(flight: Flight) -> Sequence[str]:

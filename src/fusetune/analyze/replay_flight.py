@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,13 +20,14 @@ from fusetune.analyze.reconstruction import (
     measured_rows,
     reconstruct,
 )
-from fusetune.analyze.replay_files import ReplayIdentity, write_replay
+from fusetune.analyze.replay_files import ReplayIdentity, finish_replay, replay_writer
 from fusetune.analyze.replay_settings import ReplaySettings
 from fusetune.analyze.start_choice import COLD, START_TOPICS, WARM, Start, StartSettings, choose_start
 from fusetune.analyze.withheld_gaps import plan_gaps
 from fusetune.ekf2.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.parameters import complete
-from fusetune.ekf2.replay import Gap, ReplayResult, replay
+from fusetune.ekf2.recording import RecordArrays
+from fusetune.ekf2.replay import Gap, ReplayResult, ReplaySummary, replay, replay_into
 from fusetune.errors import UserError
 from fusetune.px4.estimator_instances import of_one_instance
 from fusetune.px4.flight import Flight
@@ -35,6 +36,8 @@ from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
 
 WRITTEN_BACK = "EKF2_MAG_DECL"
+
+Summary = TypeVar("Summary", bound=ReplaySummary)
 
 REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
 """What a replay reads of a saved flight."""
@@ -53,33 +56,47 @@ class PreparedFlight:
     handovers: tuple[Handover, ...] = ()
 
     def replay(
-        self, params: Mapping[str, float], overridden: frozenset[str] = frozenset()
+        self,
+        params: Mapping[str, float],
+        overridden: frozenset[str] = frozenset(),
+        keep: Callable[[RecordArrays], RecordArrays] | None = None,
     ) -> tuple[ReplayResult, np.ndarray]:
-        """Replay a complete set; the result, and for each innovation whether its sample was measured."""
-        result = replay(
-            self.inputs,
-            params,
-            overridden=overridden,
-            start=self.start.state,
-            gaps=self.gaps,
-            handovers=self.handovers,
-        )
-        time = result.states["timestamp_sample"]
-        interval_us = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+        """Replay a complete set; the result, and for each innovation whether its sample was measured.
 
-        def measured(rows: np.ndarray) -> np.ndarray:
-            return measured_rows(rows, self.reconstructed, params, interval_us)
+        `keep` as for `fusetune.ekf2.replay.replay`.
+        """
+        result = replay(self.inputs, params, overridden=overridden, keep=keep, **self._shared())
+        return self._with_measured_gaps(result, params), self.measured(result.innovations, params, result)
 
+    def replay_into(
+        self,
+        take: Callable[[RecordArrays], None],
+        params: Mapping[str, float],
+        overridden: frozenset[str] = frozenset(),
+    ) -> ReplaySummary:
+        """Replay a complete set and hand on its rows as they come, see `fusetune.ekf2.replay.replay_into`."""
+        summary = replay_into(take, self.inputs, params, overridden=overridden, **self._shared())
+        return self._with_measured_gaps(summary, params)
+
+    def measured(self, innovations: np.ndarray, params: Mapping[str, float], of: ReplaySummary) -> np.ndarray:
+        """For each innovation row of a replay whether its sample was measured."""
+        return measured_rows(innovations, self.reconstructed, params, of.update_interval_us)
+
+    def _shared(self) -> dict[str, Any]:
+        return {"start": self.start.state, "gaps": self.gaps, "handovers": self.handovers}
+
+    def _with_measured_gaps(self, summary: Summary, params: Mapping[str, float]) -> Summary:
         gaps = tuple(
-            dataclasses.replace(gap, innovations=gap.innovations[measured(gap.innovations)]) for gap in result.gaps
+            dataclasses.replace(gap, innovations=gap.innovations[self.measured(gap.innovations, params, summary)])
+            for gap in summary.gaps
         )
-        return dataclasses.replace(result, gaps=gaps), measured(result.innovations)
+        return dataclasses.replace(summary, gaps=gaps)
 
     def with_stream(self, reconstructed: ReconstructedFlight) -> PreparedFlight:
         """The same flight, started alike, with another sensor stream."""
         return dataclasses.replace(self, inputs=build_inputs(reconstructed.flight), reconstructed=reconstructed)
 
-    def description(self, result: ReplayResult) -> dict[str, Any]:
+    def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the JSON file of a replay: how it started and what was reconstructed."""
         warm = result.warm_start_us is not None
         return {
@@ -145,15 +162,27 @@ def replay_flight(
     prepared = prepare(flight, settings.reconstruction, settings.start, gaps)
     for name, overrides in sets.items():
         params = complete(flight.parameters.initial, overrides, flight.release)
-        _replay_and_write(prepared, name, overrides, params, output_folder)
+        write_replay(prepared, name, overrides, params, output_folder)
     return prepared
 
 
-def _replay_and_write(
+def write_replay(
     prepared: PreparedFlight, name: str, overrides: Mapping[str, float], params: Mapping[str, float], folder: Path
 ) -> None:
-    result, measured = prepared.replay(params, frozenset(overrides))
-    write_replay(folder, ReplayIdentity(name, overrides, params, prepared.description(result)), result, measured)
+    """Replay a complete set and write its files while it goes on.
+
+    Parameters
+    ----------
+    name, overrides : of the set; parameters that it varies
+    params : all of its parameters
+    folder : takes the files of `fusetune.analyze.replay_files`
+    """
+    told_apart = prepared.reconstructed.changed
+    with replay_writer(folder, name, told_apart=told_apart) as writer:
+        summary = prepared.replay_into(writer.take, params, frozenset(overrides))
+        if told_apart:
+            writer.write_spooled(lambda rows: prepared.measured(rows, params, summary))
+    finish_replay(folder, ReplayIdentity(name, overrides, params, prepared.description(summary)), summary)
 
 
 def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: ReplaySettings | None = None) -> list[str]:
@@ -191,7 +220,7 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: Repl
         # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.
         params.pop(WRITTEN_BACK, None)
         values = complete(flight.parameters.initial, params | overrides, flight.release)
-        _replay_and_write(prepared, file.stem, overrides, values, output_folder)
+        write_replay(prepared, file.stem, overrides, values, output_folder)
     return [file.stem for file in set_files]
 
 

@@ -1,6 +1,6 @@
 """Scores all parameter sets of one flight on the same samples and writes the figures."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,9 @@ from fusetune.analyze.activity import inactive_parameters, same_results
 from fusetune.analyze.block_scores import BLOCK_SCHEMA, block_rows
 from fusetune.analyze.filter_events import FilterEvents, filter_events
 from fusetune.analyze.filter_states import read_states
-from fusetune.analyze.flight_phases import airborne_intervals, imu_gaps
+from fusetune.analyze.flight_phases import IMU_TOPICS, airborne_intervals, imu_gaps
 from fusetune.analyze.ground_metrics import add_ground_events, add_ground_metrics, ground_window
-from fusetune.analyze.measurement_alignment import PairedSamples, paired_samples
+from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet, paired_samples
 from fusetune.analyze.metrics_table import (
     FEWEST_SAMPLES,
     MetricsTable,
@@ -26,8 +26,10 @@ from fusetune.analyze.metrics_table import (
 )
 from fusetune.analyze.onboard import ONBOARD, onboard_samples, write_onboard
 from fusetune.analyze.reference_truth import TRUTH_TOPICS, Truth, read_references
+from fusetune.analyze.row_groups import tables_in_groups
+from fusetune.analyze.sample_spool import SampleSpool
 from fusetune.analyze.scoring_window import Cut, Interval, ScoringWindow, scoring_window, subtract
-from fusetune.analyze.set_files import SetRecord, read_set
+from fusetune.analyze.set_files import AxisSamples, SetRecord, SourceAxis, read_set
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.source_whiteness import Whiteness, source_whiteness
 from fusetune.analyze.sources import AID_SOURCES, AXES
@@ -120,11 +122,14 @@ def score_flight(
     UserError
         If a file of a replay is missing or damaged. A flight that cannot be scored is no error: its files say why.
     """
-    settings = settings or ScoringSettings()
+    settings, folder = settings or ScoringSettings(), Path(analyze_folder)
     flight = canonical(flight)
-    records = [read_set(Path(analyze_folder), name) for name in dict.fromkeys((present, *sets))]
-    airborne = airborne_intervals(flight, records[0].flags)
     log_gaps = imu_gaps(flight, settings.log_gap_s)
+    # nothing below asks for the IMU, and nothing of a flight is larger
+    flight = flight.with_topics({key: table for key, table in flight.topics.items() if key[0] not in IMU_TOPICS})
+    spool = SampleSpool(folder)
+    records = [read_set(folder, name, spool) for name in dict.fromkeys((present, *sets))]
+    airborne = airborne_intervals(flight, records[0].flags)
     window = scoring_window(records, present, airborne, log_gaps, settings)
     phase = _flight_after_warm_up(airborne, window)
     events = {record.name: filter_events(record, phase) for record in records}
@@ -140,32 +145,33 @@ def score_flight(
         add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
     onboard = onboard_samples(flight)
     blocks: list[pa.Table] = []
-    samples: list[pa.Table] = []
     windows: list[pa.Table] = []
     whiteness: dict[tuple[str, int], Whiteness] = {}
     withheld = WITHHELD_SCHEMA.empty_table()
-    if window.intervals:
-        scored = [record for record in records if record.name not in window.excluded]
-        blocks, samples, windows = _score_samples(table, scored, present, window, settings)
+    scored = [record for record in records if record.name not in window.excluded] if window.intervals else []
+    with tables_in_groups(folder / "samples.parquet", SAMPLES_SCHEMA) as write_samples:
+        if scored:
+            blocks, windows = _score_samples(table, scored, present, window, settings, write_samples)
+    if scored:
         # Replays from elsewhere, such as PX4's own estimator, come without gaps.
-        has_gaps = all((Path(analyze_folder) / f"{record.name}.withheld.parquet").exists() for record in scored)
-        gaps = paired_gaps(scored, Path(analyze_folder), present, window) if has_gaps else []
+        has_gaps = all((folder / f"{record.name}.withheld.parquet").exists() for record in scored)
+        gaps = paired_gaps(scored, folder, present, window) if has_gaps else []
         add_withheld_metrics(table, gaps)
         withheld = withheld_rows(flight.name, gaps, window.block_edges(settings.block_s))
         _add_onboard(table, onboard, window, settings, records[0].parameters)
         references = read_references(flight, _fused_sources(records), records[0].parameters)
-        whiteness = _add_state_figures(table, scored, Path(analyze_folder), flight, references, window, settings)
+        whiteness = _add_state_figures(table, scored, folder, flight, references, window, settings)
         for truth in references:
             if truth.kind == "truth" and has_gaps:
-                add_true_drift(table, scored, Path(analyze_folder), truth, window)
+                add_true_drift(table, scored, folder, truth, window)
     summary = _summary(flight, records, present, window, events, settings)
     summary["white_share"] = {
         f"{source}.{AXES[axis]}": round(one.white_share, 4)
         for (source, axis), one in whiteness.items()
         if np.isfinite(one.white_share)
     }
-    _write(Path(analyze_folder), table, blocks, samples, windows, withheld, summary)
-    write_onboard(Path(analyze_folder) / f"{ONBOARD}.innovations.parquet", onboard)
+    _write(folder, table, blocks, windows, withheld, summary)
+    write_onboard(folder / f"{ONBOARD}.innovations.parquet", onboard)
 
 
 def _flight_after_warm_up(airborne: Sequence[Interval], window: ScoringWindow) -> tuple[Interval, ...]:
@@ -175,7 +181,7 @@ def _flight_after_warm_up(airborne: Sequence[Interval], window: ScoringWindow) -
 
 
 def _fused_sources(records: Sequence[SetRecord]) -> set[str]:
-    return {source for record in records for (source, _), one in record.samples.items() if one.fused.any()}
+    return {source for record in records for source in record.fused_sources}
 
 
 def _add_state_figures(
@@ -206,10 +212,15 @@ def _add_state_figures(
 
 
 def _score_samples(
-    table: MetricsTable, records: list[SetRecord], present: str, window: ScoringWindow, settings: ScoringSettings
-) -> tuple[list[pa.Table], list[pa.Table], list[pa.Table]]:
+    table: MetricsTable,
+    records: list[SetRecord],
+    present: str,
+    window: ScoringWindow,
+    settings: ScoringSettings,
+    write_samples: Callable[[pa.Table], None],
+) -> tuple[list[pa.Table], list[pa.Table]]:
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
-    blocks, samples, windows = [], [], []
+    blocks, windows = [], []
     for source in AID_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         for axis in range(source.axes):
@@ -220,7 +231,8 @@ def _score_samples(
             add_axis_metrics(table, one, settings)
             blocks.append(block_rows(table.flight, one, edges))
             if source.name not in _NOT_IN_SAMPLES:
-                samples.append(_sample_rows(one))
+                for of_set in one.each():
+                    write_samples(_sample_rows(of_set))
         if pairs:
             add_group_metrics(table, pairs, settings)
         single = [(AXES[axis], [one]) for axis, one in pairs.items() if one.time.size >= FEWEST_SAMPLES]
@@ -228,31 +240,30 @@ def _score_samples(
             figures = window_figures(members, axis_name, wide_edges)
             add_worst_windows(table, figures)
             windows.append(window_rows(table.flight, figures, wide_edges))
-    return blocks, samples, windows
+    return blocks, windows
 
 
-def _sample_rows(pairs: PairedSamples) -> pa.Table:
-    sets, n = len(pairs.sets), pairs.time.size
-    names = pa.DictionaryArray.from_arrays(
-        pa.array(np.repeat(np.arange(sets, dtype=np.int32), n)), pa.array(pairs.sets, pa.string())
-    )
-    source = pa.DictionaryArray.from_arrays(
-        pa.array(np.zeros(sets * n, dtype=np.int32)), pa.array([pairs.source], pa.string())
-    )
+def _sample_rows(pairs: SamplesOfSet) -> pa.Table:
+    """Rows of `samples.parquet` of one set."""
+    n = pairs.time.size
+
+    def repeated(name: str) -> pa.Array:
+        return pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, np.int32)), pa.array([name], pa.string()))
+
     columns = {
-        "set": names,
-        "source": source,
-        "axis": pa.array(np.full(sets * n, pairs.axis, dtype=np.int8)),
-        "time_us": pa.array(np.tile(pairs.time, sets)),
+        "set": repeated(pairs.sets[0]),
+        "source": repeated(pairs.source),
+        "axis": pa.array(np.full(n, pairs.axis, dtype=np.int8)),
+        "time_us": pa.array(pairs.time),
     }
     for name in ("innovation", "innovation_variance", "test_ratio"):
-        columns[name] = pa.array(getattr(pairs, name).astype(np.float32).ravel())
+        columns[name] = pa.array(getattr(pairs, name)[0].astype(np.float32))
     return pa.table(columns, schema=SAMPLES_SCHEMA)
 
 
 def _add_onboard(
     table: MetricsTable,
-    onboard: dict,
+    onboard: Mapping[SourceAxis, AxisSamples],
     window: ScoringWindow,
     settings: ScoringSettings,
     parameters: dict[str, float],
@@ -323,7 +334,6 @@ def _write(
     folder: Path,
     table: MetricsTable,
     blocks: list[pa.Table],
-    samples: list[pa.Table],
     windows: list[pa.Table],
     withheld: pa.Table,
     summary: dict[str, Any],
@@ -331,7 +341,6 @@ def _write(
     tables = {
         "metrics.parquet": table.finished(),
         "scores.parquet": pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
-        "samples.parquet": pa.concat_tables(samples).unify_dictionaries() if samples else SAMPLES_SCHEMA.empty_table(),
         "windows.parquet": pa.concat_tables(windows) if windows else WINDOW_SCHEMA.empty_table(),
         "withheld.parquet": withheld,
     }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.set_files import SetRecord, reset_times
+from fusetune.analyze.set_files import SetRecord
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.sources import HORIZONTAL_AIDING
 
@@ -76,11 +76,7 @@ def subtract(intervals: Sequence[Interval], cuts: Iterable[Cut]) -> tuple[Interv
 def aiding_start(record: SetRecord) -> int | None:
     """Time at which the set first fuses something that stops horizontal drift, else anything at all, µs."""
     for sources in (HORIZONTAL_AIDING, tuple({source for source, _ in record.samples} - {"gravity"})):
-        starts = [
-            int(samples.timestamp_sample[np.argmax(samples.fused)])
-            for (source, _), samples in record.samples.items()
-            if source in sources and samples.fused.any()
-        ]
+        starts = [start for (source, _), start in record.first_fused.items() if source in sources]
         if starts:
             return min(starts)
     return None
@@ -181,7 +177,7 @@ def cuts_within(
 def _around_resets(record: SetRecord, after_us: int) -> list[Cut]:
     return [
         Cut(int(time) - FUSION_DELAY_US, int(time) + after_us, f"reset of {kind.replace('_', ' ')}")
-        for kind, times in reset_times(record).items()
+        for kind, times in record.reset_times.items()
         for time in times
     ]
 

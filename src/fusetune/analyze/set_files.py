@@ -1,18 +1,22 @@
 """Reads what the replay of one (flight, parameter set) wrote: innovations, status flags, local position, summary."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa
 
+from fusetune.analyze.sample_spool import AxisSamples, SampleSpool, SourceAxis, SpooledSamples
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.documents import read_document
-from fusetune.parquet import read_table
+from fusetune.parquet import read_pieces, read_schema, read_table
 
-SourceAxis = tuple[str, int]
+__all__ = ["AxisSamples", "SetRecord", "SourceAxis", "read_columns", "read_innovations", "read_set"]
+
+Result = TypeVar("Result")
 
 RESET_COUNTERS = {
     "horizontal_position": "xy_reset_counter",
@@ -24,24 +28,6 @@ RESET_COUNTERS = {
 
 
 @dataclass(frozen=True)
-class AxisSamples:
-    """All samples of one axis of one aid source in order of time, arrays of shape (N,).
-
-    `timestamp_sample` is the delayed time at which the estimator used the measurement, µs. `observation` is the
-    measurement as the estimator used it, empty where only innovations are known.
-    """
-
-    timestamp_sample: npt.NDArray[np.int64]
-    observation_variance: npt.NDArray[np.float64]
-    innovation: npt.NDArray[np.float64]
-    innovation_variance: npt.NDArray[np.float64]
-    test_ratio: npt.NDArray[np.float64]
-    rejected: npt.NDArray[np.bool_]
-    fused: npt.NDArray[np.bool_]
-    observation: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-
-
-@dataclass(frozen=True)
 class SetRecord:
     """One parameter set's replay of one flight."""
 
@@ -49,9 +35,11 @@ class SetRecord:
     parameters: dict[str, float]
     overrides: dict[str, float]
     summary: dict[str, Any]
-    samples: dict[SourceAxis, AxisSamples]
-    flags: dict[str, npt.NDArray[Any]]
-    local_position: dict[str, npt.NDArray[Any]]
+    samples: Mapping[SourceAxis, AxisSamples]
+    """Look up one source and axis at a time: each may be read from the disk."""
+    flags: Mapping[str, npt.NDArray[Any]]
+    local_position: Mapping[str, npt.NDArray[Any]]
+    """The same goes for these columns."""
 
     @property
     def status(self) -> str:
@@ -61,6 +49,55 @@ class SetRecord:
     def is_warm_started(self) -> bool:
         """Whether the replay started from the vehicle's own state."""
         return bool(self.summary.get("start", {}).get("mode") == "warm")
+
+    @cached_property
+    def first_fused(self) -> dict[SourceAxis, int]:
+        """Time, µs, of the first sample that was fused, of each source and axis of which one was."""
+        first = {}
+        for key in self.samples:
+            samples = self.samples[key]
+            if samples.fused.any():
+                first[key] = int(samples.timestamp_sample[np.argmax(samples.fused)])
+        return first
+
+    @property
+    def fused_sources(self) -> set[str]:
+        """Sources that were fused at least once."""
+        return {source for source, _ in self.first_fused}
+
+    @cached_property
+    def reset_times(self) -> dict[str, npt.NDArray[np.int64]]:
+        """Times at which each reset counter moved, µs; one entry for every step of the counter."""
+        time = self.local_position.get("timestamp", np.zeros(0, dtype=np.int64)).astype(np.int64)
+        times = {}
+        for kind, counter in RESET_COUNTERS.items():
+            values = self.local_position.get(counter)
+            if values is None or values.size < 2:
+                times[kind] = np.zeros(0, dtype=np.int64)
+                continue
+            # The counter is a byte that wraps in the log.
+            counts: npt.NDArray[np.int64] = values.astype(np.int64)
+            steps = np.subtract(counts[1:], counts[:-1]) & 0xFF
+            times[kind] = np.repeat(time[1:], steps)
+        return times
+
+
+class ColumnsOnDisk(Mapping[str, npt.NDArray[Any]]):
+    """Columns of a Parquet table, each read when it is asked for and not kept."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._names = path, column_names(path)
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        if name not in self._names:
+            raise KeyError(name)
+        return read_columns(self._path, [name])[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.NDArray[Any]]:
@@ -75,8 +112,18 @@ def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
-def read_set(folder: Path, name: str) -> SetRecord:
-    """Read `<folder>/<name>.*`; the states are read only where truth is compared (`true_errors`)."""
+def column_names(path: Path) -> list[str]:
+    """Names of the columns of a Parquet table; raises what `read_columns` does."""
+    return list(read_schema(path).names)
+
+
+def read_set(folder: Path, name: str, spool: SampleSpool | None = None) -> SetRecord:
+    """Read `<folder>/<name>.*`; the states are read only where truth is compared (`true_errors`).
+
+    Parameters
+    ----------
+    spool : where the samples are kept; by default in a file of their own
+    """
     summary = read_document(folder / f"{name}.json")
     parameters = {key: float(value) for key, value in summary.get("params", {}).items()}
     return SetRecord(
@@ -84,13 +131,13 @@ def read_set(folder: Path, name: str) -> SetRecord:
         parameters=parameters,
         overrides={key: float(value) for key, value in summary.get("overrides", {}).items()},
         summary=summary,
-        samples=read_innovations(folder / f"{name}.innovations.parquet", parameters),
+        samples=read_innovations(folder / f"{name}.innovations.parquet", parameters, spool),
         flags=read_columns(folder / f"{name}.status_flags.parquet"),
-        local_position=read_columns(folder / f"{name}.local_position.parquet"),
+        local_position=ColumnsOnDisk(folder / f"{name}.local_position.parquet"),
     )
 
 
-def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxis, AxisSamples]:
+def read_innovations(path: Path, parameters: dict[str, float], spool: SampleSpool | None = None) -> SpooledSamples:
     """Read an innovations table, split by source and axis; sources that measure nothing are left out.
 
     Innovations of reconstructed samples are left out, too: they are no witnesses.
@@ -98,28 +145,11 @@ def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxi
     Parameters
     ----------
     parameters : of this set; where the table has no test ratio, it follows from the source's gate
+    spool : where the samples are kept; by default in a nameless file in the folder of the table
     """
-    table = read_table(path)
-    if "measured" in table.column_names:
-        table = table.filter(table["measured"]).drop_columns("measured")
-    if table.num_rows == 0:
-        return {}
-    source = table["source"].combine_chunks()
-    if not pa.types.is_dictionary(source.type):
-        source = source.dictionary_encode()
-    names = source.dictionary.to_pylist()
-    key = source.indices.to_numpy().astype(np.int64) * 8 + table["axis"].to_numpy()
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    columns = {name: table[name].to_numpy()[order] for name in table.column_names if name not in ("source", "axis")}
-    starts = np.flatnonzero(np.r_[True, np.diff(key) != 0])
-    stops = np.r_[starts[1:], key.size]
-    samples: dict[SourceAxis, AxisSamples] = {}
-    for start, stop in zip(starts, stops, strict=True):
-        name, axis = names[key[start] >> 3], int(key[start] & 7)
-        if name in AID_SOURCES:
-            rows = slice(start, stop)
-            samples[name, axis] = _axis_samples(columns, rows, _gate(name, parameters))
+    samples = SpooledSamples(spool or SampleSpool(path.parent), lambda source: _gate(source, parameters))
+    for piece in read_pieces(path):
+        samples.add(piece)
     return samples
 
 
@@ -127,39 +157,3 @@ def _gate(source: str, parameters: dict[str, float]) -> float:
     name = AID_SOURCES[source].gate_parameter
     # PX4 takes no gate below one standard deviation.
     return max(parameters[name], 1.0) if name is not None and name in parameters else np.nan
-
-
-def _axis_samples(columns: dict[str, npt.NDArray[Any]], rows: slice, gate: float) -> AxisSamples:
-    innovation = columns["innovation"][rows].astype(np.float64)
-    variance = columns["innovation_variance"][rows].astype(np.float64)
-    if "test_ratio" in columns:
-        test_ratio = columns["test_ratio"][rows].astype(np.float64)
-    else:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            test_ratio = np.square(innovation) / (gate * gate * variance)
-    return AxisSamples(
-        timestamp_sample=columns["timestamp_sample"][rows].astype(np.int64),
-        observation_variance=columns["observation_variance"][rows].astype(np.float64),
-        innovation=innovation,
-        innovation_variance=variance,
-        test_ratio=test_ratio,
-        rejected=columns["innovation_rejected"][rows].astype(bool),
-        fused=columns["fused"][rows].astype(bool),
-        observation=columns["observation"][rows].astype(np.float64) if "observation" in columns else np.zeros(0),
-    )
-
-
-def reset_times(record: SetRecord) -> dict[str, npt.NDArray[np.int64]]:
-    """Times at which each reset counter moved, µs; one entry for every step of the counter."""
-    time = record.local_position.get("timestamp", np.zeros(0, dtype=np.int64)).astype(np.int64)
-    times = {}
-    for kind, counter in RESET_COUNTERS.items():
-        values = record.local_position.get(counter)
-        if values is None or values.size < 2:
-            times[kind] = np.zeros(0, dtype=np.int64)
-            continue
-        # The counter is a byte that wraps in the log.
-        counts: npt.NDArray[np.int64] = values.astype(np.int64)
-        steps = np.subtract(counts[1:], counts[:-1]) & 0xFF
-        times[kind] = np.repeat(time[1:], steps)
-    return times

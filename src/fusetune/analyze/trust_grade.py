@@ -16,7 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fusetune.analyze.as_flown_figures import GROUPS, AsFlownFigures, Interval, as_flown_figures, rms
+from fusetune.analyze.as_flown_figures import (
+    GROUPS,
+    AsFlownFigures,
+    Interval,
+    as_flown_figures,
+    compared_rows,
+    rms,
+)
 from fusetune.analyze.flight_phases import airborne_intervals
 from fusetune.analyze.onboard import onboard_samples
 from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS, ReconstructedFlight
@@ -220,7 +227,7 @@ class _Comparison:
 
     def figures(self, prepared: PreparedFlight) -> AsFlownFigures:
         """Figures of one replay; the first one, which is the one in use, decides which part is compared."""
-        result, measured = prepared.replay(self.params)
+        result, measured = prepared.replay(self.params, keep=compared_rows(self.onboard))
         if self.intervals is None:
             self.intervals = self._compared(result)
         return as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)

@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from fusetune.analyze.break_rate import beyond_gate, beyond_standard_deviations
 from fusetune.analyze.likelihood import gaussian_nll, winsor_limit, winsorised
-from fusetune.analyze.measurement_alignment import PairedSamples
+from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet, each_of
 from fusetune.analyze.metrics_table import MetricsTable
 from fusetune.analyze.scoring_window import ScoringWindow
 
@@ -87,6 +87,16 @@ def window_figures(members: list[PairedSamples], axis: str, edges: npt.NDArray[n
     index = np.clip(np.searchsorted(edges, first.time, side="right") - 1, 0, edges.size - 2)
     starts = np.flatnonzero(np.r_[True, np.diff(index) != 0])
     counts = np.diff(np.r_[starts, index.size])
+    limits = [winsor_limit(one.innovation) for one in members]
+    of_sets = [_figures(one, limits, starts, counts) for one in each_of(members)]
+    values = {name: np.concatenate([one[name] for one in of_sets]) for name in of_sets[0]}
+    return WindowFigures(first.source, axis, first.sets, index[starts], counts, values)
+
+
+def _figures(
+    members: list[SamplesOfSet], limits: list[float], starts: npt.NDArray[np.int64], counts: npt.NDArray[np.int64]
+) -> dict[str, Array]:
+    """Figures (1, W) of one set in the windows that begin at the rows `starts` and hold `counts` samples."""
 
     def mean(values: npt.NDArray) -> Array:
         return np.add.reduceat(values.astype(np.float64), starts, axis=-1) / counts
@@ -94,8 +104,8 @@ def window_figures(members: list[PairedSamples], axis: str, edges: npt.NDArray[n
     squared = sum(np.square(one.innovation) for one in members)
     nis = sum(np.square(one.innovation) / one.innovation_variance for one in members)
     nll = sum(
-        gaussian_nll(winsorised(one.innovation, winsor_limit(one.innovation)), one.innovation_variance)
-        for one in members
+        gaussian_nll(winsorised(one.innovation, limit), one.innovation_variance)
+        for one, limit in zip(members, limits, strict=True)
     )
     values = {
         "rms_innovation": np.sqrt(mean(np.asarray(squared))),
@@ -106,7 +116,7 @@ def window_figures(members: list[PairedSamples], axis: str, edges: npt.NDArray[n
         beyond = [beyond_standard_deviations(one.innovation, one.innovation_variance, limit) for one in members]
         values[f"break_rate_{limit}sd"] = mean(np.logical_or.reduce(beyond))
     values["break_rate_gate"] = mean(np.logical_or.reduce([beyond_gate(one) for one in members]))
-    return WindowFigures(first.source, axis, first.sets, index[starts], counts, values)
+    return values
 
 
 def add_worst_windows(table: MetricsTable, figures: WindowFigures) -> None:

@@ -12,9 +12,9 @@ import numpy as np
 
 from fusetune.ekf2 import message_samples as convert
 from fusetune.ekf2.arrival_order import RunSchedule, schedule_runs
-from fusetune.ekf2.sensor_samples import SYSTEM_FLAGS_SAMPLE
+from fusetune.ekf2.sensor_samples import IMU_SAMPLE, SYSTEM_FLAGS_SAMPLE
 from fusetune.ekf2.taken_samples import AIDING, only_usable
-from fusetune.px4.flight import Flight, ParameterChange
+from fusetune.px4.flight import Flight, ParameterChange, TopicTable, select_rows
 
 ARMING_STATE_ARMED = 2
 VEHICLE_TYPE_FIXED_WING = 2
@@ -33,15 +33,30 @@ ESTIMATOR_COMMANDS = (
 ARRIVAL_TOPICS = ("airspeed", "auxvel", "baro", "ev", "flow", "gnss", "mag", "range", "system_flags", "command")
 
 ARRIVALS = np.dtype(
-    [(name, "i8") for name in ARRIVAL_TOPICS] + [("reset_accel_bias", "?"), ("reset_gyro_bias", "?")], align=True
+    [(name, "i4") for name in ARRIVAL_TOPICS] + [("reset_accel_bias", "?"), ("reset_gyro_bias", "?")], align=True
 )
 """What arrives with one IMU sample: a position in each sample array, -1 for nothing."""
+
+IMU_ROW = np.dtype(
+    [
+        ("time_us", "i8"),
+        ("delta_ang", "f4", (3,)),
+        ("delta_vel", "f4", (3,)),
+        ("delta_ang_dt", "f4"),
+        ("delta_vel_dt", "f4"),
+        ("delta_vel_clipping", "?", (3,)),
+    ],
+    align=True,
+)
+"""An IMU_SAMPLE at half its size, for a flight has hundreds a second: PX4 gives all its figures single precision."""
+
+IMU_ROWS_AT_ONCE = 1 << 16
 
 COMMAND = np.dtype([("timestamp", "i8"), ("command", "i8"), ("param", "f8", (7,))], align=True)
 
 
 class SampleArrays(NamedTuple):
-    """The arrays that the compiled replay reads."""
+    """The arrays that the compiled replay reads, and of a whole flight `imu` as IMU_ROW, see `of_runs`."""
 
     imu: np.ndarray
     arrivals: np.ndarray
@@ -58,6 +73,18 @@ class SampleArrays(NamedTuple):
     auxvel: np.ndarray
     system_flags: np.ndarray
     command: np.ndarray
+
+    def of_runs(self, start: int, stop: int) -> SampleArrays:
+        """The same for the estimator's runs from `start` to before `stop` alone, `imu` as IMU_SAMPLE."""
+        return self._replace(imu=imu_samples(self.imu[start:stop]), arrivals=self.arrivals[start:stop])
+
+
+def imu_samples(rows: np.ndarray) -> np.ndarray:
+    """IMU_ROW → IMU_SAMPLE."""
+    samples = np.zeros(len(rows), IMU_SAMPLE)
+    for name in rows.dtype.names or ():
+        samples[name] = rows[name]
+    return samples
 
 
 @dataclass(frozen=True)
@@ -86,7 +113,6 @@ def build_inputs(flight: Flight) -> EstimatorInputs:
         The flight has no `sensor_combined`.
     """
     runs = schedule_runs(flight)
-    imu_table = flight.topics["sensor_combined", 0]
     arrivals = np.full(len(runs.timestamp), -1, ARRIVALS)
     arrivals["reset_accel_bias"], arrivals["reset_gyro_bias"] = _bias_resets(flight, runs)
     aiding = {name: take(flight, runs) for name, take in AIDING.items()}
@@ -95,7 +121,7 @@ def build_inputs(flight: Flight) -> EstimatorInputs:
     system_flags = _system_flags(flight, runs, arrivals)
     command = _commands(flight, runs, arrivals)
     arrays = SampleArrays(
-        imu=convert.imu_samples(imu_table)[runs.imu_rows],
+        imu=_imu_rows(flight.topics["sensor_combined", 0], runs.imu_rows),
         arrivals=arrivals,
         **{name: one.samples for name, one in aiding.items()},
         air_density=aiding["baro"].beside,
@@ -108,6 +134,17 @@ def build_inputs(flight: Flight) -> EstimatorInputs:
         (int(np.searchsorted(runs.timestamp, change.timestamp)), change) for change in flight.parameters.changed
     )
     return EstimatorInputs(flight.name, runs.mode, arrays, changes)
+
+
+def _imu_rows(table: TopicTable, chosen: np.ndarray) -> np.ndarray:
+    """Chosen rows of `sensor_combined` as IMU_ROW; the wide samples exist of some at a time."""
+    rows = np.zeros(len(chosen), IMU_ROW)
+    for first in range(0, len(chosen), IMU_ROWS_AT_ONCE):
+        part = slice(first, first + IMU_ROWS_AT_ONCE)
+        samples = convert.imu_samples(select_rows(table, chosen[part]))
+        for name in IMU_ROW.names or ():
+            rows[name][part] = samples[name]
+    return rows
 
 
 def _bias_resets(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndarray]:

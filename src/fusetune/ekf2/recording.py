@@ -4,6 +4,7 @@ An aid source is recorded whenever it has a new `timestamp_sample` after an upda
 and position at every update; flags when they change, and once a second.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -144,11 +145,25 @@ def _zero_rows(count: int, dtype: np.dtype) -> np.ndarray:
     return np.zeros(count * dtype.itemsize, np.uint8).view(dtype)
 
 
+def joined(parts: Sequence[RecordArrays]) -> RecordArrays:
+    """Rows of several stretches, one after the other."""
+    dtypes = [rows.dtype for rows in parts[0]] if parts else (INNOVATION_ROW, STATE_ROW, LOCAL_POSITION_ROW, FLAGS_ROW)
+    return RecordArrays(*(joined_rows([part[i] for part in parts], dtype) for i, dtype in enumerate(dtypes)))
+
+
 def joined_rows(parts: list[np.ndarray], dtype: np.dtype) -> np.ndarray:
     """Rows of several parts in one array, copied as bytes and not field by field."""
     whole = _zero_rows(sum(map(len, parts)), dtype)
     np.concatenate([part.view(np.uint8) for part in parts] or [whole.view(np.uint8)], out=whole.view(np.uint8))
     return whole
+
+
+def with_fields(rows: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Some fields of rows, in an array that holds no others."""
+    kept = np.empty(len(rows), np.dtype([(name, rows.dtype[name]) for name in names], align=True))
+    for name in names:
+        kept[name] = rows[name]
+    return kept
 
 
 @kernel

@@ -2,14 +2,14 @@
 
 The compiled loop does at every IMU sample what PX4's EKF2 module does in one run: take the IMU sample, the newest
 message of every aiding topic, the system flags; update the filter; publish. It works through the flight in stretches,
-so that memory for results grows only with what is recorded.
+so that what is recorded of one can be written before the next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -30,12 +30,11 @@ from fusetune.ekf2.output_predictor import initialise_output_predictor, predict_
 from fusetune.ekf2.parameters import PARAMETER_NAMES, parameter_record
 from fusetune.ekf2.recording import (
     FLAG_COLUMNS,
-    FLAGS_ROW,
-    INNOVATION_ROW,
     LOCAL_POSITION_ROW,
     RECORDER_MEMORY,
-    STATE_ROW,
+    RecordArrays,
     allocate_records,
+    joined,
     joined_rows,
     record_update,
     views_of,
@@ -95,48 +94,78 @@ class GapResult:
     local_position: np.ndarray
 
 
-@dataclass(frozen=True)
-class ReplayResult:
-    """What one replay published, as structured arrays in time order (see `fusetune.ekf2.recording`)."""
+@dataclass(frozen=True, kw_only=True)
+class ReplaySummary:
+    """How a replay went, without the rows that it published."""
 
     mode: str
-    innovations: np.ndarray
-    states: np.ndarray
-    local_position: np.ndarray
-    flags: np.ndarray
     imu_samples: int
     updates: int
+    update_interval_us: float
+    """Median time between two updates; 0 with fewer than two."""
     origin: tuple[float, float, float] | None
     """Latitude and longitude (deg) and altitude (m) of the local frame, None while never set."""
+    resets: Mapping[str, int]
+    """Reset counters at the end of the flight, under the names of `vehicle_local_position`."""
+    filter_fault_flags_max: int
+    """Largest value of the fault flags seen as one number, like `estimator_status.filter_fault_flags`."""
+    diverged: bool
+    """Whether a state or variance stopped being a finite number."""
     gaps: tuple[GapResult, ...] = ()
     warm_start_us: int | None = None
     """Fusion time horizon at which the filter took over the vehicle's state, None where it started from nothing."""
     levelled: bool = False
     """Whether the filter ever had its tilt, without which it does not begin."""
 
-    @property
-    def resets(self) -> dict[str, int]:
-        """Reset counters at the end of the flight, under the names of `vehicle_local_position`."""
-        names = [name for name in LOCAL_POSITION_ROW.names or () if name.endswith("_reset_counter")]
-        return {name: int(self.local_position[name][-1]) if len(self.local_position) else 0 for name in names}
 
-    @property
-    def filter_fault_flags_max(self) -> int:
-        """Largest value of the fault flags seen as one number, like `estimator_status.filter_fault_flags`."""
-        faults = [i for i, name in enumerate(FLAG_COLUMNS) if name.startswith("fs_")]
-        bits = self.flags["flags"][:, faults].astype(np.int64) << np.arange(len(faults))
-        return int(bits.sum(axis=1).max(initial=0))
+@dataclass(frozen=True, kw_only=True)
+class ReplayResult(ReplaySummary):
+    """What one replay published, as structured arrays in time order (see `fusetune.ekf2.recording`)."""
 
-    @property
-    def diverged(self) -> bool:
-        """Whether a state or variance stopped being a finite number."""
-        if not len(self.states):
-            return False
-        return not (np.isfinite(self.states["states"]).all() and np.isfinite(self.states["covariances"]).all())
+    innovations: np.ndarray
+    states: np.ndarray
+    local_position: np.ndarray
+    flags: np.ndarray
 
     def source_names(self) -> np.ndarray:
         """Aid source of each innovation row."""
         return np.array(AID_SOURCE_NAMES)[self.innovations["source"]]
+
+
+class _Tally:
+    """What is told of all rows, counted as they come."""
+
+    def __init__(self) -> None:
+        self._horizons: list[np.ndarray] = []
+        self._diverged = False
+        self._faults = 0
+        self._resets = {name: 0 for name in LOCAL_POSITION_ROW.names or () if name.endswith("_reset_counter")}
+
+    def add(self, rows: RecordArrays) -> None:
+        states, position = rows.states, rows.local_position
+        self._horizons.append(states["timestamp_sample"].copy())
+        self._diverged |= not (np.isfinite(states["states"]).all() and np.isfinite(states["covariances"]).all())
+        faults = [i for i, name in enumerate(FLAG_COLUMNS) if name.startswith("fs_")]
+        bits = rows.flags["flags"][:, faults].astype(np.int64) << np.arange(len(faults))
+        self._faults = max(self._faults, int(bits.sum(axis=1).max(initial=0)))
+        if len(position):
+            self._resets = {name: int(position[name][-1]) for name in self._resets}
+
+    def summary(self, course: Course, warm_start_us: int | None, gaps: Sequence[GapResult | None]) -> ReplaySummary:
+        time = np.concatenate([np.zeros(0, np.int64), *self._horizons])
+        return ReplaySummary(
+            mode=course.inputs.mode,
+            imu_samples=len(course.inputs.arrays.imu),
+            updates=int(course.recorder["updates"][0]),
+            update_interval_us=float(np.median(np.diff(time))) if len(time) > 1 else 0.0,
+            origin=_origin(course.ekf["origin"][0]),
+            resets=self._resets,
+            filter_fault_flags_max=self._faults,
+            diverged=self._diverged,
+            gaps=tuple(one for one in gaps if one is not None),
+            warm_start_us=warm_start_us,
+            levelled=bool(course.ekf["filter_initialised"][0]),
+        )
 
 
 def replay(
@@ -147,11 +176,52 @@ def replay(
     gaps: Sequence[Gap] = (),
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
+    keep: Callable[[RecordArrays], RecordArrays] | None = None,
 ) -> ReplayResult:
-    """Run the estimator over one flight.
+    """Run the estimator over one flight and keep what it published.
 
     Parameters
     ----------
+    keep : callable, optional
+        What is kept of the rows of each stretch of the flight, fewer rows or fewer fields of them; by default all.
+
+    All others are those of `replay_into`.
+
+    Returns
+    -------
+    ReplayResult
+        The same inputs and parameters give the same bytes.
+    """
+    kept: list[RecordArrays] = []
+    summary = replay_into(
+        lambda rows: kept.append(rows if keep is None else keep(rows)),
+        inputs,
+        parameters,
+        overridden=overridden,
+        gaps=gaps,
+        start=start,
+        handovers=handovers,
+    )
+    told = {field.name: getattr(summary, field.name) for field in fields(ReplaySummary)}
+    return ReplayResult(**told, **joined(kept)._asdict())
+
+
+def replay_into(
+    take: Callable[[RecordArrays], None],
+    inputs: EstimatorInputs,
+    parameters: Mapping[str, float],
+    *,
+    overridden: frozenset[str] | None = None,
+    gaps: Sequence[Gap] = (),
+    start: LoggedState | None = None,
+    handovers: Sequence[Handover] = (),
+) -> ReplaySummary:
+    """Run the estimator over one flight and hand on what it publishes, a stretch of the flight at a time.
+
+    Parameters
+    ----------
+    take : callable
+        Is given the rows of each stretch, in order.
     inputs : EstimatorInputs
         From `fusetune.ekf2.inputs.build_inputs`.
     parameters : mapping
@@ -166,35 +236,19 @@ def replay(
         where the samples end before that time, the filter starts from nothing, as when the vehicle boots.
     handovers : sequence of Handover
         Another estimator instance became primary: the filter takes over what that knew of its sensors.
-
-    Returns
-    -------
-    ReplayResult
-        The same inputs and parameters give the same bytes.
     """
     ranges = [_runs_of(inputs, gap) for gap in gaps]
     course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers)
-    kept: list[tuple[np.ndarray, ...]] = []
+    tally = _Tally()
     found: list[GapResult | None] = [None] * len(gaps)
     for begin, end in course.stretches(first_run, len(inputs.arrays.imu), [first for first, _ in ranges]):
         for number, (first, last) in enumerate(ranges):
             if first == begin:
                 found[number] = _continue_into_gap(course, gaps[number], first, last)
-        kept.append(course.run(begin, end))
-    innovations, states, local_position, flags = _joined(kept)
-    return ReplayResult(
-        mode=inputs.mode,
-        innovations=innovations,
-        states=states,
-        local_position=local_position,
-        flags=flags,
-        imu_samples=len(inputs.arrays.imu),
-        updates=int(course.recorder["updates"][0]),
-        origin=_origin(course.ekf["origin"][0]),
-        gaps=tuple(one for one in found if one is not None),
-        warm_start_us=warm_start_us,
-        levelled=bool(course.ekf["filter_initialised"][0]),
-    )
+        rows = course.run(begin, end)
+        tally.add(rows)
+        take(rows)
+    return tally.summary(course, warm_start_us, found)
 
 
 def begin_course(
@@ -292,21 +346,16 @@ class Course:
                     take_sensor_states(self.ekf[0], state)
             yield start, stop
 
-    def run(self, start: int, stop: int) -> tuple[np.ndarray, ...]:
+    def run(self, start: int, stop: int) -> RecordArrays:
         """Process some runs; copies of what they recorded."""
         self.recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
-        views = views_of(self.ekf)
-        run_estimator(
-            self.ekf[0], self.params[0], self.inputs.arrays, views, self.recorder[0], self.records, start, stop
-        )
+        views, arrays = views_of(self.ekf), self.inputs.arrays.of_runs(start, stop)
+        run_estimator(self.ekf[0], self.params[0], arrays, views, self.recorder[0], self.records, stop - start)
         done = self.recorder[0]
         counts = (done["innovation_rows"], done["update_rows"], done["update_rows"], done["flag_rows"])
-        return tuple(joined_rows([rows[:count]], rows.dtype) for rows, count in zip(self.records, counts, strict=True))
-
-
-def _joined(kept: list[tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
-    dtypes = (INNOVATION_ROW, STATE_ROW, LOCAL_POSITION_ROW, FLAGS_ROW)
-    return tuple(joined_rows([part[i] for part in kept], dtype) for i, dtype in enumerate(dtypes))
+        return RecordArrays(
+            *(joined_rows([rows[:count]], rows.dtype) for rows, count in zip(self.records, counts, strict=True))
+        )
 
 
 def _runs_of(inputs: EstimatorInputs, gap: Gap) -> tuple[int, int]:
@@ -321,7 +370,7 @@ def _continue_into_gap(course: Course, gap: Gap, first: int, last: int) -> GapRe
     branch = course.branch()
     branch.ekf["withheld"][gap.sensor] = True
     start = int(branch.ekf["time_delayed_us"][0])
-    innovations, _, local_position, _ = _joined([branch.run(*stretch) for stretch in branch.stretches(first, last)])
+    innovations, _, local_position, _ = joined([branch.run(*stretch) for stretch in branch.stretches(first, last)])
     if not len(local_position):
         return None
     sources = [AID_SOURCE_NAMES.index(name) for name in WITHHOLDABLE[gap.sensor]]
@@ -340,9 +389,9 @@ def _origin(origin: np.void) -> tuple[float, float, float] | None:
 
 
 @entry_kernel
-def run_estimator(ekf, params, inputs, views, recorder, records, start, stop):
-    """Process the runs `start` to `stop` of a flight."""
-    for run in range(start, stop):
+def run_estimator(ekf, params, inputs, views, recorder, records, runs):
+    """Process a stretch of a flight; `inputs` are of its runs."""
+    for run in range(runs):
         arrivals = inputs.arrivals[run]
         if arrivals.command >= 0:
             handle_command(ekf, params, inputs.command[arrivals.command])

@@ -1,4 +1,4 @@
-"""The results of a replay as columns, under the names that PX4's estimator topics have."""
+"""Rows of a replay (see `fusetune.ekf2.recording`) as columns, under the names that PX4's estimator topics have."""
 
 from __future__ import annotations
 
@@ -7,32 +7,30 @@ import pyarrow as pa
 
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.recording import FLAG_COLUMNS
-from fusetune.ekf2.replay import ReplayResult
 
 
-def innovation_table(result: ReplayResult) -> pa.Table:
+def innovation_table(rows: np.ndarray) -> pa.Table:
     """One row per aid-source sample and axis; `innovation_variance` includes the observation's."""
-    rows = result.innovations
     source = pa.DictionaryArray.from_arrays(pa.array(rows["source"]), pa.array(AID_SOURCE_NAMES))
     names = [name for name in rows.dtype.names or () if name != "source"]
     return pa.table({"source": source} | {name: np.ascontiguousarray(rows[name]) for name in names})
 
 
-def state_table(result: ReplayResult) -> pa.Table:
+def state_table(rows: np.ndarray) -> pa.Table:
     """One row per filter update: `states_0` … `states_24` and `covariances_0` … `covariances_23` (the variances)."""
-    return _flattened(result.states, ("states", "covariances"))
+    return _flattened(rows, ("states", "covariances"))
 
 
-def local_position_table(result: ReplayResult) -> pa.Table:
+def local_position_table(rows: np.ndarray) -> pa.Table:
     """One row per filter update: what the output predictor publishes at the newest IMU sample."""
-    return _flattened(result.local_position, ("q",))
+    return _flattened(rows, ("q",))
 
 
-def flags_table(result: ReplayResult) -> pa.Table:
+def flags_table(rows: np.ndarray) -> pa.Table:
     """One row per change of a flag, at least one a second."""
-    flags = result.flags["flags"].astype(bool)
+    flags = rows["flags"].astype(bool)
     columns = {name: np.ascontiguousarray(flags[:, i]) for i, name in enumerate(FLAG_COLUMNS)}
-    return pa.table({"timestamp": np.ascontiguousarray(result.flags["timestamp"])} | columns)
+    return pa.table({"timestamp": np.ascontiguousarray(rows["timestamp"])} | columns)
 
 
 def _flattened(rows: np.ndarray, arrays: tuple[str, ...]) -> pa.Table:

@@ -18,7 +18,7 @@ from fusetune.ekf2.control_status import CONTROL_STATUS_NAMES
 from fusetune.ekf2.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.estimator import SAMPLES
 from fusetune.ekf2.geodesy import reproject
-from fusetune.ekf2.inputs import EstimatorInputs
+from fusetune.ekf2.inputs import EstimatorInputs, imu_samples
 from fusetune.ekf2.prediction import GRAVITY
 from fusetune.ekf2.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MAG_BODY, MAG_EARTH, TERRAIN, WIND
 from fusetune.ekf2.world_magnetic_model import field_at
@@ -120,7 +120,7 @@ def _carried_on(state: LoggedState, imu: np.ndarray, until: int) -> tuple[np.nda
     """The logged state carried on to the horizon, at most one update interval later."""
     q, velocity, position = state.q.copy(), state.velocity.copy(), state.position.copy()
     first, last = np.searchsorted(imu["time_us"], (state.time_us, until), side="right")
-    for sample in imu[first : min(last + 1, len(imu))]:
+    for sample in imu_samples(imu[first : min(last + 1, len(imu))]):
         begin = int(sample["time_us"]) - round(float(sample["delta_ang_dt"]) * 1e6)
         share = (min(until, int(sample["time_us"])) - max(state.time_us, begin)) / max(
             int(sample["time_us"]) - begin, 1

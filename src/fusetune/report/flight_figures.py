@@ -1,6 +1,6 @@
 """One picture per flight: track, height, test ratios over time, and where fusion broke."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,7 @@ class _FlightData:
         self.present = present
         names = [present, *(name for name in sets if name != present)][:_MOST_SETS]
         self.sets = [name for name in names if self.summary["sets"].get(name, {}).get("status") in _DRAWN]
-        self.samples: dict[str, dict[SourceAxis, AxisSamples]] = {}
+        self.samples: dict[str, Mapping[SourceAxis, AxisSamples]] = {}
         self.local: dict[str, dict[str, npt.NDArray]] = {}
         for name in self.sets:
             parameters = self.summary["sets"][name]["parameters"]
@@ -211,7 +211,9 @@ def _finish_ratios(axes: Axes, data: _FlightData) -> None:
         axes.legend(loc="upper left", ncols=4, fontsize=7, borderaxespad=0.2, labelspacing=0.2, reverse=True)
 
 
-def _largest_ratio(samples: dict[SourceAxis, AxisSamples], source: str) -> tuple[npt.NDArray[np.int64], Array] | None:
+def _largest_ratio(
+    samples: Mapping[SourceAxis, AxisSamples], source: str
+) -> tuple[npt.NDArray[np.int64], Array] | None:
     axes = [samples[source, axis] for axis in range(AID_SOURCES[source].axes) if (source, axis) in samples]
     if not axes or not axes[0].fused.any():
         return None
