@@ -184,7 +184,7 @@ def grade_flight(
     return TrustGrade(
         grade=graded.grade,
         words=GRADE_WORDS[graded.grade],
-        reason=_reason(graded, repaired, causes, settings),
+        reason=_reason(graded, repaired, causes),
         start=f"{prepared.start.mode}: {prepared.start.why}",
         as_logged_grade=grade_of(raw, settings)[0],
         as_logged=raw,
@@ -196,14 +196,14 @@ def grade_flight(
     )
 
 
-def _reason(graded: Graded, figures: AsFlownFigures, causes: tuple[Cause, ...], settings: TrustSettings) -> str:
+def _reason(graded: Graded, figures: AsFlownFigures, causes: tuple[Cause, ...]) -> str:
     """Why the grade is no A: the figures that have it, those that could not be compared, and the largest cause."""
     if graded.grade == "A":
         return ""
     if all(name in _NO_PREDICTION and grade != "D" for name, grade in graded.figure_grades.items()):
         return "the log holds nothing of the vehicle's own estimator that could be compared"
     parts = limits_in_words(figures, [name for name, one in graded.figure_grades.items() if one == graded.grade])
-    if graded.not_compared and _best_without(graded.not_compared, settings) == graded.grade:
+    if graded.not_compared:
         parts.append(not_compared_in_words(graded.not_compared))
     parts += [cause.cause for cause in causes if not cause.repaired and cause.cost > 0.0][:1]
     return "; ".join(parts)

@@ -126,7 +126,7 @@ def holds_section(results: Results) -> str:
     if validated is None:
         if not results.flights:
             return ""
-        return section(title, paragraph("With fewer than three flights in the decision none can be left out to see."))
+        return section(title, paragraph("With fewer than three flights that count none can be left out to see."))
     chosen, worth = validated["chosen"], validated["differences"]
     rows = [(flight, set_name(name, results), _worth(worth[flight])) for flight, name in sorted(chosen.items())]
     rows.append((Cell("mean", "quiet"), Cell(""), signed(float(percent_change(validated["difference"])))))
