@@ -98,7 +98,7 @@ def test_of_one_block_the_page_says_what_is_not_known(tmp_path: Path) -> None:
 def test_flights_that_are_all_distrusted_have_no_say_and_no_green_mark(tmp_path: Path) -> None:
     sets = {"present": MadeSet(error=0.13), "better": MadeSet(error=0.1)}
     reason = "the replay resets its height 144 times where the vehicle did so 0 times"
-    fidelity = {"grade": "D", "trust": {"figure_grades": {"height_resets": "D"}, "reason": reason}}
+    fidelity = {"grade": "D", "trust": {"is_compared": True, "reason": reason}}
     page = without_pictures(make_report(tmp_path, sets, flights=2, fidelity=fidelity))
     assert "none of the 2 replayed flights has a say" in page
     assert "could not be scored" not in page
