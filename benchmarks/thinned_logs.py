@@ -229,16 +229,19 @@ def _print_vehicle(logs: Path) -> None:
     print("### Default-profile logs: RMS of innovations, replay to vehicle\n")
     groups = ("horizontal_velocity", "horizontal_position", "heading", "magnetic_field")
     print(
-        "| log | grade (as logged) | velocity | position | heading | field | as logged: velocity | position | "
-        "heading | field | costs most | of it | s lost after log start | s lost in the air |"
+        "| log | grade (as logged) | velocity | position | heading | field | height, m | vertical velocity, m/s | "
+        "as logged: velocity | position | heading | field | costs most | of it | s lost after log start | "
+        "s lost in the air |"
     )
-    print("|---" * 14 + "|")
+    print("|---" * 16 + "|")
     collected: list[list[float]] = []
     for stem in DEFAULT_PROFILE:
         for log in sorted(logs.glob(f"{stem}*.ulg")):
             flight = canonical(read_ulog(log))
             grade = grade_flight(flight)
             sizes = [grade.repaired.innovation_ratio.get(name, float("nan")) for name in groups]
+            height = (grade.repaired.height_m, grade.repaired.vertical_velocity_m_s)
+            sizes += [float("nan") if value is None else value for value in height]
             raw = [grade.as_logged.innovation_ratio.get(name, float("nan")) for name in groups]
             lost = _lost_s(flight)
             collected.append([*sizes, *raw, *lost])
@@ -249,7 +252,7 @@ def _print_vehicle(logs: Path) -> None:
             print("| " + " | ".join(cells) + " |", flush=True)
     if collected:
         medians = [statistics.median(v for v in column if np.isfinite(v)) for column in zip(*collected, strict=True)]
-        cells = ["**median**", "", *map(_number, medians[:8]), "", "", *map(_number, medians[8:])]
+        cells = ["**median**", "", *map(_number, medians[:10]), "", "", *map(_number, medians[10:])]
         print("| " + " | ".join(cells) + " |\n")
 
 

@@ -134,7 +134,7 @@ def coverage(
             drawn = generator.integers(0, len(world.flights), flights)
             _, ranked = decide(world, drawn, range(len(world.sets)), settings)
             for one in ranked:
-                if one.name != world.sets[0]:
+                if one.name != world.sets[0] and one.lower is not None and one.upper is not None:
                     inside.append(one.lower <= true[world.sets.index(one.name)] <= one.upper)
         shares[world.name] = float(np.mean(inside))
     return shares

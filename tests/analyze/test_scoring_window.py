@@ -91,7 +91,21 @@ def test_a_diverged_set_is_left_out_with_its_reason(tmp_path: Path) -> None:
 def test_a_flight_too_short_is_not_scored_and_says_why(tmp_path: Path) -> None:
     window = scoring_window(records(tmp_path, {"present": MadeSet()}), "present", ((at(10.0), at(13.0)),), (), SETTINGS)
     assert not window.intervals
-    assert window.reason == "only 3.0 s of flight remain after the warm-up and the cuts, 5 s are needed"
+    assert window.reason == (
+        "only 3.0 s of flight remain after the warm-up and the cuts, 5 s are needed: of 3.0 s in the air none is cut"
+    )
+
+
+def test_a_flight_that_is_cut_away_says_by_what(tmp_path: Path) -> None:
+    """Resets at 12, 15, … 69 s, each with 3 s to follow, take all that the warm-up leaves, which ends at 14.89 s."""
+    restless = tuple(float(s) for s in range(9, 70, 3))
+    made = records(tmp_path, {"present": MadeSet(aiding_s=10.0, resets_s=restless)})
+    window = scoring_window(made, "present", AIRBORNE, ((at(30.0), at(32.0)),), SETTINGS)
+    assert not window.intervals
+    assert window.reason == (
+        "only 0.0 s of flight remain after the warm-up and the cuts, 5 s are needed: of 60.0 s in the air "
+        "20 resets of horizontal position take 55.1 s, 1 gap in the log takes 5.0 s, the warm-up takes 4.9 s"
+    )
 
 
 def test_a_log_without_flight_is_not_scored(tmp_path: Path) -> None:

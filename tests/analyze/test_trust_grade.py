@@ -73,6 +73,14 @@ def test_what_could_not_be_compared_limits_the_grade(figures, grade, missing):
     assert not set(graded.not_compared) & graded.figure_grades.keys()
 
 
+def test_what_does_not_speak_for_a_replay_may_speak_against_it():
+    flags = dataclasses.replace(NOTHING, flags_equal=1.0, height_flags_equal=0.95)
+    assert not grade_of(flags, SETTINGS).is_compared
+    assert not grade_of(NOTHING, SETTINGS).is_compared
+    assert grade_of(dataclasses.replace(flags, resets={"height": (144, 0)}), SETTINGS).is_compared
+    assert grade_of(PERFECT, SETTINGS).is_compared
+
+
 @given(st.sets(st.sampled_from(FIGURES)))
 def test_a_figure_less_never_betters_the_grade(names):
     less = changed(

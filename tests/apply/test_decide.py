@@ -215,9 +215,9 @@ def test_the_number_of_candidates_is_allowed_for(
 def test_a_flight_whose_replay_cannot_be_trusted_does_not_count(tmp_path: Path) -> None:
     sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
     folders, table = make_study(tmp_path, sets)
-    for folder, grade, compared in zip(folders, "ABCDDA", ({"x": "A"},) * 4 + ({}, {"x": "A"}), strict=True):
+    for folder, grade, compared in zip(folders, "ABCDDA", (True, True, True, True, False, True), strict=True):
         reason = "the replay resets its height 144 times" if grade == "D" else ""
-        fidelity = {"grade": grade, "trust": {"figure_grades": compared, "reason": reason}}
+        fidelity = {"grade": grade, "trust": {"is_compared": compared, "reason": reason}}
         write_document(folder / "fidelity.json", fidelity)
     decide(folders, table, tmp_path / "apply", sets=list(sets))
     decision = json.loads((tmp_path / "apply" / "decision.json").read_text())
@@ -241,7 +241,7 @@ def test_flights_that_have_no_say_are_told_by_what_keeps_them_out(tmp_path: Path
             (folder / "scoring.json").read_text().replace(f'"flight_{number}"', f'"short_{number}"')
         )
     for folder in folders[:2]:
-        fidelity = {"grade": "D", "trust": {"figure_grades": {"velocity_m_s": "D"}}}
+        fidelity = {"grade": "D", "trust": {"is_compared": True}}
         (folder / "fidelity.json").write_text(json.dumps(fidelity))
     decide([*folders, *short], table, tmp_path / "apply", sets=list(sets), newest_flight="flight_4")
     text = json.loads((tmp_path / "apply" / "decision.json").read_text())["paragraph"]

@@ -1,6 +1,8 @@
 """The whole report of a made study."""
 
+import json
 from pathlib import Path
+from typing import Any
 
 from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
@@ -19,14 +21,27 @@ SETS = {
 """One set to choose, one that is better one step ahead and worse without GNSS, one that is vetoed."""
 
 
-def make_report(root: Path, sets: dict[str, MadeSet], flights: int, landing_s: float = 70.0) -> str:
-    """Make and score flights, decide, and return the page; all files lie below `root`."""
+def make_report(
+    root: Path,
+    sets: dict[str, MadeSet],
+    flights: int,
+    landing_s: float = 70.0,
+    fidelity: dict[str, Any] | None = None,
+) -> str:
+    """Make and score flights, decide, and return the page; all files lie below `root`.
+
+    `fidelity` is what the grade of every flight is read from; its section of the page is left out.
+    """
     folders, table = make_study(root, sets, flights, refused=("bad",), landing_s=landing_s)
+    for folder in folders if fidelity else ():
+        (folder / "fidelity.json").write_text(json.dumps(fidelity))
     decide(folders, table, root / "apply", sets=list(sets))
     pictures = []
     for folder in folders:
         pictures.append(root / "report" / "flights" / f"{folder.name}.png")
         plot_flight(root / "save" / folder.name, folder, list(sets), pictures[-1])
+    for folder in folders if fidelity else ():
+        (folder / "fidelity.json").unlink()
     plot_summary(folders, root / "apply", root / "report")
     build_report(table, folders, pictures, root / "apply", root / "report", root / "report.html")
     return (root / "report.html").read_text(encoding="utf-8")

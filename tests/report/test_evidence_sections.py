@@ -132,7 +132,7 @@ def test_a_choice_that_hangs_on_single_flights_is_said_to(results: Results) -> N
     assert "the same without any one of 3 of the 5 flights" in text
     kept = validated | {"chosen": dict.fromkeys(validated["chosen"], "present")}
     assert "no set does better than the present one" in holds_section(with_decision(results, leave_one_out=kept))
-    assert "fewer than three scored flights" in holds_section(with_decision(results, leave_one_out=None))
+    assert "fewer than three flights that count" in holds_section(with_decision(results, leave_one_out=None))
 
 
 def test_weights_stand_beside_the_whiteness_that_they_come_from(results: Results) -> None:
@@ -184,4 +184,4 @@ def test_paper_mode_tells_why(results: Results) -> None:
 def test_without_any_gap_and_with_one_set_there_is_still_a_page(tmp_path: Path) -> None:
     page = make_report(tmp_path, {"present": MadeSet()}, flights=1)
     assert "Without a sensor" in page
-    assert "With fewer than three scored flights" in page
+    assert "With fewer than three flights that count" in page

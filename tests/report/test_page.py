@@ -81,6 +81,49 @@ def test_flights_that_cannot_be_scored_still_make_a_page(tmp_path: Path) -> None
     assert "s of flight remain after the warm-up" in page
 
 
+def test_of_one_block_the_page_says_what_is_not_known(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.1), "worse": MadeSet(error=0.2), "better": MadeSet(error=0.05)}
+    page = without_pictures(make_report(tmp_path, sets, flights=1, landing_s=21.0))
+    assert "how far chance could do that is not known" in page
+    ranking = page[page.index("Ranking, best first") : page.index("All other criteria")]
+    for name in ("worse", "better"):
+        (row,) = (part for part in ranking.split("<tr>") if f">{name}<" in part)
+        assert row.partition("</tr>")[0].count("not known") == 4
+        assert ">eligible<" in row
+    assert "beyond doubt" not in page[: page.index("Without a sensor")]
+    assert not re.search(r">[^<]*\bnan\b", page)
+    assert ">None<" not in page
+
+
+def test_flights_that_are_all_distrusted_have_no_say_and_no_green_mark(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13), "better": MadeSet(error=0.1)}
+    reason = "the replay resets its height 144 times where the vehicle did so 0 times"
+    fidelity = {"grade": "D", "trust": {"is_compared": True, "reason": reason}}
+    page = without_pictures(make_report(tmp_path, sets, flights=2, fidelity=fidelity))
+    assert "none of the 2 replayed flights has a say" in page
+    assert "could not be scored" not in page
+    assert reason in page
+    assert ", from no flight</p>" in page
+    assert "3 logs, 2 scored, 0 in the decision." in page
+    flights = page[page.index("Flight by flight") :]
+    assert '<span class="good">' not in flights
+    assert flights.count('<span class="bad">') == 2
+    assert "flight_0 – not counted: its replay has trust grade D" in flights
+
+
+def without_pictures(page: str) -> str:
+    return re.sub(r'src="data:[^"]*"', "", page)
+
+
+def test_all_sets_ruled_out_are_told_as_such(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.1), "a": MadeSet(resets_s=(40.0,)), "b": MadeSet(fault_flags=8)}
+    page = without_pictures(make_report(tmp_path, sets, flights=3))
+    assert "No other set was eligible for comparison." in page
+    assert "Ruled out, and so not eligible: " in page
+    ranking = page[page.index("Ranking, best first") : page.index("All other criteria")]
+    assert ranking.count(">not eligible<") == 2
+
+
 def test_a_set_that_diverged_is_drawn_around(tmp_path: Path) -> None:
     page = make_report(tmp_path, {"present": MadeSet(), "b": MadeSet(status="diverged")}, flights=1)
     assert "diverged: the covariance is not finite" in page

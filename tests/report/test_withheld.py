@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fusetune.apply.ranking import ELIGIBLE, NOT_ELIGIBLE, PRESENT
 from fusetune.report.figures import figure_style
 from fusetune.report.results import Results
 from fusetune.report.unaided_figures import drift_figure
@@ -14,7 +15,7 @@ def results(rows: list[tuple], shown: tuple[str, ...] = ("present", "b"), vetoed
     metrics = pd.DataFrame(rows, columns=["flight", "set", "source", "axis", "metric", "value"])
     names = ["flight", "set", "source", "axis", "metric"]
     ranking = pd.DataFrame({"name": list(shown)})
-    ranking["status"] = ["present" if n == "present" else "vetoed" if n in vetoed else "candidate" for n in shown]
+    ranking["status"] = [PRESENT if n == "present" else NOT_ELIGIBLE if n in vetoed else ELIGIBLE for n in shown]
     return Results(
         decision={"chosen": "present"},
         ranking=ranking,

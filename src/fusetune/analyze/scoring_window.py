@@ -126,16 +126,34 @@ def scoring_window(
     settle_s = settings.warm_settle_s if present_record.is_warm_started else settings.settle_s
     warm_up_end = max(starts.values()) + round(settle_s * 1e6)
     flying = subtract(airborne, [Cut(-(2**62), warm_up_end, "warm-up")])
-    cuts = cuts_within(records, excluded, flying, present, gaps, settings)
+    single_cuts = _cuts(records, excluded, flying, present, gaps, settings)
+    cuts = _merged(single_cuts)
     intervals = subtract(flying, cuts)
     window = ScoringWindow(intervals, cuts, excluded, warm_up_end)
     if window.duration_s < settings.minimum_scored_s:
         reason = (
             f"only {window.duration_s:.1f} s of flight remain after the warm-up and the cuts, "
-            f"{settings.minimum_scored_s:g} s are needed"
+            f"{settings.minimum_scored_s:g} s are needed: {_what_was_taken(airborne, flying, single_cuts)}"
         )
         return ScoringWindow((), cuts, excluded, warm_up_end, reason)
     return window
+
+
+def _what_was_taken(airborne: Sequence[Interval], flying: Sequence[Interval], cuts: Sequence[Cut]) -> str:
+    """In words, how much of the flight the warm-up and each kind of cut takes, the largest first."""
+    total = _duration(airborne)
+    takes = [("the warm-up takes", total - _duration(flying))]
+    for reason in sorted({cut.reason for cut in cuts}):
+        own = [cut for cut in cuts if cut.reason == reason]
+        what, verb = (reason, "takes") if len(own) == 1 else (_plural(reason), "take")
+        takes.append((f"{len(own)} {what} {verb}", _duration(flying) - _duration(subtract(flying, own))))
+    told = [f"{words} {taken * 1e-6:.1f} s" for words, taken in sorted(takes, key=lambda one: -one[1]) if taken > 0]
+    return f"of {total * 1e-6:.1f} s in the air " + (", ".join(told) if told else "none is cut")
+
+
+def _plural(reason: str) -> str:
+    first, _, rest = reason.partition(" ")
+    return f"{first}s {rest}"
 
 
 def _failure(record: SetRecord) -> str:
@@ -158,6 +176,18 @@ def cuts_within(
 
     `excluded` takes sets whose own resets would cost the others too much of what the present set leaves of the flight.
     """
+    return _merged(_cuts(records, excluded, flying, present, gaps, settings))
+
+
+def _cuts(
+    records: Sequence[SetRecord],
+    excluded: dict[str, str],
+    flying: Sequence[Interval],
+    present: str,
+    gaps: Sequence[Interval],
+    settings: ScoringSettings,
+) -> list[Cut]:
+    """One cut for each reset and gap; those of several sets at one time are one."""
     after = round(settings.reset_cut_s * 1e6)
     cuts = [Cut(start, stop + after, "gap in the log") for start, stop in gaps]
     of_set = {record.name: _around_resets(record, after) for record in records if record.name not in excluded}
@@ -170,8 +200,7 @@ def cuts_within(
             excluded[name] = f"its resets would cut {lost * 1e-6:.1f} s of {total * 1e-6:.1f} s"
         else:
             cuts += own
-    relevant = [cut for cut in cuts if any(cut.stop > start and cut.start < stop for start, stop in flying)]
-    return _merged(relevant)
+    return [cut for cut in dict.fromkeys(cuts) if any(cut.stop > start and cut.start < stop for start, stop in flying)]
 
 
 def _around_resets(record: SetRecord, after_us: int) -> list[Cut]:

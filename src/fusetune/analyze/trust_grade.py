@@ -110,6 +110,8 @@ class TrustGrade:
     as_logged_grade: str
     as_logged: AsFlownFigures
     repaired: AsFlownFigures
+    is_compared: bool
+    """Whether the log held anything that speaks for the replay, or against it."""
     figure_grades: dict[str, str]
     not_compared: tuple[str, ...]
     """Figures that the log does not let be compared."""
@@ -124,9 +126,14 @@ class Graded(NamedTuple):
     figure_grades: dict[str, str]
     not_compared: tuple[str, ...]
 
+    @property
+    def is_compared(self) -> bool:
+        """Whether anything speaks for the replay, or against it."""
+        return any(name not in _NO_PREDICTION or grade == "D" for name, grade in self.figure_grades.items())
+
 
 _NO_PREDICTION = ("height_resets", *FALLING)
-"""Alone these say nothing of how well the filter predicts."""
+"""Alone these do not speak for a replay: they say nothing of how well the filter predicts."""
 
 
 def grade_of(figures: AsFlownFigures, settings: TrustSettings) -> Graded:
@@ -191,11 +198,12 @@ def grade_flight(
     return TrustGrade(
         grade=graded.grade,
         words=GRADE_WORDS[graded.grade],
-        reason=_reason(graded, repaired, causes, settings),
+        reason=_reason(graded, repaired, causes),
         start=f"{prepared.start.mode}: {prepared.start.why}",
         as_logged_grade=grade_of(raw, settings)[0],
         as_logged=raw,
         repaired=repaired,
+        is_compared=graded.is_compared,
         figure_grades=graded.figure_grades,
         not_compared=graded.not_compared,
         causes=causes,
@@ -203,14 +211,14 @@ def grade_flight(
     )
 
 
-def _reason(graded: Graded, figures: AsFlownFigures, causes: tuple[Cause, ...], settings: TrustSettings) -> str:
+def _reason(graded: Graded, figures: AsFlownFigures, causes: tuple[Cause, ...]) -> str:
     """Why the grade is no A: the figures that have it, those that could not be compared, and the largest cause."""
     if graded.grade == "A":
         return ""
-    if all(name in _NO_PREDICTION and grade != "D" for name, grade in graded.figure_grades.items()):
+    if not graded.is_compared:
         return "the log holds nothing of the vehicle's own estimator that could be compared"
     parts = limits_in_words(figures, [name for name, one in graded.figure_grades.items() if one == graded.grade])
-    if graded.not_compared and _best_without(graded.not_compared, settings) == graded.grade:
+    if graded.not_compared:
         parts.append(not_compared_in_words(graded.not_compared))
     parts += [cause.cause for cause in causes if not cause.repaired and cause.cost > 0.0][:1]
     return "; ".join(parts)

@@ -26,10 +26,10 @@ def limits_in_words(figures: AsFlownFigures, names: Sequence[str]) -> list[str]:
             f"the replay takes its height from the vehicle's sources in only {one.height_flags_equal:.0%} of the time"
         ),
         "innovation_factor": _innovations,
-        "velocity_m_s": lambda one: f"horizontal velocity differs by {one.velocity_m_s:.2g} m/s",
-        "heading_deg": lambda one: f"heading differs by {one.heading_deg:.2g}°",
-        "height_m": lambda one: f"height differs by {one.height_m:.2g} m",
-        "vertical_velocity_m_s": lambda one: f"vertical velocity differs by {one.vertical_velocity_m_s:.2g} m/s",
+        "velocity_m_s": lambda one: f"horizontal velocity differs by {one.velocity_m_s:.3g} m/s",
+        "heading_deg": lambda one: f"heading differs by {one.heading_deg:.3g}°",
+        "height_m": lambda one: f"height differs by {one.height_m:.3g} m",
+        "vertical_velocity_m_s": lambda one: f"vertical velocity differs by {one.vertical_velocity_m_s:.3g} m/s",
         "flags_equal": lambda one: f"the flags agree in {one.flags_equal:.0%} of the time",
     }
     return [words[name](figures) for name in words if name in names]

@@ -188,7 +188,7 @@ def trust_grade(folder: Path) -> tuple[str | None, str]:
         return None, ""
     fidelity = read_document(path)
     trust = fidelity.get("trust", {})
-    return (str(fidelity["grade"]) if trust.get("figure_grades") else None), trust.get("reason", "")
+    return (str(fidelity["grade"]) if trust.get("is_compared") else None), trust.get("reason", "")
 
 
 def white_shares(metrics: pa.Table, present: str) -> dict[str, float]:

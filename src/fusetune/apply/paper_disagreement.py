@@ -239,7 +239,7 @@ def _why_the_paper_prefers(case: Disagreement) -> list[str]:
         return [
             f"“{chosen.name}” has the smaller innovations (aggregate RMS {chosen.aggregate_rms:.3g} against "
             f"{first.aggregate_rms:.3g}), but its mean NIS lies inside the paper's χ² bounds on "
-            f"{chosen.flights_inside} of {chosen.flights} flights only, that of “{first.name}” on "
+            f"{chosen.flights_inside} of {_flights(chosen.flights)} only, that of “{first.name}” on "
             f"{first.flights_inside} of {first.flights}."
         ]
     return [*_smaller_innovations(case), *_consistency(case)]
@@ -255,8 +255,9 @@ def _smaller_innovations(case: Disagreement) -> list[str]:
     main, other = sorted(parts, key=lambda name: parts[name][0] ** 2 - parts[name][1] ** 2)
     sentences = [
         f"It has the lower aggregate RMS, {first.aggregate_rms:.3g} against {chosen.aggregate_rms:.3g} "
-        f"({_change(first.aggregate_rms, chosen.aggregate_rms)}; lower on {lower} of {len(first.flight_rms)} flights), "
-        f"mostly by its {main} innovations ({_change(*parts[main])}; {other} {_change(*parts[other])})."
+        f"({_change(first.aggregate_rms, chosen.aggregate_rms)}; lower on {lower} of "
+        f"{_flights(len(first.flight_rms))}), mostly by its {main} innovations ({_change(*parts[main])}; {other} "
+        f"{_change(*parts[other])})."
     ]
     if main != "velocity" and case.position_white_share < WANDERING:
         sentences.append(
@@ -280,7 +281,7 @@ def _consistency(case: Disagreement) -> list[str]:
         return []
     return [
         f"The mean NIS of “{chosen.name}” lies inside the paper's χ² bounds on {chosen.flights_inside} of "
-        f"{chosen.flights} flights, that of “{first.name}” on {first.flights_inside} of {first.flights}; the bounds "
+        f"{_flights(chosen.flights)}, that of “{first.name}” on {first.flights_inside} of {first.flights}; the bounds "
         "take samples as independent, which these are not."
     ]
 
@@ -295,6 +296,10 @@ def _prediction(where: str, ratio: LogRatio, case: Disagreement) -> str:
     chance = "" if ratio.is_certain or ratio.lower is None else ", which may be chance"
     names = f"the errors of “{case.first.name}” are {size} than those of “{case.chosen.name}”"
     return f"{where}, {names} ({span}){chance}."
+
+
+def _flights(number: int) -> str:
+    return "1 flight" if number == 1 else f"{number} flights"
 
 
 def _change(value: float, base: float) -> str:

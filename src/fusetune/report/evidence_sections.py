@@ -25,8 +25,11 @@ from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY
 def evidence_section(results: Results, figures: Path) -> str:
     """Forest plot, heat map, signs per flight, ranking and objections."""
     rule = results.decision["rule"]
+    title = "What the flights say"
+    if not results.flights:
+        return section(title, paragraph("No flight has a say, so there is nothing to compare the sets by."))
     return section(
-        "What the flights say",
+        title,
         paragraph(
             "Every set was replayed on every flight, so the sets saw the same samples. They are judged by two kinds of "
             "prediction. Aided: of each measurement, one step ahead, before it was used. Unaided: of velocity and "
@@ -37,8 +40,8 @@ def evidence_section(results: Results, figures: Path) -> str:
             figures / "differences.svg",
             f"Dot: mean over the flights; bar: {rule['confidence']:.0%} interval from redrawing flights and their "
             "blocks of about 10 s. A set replaces the present one only if its bar in the first column lies wholly left "
-            "of the line, and none of its other bars wholly right of it. The columns have scales of their own; arrows "
-            "point at what lies outside.",
+            "of the line, and none of its other bars wholly right of it. A dot without a bar: how far chance could do "
+            "that is not known. The columns have scales of their own; arrows point at what lies outside.",
         ),
         objections_table(results),
         figure(
@@ -53,7 +56,9 @@ def evidence_section(results: Results, figures: Path) -> str:
 
 
 def withheld_section(results: Results, figures: Path) -> str:
-    """Drift while sensors are withheld, and the two aims against each other."""
+    """Drift while sensors are withheld, and the two aims against each other; empty where no flight has a say."""
+    if not results.flights:
+        return ""
     parts = [
         paragraph(
             "Several times in each flight GNSS, and at other times the barometer or the magnetometer, was kept from "
@@ -126,7 +131,7 @@ def holds_section(results: Results) -> str:
     if validated is None:
         if not results.flights:
             return ""
-        return section(title, paragraph("With fewer than three flights in the decision none can be left out to see."))
+        return section(title, paragraph("With fewer than three flights that count none can be left out to see."))
     chosen, worth = validated["chosen"], validated["differences"]
     rows = [(flight, set_name(name, results), _worth(worth[flight])) for flight, name in sorted(chosen.items())]
     rows.append((Cell("mean", "quiet"), Cell(""), signed(float(percent_change(validated["difference"])))))

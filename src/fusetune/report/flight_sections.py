@@ -66,7 +66,9 @@ def _part(name: str, results: Results) -> str:
 
 
 def innovations_section(results: Results, figures: Path) -> str:
-    """RMS per variable and set as in the paper's table 12, box plots, consistency, breaks."""
+    """RMS per variable and set as in the paper's table 12, box plots, consistency, breaks; empty without flights."""
+    if not results.flights:
+        return ""
     rms = rms_table(results)
     rows: list[list[Cell | str]] = []
     for variable, values in rms.iterrows():

@@ -113,9 +113,9 @@ def objections_table(results: Results) -> str:
     rows = []
     vetoes = {one["name"]: one["reasons"] for one in results.decision["ranking"]}
     for one in results.ranking.to_dict("records"):
-        reasons = _first_few(vetoes[one["name"]])
+        reasons = []
         if one["name"] != results.present:
-            reasons += [
+            reasons = _first_few(vetoes[one["name"]]) + [
                 f"{AIM_WORDS[aim]} its errors are {_percent(one[f'{aim}_difference']):.1f} % larger than now (interval "
                 f"{interval_text(one[f'{aim}_lower'], one[f'{aim}_upper'])} %)"
                 for aim in worse_aims(one)

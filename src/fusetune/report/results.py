@@ -53,7 +53,8 @@ class Results:
     @property
     def flights(self) -> tuple[str, ...]:
         """Flights that decide, by name: what the figures and tables that compare the sets are made of."""
-        return tuple(name for name in self.scored if name in self.decision["weights"])
+        counted = _counted(self.decision)
+        return tuple(name for name in self.scored if name in counted)
 
     def reason(self, name: str) -> str:
         """Why an analysed flight has no say in the decision; empty where it has."""
@@ -87,11 +88,12 @@ def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results
     decision = read_document(apply_folder / "decision.json")
     ranking = read_table(apply_folder / "ranking.parquet").to_pandas()
     scoring, folders, metrics = {}, {}, []
+    counted = _counted(decision)
     for folder in sorted(map(Path, analyze_folders), key=lambda path: path.name):
         summary = read_document(folder / "scoring.json")
         scoring[summary["flight"]] = summary
         folders[summary["flight"]] = folder
-        if summary["flight"] in decision["weights"]:
+        if summary["flight"] in counted:
             metrics.append(read_table(folder / "metrics.parquet").to_pandas())
     present = decision["present"]
     return Results(
@@ -104,6 +106,11 @@ def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results
         shown=_shown(ranking, present),
         present=present,
     )
+
+
+def _counted(decision: Mapping[str, Any]) -> set[str]:
+    """Flights that have a say in a decision."""
+    return {str(row["flight"]) for row in decision["flights"] if row["scored"]}
 
 
 def _empty_metrics() -> pd.DataFrame:

@@ -7,18 +7,24 @@ from typing import Any
 from fusetune.documents import read_document
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
 
+NOT_COMPARED = "not compared"
 GRADE_KINDS = {"A": "good", "B": "good", "C": "", "D": "bad"}
 FIGURE_WORDS = {
     "innovation_factor": "size of innovations, replay to vehicle",
     "velocity_m_s": "horizontal velocity, RMS difference, m/s",
     "heading_deg": "heading, RMS difference, °",
+    "height_m": "height less its mean, RMS difference, m",
+    "vertical_velocity_m_s": "vertical velocity, RMS difference, m/s",
+    "height_resets": "resets of height, more or fewer",
     "flags_equal": "flags alike, share of time",
+    "height_flags_equal": "height from the same sources, share of time",
 }
 INTRODUCTION = (
     "Each flight was also replayed with the parameters it flew, and the result set beside what the vehicle's own "
-    "estimator logged. The grade follows from the size of the innovations, velocity, heading and flags: A and B repeat "
-    "the flight, of a C only clear differences between sets can be trusted. Logs that lack samples are repaired first; "
-    "how they would stand as they are is shown beside."
+    "estimator logged. The grade follows from the size of the innovations, velocity, heading, height, resets of height "
+    "and flags; what the log does not let be compared limits it. A and B repeat the flight, of a C only clear "
+    "differences between sets can be trusted. Logs that lack samples are repaired first; how they would stand as they "
+    "are is shown beside."
 )
 
 
@@ -74,7 +80,7 @@ def _grade(trust: dict[str, Any]) -> str:
         for group in groups
     ]
     rows += [
-        (words, *_both(trust, name), trust["figure_grades"].get(name, "–"))
+        (words, *_both(trust, name), trust["figure_grades"].get(name, NOT_COMPARED))
         for name, words in FIGURE_WORDS.items()
         if name != "innovation_factor"
     ]
@@ -95,9 +101,17 @@ def _grade(trust: dict[str, Any]) -> str:
 
 
 def _both(trust: dict[str, Any], name: str, group: str = "") -> tuple[str | Cell, str | Cell]:
+    if name == "height_resets":
+        first, second = (_most_parted(trust[kind]["resets"]) for kind in ("as_logged", "repaired"))
+        return first, second
     values = [trust[kind][name].get(group) if group else trust[kind][name] for kind in ("as_logged", "repaired")]
-    first, second = ("–" if value is None else number(value) for value in values)
+    first, second = (NOT_COMPARED if value is None else number(value) for value in values)
     return first, second
+
+
+def _most_parted(resets: dict[str, list[int]]) -> str | Cell:
+    """Number of resets, of height or vertical velocity, by which the replay and the vehicle differ most."""
+    return number(max(abs(ours - theirs) for ours, theirs in resets.values())) if resets else NOT_COMPARED
 
 
 def _figures(flight: dict[str, Any]) -> str:

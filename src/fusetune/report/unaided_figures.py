@@ -21,7 +21,7 @@ def drift_figure(results: Results) -> Figure:
     """Drift of horizontal position and velocity, mean over the flights, above; against the present set, below."""
     columns = [(one, summary) for one in (POSITION, VELOCITY) if len(summary := drift_summary(results, one))]
     if not columns:
-        return empty_figure("GNSS was not withheld on any scored flight: there is no drift to show.")
+        return empty_figure("GNSS was not withheld often enough on any flight that counts to show a drift.")
     with_change = len(results.shown) > 1
     longest = max(len(_label(name, results)) for name in results.shown)
     width = 3.1 * len(columns) + 0.5 + 0.07 * longest
