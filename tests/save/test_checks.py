@@ -9,7 +9,7 @@ import pytest
 from tests.save.made_flight import SLOW_HZ, check_of, judged, made_flight
 
 from fusetune.errors import UserError
-from fusetune.px4.flight import LeftOut, ParameterChange
+from fusetune.px4.flight import Flight, LeftOut, ParameterChange
 from fusetune.px4.release_layouts import canonical
 from fusetune.save.verdict import VerdictThresholds
 
@@ -274,3 +274,106 @@ def test_thresholds_are_checked() -> None:
     with pytest.raises(UserError, match="expected a number"):
         VerdictThresholds.from_mapping({"low_imu_rate_hz": "fast"})
     assert VerdictThresholds.from_mapping({"low_imu_rate_hz": 150}).low_imu_rate_hz == 150.0
+
+
+def without_velocity(version: int) -> Flight:
+    flight = made_flight()
+    flight.info["ver_sw_release"] = version
+    table = flight.topics["vehicle_gps_position", 0]
+    table["vel_ned_valid"] = np.zeros(len(table["timestamp"]), np.bool_)
+    return flight
+
+
+def test_gnss_that_the_estimator_does_not_take_is_no_aid() -> None:
+    flight = without_velocity(0x011000FF)
+    rows = len(flight.topics["vehicle_gps_position", 0]["timestamp"])
+    for name in ("gnss", "horizontal_aid"):
+        check = check_of(flight, name)
+        assert check.status == "warning"
+        assert f"given 0 of {rows} samples of GNSS ({rows} velocity not valid (vel_ned_valid))" in check.reason
+    assert "horizontal aiding by" not in " ".join(judged(flight).warnings)
+    assert f"0 of {rows} of GNSS" in check_of(flight, "samples_given").reason
+
+
+def test_releases_that_took_gnss_without_the_velocity_flag_are_aided_by_it() -> None:
+    flight = without_velocity(0x010B00FF)
+    assert check_of(flight, "gnss").status == "pass"
+    assert check_of(flight, "horizontal_aid").reason == "horizontal aiding by GNSS"
+
+
+def test_gnss_of_which_a_part_is_not_taken_is_warned_of() -> None:
+    flight = without_velocity(0x011000FF)
+    valid = flight.topics["vehicle_gps_position", 0]["vel_ned_valid"]
+    valid[: len(valid) // 2] = True
+    check = check_of(flight, "gnss")
+    assert (check.status, check.figure) == ("warning", len(valid) // 2)
+    assert check_of(flight, "horizontal_aid").status == "pass"
+
+
+@pytest.mark.parametrize(
+    "field", ["latitude_deg", "vel_e_m_s", "eph", "epv", "s_variance_m_s", "fix_type", "satellites_used"]
+)
+def test_gnss_without_a_field_is_left_out_for_that_reason(field: str) -> None:
+    flight = made_flight()
+    table = flight.topics["vehicle_gps_position", 0]
+    rows = len(table.pop(field))
+    verdict = judged(flight)
+    assert verdict.status == "replayable"
+    left_out = check_of(flight, "sensor_values")
+    assert left_out.reason == (f"{rows} messages left out ({rows} of vehicle_gps_position: lacks the field {field})")
+    assert "kept some fields only" in left_out.remedy
+    for name in ("gnss", "horizontal_aid"):
+        check = check_of(flight, name)
+        assert check.status == "warning"
+        assert f"lacks the field {field}" in check.reason
+        assert "kept some fields only" in check.remedy
+    assert not any("3D fix" in warning for warning in verdict.warnings)
+
+
+@pytest.mark.parametrize(
+    ("topic", "field", "name"),
+    [
+        ("vehicle_magnetometer", "magnetometer_ga[1]", "magnetometer"),
+        ("vehicle_air_data", "baro_alt_meter", "barometer"),
+    ],
+)
+def test_sensors_without_a_field_name_it(topic: str, field: str, name: str) -> None:
+    flight = made_flight()
+    flight.parameters.initial["EKF2_GPS_CTRL"] = 7
+    del flight.topics[topic, 0][field]
+    check = check_of(flight, name)
+    assert check.status == "warning"
+    assert f"lacks the field {field}" in check.reason
+    assert "kept some fields only" in check.remedy
+
+
+def test_vision_of_an_unknown_frame_does_not_aid() -> None:
+    flight = made_flight()
+    flight.parameters.initial |= {"EKF2_GPS_CTRL": 0, "EKF2_EV_CTRL": 1}
+    time = flight.topics["vehicle_air_data", 0]["timestamp"]
+    position = {f"position[{axis}]": np.ones(len(time), np.float32) for axis in range(3)}
+    vision = {"timestamp": time, "pose_frame": np.zeros(len(time), np.uint8), **position}
+    flight.topics["vehicle_visual_odometry", 0] = vision
+    said = f"given 0 of {len(time)} samples of external vision's position ({len(time)} of an unknown frame)"
+    assert said in check_of(flight, "horizontal_aid").reason
+    assert check_of(flight, "samples_given").status == "warning"
+    vision["pose_frame"][:] = 2
+    assert check_of(flight, "horizontal_aid").reason == "horizontal aiding by external vision"
+    del vision["pose_frame"]
+    assert "external vision samples that can be used (each lacks the field pose_frame)" in (
+        check_of(flight, "horizontal_aid").reason
+    )
+
+
+def test_a_range_finder_that_looks_elsewhere_measures_no_height() -> None:
+    flight = made_flight()
+    del flight.topics["vehicle_air_data", 0]
+    flight.parameters.initial |= {"EKF2_GPS_CTRL": 0, "EKF2_RNG_CTRL": 2}
+    time = flight.topics["vehicle_magnetometer", 0]["timestamp"]
+    down = np.full(len(time), 25, np.uint8)
+    ranges = {"timestamp": time, "current_distance": np.ones(len(time), np.float32), "orientation": down}
+    flight.topics["distance_sensor", 0] = ranges
+    assert "height from range finder" in check_of(flight, "barometer").reason
+    down[:] = 0
+    assert check_of(flight, "barometer").status == "fail"
+    assert "not facing down" in check_of(flight, "samples_given").reason

@@ -87,6 +87,7 @@ def test_gnss_without_fix_is_refused_only_where_nothing_else_aids() -> None:
     flow = without_fix()
     pixels = {f"pixel_flow[{axis}]": np.zeros(len(time), np.float32) for axis in range(2)}
     pixels["integration_timespan_us"] = np.full(len(time), 50_000, np.uint32)
+    pixels["quality"] = np.full(len(time), 200, np.uint8)
     flow.topics["vehicle_optical_flow", 0] = {"timestamp": time, **pixels}
     assert judged(flow).status == "replayable"
 

@@ -79,7 +79,18 @@ def recover_from_interruption():
 recover_from_interruption()
 
 # Changed sources run again what depends on them.
-BASE = ("checksum_file.py", "documents.py", "errors.py", "files.py", "parquet.py", "px4")
+BASE = ("checksum_file.py", "documents.py", "errors.py", "files.py", "parquet.py", "px4", "time_limit.py")
+GIVEN_SAMPLES = tuple(
+    f"ekf2/{name}.py"
+    for name in (
+        "arrival_order",
+        "given_samples",
+        "message_samples",
+        "range_selection",
+        "sensor_samples",
+        "taken_samples",
+    )
+)
 REPLAY_SOURCES = (
     "ekf2",
     "save",
@@ -95,7 +106,7 @@ REPLAY_SOURCES = (
 DIGEST = {
     "design": source_digest(*BASE, "design"),
     "execute": source_digest(*BASE, "ekf2", "design", "execute"),
-    "save": source_digest(*BASE, "save"),
+    "save": source_digest(*BASE, *GIVEN_SAMPLES, "save"),
     "replay": source_digest(*BASE, *REPLAY_SOURCES),
     "score": source_digest(*BASE, "ekf2", "save", "analyze"),
     "apply": source_digest(*BASE, "apply"),

@@ -11,7 +11,7 @@ from fusetune.ekf2 import message_samples as convert
 from fusetune.ekf2.arrival_order import schedule_runs
 from fusetune.ekf2.message_samples import Refusal
 from fusetune.ekf2.taken_samples import AIDING, TakenSamples
-from fusetune.px4.flight import Flight, TopicTable, row_count
+from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count
 
 NO_NUMBER = convert.NO_NUMBER
 """Reason of messages in which a sensor says itself that it has nothing to say."""
@@ -23,7 +23,8 @@ class GivenSamples:
 
     Attributes
     ----------
-    sensor : an aiding sensor of the estimator's inputs; of vision ``"ev_pos"``, ``"ev_vel"`` and ``"ev_yaw"``
+    sensor : an aiding sensor of the estimator's inputs, and ``"gnss_yaw"``; of vision ``"ev_pos"``, ``"ev_vel"`` and
+        ``"ev_yaw"``
     topic : that it is taken from
     messages : that the log holds
     given : samples that reach the estimator; where the log holds more than one message per run of it, the newest
@@ -58,30 +59,19 @@ def given_samples(flight: Flight) -> dict[str, GivenSamples]:
     return {one.sensor: one for name, take in AIDING.items() for one in _given(flight, name, take(flight, runs))}
 
 
-def _given(flight: Flight, name: str, taken: TakenSamples) -> Iterator[GivenSamples]:
-    release = flight.release
+def _given(flight: Flight, name: str, samples: TakenSamples) -> Iterator[GivenSamples]:
     if name == "ev":
-        yield from _vision_parts(flight, taken)
-    elif name == "range":
-        tables = [flight.topics["distance_sensor", k] for k in flight.instances("distance_sensor")]
-        refused = [refusal for table in tables for refusal in convert.range_refusals(table)]
-        messages = sum(row_count(table) for table in tables)
-        if messages:
-            yield GivenSamples(name, "distance_sensor", messages, _arrived(taken), _counted(refused))
-    elif name == "airspeed":
-        yield from _airspeed(flight, taken)
-    else:
-        topic = _TOPICS[name]
-        table = flight.topic(topic)
-        if table is not None and row_count(table):
-            refusals: Sequence[Refusal] = ()
-            if name == "gnss":
-                refusals = convert.gnss_refusals(table, release)
-            elif name == "flow":
-                refusals = convert.flow_refusals(table)
-            elif name == "auxvel":
-                refusals = convert.auxvel_refusals(table)
-            yield GivenSamples(name, topic, row_count(table), _arrived(taken), _counted(refusals))
+        yield from _vision_parts(flight, samples)
+        return
+    topics, refusals = _messages(flight, name)
+    messages = sum(row_count(table) for table in topics.values())
+    if messages:
+        yield GivenSamples(name, next(iter(topics))[0], messages, _arrived(samples), _counted(refusals))
+    if messages and name == "gnss":
+        given = int(np.isfinite(_arrived_samples(samples)["yaw"]).sum())
+        without = int((~np.isfinite(samples.samples["yaw"])).sum())
+        refused = (("without a heading", without),) if without else ()
+        yield GivenSamples("gnss_yaw", _TOPICS["gnss"], messages, given, refused)
 
 
 _TOPICS = {
@@ -91,34 +81,61 @@ _TOPICS = {
     "flow": "vehicle_optical_flow",
     "auxvel": "landing_target_pose",
 }
+"""Sensors that are taken from instance 0 of one topic."""
 
 
-def _airspeed(flight: Flight, taken: TakenSamples) -> Iterator[GivenSamples]:
-    validated, raw = flight.topic("airspeed_validated"), flight.topic("airspeed")
+def _messages(flight: Flight, name: str) -> tuple[dict[TopicKey, TopicTable], list[Refusal]]:
+    """Topics that a sensor's samples are taken from, and which of their messages are refused."""
+    if name == "range":
+        topics = {key: table for key, table in flight.topics.items() if key[0] == "distance_sensor"}
+        return topics, [refusal for table in topics.values() for refusal in convert.range_refusals(table)]
+    if name == "airspeed":
+        return _airspeed(flight)
+    key = (_TOPICS[name], 0)
+    table = flight.topics.get(key)
+    if table is None:
+        return {}, []
+    refusals = []
+    if name == "gnss":
+        refusals = convert.gnss_refusals(table, flight.release)
+    elif name == "flow":
+        refusals = convert.flow_refusals(table)
+    elif name == "auxvel":
+        refusals = convert.auxvel_refusals(table)
+    return {key: table}, refusals
+
+
+def _airspeed(flight: Flight) -> tuple[dict[TopicKey, TopicTable], list[Refusal]]:
+    keys = [key for key in (("airspeed_validated", 0), ("airspeed", 0)) if key in flight.topics]
     refusals: list[Refusal] = []
-    if validated is not None:
-        refusals += convert.validated_airspeed_refusals(validated, flight.release)
-    if raw is not None:
-        refusals += convert.airspeed_refusals(raw)
-    messages = sum(row_count(table) for table in (validated, raw) if table is not None)
-    if messages:
-        topic = "airspeed" if validated is None else "airspeed_validated"
-        yield GivenSamples("airspeed", topic, messages, _arrived(taken), _counted(refusals))
+    for key in keys:
+        table = flight.topics[key]
+        is_validated = key[0] == "airspeed_validated"
+        refusals += (
+            convert.validated_airspeed_refusals(table, flight.release)
+            if is_validated
+            else convert.airspeed_refusals(table)
+        )
+    return {key: flight.topics[key] for key in keys}, refusals
 
 
-def _vision_parts(flight: Flight, taken: TakenSamples) -> Iterator[GivenSamples]:
-    table: TopicTable | None = flight.topic("vehicle_visual_odometry")
+def _vision_parts(flight: Flight, samples: TakenSamples) -> Iterator[GivenSamples]:
+    table = flight.topic("vehicle_visual_odometry")
     if table is None or not row_count(table):
         return
-    arrived = taken.samples[taken.arrival[taken.arrival >= 0]]
+    arrived = _arrived_samples(samples)
     refusals = convert.vision_refusals(table, flight.release)
     for sensor, part, refused in zip(("ev_pos", "ev_vel", "ev_yaw"), ("pos", "vel", "quat"), refusals, strict=True):
         given = int(np.isfinite(arrived[part]).all(axis=1).sum())
         yield GivenSamples(sensor, "vehicle_visual_odometry", row_count(table), given, _counted(refused))
 
 
-def _arrived(taken: TakenSamples) -> int:
-    return int(np.sum(taken.arrival >= 0))
+def _arrived(samples: TakenSamples) -> int:
+    return int(np.sum(samples.arrival >= 0))
+
+
+def _arrived_samples(samples: TakenSamples) -> np.ndarray:
+    return samples.samples[samples.arrival[samples.arrival >= 0]]
 
 
 def _counted(refusals: Sequence[Refusal]) -> tuple[tuple[str, int], ...]:

@@ -155,7 +155,7 @@ def _bias_resets(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndar
     for sensor in ("accel", "gyro"):
         count = convert.column(imu, f"{sensor}_calibration_count", 0.0)[runs.imu_rows]
         reset = convert.changed_since_previous(count, 0.0)
-        if selection is not None:
+        if selection is not None and f"{sensor}_device_id" in selection:
             newest = runs.newest_message("sensor_selection", selection["timestamp"])
             device = selection[f"{sensor}_device_id"].astype(np.int64)
             seen = np.flatnonzero(newest >= 0)

@@ -104,18 +104,19 @@ def _airspeed(flight: Flight, runs: RunSchedule) -> TakenSamples:
     validated, raw = flight.topic("airspeed_validated"), flight.topic("airspeed")
     samples = np.zeros(0, AIRSPEED_SAMPLE)
     arrival = np.full(len(runs.timestamp), -1)
-    last_validated = np.zeros(len(runs.timestamp), dtype=np.int64)
+    reads_validated = flight.release is None or flight.release >= convert.USES_VALIDATED_AIRSPEED
+    never = 0 if reads_validated else -AIRSPEED_VALIDATED_MAX_AGE_US
+    last_validated = np.full(len(runs.timestamp), never, np.int64)
     is_validated = np.zeros(len(runs.timestamp), dtype=bool)
     if validated is not None:
         samples = convert.validated_airspeed_samples(validated)
         usable = convert.taken(validated, convert.validated_airspeed_refusals(validated, flight.release))
         newest = runs.newest_message("airspeed_validated", validated["timestamp"])
         arrival = only_usable(newest, usable)
-        reads_validated = flight.release is None or flight.release >= convert.USES_VALIDATED_AIRSPEED
         heard = newest if reads_validated else arrival
         is_validated = heard >= 0
-        seen = np.where(is_validated, validated["timestamp"].astype(np.int64)[heard], 0)
-        last_validated = np.concatenate([[0], np.maximum.accumulate(seen)[:-1]])
+        seen = np.where(is_validated, validated["timestamp"].astype(np.int64)[heard], never)
+        last_validated = np.concatenate([[never], np.maximum.accumulate(seen)[:-1]])
     if raw is not None:
         scale = float(flight.parameters.initial.get("ASPD_SCALE_1", 1.0))
         usable = convert.taken(raw, convert.airspeed_refusals(raw))

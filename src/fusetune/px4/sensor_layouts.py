@@ -17,6 +17,9 @@ RELATIVE_TIMESTAMP_INVALID = 0x7FFFFFFF
 DOWNWARD_FACING = 25
 _ROTARY_WING, _FIXED_WING = 1, 2
 _AXES, _QUATERNION_PARTS = 3, 4
+_FLOW_DISTANCE_M = (0.0, 10.0)
+"""Limits of a flow sensor that EKF2 begins with, before one tells its own."""
+
 _POSE_FRAME_OF_LOCAL_FRAME = {0: 1, 1: 2, 3: 3}
 """LOCAL_FRAME_* (NED, FRD, BODY_FRD) of the odometry message as POSE_FRAME_* / VELOCITY_FRAME_* of v1.14."""
 
@@ -69,6 +72,9 @@ def vehicle_gps_position(table: TopicTable) -> TopicTable:
     for name, (old, unit) in scaled.items():
         if name not in result and old in result:
             result[name] = result[old].astype(np.float64) * unit
+    if "heading" in result and "heading_offset" not in result:
+        # both came with v1.9; a heading of the antennas alone is none of the vehicle
+        result["heading"] = np.full_like(result["heading"], np.nan)
     return _with_defaults(
         result,
         timestamp_sample=table["timestamp"],
@@ -144,15 +150,14 @@ def vehicle_optical_flow(table: TopicTable) -> TopicTable:
     }
     result = dict(table)
     result.update({new: table[old] for new, old in renamed.items() if new not in table and old in table})
-    unlimited = np.float32(np.nan)
     # a sensor without a gyro says so by no numbers, and EKF2 takes the IMU's
     result = _without_vectors(result, {"delta_angle": _AXES})
     return _with_defaults(
         result,
         timestamp_sample=table["timestamp"],
-        max_flow_rate=unlimited,
-        min_ground_distance=unlimited,
-        max_ground_distance=unlimited,
+        max_flow_rate=np.float32(np.nan),
+        min_ground_distance=np.float32(_FLOW_DISTANCE_M[0]),
+        max_ground_distance=np.float32(_FLOW_DISTANCE_M[1]),
         distance_m=np.float32(np.nan),
     )
 

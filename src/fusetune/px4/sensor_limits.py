@@ -101,7 +101,12 @@ _NEEDED: Mapping[str, tuple[str, ...]] = {
     "vehicle_imu": (*_names("delta_angle"), *_names("delta_velocity"), "delta_angle_dt", "delta_velocity_dt"),
     "vehicle_command": ("command", *(f"param{number}" for number in range(1, 8))),
     "distance_sensor": ("current_distance",),
-    "vehicle_optical_flow": (*_names("pixel_flow", 2), "integration_timespan_us", "quality", *_names("delta_angle")),
+    "vehicle_optical_flow": (
+        *_names("pixel_flow", 2),
+        *_names("delta_angle"),
+        "integration_timespan_us",
+        "quality",
+    ),
     "vehicle_visual_odometry": (
         *_names("position"),
         *_names("velocity"),

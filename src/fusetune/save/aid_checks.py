@@ -34,6 +34,7 @@ _VISION_PARTS = {
 }
 _WORDS = {
     "gnss": "GNSS",
+    "gnss_yaw": "GNSS's heading",
     "mag": "magnetometer",
     "baro": "barometer",
     "range": "range finder",
@@ -237,10 +238,12 @@ def horizontal_aid(aids: _Aids) -> Check:
     unusable = list(_unusable_aids(aids))
     if never_fixed and not onboard:
         reason = "not replayable with GNSS: it never has a 3D fix, and nothing else aids the horizontal position"
+        others = "; ".join(why for sensor, why, _ in unusable if sensor != "gnss")
+        reason = f"{reason} ({others})" if others else reason
         return Check(name, "fail", reason, "Fly where satellites can be received, or log the other aid", 0.0, 1.0)
     if unusable:
-        reason = f"no horizontal aiding: {'; '.join(why for why, _ in unusable)}{f'; {flown}' if flown else ''}"
-        return Check(name, "warning", reason, unusable[0][1], 0.0, 1.0)
+        reason = f"no horizontal aiding: {'; '.join(why for _, why, _ in unusable)}{f'; {flown}' if flown else ''}"
+        return Check(name, "warning", reason, unusable[0][2], 0.0, 1.0)
     if onboard:
         reason = f"{flown}, whose samples the log lacks: no horizontal aiding"
         return Check(name, "warning", reason, log_more(aids.flight, ""), 0.0, 1.0)
@@ -262,20 +265,23 @@ def _horizontal_aids(aids: _Aids) -> list[str]:
     return found
 
 
-def _unusable_aids(aids: _Aids) -> Iterator[tuple[str, str]]:
-    """Horizontal aids that are switched on and logged, but not given to the estimator: why, and the remedy."""
+def _unusable_aids(aids: _Aids) -> Iterator[tuple[str, str, str]]:
+    """Horizontal aids that are switched on and logged, but not given to the estimator; why not, and the remedy."""
     switched_on = {
         "gnss": aids.uses("EKF2_GPS_CTRL", _HORIZONTAL),
         "ev_pos": aids.uses("EKF2_EV_CTRL", _POSITION),
         "ev_vel": aids.uses("EKF2_EV_CTRL", _VELOCITY),
         "flow": bool(aids.parameters["EKF2_OF_CTRL"]),
     }
-    topics = {"gnss": _GNSS, "ev_pos": _VISION, "ev_vel": _VISION, "flow": "vehicle_optical_flow"}
+    topics = {"gnss": ("GNSS", _GNSS), "flow": ("optical flow", "vehicle_optical_flow")}
+    told = set()
     for sensor in (sensor for sensor, is_on in switched_on.items() if is_on):
-        if aids.lacks_fields(topics[sensor]):
-            yield aids.why_no_samples(topics[sensor], _WORDS[sensor])
+        words, topic = topics.get(sensor, ("external vision", _VISION))
+        if aids.lacks_fields(topic) and topic not in told:
+            told.add(topic)
+            yield sensor, *aids.why_no_samples(topic, words)
         elif sensor in aids.given and _is_withheld(aids.given[sensor]):
-            yield _told(aids.given[sensor]), _DROPPED
+            yield sensor, _told(aids.given[sensor]), _DROPPED
 
 
 def _onboard_aids(flight: Flight) -> list[str]:
@@ -291,6 +297,7 @@ def samples_given(aids: _Aids) -> Check:
     name, parameters = "samples_given", aids.parameters
     switched_on = {
         "gnss": aids.uses("EKF2_GPS_CTRL", ~0),
+        "gnss_yaw": aids.uses("EKF2_GPS_CTRL", _YAW),
         "mag": parameters["EKF2_MAG_TYPE"] != _MAG_TYPE_NONE,
         "baro": bool(parameters["EKF2_BARO_CTRL"]),
         "range": parameters["EKF2_RNG_CTRL"] > 0,
