@@ -89,6 +89,12 @@ def shared_reference() -> Path:
 
 
 @pytest.fixture(scope="session")
+def shared_reference_random() -> Path:
+    """Folder of PX4's own replays with random parameter sets; the test is skipped where it does not exist."""
+    return _shared_part("reference_random")
+
+
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of fact tables; the test is skipped where it does not exist."""
     return _shared_part("data")

@@ -105,6 +105,18 @@ def test_terrain_reset_takes_the_whole_innovation_and_the_height_uncertainty():
     assert ekf["P"][TERRAIN, HEIGHT] == pytest.approx(4.0)
     assert ekf["state_reset"]["hagl_counter"] == 1
     assert ekf["state_reset"]["hagl_change"] == pytest.approx(3.0)
+    assert_holds_what_it_measured(ekf, variance)
+
+
+def assert_holds_what_it_measured(ekf: np.void, variance: float) -> None:
+    """The state is where the sensor says: no innovation is left to be rejected or fused once more."""
+    aid = ekf["aid"]["rng_hgt"]
+    for name in ("innovation", "innovation_filtered", "test_ratio", "test_ratio_filtered"):
+        assert aid[name][0] == 0.0
+    assert aid["innovation_variance"][0] == variance
+    assert aid["fused"]
+    assert not aid["innovation_rejected"]
+    assert aid["time_last_fuse"] == ekf["time_delayed_us"]
 
 
 def test_terrain_first_then_height_when_low_and_slow():
@@ -148,6 +160,39 @@ def test_as_unconditional_reference_the_ground_becomes_the_datum():
     assert ekf["cs"]["rng_hgt"]
     assert not ekf["cs"]["rng_terrain"]
     assert ekf["events"]["reset_hgt_to_rng"]
+
+
+def test_distance_that_became_the_datum_is_not_fused_against_the_old_height():
+    """The height was 478 m off; R = P_zz + 0.1² = 0.02 m² each time, so the first sample leaves the terrain 0.03 m².
+
+    The second resets the height to R and is fused with no innovation: its gain P_zz / R = 1 makes the height as
+    uncertain as terrain and distance together, 0.03 + 0.02.
+    """
+    ekf, params = (
+        _flying(altitude=480.0),
+        make_parameters(EKF2_RNG_CTRL=ENABLED, EKF2_HGT_REF=RANGE, EKF2_RNG_NOISE=0.1, EKF2_RNG_SFE=0.0),
+    )
+    _feed(ekf, params, 2.0)
+    _feed(ekf, params, 2.0)
+    assert ekf["cs"]["rng_hgt"]
+    assert ekf["gpos_alt"] == pytest.approx(2.0, abs=1e-6)
+    assert not ekf["reject"]["hagl"]
+    assert ekf["P"][HEIGHT, HEIGHT] == pytest.approx(0.05)
+    assert_holds_what_it_measured(ekf, ekf["aid"]["rng_hgt"]["observation_variance"][0])
+
+
+def test_height_that_failed_too_long_is_taken_from_the_distance():
+    ekf, params = _flying(), make_parameters(EKF2_RNG_CTRL=ENABLED, EKF2_HGT_REF=RANGE)
+    _feed(ekf, params, 2.0, samples=3)
+    ekf["gpos_alt"] = 9.0
+    ekf["vel"][2] = 1.0
+    at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.05)
+    ekf["time_last_hgt_fuse"] = ekf["time_delayed_us"] - 5_100_000
+    ekf["range_sample"]["time_us"] = ekf["range_newest_time_us"] = ekf["time_delayed_us"] - 3_000
+    control_range_hagl_fusion(ekf, params)
+    assert ekf["gpos_alt"] == pytest.approx(2.0, abs=1e-6)
+    assert ekf["vel"][2] == 0.0
+    assert_holds_what_it_measured(ekf, ekf["aid"]["rng_hgt"]["observation_variance"][0])
 
 
 def test_conditional_reference_keeps_the_height():
