@@ -6,7 +6,6 @@ pyarrow.
 
 from __future__ import annotations
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +14,6 @@ if TYPE_CHECKING:
     from fusetune.save.flights_table import write_flights_table
     from fusetune.save.log_folder import save_log
     from fusetune.save.verdict import Verdict, VerdictThresholds, judge
-
-# Arrow's own allocators hold on to several times the size of a small log. It reads this once, when it is loaded.
-os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 
 __all__ = ["Verdict", "VerdictThresholds", "judge", "load_flight", "save_log", "write_flights_table"]
 
