@@ -158,7 +158,7 @@ def grade_flight(
     prepared = dataclasses.replace(prepared or prepare(flight, replay.reconstruction, replay.start), gaps=())
     comparison = _Comparison(flight, settings)
     repaired = comparison.figures(prepared)
-    raw = comparison.figures(prepare(flight))
+    raw = comparison.figures(_as_logged(flight, prepared, replay))
     grade, figure_grades = grade_of(repaired, settings)
     causes: tuple[Cause, ...] = ()
     if settings.causes and math.isfinite(distance(repaired, settings)):
@@ -180,6 +180,13 @@ def grade_flight(
         causes=causes,
         instances=_instances(flight),
     )
+
+
+def _as_logged(flight: Flight, prepared: PreparedFlight, replay: ReplaySettings) -> PreparedFlight:
+    """The flight as the log is, replayed from nothing; where nothing was missing, with the samples of `prepared`."""
+    if replay.reconstruction is None or prepared.reconstructed.changed:
+        return prepare(flight)
+    return dataclasses.replace(prepared, start=Start(None, "asked for"), handovers=())
 
 
 class _Comparison:
