@@ -72,11 +72,13 @@ def read_schema(path: str | os.PathLike[str]) -> pa.Schema:
         return parquet.schema_arrow
 
 
-def read_pieces(path: str | os.PathLike[str]) -> Iterator[pa.Table]:
-    """Read a Parquet file one row group at a time; raises what `read_table` does."""
+def read_pieces(path: str | os.PathLike[str], columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+    """Read a Parquet file, or some of its columns, one row group at a time; raises what `read_table` does."""
     with _opened(path) as parquet:
         for number in range(parquet.num_row_groups):
-            yield parquet.read_row_group(number, use_threads=False)
+            yield parquet.read_row_group(
+                number, columns=columns if columns is None else list(columns), use_threads=False
+            )
 
 
 def seal(path: str | os.PathLike[str]) -> None:

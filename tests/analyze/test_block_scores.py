@@ -22,9 +22,10 @@ def test_blocks_add_up_and_are_paired(tmp_path: Path) -> None:
     counts = frame.pivot(index="block", columns="set", values="n")
     np.testing.assert_array_equal(counts["present"], counts["other"])
     totals = frame.groupby("set")[["n", "sum_nis", "sum_log_variance", "sum_squared_innovation"]].sum()
-    for row, name in enumerate(pairs.sets):
-        nis = pairs.innovation[row] ** 2 / pairs.innovation_variance[row]
+    for name, one in zip(pairs.sets, pairs.each(), strict=True):
+        innovation, variance = one.innovation[0], one.innovation_variance[0]
+        nis = innovation**2 / variance
         assert totals.loc[name, "n"] == pairs.time.size
         np.testing.assert_allclose(totals.loc[name, "sum_nis"], nis.sum())
-        np.testing.assert_allclose(totals.loc[name, "sum_log_variance"], np.log(pairs.innovation_variance[row]).sum())
-        np.testing.assert_allclose(totals.loc[name, "sum_squared_innovation"], np.sum(pairs.innovation[row] ** 2))
+        np.testing.assert_allclose(totals.loc[name, "sum_log_variance"], np.log(variance).sum())
+        np.testing.assert_allclose(totals.loc[name, "sum_squared_innovation"], np.sum(innovation**2))

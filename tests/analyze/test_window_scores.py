@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.likelihood import gaussian_nll
-from fusetune.analyze.measurement_alignment import PairedSamples
+from fusetune.analyze.measurement_alignment import PairedSamples, paired_rows
 from fusetune.analyze.metrics_table import MetricsTable
 from fusetune.analyze.scoring_window import ScoringWindow
 from fusetune.analyze.window_scores import add_worst_windows, window_edges, window_figures, window_rows
@@ -15,18 +15,18 @@ SECOND = 1_000_000
 def pairs(innovation: np.ndarray, axis: int = 0, variance: float = 1.0) -> PairedSamples:
     """Innovations (S, N) once a second."""
     sets = tuple("ab"[: innovation.shape[0]])
-    variances = np.full(innovation.shape, variance)
-    return PairedSamples(
-        "gnss_vel",
-        axis,
-        sets,
-        np.arange(innovation.shape[1], dtype=np.int64) * SECOND,
-        variances,
-        innovation,
-        variances,
-        np.square(innovation) / 25.0,
-        np.square(innovation) > 25.0,
-    )
+    rows = [
+        paired_rows(
+            {
+                "innovation": one,
+                "innovation_variance": np.full(one.shape, variance),
+                "test_ratio": np.square(one) / 25.0,
+                "rejected": np.square(one) > 25.0,
+            }
+        )
+        for one in innovation
+    ]
+    return PairedSamples("gnss_vel", axis, sets, np.arange(innovation.shape[1], dtype=np.int64) * SECOND, rows)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,9 @@ sys.path.insert(0, str(PROJECT / "src"))
 prepend_to_path_list("PYTHONPATH", str(PROJECT / "src"))
 # The work is small matrices in sequence: threads of a numerics library would cost their start and gain nothing.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# The C library of Linux would keep freed arrays of up to 32 MB for later ones; others do not know these.
+os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", str(1 << 20))
+os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(1 << 20))
 
 from snakemake.exceptions import WorkflowError
 
@@ -99,6 +102,7 @@ REPLAY_SOURCES = (
     "analyze/replay_files.py",
     "analyze/replay_flight.py",
     "analyze/replay_settings.py",
+    "analyze/row_groups.py",
     "analyze/settings.py",
     "analyze/start_choice.py",
     "analyze/withheld_gaps.py",

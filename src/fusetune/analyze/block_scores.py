@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from fusetune.analyze.likelihood import gaussian_nll, student_t_nll, winsor_limit, winsorised
+from fusetune.analyze.likelihood import gaussian_nll, student_t_nll, winsorised
 from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet
 
 BLOCK_SCHEMA = pa.schema(
@@ -37,8 +37,7 @@ def block_rows(flight: str, pairs: PairedSamples, edges: npt.NDArray[np.int64]) 
     starts = np.flatnonzero(np.r_[True, np.diff(block) != 0])
     counts = np.diff(np.r_[starts, block.size])
     sets = len(pairs.sets)
-    limit = winsor_limit(pairs.innovation)
-    sums = [_sums(one, limit, starts) for one in pairs.each()]
+    sums = [_sums(one, pairs.winsor_limit, starts) for one in pairs.each()]
     rows = sets * starts.size
     columns: dict[str, pa.Array] = {
         "flight": pa.array([flight] * rows, pa.string()),

@@ -5,7 +5,7 @@ import numpy.typing as npt
 from scipy.special import betaincinv
 
 from fusetune.analyze.consistency import Bounds
-from fusetune.analyze.measurement_alignment import PairedSamples
+from fusetune.analyze.measurement_alignment import SamplesOfSet
 
 Array = npt.NDArray[np.float64]
 
@@ -15,7 +15,7 @@ def beyond_standard_deviations(innovation: Array, innovation_variance: Array, li
     return np.square(innovation) > limit * limit * innovation_variance
 
 
-def beyond_gate(pairs: PairedSamples) -> npt.NDArray[np.bool_]:
+def beyond_gate(pairs: SamplesOfSet) -> npt.NDArray[np.bool_]:
     """True where the axis is beyond its gate; where its gate is unknown, where the source was rejected."""
     return np.where(np.isfinite(pairs.test_ratio), pairs.test_ratio > 1.0, pairs.rejected)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.set_files import read_columns
+from fusetune.analyze.set_files import read_columns_in_pieces
 from fusetune.ekf2 import state
 
 Array = npt.NDArray[np.float64]
@@ -33,6 +33,16 @@ class FilterStates:
     position_variance: Array
 
 
+_BLOCKS = {
+    "quaternion": ("states", state.PUBLISHED_QUATERNION, 4),
+    "velocity": ("states", state.PUBLISHED_VELOCITY, 3),
+    "attitude_variance": ("covariances", state.ATTITUDE, 3),
+    "velocity_variance": ("covariances", state.VELOCITY, 3),
+    "position_variance": ("covariances", state.POSITION, 3),
+}
+"""Columns of the file that make an array: prefix, first index, number."""
+
+
 def read_states(folder: Path, name: str) -> FilterStates:
     """Read `<folder>/<name>.states.parquet`.
 
@@ -41,25 +51,16 @@ def read_states(folder: Path, name: str) -> FilterStates:
     UserError
         If the file is missing or damaged.
     """
-    published = [*_indices(state.PUBLISHED_QUATERNION, 4), *_indices(state.PUBLISHED_VELOCITY, 3)]
-    blocks = (state.ATTITUDE, state.VELOCITY, state.POSITION)
-    columns = ["timestamp_sample", *(f"states_{i}" for i in published)]
-    columns += [f"covariances_{i}" for first in blocks for i in _indices(first, 3)]
-    table = read_columns(folder / f"{name}.states.parquet", columns)
-
-    def block(prefix: str, first: int, size: int) -> Array:
-        return np.column_stack([table[f"{prefix}_{i}"] for i in _indices(first, size)]).astype(np.float64)
-
-    attitude, velocity, position = (block("covariances", first, 3) for first in blocks)
-    return FilterStates(
-        time=table["timestamp_sample"].astype(np.int64),
-        quaternion=block("states", state.PUBLISHED_QUATERNION, 4),
-        velocity=block("states", state.PUBLISHED_VELOCITY, 3),
-        attitude_variance=attitude,
-        velocity_variance=velocity,
-        position_variance=position,
-    )
-
-
-def _indices(first: int, size: int) -> range:
-    return range(first, first + size)
+    blocks = _BLOCKS.values()
+    columns = [
+        "timestamp_sample",
+        *(f"{prefix}_{i}" for prefix, first, size in blocks for i in range(first, first + size)),
+    ]
+    parts: dict[str, list[npt.NDArray]] = {name: [] for name in ("time", *_BLOCKS)}
+    for piece in read_columns_in_pieces(folder / f"{name}.states.parquet", columns):
+        parts["time"].append(piece["timestamp_sample"].astype(np.int64))
+        for block, (prefix, first, size) in _BLOCKS.items():
+            values = np.column_stack([piece[f"{prefix}_{i}"] for i in range(first, first + size)])
+            parts[block].append(values.astype(np.float64))
+    shapes = {"time": np.zeros(0, np.int64)} | {name: np.zeros((0, size)) for name, (_, _, size) in _BLOCKS.items()}
+    return FilterStates(**{block: np.concatenate([shapes[block], *parts.pop(block)]) for block in shapes})

@@ -34,13 +34,12 @@ def student_t_nll(innovation: Array, innovation_variance: Array, dof: float = ST
     return constant + 0.5 * np.log(scale) + 0.5 * (dof + 1.0) * np.log1p(np.square(innovation) / (dof * scale))
 
 
-def winsor_limit(innovation: npt.NDArray[np.floating]) -> float:
+def winsor_limit(innovation: Array) -> float:
     """Limit beyond which innovations are winsorised: 5 robust standard deviations over all sets together.
 
     It must not depend on S: clipping ν/√S would let a set win by making S small.
     """
-    size = np.abs(innovation).astype(np.float64)
-    median = float(np.median(size, overwrite_input=True))
+    median = float(np.median(np.abs(innovation), overwrite_input=True))
     return WINSOR_STANDARD_DEVIATIONS * _NORMAL_CONSISTENCY * median if median > 0.0 else math.inf
 
 

@@ -6,12 +6,15 @@ another delay stamps the same measurement otherwise. Adding the delay back gives
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.likelihood import winsor_limit
+from fusetune.analyze.sample_spool import SampleSpool, SpooledRows
 from fusetune.analyze.scoring_window import ScoringWindow
 from fusetune.analyze.set_files import AxisSamples, SetRecord, SourceAxis
 from fusetune.analyze.sources import AID_SOURCES
@@ -21,43 +24,54 @@ _TOLERANCE = 0.4
 
 
 @dataclass(frozen=True)
-class PairedSamples:
-    """Samples of one source and axis that all named sets have in common; arrays (S, N), the sets first.
+class SamplesOfSet:
+    """Samples of one source, axis and set, arrays (1, N): the sets first, here the only one.
 
     `time` (N,) is the time of the measurement, µs. Rejected samples are among them: a set that rejects its worst
-    samples must not profit from it. Figures that are exact in single precision, as all of a replay are, are held so:
-    calculate with what `each` gives, which is one set at a time and in double precision.
+    samples must not profit from it.
+    """
+
+    source: str
+    axis: int
+    sets: tuple[str]
+    time: npt.NDArray[np.int64]
+    innovation: npt.NDArray[np.float64]
+    innovation_variance: npt.NDArray[np.float64]
+    test_ratio: npt.NDArray[np.float64]
+    rejected: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class PairedSamples:
+    """Samples of one source and axis that all named sets have in common; calculate with what `each` gives.
+
+    `rows` holds the samples of each set, (N,) with the `FIGURES`, in single precision where that is exact, and may read
+    them from the disk.
     """
 
     source: str
     axis: int
     sets: tuple[str, ...]
     time: npt.NDArray[np.int64]
-    observation_variance: npt.NDArray[np.floating]
-    innovation: npt.NDArray[np.floating]
-    innovation_variance: npt.NDArray[np.floating]
-    test_ratio: npt.NDArray[np.floating]
-    rejected: npt.NDArray[np.bool_]
+    rows: Sequence[np.ndarray]
 
     def each(self) -> Iterator[SamplesOfSet]:
-        """The same of each set alone."""
-        for number, name in enumerate(self.sets):
-            rows = slice(number, number + 1)
-            figures = {figure: getattr(self, figure)[rows].astype(np.float64) for figure in _FIGURES}
-            yield SamplesOfSet(self.source, self.axis, (name,), self.time, rejected=self.rejected[rows], **figures)
+        """The samples of one set after the other, in double precision."""
+        for name, rows in zip(self.sets, self.rows, strict=True):
+            innovation, variance, ratio = (rows[figure].astype(np.float64)[None] for figure in FIGURES[:3])
+            rejected = rows["rejected"][None]
+            yield SamplesOfSet(self.source, self.axis, (name,), self.time, innovation, variance, ratio, rejected)
+
+    @cached_property
+    def winsor_limit(self) -> float:
+        """See `fusetune.analyze.likelihood.winsor_limit`."""
+        together = np.empty((len(self.sets), self.time.size))
+        for number, rows in enumerate(self.rows):
+            together[number] = rows["innovation"]
+        return winsor_limit(together)
 
 
-@dataclass(frozen=True)
-class SamplesOfSet(PairedSamples):
-    """Paired samples of one set, arrays (1, N), in double precision."""
-
-    observation_variance: npt.NDArray[np.float64]
-    innovation: npt.NDArray[np.float64]
-    innovation_variance: npt.NDArray[np.float64]
-    test_ratio: npt.NDArray[np.float64]
-
-
-_FIGURES = ("observation_variance", "innovation", "innovation_variance", "test_ratio")
+FIGURES = ("innovation", "innovation_variance", "test_ratio", "rejected")
 
 
 def each_of(members: Sequence[PairedSamples]) -> Iterator[list[SamplesOfSet]]:
@@ -65,8 +79,17 @@ def each_of(members: Sequence[PairedSamples]) -> Iterator[list[SamplesOfSet]]:
     return (list(one) for one in zip(*(member.each() for member in members), strict=True))
 
 
+def paired_rows(columns: Mapping[str, npt.NDArray]) -> np.ndarray:
+    """Rows of one set for `PairedSamples`, of columns by the names of `FIGURES`."""
+    narrow = {name: narrowed(columns[name]) if name != "rejected" else columns[name] for name in FIGURES}
+    rows = np.empty(len(narrow["rejected"]), np.dtype([(name, values.dtype) for name, values in narrow.items()]))
+    for name, values in narrow.items():
+        rows[name] = values
+    return rows
+
+
 def narrowed(values: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
-    """Values in single precision where that is what they are."""
+    """Values in single precision where that is what they are, as of all figures of a replay."""
     with np.errstate(over="ignore", invalid="ignore"):
         single = values.astype(np.float32)
     return single if np.array_equal(single, values, equal_nan=True) else values
@@ -93,9 +116,17 @@ def match(reference: npt.NDArray[np.int64], time: npt.NDArray[np.int64], toleran
 
 
 def paired_samples(
-    records: Sequence[SetRecord], key: SourceAxis, present: str, window: ScoringWindow
+    records: Sequence[SetRecord],
+    key: SourceAxis,
+    present: str,
+    window: ScoringWindow,
+    spool: SampleSpool | None = None,
 ) -> PairedSamples | None:
     """Common samples of one source and axis inside the window.
+
+    Parameters
+    ----------
+    spool : takes the samples; by default they stay in memory
 
     Returns
     -------
@@ -107,30 +138,23 @@ def paired_samples(
     using = sorted((one for one in records if key in one.first_fused), key=lambda record: record.name != present)
     if not using:
         return None
-    reference = _times_of(using[0], key)
+    reference = measurement_time(using[0].samples[key], source, using[0].parameters)
     if reference.size < 2:
         return None
     tolerance = _TOLERANCE * float(np.median(np.diff(reference)))
     common = window.contains(reference)
     index = []
     for record in using:
-        time, one = _times_of(record, key), record.samples[key]
+        one = record.samples[key]
+        time = measurement_time(one, source, record.parameters)
         row = match(reference, time, tolerance)
         usable = np.isfinite(one.innovation) & np.isfinite(one.innovation_variance) & (one.innovation_variance > 0.0)
         common &= (row >= 0) & usable[row] & (reference >= time[np.argmax(one.fused)])
         index.append(row.astype(np.int32))
     if not common.any():
         return None
-    kept: dict[str, list[npt.NDArray]] = {name: [] for name in (*_FIGURES, "rejected")}
+    kept: list[np.ndarray] | SpooledRows = [] if spool is None else SpooledRows(spool)
     for record, rows in zip(using, index, strict=True):
-        one = record.samples[key]
-        for name, parts in kept.items():
-            values = getattr(one, name)[rows[common]]
-            parts.append(values if name == "rejected" else narrowed(values))
-    stacked = {name: np.stack(parts) for name, parts in kept.items()}
-    sets = tuple(record.name for record in using)
-    return PairedSamples(source=source, axis=axis, sets=sets, time=reference[common], **stacked)
-
-
-def _times_of(record: SetRecord, key: SourceAxis) -> npt.NDArray[np.int64]:
-    return measurement_time(record.samples[key], key[0], record.parameters)
+        one = record.samples[key].rows(rows[common])
+        kept.append(paired_rows({name: getattr(one, name) for name in FIGURES}))
+    return PairedSamples(source, axis, tuple(record.name for record in using), reference[common], kept)

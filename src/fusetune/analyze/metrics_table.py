@@ -79,7 +79,7 @@ def add_axis_metrics(table: MetricsTable, pairs: PairedSamples, settings: Scorin
     """Append all figures of one source and axis for all its sets."""
     if pairs.time.size < FEWEST_SAMPLES:
         return
-    limit = likelihood.winsor_limit(pairs.innovation)
+    limit = pairs.winsor_limit
     table.add_metric_by_metric([_axis_metrics(table.flight, one, limit, settings) for one in pairs.each()])
 
 
@@ -135,7 +135,7 @@ def add_group_metrics(table: MetricsTable, pairs: dict[int, PairedSamples], sett
     pairs : by axis
     """
     for group, members in groups_of(pairs):
-        limits = [likelihood.winsor_limit(one.innovation) for one in members]
+        limits = [one.winsor_limit for one in members]
         table.add_metric_by_metric(
             [_group_metrics(table.flight, group, one, limits, settings) for one in each_of(members)]
         )

@@ -8,10 +8,10 @@ for is read from there.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +71,30 @@ class SampleSpool:
             done += self._file.readinto(content[done : done + count * dtype.itemsize])
         assert done == len(content), "what was put into the spool can be read from it"
         return rows
+
+
+class SpooledRows(Sequence[np.ndarray]):
+    """Arrays of rows, each read from the spool when it is asked for."""
+
+    def __init__(self, spool: SampleSpool) -> None:
+        self._spool = spool
+        self._parts: list[tuple[int, int, np.dtype]] = []
+
+    def append(self, rows: np.ndarray) -> None:
+        self._parts.append((self._spool.put(rows), len(rows), rows.dtype))
+
+    @overload
+    def __getitem__(self, number: int) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[np.ndarray]: ...
+    def __getitem__(self, number: int | slice) -> np.ndarray | list[np.ndarray]:
+        if isinstance(number, slice):
+            return [self[one] for one in range(len(self))[number]]
+        place, count, dtype = self._parts[number]
+        return self._spool.get([(place, count)], dtype)
+
+    def __len__(self) -> int:
+        return len(self._parts)
 
 
 class SpooledSamples(Mapping[SourceAxis, AxisSamples]):

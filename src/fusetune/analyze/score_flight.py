@@ -151,7 +151,7 @@ def score_flight(
     scored = [record for record in records if record.name not in window.excluded] if window.intervals else []
     with tables_in_groups(folder / "samples.parquet", SAMPLES_SCHEMA) as write_samples:
         if scored:
-            blocks, windows = _score_samples(table, scored, present, window, settings, write_samples)
+            blocks, windows = _score_samples(table, scored, present, window, settings, folder, write_samples)
     if scored:
         # Replays from elsewhere, such as PX4's own estimator, come without gaps.
         has_gaps = all((folder / f"{record.name}.withheld.parquet").exists() for record in scored)
@@ -217,14 +217,16 @@ def _score_samples(
     present: str,
     window: ScoringWindow,
     settings: ScoringSettings,
+    folder: Path,
     write_samples: Callable[[pa.Table], None],
 ) -> tuple[list[pa.Table], list[pa.Table]]:
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
     blocks, windows = [], []
     for source in AID_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
+        spool = SampleSpool(folder)
         for axis in range(source.axes):
-            found = paired_samples(records, (source.name, axis), present, window)
+            found = paired_samples(records, (source.name, axis), present, window, spool)
             if found is not None:
                 pairs[axis] = found
         for one in pairs.values():

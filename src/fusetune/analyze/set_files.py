@@ -14,7 +14,15 @@ from fusetune.analyze.sources import AID_SOURCES
 from fusetune.documents import read_document
 from fusetune.parquet import read_pieces, read_schema, read_table
 
-__all__ = ["AxisSamples", "SetRecord", "SourceAxis", "read_columns", "read_innovations", "read_set"]
+__all__ = [
+    "AxisSamples",
+    "SetRecord",
+    "SourceAxis",
+    "read_columns",
+    "read_columns_in_pieces",
+    "read_innovations",
+    "read_set",
+]
 
 Result = TypeVar("Result")
 
@@ -110,6 +118,12 @@ def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.
     """
     table = read_table(path, columns)
     return {name: table[name].to_numpy() for name in table.column_names}
+
+
+def read_columns_in_pieces(path: Path, columns: list[str]) -> Iterator[dict[str, npt.NDArray[Any]]]:
+    """The same, one part of the rows after the other."""
+    for table in read_pieces(path, columns):
+        yield {name: table[name].to_numpy() for name in table.column_names}
 
 
 def column_names(path: Path) -> list[str]:

@@ -190,7 +190,7 @@ def grade_flight(
     prepared = dataclasses.replace(prepared or prepare(flight, replay.reconstruction, replay.start), gaps=())
     comparison = _Comparison(flight, settings)
     repaired = comparison.figures(prepared)
-    raw = comparison.figures(prepare(flight))
+    raw = comparison.figures(_as_logged(flight, prepared, replay))
     graded = grade_of(repaired, settings)
     causes: tuple[Cause, ...] = ()
     if settings.causes and math.isfinite(distance(repaired, settings)):
@@ -222,6 +222,13 @@ def _reason(graded: Graded, figures: AsFlownFigures, causes: tuple[Cause, ...]) 
         parts.append(not_compared_in_words(graded.not_compared))
     parts += [cause.cause for cause in causes if not cause.repaired and cause.cost > 0.0][:1]
     return "; ".join(parts)
+
+
+def _as_logged(flight: Flight, prepared: PreparedFlight, replay: ReplaySettings) -> PreparedFlight:
+    """The flight as the log is, replayed from nothing; where nothing was missing, with the samples of `prepared`."""
+    if replay.reconstruction is None or prepared.reconstructed.changed:
+        return prepare(flight)
+    return dataclasses.replace(prepared, start=Start(None, "asked for"), handovers=())
 
 
 class _Comparison:

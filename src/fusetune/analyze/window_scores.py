@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.break_rate import beyond_gate, beyond_standard_deviations
-from fusetune.analyze.likelihood import gaussian_nll, winsor_limit, winsorised
+from fusetune.analyze.likelihood import gaussian_nll, winsorised
 from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet, each_of
 from fusetune.analyze.metrics_table import MetricsTable
 from fusetune.analyze.scoring_window import ScoringWindow
@@ -87,7 +87,7 @@ def window_figures(members: list[PairedSamples], axis: str, edges: npt.NDArray[n
     index = np.clip(np.searchsorted(edges, first.time, side="right") - 1, 0, edges.size - 2)
     starts = np.flatnonzero(np.r_[True, np.diff(index) != 0])
     counts = np.diff(np.r_[starts, index.size])
-    limits = [winsor_limit(one.innovation) for one in members]
+    limits = [one.winsor_limit for one in members]
     of_sets = [_figures(one, limits, starts, counts) for one in each_of(members)]
     values = {name: np.concatenate([one[name] for one in of_sets]) for name in of_sets[0]}
     return WindowFigures(first.source, axis, first.sets, index[starts], counts, values)

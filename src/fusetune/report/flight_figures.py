@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 
 from fusetune.analyze.attitude import interpolate
 from fusetune.analyze.ground_truth import Truth, read_truth
-from fusetune.analyze.set_files import AxisSamples, SourceAxis, read_columns, read_innovations
+from fusetune.analyze.sample_spool import SampleSpool
+from fusetune.analyze.set_files import AxisSamples, ColumnsOnDisk, SourceAxis, read_innovations
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.documents import read_document
 from fusetune.px4.flight import Flight
@@ -40,7 +41,9 @@ _SMALLEST_RATIO = 1e-4
 class _FlightData:
     """What the panels draw: replays of the sets and, of the flight itself, start and truth."""
 
-    def __init__(self, flight_folder: Path, analyze_folder: Path, sets: Sequence[str], present: str) -> None:
+    def __init__(
+        self, flight_folder: Path, analyze_folder: Path, sets: Sequence[str], present: str, spool: SampleSpool
+    ) -> None:
         self.summary: dict[str, Any] = read_document(analyze_folder / "scoring.json")
         topics = ("vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth")
         flight: Flight = load_flight(flight_folder, topics=topics)
@@ -50,12 +53,11 @@ class _FlightData:
         names = [present, *(name for name in sets if name != present)][:_MOST_SETS]
         self.sets = [name for name in names if self.summary["sets"].get(name, {}).get("status") in _DRAWN]
         self.samples: dict[str, Mapping[SourceAxis, AxisSamples]] = {}
-        self.local: dict[str, dict[str, npt.NDArray]] = {}
+        self.local: dict[str, ColumnsOnDisk] = {}
         for name in self.sets:
             parameters = self.summary["sets"][name]["parameters"]
-            self.samples[name] = read_innovations(analyze_folder / f"{name}.innovations.parquet", parameters)
-            columns = ["timestamp", "x", "y", "z", "xy_valid"]
-            self.local[name] = read_columns(analyze_folder / f"{name}.local_position.parquet", columns)
+            self.samples[name] = read_innovations(analyze_folder / f"{name}.innovations.parquet", parameters, spool)
+            self.local[name] = ColumnsOnDisk(analyze_folder / f"{name}.local_position.parquet")
 
     def seconds(self, time: npt.NDArray[np.int64]) -> Array:
         """Seconds since the start of the log."""
@@ -74,11 +76,13 @@ def plot_flight(
     sets : names of the sets; the present one and the first seven others are drawn
     output : the picture
     """
-    data = _FlightData(Path(flight_folder), Path(analyze_folder), sets, present)
+    output = Path(output)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    data = _FlightData(Path(flight_folder), Path(analyze_folder), sets, present, SampleSpool(output.parent))
     with figure_style():
         if present not in data.sets:
             reason = data.summary["sets"][present]["reason"]
-            save_png(empty_figure(f"The replay of the present set did not come to its end: {reason}"), Path(output))
+            save_png(empty_figure(f"The replay of the present set did not come to its end: {reason}"), output)
             return
         figure = new_figure(10.0, 6.8, layout=None)
         margins = {"left": 0.06, "right": 0.985, "bottom": 0.07, "top": 0.965, "hspace": 0.42, "wspace": 0.24}
@@ -90,7 +94,7 @@ def plot_flight(
         _ratios_by_source(first, data)
         _ratios_by_set(figure.add_subplot(grid[1, 1], sharex=first), data, colours)
         _breaks(figure.add_subplot(grid[2, 1], sharex=first), data, colours)
-        save_png(figure, Path(output))
+        save_png(figure, output)
 
 
 def _track(axes: Axes, data: _FlightData, colours: dict[str, str]) -> None:
@@ -228,8 +232,8 @@ def _breaks(axes: Axes, data: _FlightData, colours: dict[str, str]) -> None:
     for row, name in enumerate(data.sets):
         times = [
             one.timestamp_sample[one.rejected & (np.arange(one.fused.size) >= np.argmax(one.fused))]
-            for (source, axis), one in data.samples[name].items()
-            if axis == 0 and source in _SOURCES and one.fused.any()
+            for source, axis in data.samples[name]
+            if axis == 0 and source in _SOURCES and (one := data.samples[name][source, axis]).fused.any()
         ]
         time = data.seconds(np.concatenate(times)) if times else np.zeros(0)
         axes.plot(time, np.full(time.size, row), "|", color=colours[name], markersize=7, markeredgewidth=0.8)

@@ -6,7 +6,6 @@ pyarrow.
 
 from __future__ import annotations
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +15,6 @@ if TYPE_CHECKING:
     from fusetune.save.log_folder import save_log
     from fusetune.save.present import Present, find_present, read_present, write_present
     from fusetune.save.verdict import Verdict, VerdictThresholds, judge
-
-# Arrow's own allocators hold on to several times the size of a small log. It reads this once, when it is loaded.
-os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 
 __all__ = [
     "Present",
