@@ -22,7 +22,7 @@ include: "workflow/rules/report.smk"
 
 
 wildcard_constraints:
-    flight="|".join(map(re.escape, LOGS)),
+    flight="|".join(map(re.escape, LOGS)) or NO_FLIGHT,
 
 
 rule all:
@@ -31,6 +31,10 @@ rule all:
         rules.design.output,
         rules.decide.output,
         rules.build_report.output,
+
+
+for each in workflow.rules:
+    each.set_input(before_any_job)
 
 
 onstart:

@@ -1,6 +1,7 @@
 # Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
 import csv
 import json
+from dataclasses import astuple
 
 REPLAY_PARTS = (
     "innovations.parquet",
@@ -35,11 +36,21 @@ def read_csv(path):
 
 
 def replayable_rows():
-    return [row for row in read_csv(checkpoints.list_flights.get().output.csv) if row["status"] == "replayable"]
+    rows = read_csv(checkpoints.list_flights.get().output.csv)
+    # What other flights left here is no answer to these; a dry run, which mends nothing, may meet it.
+    return [row for row in rows if row["status"] == "replayable" and row["flight"] in LOGS]
 
 
 def replayable_flights():
     return [row["flight"] for row in replayable_rows()]
+
+
+def flown_log(flight):
+    """Path, name to show and content of a log that was flown; None for a simulated one, which is an input."""
+    if DEMONSTRATED:
+        return None
+    log = FLOWN_LOGS[flight]
+    return {"path": log.path, "shown": log.shown, "checksum": CONTENT.of(log.path)}
 
 
 def of_replayable_flights(patterns):
@@ -85,7 +96,7 @@ def closing_words():
     if not os.path.exists("results/save/flights.csv"):
         return "Done."
     statuses = [row["status"] for row in read_csv("results/save/flights.csv")]
-    kind = "flights" if FLOWN_LOGS else "simulated flights"
+    kind = "simulated flights" if DEMONSTRATED else "flights"
     refused = len(statuses) - statuses.count("replayable")
     flights = f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv)."
     if not os.path.exists("results/report.html"):

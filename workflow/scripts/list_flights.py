@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from fusetune.save import write_flights_table
+from fusetune.save.discovery import RefusedEntry
 
 from job import keep_out, logged_job
 
@@ -11,4 +12,5 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    write_flights_table(snakemake.input.folders, snakemake.output.table, snakemake.output.csv)
+    refused = [RefusedEntry(*entry) for entry in snakemake.params.refused]
+    write_flights_table(snakemake.input.folders, snakemake.output.table, snakemake.output.csv, refused)
