@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
 from fusetune.px4.ulog_reader import file_checksum, read_ulog
+from fusetune.save.discovery import printable
 from fusetune.save.flight_folder import METADATA_FILE, write_flight
 from fusetune.save.log_facts import log_facts
 from fusetune.save.verdict import Verdict, VerdictThresholds, judge, unreadable
@@ -21,7 +23,12 @@ VERDICT_FILE = "verdict.json"
 
 
 def save_log(
-    log: str | os.PathLike[str], folder: str | os.PathLike[str], thresholds: VerdictThresholds | None = None
+    log: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    thresholds: VerdictThresholds | None = None,
+    *,
+    shown: str | None = None,
+    checksum: str | None = None,
 ) -> Verdict:
     """Save a log: tables, `metadata.json` and `verdict.json`, which `metadata.json` repeats.
 
@@ -33,9 +40,13 @@ def save_log(
     log
         ULog file.
     folder
-        Folder of the flight.
+        Folder of the flight, by whose name the flight is known.
     thresholds
         From where on a flight can be replayed.
+    shown
+        The file as it is told of; its name by default.
+    checksum
+        SHA-256 that the log has to have. With another one it is refused: it changed after it was asked for.
 
     Raises
     ------
@@ -47,7 +58,8 @@ def save_log(
     try:
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir(parents=True)
-        verdict = _write(Path(log), partial, thresholds or VerdictThresholds())
+        source = _Source(Path(log), target.name, shown or printable(Path(log).name), checksum)
+        verdict = _write(source, partial, thresholds or VerdictThresholds())
         shutil.rmtree(target, ignore_errors=True)
         os.replace(partial, target)
     except OSError as error:
@@ -55,18 +67,33 @@ def save_log(
     return verdict
 
 
-def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
+@dataclass(frozen=True)
+class _Source:
+    log: Path
+    flight: str
+    shown: str
+    checksum: str | None
+
+
+def _write(source: _Source, folder: Path, thresholds: VerdictThresholds) -> Verdict:
     try:
-        flight = read_ulog(log)
+        flight = replace(read_ulog(source.log), name=source.flight)
+        _demand_checksum(source, flight.checksum)
     except UserError as error:
-        verdict = unreadable(log.stem, error)
-        _write_json(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
+        verdict = unreadable(source.flight, error)
+        _write_json(folder / METADATA_FILE, _metadata_of_unreadable(source) | {"verdict": verdict.document()})
     else:
         verdict = _judge(flight, thresholds)
-        extra = {"file": log.name, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
+        extra = {"file": source.shown, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
         write_flight(folder, flight, extra | log_facts(flight))
     _write_json(folder / VERDICT_FILE, verdict.document())
     return verdict
+
+
+def _demand_checksum(source: _Source, read: str) -> None:
+    if source.checksum not in (None, read):
+        reason = "changed between the start of the run and its reading"
+        raise UserError(source.log, reason, "Run the pipeline again when nothing writes to the log any more")
 
 
 def _judge(flight: Flight, thresholds: VerdictThresholds) -> Verdict:
@@ -83,12 +110,12 @@ def _present_ekf2(flight: Flight) -> dict[str, float]:
     return migrate(flight.parameters.at_end(), flight.release)
 
 
-def _metadata_of_unreadable(log: Path) -> dict[str, Any]:
+def _metadata_of_unreadable(source: _Source) -> dict[str, Any]:
     try:
-        checksum, size = file_checksum(log), log.stat().st_size
+        checksum, size = file_checksum(source.log), source.log.stat().st_size
     except (UserError, OSError):
         checksum, size = "", 0
-    return {"name": log.stem, "file": log.name, "checksum": checksum, "size_bytes": size}
+    return {"name": source.flight, "file": source.shown, "checksum": checksum, "size_bytes": size}
 
 
 def _write_json(file: Path, document: dict[str, Any]) -> None:
