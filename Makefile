@@ -1,6 +1,7 @@
 # make       sets up .venv where that is needed, then runs the pipeline
 # make test  sets up .venv where that is needed, then runs the tests
 CORES ?= 2
+EXTRAS ?= dev
 PYTHON ?= $(shell command -v python3.11 || command -v python3 || command -v python)
 BIN := .venv/bin
 READY := .venv/.ready
@@ -25,11 +26,11 @@ $(READY): requirements.lock pyproject.toml
 	@if command -v uv >/dev/null 2>&1; then \
 		echo "Setting up .venv with uv ..." && \
 		{ [ -d .venv ] || uv venv --quiet --python '>=3.11' .venv; } && \
-		uv pip install --quiet --python $(BIN)/python -c requirements.lock -e '.[dev]'; \
+		uv pip install --quiet --python $(BIN)/python -c requirements.lock -e '.[$(EXTRAS)]'; \
 	elif [ -n "$(PYTHON)" ] && "$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then \
 		echo "Setting up .venv with pip ..." && \
 		{ [ -d .venv ] || "$(PYTHON)" -m venv .venv; } && \
-		$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[dev]'; \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[$(EXTRAS)]'; \
 	else \
 		echo "fusetune needs Python 3.11 or newer, or uv: install one of them and run make again." >&2; exit 1; \
 	fi

@@ -25,7 +25,7 @@ include: "workflow/rules/report.smk"
 
 
 wildcard_constraints:
-    flight="|".join(map(re.escape, LOGS)),
+    flight="|".join(map(re.escape, LOGS)) or NO_FLIGHT,
 
 
 # What needs seconds of one core for all flights together runs beside Snakemake itself, wherever the flights are sent.
@@ -44,6 +44,10 @@ rule all:
         rules.design.output,
         rules.decide.output,
         rules.build_report.output,
+
+
+for each in workflow.rules:
+    each.set_input(before_any_job)
 
 
 onstart:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
 
 RUN_AGAIN = "Delete it and run the pipeline again"
 """What mends a damaged file of results."""
 FOLDER_AGAIN = "Delete the whole folder {folder} and run the pipeline again"
 """What mends a file in the folder of a saved flight: the pipeline knows the folder, not the files in it."""
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 class UserError(Exception):
@@ -31,3 +34,22 @@ class UserError(Exception):
 
     def __str__(self) -> str:
         return f"{self.file}: {self.reason}. {self.remedy}."
+
+
+def write_error(error: OSError, place: str | os.PathLike[str]) -> UserError | None:
+    """What a failure to write means for the user; `None` for one that is no matter of room or of permissions.
+
+    Parameters
+    ----------
+    place
+        File or folder to name where the error does not say which file it was.
+    """
+    # libraries in C++ hand the reason on as text only
+    number = error.errno or next((code for code in _NO_ROOM if os.strerror(code) in str(error)), None)
+    if number in _NO_ROOM:
+        remedy = "Make room on that disk and start again; what is finished stays"
+    elif number in _NOT_ALLOWED:
+        remedy = "Mend the permissions, or work in a folder that can be written"
+    else:
+        return None
+    return UserError(error.filename or place, f"cannot be written ({os.strerror(number)})", remedy)

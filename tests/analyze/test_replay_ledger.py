@@ -23,7 +23,7 @@ def flight(tmp_path: Path) -> Path:
 
 
 def ledger(flight: Path, made_with: object = "settings") -> ReplayLedger:
-    return ReplayLedger(flight.parent / "ledger.json", flight, flight.parent, made_with)
+    return ReplayLedger(flight, flight.parent, made_with)
 
 
 def replay(flight: Path) -> None:
@@ -42,6 +42,14 @@ def test_a_new_set_and_one_with_other_values_are_outdated(flight: Path) -> None:
     replay(flight)
     changed = {"low": {"EKF2_ACC_NOISE": 0.3}, "new": {"EKF2_ACC_NOISE": 0.5}}
     assert ledger(flight).outdated(SETS | changed) == changed
+
+
+def test_sets_that_other_jobs_replayed_are_up_to_date(flight: Path) -> None:
+    replay(flight)
+    for name, values in SETS.items():
+        assert ledger(flight).outdated({name: values, "new": {}}) == {"new": {}}
+    ledger(flight).record({})
+    assert ledger(flight).outdated(SETS) == {}
 
 
 def test_other_settings_outdate_all(flight: Path) -> None:

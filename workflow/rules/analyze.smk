@@ -26,7 +26,6 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
         params:
             sets=overrides_of(chunk),
             replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},
-            ledger=f"results/analyze/{{flight}}/.replay_{number}.json",
             code=DIGEST["replay"],
         message:
             f"Analyze: replay {{wildcards.flight}} with {', '.join(chunk)}"
@@ -55,7 +54,6 @@ rule analyze_flight:
     params:
         sets=overrides_of(REPLAY_CHUNKS[-1]),
         replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},
-        ledger=f"results/analyze/{{flight}}/.replay_{len(REPLAY_CHUNKS)}.json",
         code=DIGEST["replay"],
         scored=SETS,
         present=PRESENT,

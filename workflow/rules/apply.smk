@@ -40,6 +40,7 @@ rule decide:
         descriptions={pset.name: pset.description for pset in STUDY.sets},
         decision=SETTINGS["decision"],
         seed=SETTINGS["seed"],
+        contents=contents(*CONFIGURATION_FILES),
         code=DIGEST["apply"],
     message:
         "Apply: decide over {params.sets}"

@@ -1,5 +1,6 @@
 # Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
 import csv
+from dataclasses import astuple
 
 from fusetune.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
@@ -47,7 +48,16 @@ def read_csv(path):
 
 def replayable_flights():
     rows = read_csv(checkpoints.list_flights.get().output.csv)
-    return [row["flight"] for row in rows if row["status"] == "replayable"]
+    # What other flights left here is no answer to these; a dry run, which mends nothing, may meet it.
+    return [row["flight"] for row in rows if row["status"] == "replayable" and row["flight"] in LOGS]
+
+
+def flown_log(flight):
+    """Path, name to show and content of a log that was flown; None for a simulated one, which is an input."""
+    if DEMONSTRATED:
+        return None
+    log = FLOWN_LOGS[flight]
+    return {"path": log.path, "shown": log.shown, "checksum": CONTENT.of(log.path)}
 
 
 def of_replayable_flights(patterns):
@@ -73,7 +83,7 @@ def closing_words():
     if not os.path.exists("results/save/flights.csv"):
         return "Done."
     statuses = [row["status"] for row in read_csv("results/save/flights.csv")]
-    kind = "flights" if FLOWN_LOGS else "simulated flights"
+    kind = "simulated flights" if DEMONSTRATED else "flights"
     refused = len(statuses) - statuses.count("replayable")
     flights = f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv)."
     if not os.path.exists("results/report.html"):

@@ -4,9 +4,11 @@ import re
 from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study
 from fusetune.execute.vehicle import load_vehicle
+from fusetune.save.discovery import discover_logs
 
 PRESENT = "present"
 AS_FLOWN = "as_flown"
+NO_FLIGHT = "(?!)"
 CONFIG_FILE = configuration_files()[-1]
 
 
@@ -20,29 +22,17 @@ def with_defaults(values, schema):
     return values
 
 
-def discovered_logs():
-    """Logs in the folder of flights and in folders below it, name of the flight -> file."""
+def discovery():
+    """Logs in the folder of flights and in folders below it, and what looks like one and cannot be flown."""
     folder = SETTINGS["flights_dir"]
-    if not os.path.isdir(folder):
+    try:
+        return discover_logs(folder)
+    except OSError as error:
         raise UserError(
             CONFIG_FILE,
-            f"flights_dir is {folder!r}, which is no folder",
-            "Make it or name another",
-        )
-    found = glob_wildcards(os.path.join(folder, "{flight}.{suffix,[uU][lL][gG]}"))
-    logs = {}
-    for stem, suffix in sorted(zip(found.flight, found.suffix)):
-        file, flight = os.path.join(folder, f"{stem}.{suffix}"), os.path.basename(stem)
-        if flight.startswith("."):
-            continue
-        if flight in logs:
-            raise UserError(
-                file,
-                f"gives the same flight name as {logs[flight]}",
-                "Rename one of the two",
-            )
-        logs[flight] = file
-    return logs
+            f"flights_dir is {folder!r}, which is no folder that can be read ({error.strerror})",
+            "Make it, mend its permissions, or name another",
+        ) from error
 
 
 def demonstration_flights():
@@ -84,8 +74,11 @@ VARIED = sorted({name for overrides in OVERRIDES.values() for name in overrides}
 REPLAYED = [*SETS, AS_FLOWN]
 DEMONSTRATION = demonstration_flights()
 FAULTS = told_in_one_line(checked_faults)
-FLOWN_LOGS = told_in_one_line(discovered_logs)
-LOGS = FLOWN_LOGS or {flight: f"results/execute/{flight}.ulg" for flight in DEMONSTRATION}
+FOUND = told_in_one_line(discovery)
+FLOWN_LOGS = {log.flight: log for log in FOUND.logs}
+# A folder with nothing but entries that cannot be flown is not empty: its user waits for a word on those.
+DEMONSTRATED = not (FOUND.logs or FOUND.refused)
+LOGS = {flight: f"results/execute/{flight}.ulg" for flight in DEMONSTRATION} if DEMONSTRATED else list(FLOWN_LOGS)
 if SETTINGS["present_flight"] not in (None, *LOGS):
     raise WorkflowError(
         f"{CONFIG_FILE}: present_flight is {SETTINGS['present_flight']!r}, which is no flight in "
@@ -96,7 +89,12 @@ CONFIGURATION_FILES = [
     SETTINGS["study"],
     SETTINGS["mission"],
 ]
-if not FLOWN_LOGS and workflow.is_main_process:
+if DEMONSTRATED and workflow.is_main_process:
     told_in_one_line(check_demonstration)
-if not FLOWN_LOGS:
+if DEMONSTRATED:
     CONFIGURATION_FILES.append(SETTINGS["demonstration"]["vehicle"])
+
+
+def contents(*files):
+    """Params function: what files hold, so that one that is exchanged for an older one is noticed, too."""
+    return lambda wildcards: {str(file): CONTENT.of(file) for file in files}

@@ -16,6 +16,7 @@ rule design:
     conda:
         "../envs/fusetune.yaml"
     params:
+        contents=contents(SETTINGS["study"], SETTINGS["mission"]),
         code=DIGEST["design"],
     message:
         "Design: write the mission plan and {STUDY.name}'s parameter sets"

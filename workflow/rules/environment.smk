@@ -1,13 +1,22 @@
 # Where jobs find the package and its compiled kernels, and how a run goes on after one that was killed.
-import base64
 import os
-import shutil
+import signal
 import sys
+from functools import cache
 from pathlib import Path
 
 PROJECT = Path(workflow.basedir)
 STATE = Path(".snakemake")
+RESULTS = Path("results")
 LONGEST_JOB_S = 600.0
+
+
+def end_quietly(number, frame):
+    raise SystemExit(128 + number)
+
+
+# Python would show where it was, which helps nobody. Snakemake ends its jobs on this as on a KeyboardInterrupt.
+signal.signal(signal.SIGINT, end_quietly)
 
 
 def prepend_to_path_list(variable, folder):
@@ -26,27 +35,33 @@ os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(1 << 20))
 from snakemake.exceptions import WorkflowError
 
 from fusetune.cluster_jobs import cancel_queued_jobs
+from fusetune.content import ContentDigests
 from fusetune.digest import source_digest
-from fusetune.errors import UserError
+from fusetune.errors import UserError, write_error
 from fusetune.kernel_cache import use_kernel_cache
-from fusetune.run_lock import claim_run, wait_for_jobs
+from fusetune.recovery import (
+    belong_together,
+    bind_together,
+    remove,
+    remove_stale_locks,
+    remove_unfinished,
+    unfinished_files,
+)
+from fusetune.run_lock import RUN_VARIABLE, claim_run, holder_of, join_run, new_run, wait_for_jobs
+
+CONTENT = ContentDigests(STATE / "fusetune_contents.json")
 
 
-def unfinished_files():
-    """Files of jobs that never ended, each with the marker that Snakemake keeps for it: its name in base 64, cut at '@'."""
-    for marker in STATE.glob("incomplete/**/*"):
-        if marker.is_file():
-            parts = marker.relative_to(STATE / "incomplete").parts
-            name = base64.urlsafe_b64decode("".join(part.removeprefix("@") for part in parts)).decode()
-            yield Path(name), marker
+# A job knows by its name the run that it works for.
+if workflow.is_main_process:
+    RUN = new_run()
+if RUN_VARIABLE in os.environ:
+    workflow.register_envvars(RUN_VARIABLE)
 
 
 def cancel_jobs_of_interrupted_run():
     """Jobs that wait in Slurm's queue would start beside those of this run."""
-    try:
-        jobs = cancel_queued_jobs(STATE)
-    except UserError as error:
-        raise WorkflowError(str(error)) from None
+    jobs = cancel_queued_jobs(STATE)
     if jobs:
         numbers = ", ".join(job.number for job in jobs)
         print(
@@ -55,31 +70,73 @@ def cancel_jobs_of_interrupted_run():
         )
 
 
-def recover_from_interruption():
-    """Let a run go on where a killed one stopped.
+def told_and_ended(error):
+    """End the process with one sentence; Snakemake would tell of an error in an input function as of a programmer's."""
+    print(error, file=sys.stderr)
+    raise SystemExit(1)
 
-    Snakemake's lock is a file that outlives a killed process. Whoever gets ours, which the operating system drops with
-    its holder, knows that such a file is stale. Jobs that outlived their run are waited for. Snakemake looks for
-    unfinished files before it knows the jobs behind a checkpoint; taking such files away makes them be made again.
-    """
-    if not workflow.is_main_process or not claim_run(STATE):
-        return
+
+def recover_from_interruption(claim):
+    """Let a run go on where a killed one stopped; this process holds the folder."""
     cancel_jobs_of_interrupted_run()
     if not wait_for_jobs(STATE, 0.0):
         print("Waiting for the jobs that an interrupted run left at work ...", file=sys.stderr)
         if not wait_for_jobs(STATE, LONGEST_JOB_S):
-            raise WorkflowError("Jobs of an interrupted run are still at work here; end them and start again.")
-    for lock in STATE.glob("locks/*.lock"):
-        lock.unlink(missing_ok=True)
-    for file, marker in list(unfinished_files()):
-        if file.is_dir():
-            shutil.rmtree(file)
-        else:
-            file.unlink(missing_ok=True)
-        marker.unlink()
+            told_and_ended("Jobs of an interrupted run are still at work here. End them and start again.")
+    remove_stale_locks(STATE, claim)
+    remove_unfinished(unfinished_files(STATE, PRODUCTS))
+    if not belong_together(STATE, RESULTS):
+        flights = Path(SETTINGS["flights_dir"]).resolve()
+        for part in BELIEVED:
+            if part.resolve() not in (flights, *flights.parents):
+                remove(part)
+        bind_together(STATE, RESULTS)
 
 
-recover_from_interruption()
+def tell_what_a_run_would_mend():
+    if any(unfinished_files(STATE, PRODUCTS)):
+        who = holder_of(STATE) or "it said that it ended"
+        print(f"Some files are unfinished: a run is at work here, or was interrupted ({who}).", file=sys.stderr)
+    if RESULTS.exists() and not belong_together(STATE, RESULTS):
+        print("Nothing is known of how results/ was made; the next run makes it again.", file=sys.stderr)
+
+
+@cache
+def take_the_folder():
+    if not workflow.is_main_process:
+        return
+    # Only to run jobs, to try it, or to touch files is an executor named: not to report, to list, to clean up ...
+    if workflow.executor_plugin is None or workflow.dryrun:
+        tell_what_a_run_would_mend()
+        return
+    try:
+        claim = claim_run(STATE, RUN)
+        if not claim.locked:
+            print("No locks in this file system: after a killed run use snakemake --unlock.", file=sys.stderr)
+        elif not workflow.touch:
+            recover_from_interruption(claim)
+            CONTENT.save()
+    except UserError as error:
+        told_and_ended(error)
+    except OSError as error:
+        told_and_ended(write_error(error, os.getcwd()) or error)
+
+
+def before_any_job(wildcards):
+    """Input function of every rule, which gives no file.
+
+    Snakemake asks for the input of jobs after it has said what it is about to do, and before it looks for locks and
+    unfinished files. What is true only for a process that will run jobs is done here.
+    """
+    take_the_folder()
+    return []
+
+
+if not workflow.is_main_process:
+    try:
+        join_run(STATE)
+    except UserError as error:
+        told_and_ended(error)
 
 # Changed sources run again what depends on them.
 BASE = ("checksum_file.py", "documents.py", "errors.py", "files.py", "parquet.py", "px4", "time_limit.py")
@@ -119,3 +176,8 @@ DIGEST = {
 
 # Kernels are compiled once by a rule; the folder is named by the state of their sources.
 KERNELS_READY = os.path.join(use_kernel_cache(), "ready.json")
+
+# What this workflow makes; and of that, what Snakemake takes for up to date when it has no memory of it. Replays are not
+# among it: they are made from a saved flight, and keep a record of their own.
+PRODUCTS = [RESULTS, Path(KERNELS_READY)]
+BELIEVED = [RESULTS / part for part in ("design", "execute", "save", "apply", "report", "report.html")]

@@ -28,6 +28,7 @@ rule simulate_flight:
         seed=lambda wildcards: 1000 * SETTINGS["demonstration"]["seed"]
         + list(DEMONSTRATION).index(wildcards.flight)
         + 1,
+        contents=contents(SETTINGS["mission"], SETTINGS["demonstration"]["vehicle"]),
         code=DIGEST["execute"],
     message:
         "Execute: simulate {wildcards.flight}"

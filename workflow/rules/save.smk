@@ -1,6 +1,7 @@
 rule save_flight:
     input:
-        log=lambda wildcards: LOGS[wildcards.flight],
+        # A flown log is no input: its content is what counts, not its time stamp, and no name of it can stop the others.
+        log=lambda wildcards: LOGS[wildcards.flight] if DEMONSTRATED else [],
     output:
         directory("results/save/{flight}"),
     log:
@@ -8,10 +9,11 @@ rule save_flight:
     conda:
         "../envs/fusetune.yaml"
     params:
+        flown=lambda wildcards: flown_log(wildcards.flight),
         code=DIGEST["save"],
         thresholds=SETTINGS["verdict"],
     message:
-        "Save: read {input.log}"
+        "Save: read {wildcards.flight}"
     script:
         "../scripts/save_flight.py"
 
@@ -34,6 +36,7 @@ checkpoint list_flights:
     conda:
         "../envs/fusetune.yaml"
     params:
+        refused=[list(astuple(entry)) for entry in FOUND.refused],
         code=DIGEST["save"],
         varied=VARIED,
         present_flight=SETTINGS["present_flight"],

@@ -2,30 +2,48 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 
-from fusetune.errors import UserError
+from fusetune.errors import UserError, write_error
 from fusetune.run_lock import join_run
 
 
 @contextmanager
 def logged_job(log: str) -> Iterator[None]:
-    """Send what the body prints to `log`; end the process with status 1 where the input is at fault."""
+    """Send what the body prints to `log`; end the process with status 1 where the input or the disk is at fault."""
     console = sys.stderr
-    with open(log, "w", encoding="utf-8") as file, redirect_stdout(file), redirect_stderr(file):
-        join_run(".snakemake")
-        try:
-            yield
-        except UserError as error:
-            print(error, file=file)
-            print(error, file=console)
-            raise SystemExit(1) from None
-        except Exception:
-            traceback.print_exc(file=file)
+    try:
+        with (
+            open(log, "w", encoding="utf-8", errors="backslashreplace") as file,
+            redirect_stdout(file),
+            redirect_stderr(file),
+        ):
+            join_run(".snakemake")
+            try:
+                yield
+            except (UserError, OSError) as error:
+                told = error if isinstance(error, UserError) else write_error(error, "results")
+                if told is None:
+                    traceback.print_exc(file=file)
+                    raise
+                print(told, file=console)
+                print(told, file=file)
+                raise SystemExit(1) from None
+            except Exception:
+                traceback.print_exc(file=file)
+                raise
+    except KeyboardInterrupt:
+        raise SystemExit(128 + signal.SIGINT) from None
+    except (UserError, OSError) as error:  # the log itself cannot be written, or this job is no longer asked for
+        told = error if isinstance(error, UserError) else write_error(error, log)
+        if told is None:
             raise
+        print(told, file=console)
+        raise SystemExit(1) from None
 
 
 class _Absent:

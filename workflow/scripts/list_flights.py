@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.save import find_present, write_flights_table, write_present
+from fusetune.save.discovery import RefusedEntry
 
 from job import keep_out, logged_job
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
     params, folders = snakemake.params, [Path(folder) for folder in snakemake.input.folders]
-    rows = write_flights_table(folders, snakemake.output.table, snakemake.output.csv)
+    refused = [RefusedEntry(*entry) for entry in params.refused]
+    rows = write_flights_table(folders, snakemake.output.table, snakemake.output.csv, refused)
     present = find_present(rows, {folder.name: folder for folder in folders}, params.varied, params.present_flight)
     write_present(snakemake.output.present, present)

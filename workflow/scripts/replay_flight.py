@@ -16,7 +16,7 @@ keep_out("pandas", "scipy")
 with logged_job(snakemake.log[0]):
     params = snakemake.params
     flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
-    ledger = ReplayLedger(Path(params.ledger), flight, folder, [params.code, dict(params.replay)])
+    ledger = ReplayLedger(flight, folder, [params.code, dict(params.replay)])
     outdated = ledger.outdated(params.sets)
     replay_saved_flight(flight, outdated, folder, ReplaySettings.from_mapping(params.replay))
     ledger.record(outdated)

@@ -12,5 +12,11 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
     thresholds = VerdictThresholds.from_mapping(snakemake.params.thresholds)
-    verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds)
+    flown = snakemake.params.flown
+    if flown is None:
+        verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds)
+    else:
+        verdict = save_log(
+            flown["path"], snakemake.output[0], thresholds, shown=flown["shown"], checksum=flown["checksum"]
+        )
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")

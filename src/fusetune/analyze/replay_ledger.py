@@ -14,16 +14,16 @@ from fusetune.save.flight_folder import read_metadata
 class ReplayLedger:
     """The record of the replays of one flight.
 
+    Each set has a file of its own, so that it does not matter which job replays it, and with which other sets.
+
     Parameters
     ----------
-    file : of the record
     flight_folder : `results/save/<flight>`
     output_folder : holds the files of the replays
     made_with : what beside the log and the values of a set the replays follow from: settings, state of the sources
     """
 
-    def __init__(self, file: Path, flight_folder: Path, output_folder: Path, made_with: Any) -> None:
-        self._ledger = Ledger(file)
+    def __init__(self, flight_folder: Path, output_folder: Path, made_with: Any) -> None:
         self._folder = output_folder
         self._source = [read_metadata(flight_folder)["checksum"], made_with]
 
@@ -32,13 +32,16 @@ class ReplayLedger:
         return {
             name: values
             for name, values in sets.items()
-            if not self._ledger.is_current(name, self._key(values), self._files(name))
+            if not self._ledger(name).is_current(name, self._key(values), self._files(name))
         }
 
     def record(self, sets: Mapping[str, Mapping[str, float]]) -> None:
         """Enter sets that have just been replayed."""
         for name, values in sets.items():
-            self._ledger.record(name, self._key(values), self._files(name))
+            self._ledger(name).record(name, self._key(values), self._files(name))
+
+    def _ledger(self, name: str) -> Ledger:
+        return Ledger(self._folder / f".{name}.made.json")
 
     def _key(self, values: Mapping[str, float]) -> str:
         return key_of([*self._source, dict(values)])

@@ -13,12 +13,14 @@ import pyarrow.csv as pa_csv
 from fusetune.checksum_file import write_checksum
 from fusetune.files import atomic_path
 from fusetune.parquet import write_table
+from fusetune.save.discovery import RefusedEntry
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
 from fusetune.save.log_folder import VERDICT_FILE
 
 SCHEMA = pa.schema(
     [
         ("flight", pa.string()),
+        ("file", pa.string()),
         ("status", pa.string()),
         ("reason", pa.string()),
         ("remedy", pa.string()),
@@ -36,6 +38,7 @@ SCHEMA = pa.schema(
 )
 """Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused.
 
+`file` is the path of the log below the folder of flights.
 `checks` holds name, status and figure of every check; `advice`, which the CSV leaves out, the remedies of those that
 did not pass.
 """
@@ -44,9 +47,15 @@ _DUPLICATE = "duplicate"
 
 
 def write_flights_table(
-    folders: Sequence[str | os.PathLike[str]], table: str | os.PathLike[str], csv: str | os.PathLike[str]
+    folders: Sequence[str | os.PathLike[str]],
+    table: str | os.PathLike[str],
+    csv: str | os.PathLike[str],
+    refused: Sequence[RefusedEntry] = (),
 ) -> list[dict[str, Any]]:
     """Put the verdicts of saved flights into one table, in the order given, as Parquet and as CSV.
+
+    What was `refused` before it could be saved comes last.
+
 
     Of flights whose logs have equal bytes the first by name stays; the others are refused, so that no flight counts
     twice. Which is first depends on neither the order given nor that of the jobs.
@@ -62,6 +71,7 @@ def write_flights_table(
     """
     found = [_row(Path(folder)) for folder in folders]
     _refuse_duplicates(found)
+    found += [_row_of_refused(entry) for entry in refused]
     rows = pa.Table.from_pylist(found, schema=SCHEMA)
     with atomic_path(table) as temporary:
         write_table(rows, temporary)
@@ -77,6 +87,7 @@ def _row(folder: Path) -> dict[str, Any]:
     warned = [check for check in verdict["checks"] if check["status"] == "warning"]
     return {
         "flight": verdict["flight"],
+        "file": metadata["file"],
         "status": verdict["status"],
         "reason": "; ".join(check["reason"] for check in failed),
         "remedy": "; ".join(check["remedy"] for check in failed),
@@ -94,6 +105,22 @@ def _row(folder: Path) -> dict[str, Any]:
             for check in (*failed, *warned)
             if check["remedy"]
         ],
+    }
+
+
+def _row_of_refused(entry: RefusedEntry) -> dict[str, Any]:
+    check = {"check": "readable", "reason": entry.reason, "remedy": entry.remedy}
+    texts = dict.fromkeys(("warnings", "hardware", "recorded", "checksum"), "")
+    return texts | {
+        "flight": entry.flight,
+        "file": entry.shown,
+        "status": "refused",
+        "reason": entry.reason,
+        "remedy": entry.remedy,
+        "checks": "readable fail",
+        "firmware": "unknown",
+        "size_bytes": 0,
+        "advice": [check],
     }
 
 

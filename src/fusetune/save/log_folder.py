@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from fusetune.px4.logged_parameters import checked_history
 from fusetune.px4.reading_limits import ReadingLimits
 from fusetune.px4.release_layouts import canonical
 from fusetune.px4.ulog_reader import file_checksum, read_ulog, takes_too_long
+from fusetune.save.discovery import printable
 from fusetune.save.flight_folder import METADATA_FILE, write_flight
 from fusetune.save.log_facts import log_facts
 from fusetune.save.verdict import Verdict, VerdictThresholds, judge, unreadable
@@ -29,6 +31,9 @@ def save_log(
     folder: str | os.PathLike[str],
     thresholds: VerdictThresholds | None = None,
     limits: ReadingLimits | None = None,
+    *,
+    shown: str | None = None,
+    checksum: str | None = None,
 ) -> Verdict:
     """Save a log: tables, `metadata.json` and `verdict.json`, which `metadata.json` repeats.
 
@@ -40,11 +45,15 @@ def save_log(
     log
         ULog file.
     folder
-        Folder of the flight.
+        Folder of the flight, by whose name the flight is known.
     thresholds
         From where on a flight can be replayed.
     limits
         How many tables the log may have, and how long all this may take.
+    shown
+        The file as it is told of; its name by default.
+    checksum
+        SHA-256 that the log has to have. With another one it is refused: it changed after it was asked for.
 
     Raises
     ------
@@ -56,7 +65,8 @@ def save_log(
     try:
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir(parents=True)
-        verdict = _write(Path(log), partial, thresholds or VerdictThresholds(), limits)
+        source = _Source(Path(log), target.name, shown or printable(Path(log).name), checksum)
+        verdict = _write(source, partial, thresholds or VerdictThresholds(), limits)
         shutil.rmtree(target, ignore_errors=True)
         os.replace(partial, target)
     except OSError as error:
@@ -64,30 +74,45 @@ def save_log(
     return verdict
 
 
-def _write(log: Path, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits) -> Verdict:
+@dataclass(frozen=True)
+class _Source:
+    log: Path
+    flight: str
+    shown: str
+    checksum: str | None
+
+
+def _write(source: _Source, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits) -> Verdict:
     deadline = Deadline(limits.time_limit_s)
     try:
-        if has_checksum(log):
-            check_checksum(log, RUN_AGAIN)
-        verdict = _write_readable(log, folder, thresholds, limits, deadline)
+        if has_checksum(source.log):
+            check_checksum(source.log, RUN_AGAIN)
+        verdict = _write_readable(source, folder, thresholds, limits, deadline)
     except (UserError, TimeLimitError) as error:
-        told = error if isinstance(error, UserError) else takes_too_long(log, deadline)
-        verdict = unreadable(log.stem, told)
+        told = error if isinstance(error, UserError) else takes_too_long(source.log, deadline)
+        verdict = unreadable(source.flight, told)
         for table in folder.glob("*.parquet"):
             table.unlink()
-        write_document(folder / METADATA_FILE, _metadata_of_unreadable(log) | {"verdict": verdict.document()})
+        write_document(folder / METADATA_FILE, _metadata_of_unreadable(source) | {"verdict": verdict.document()})
     write_document(folder / VERDICT_FILE, verdict.document())
     return verdict
 
 
 def _write_readable(
-    log: Path, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits, deadline: Deadline
+    source: _Source, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits, deadline: Deadline
 ) -> Verdict:
-    flight = read_ulog(log, limits, deadline)
+    flight = replace(read_ulog(source.log, limits, deadline), name=source.flight)
+    _demand_checksum(source, flight.checksum)
     verdict = _judge(flight, thresholds, deadline)
-    extra = {"file": log.name, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
+    extra = {"file": source.shown, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
     write_flight(folder, flight, extra | log_facts(flight), deadline)
     return verdict
+
+
+def _demand_checksum(source: _Source, read: str) -> None:
+    if source.checksum not in (None, read):
+        reason = "changed between the start of the run and its reading"
+        raise UserError(source.log, reason, "Run the pipeline again when nothing writes to the log any more")
 
 
 def _judge(flight: Flight, thresholds: VerdictThresholds, deadline: Deadline) -> Verdict:
@@ -104,9 +129,9 @@ def _present_ekf2(flight: Flight) -> dict[str, float]:
     return migrate(checked_history(flight.parameters, flight.release)[0].at_end(), flight.release)
 
 
-def _metadata_of_unreadable(log: Path) -> dict[str, Any]:
+def _metadata_of_unreadable(source: _Source) -> dict[str, Any]:
     try:
-        checksum, size = file_checksum(log), log.stat().st_size
+        checksum, size = file_checksum(source.log), source.log.stat().st_size
     except (UserError, OSError):
         checksum, size = "", 0
-    return {"name": log.stem, "file": log.name, "checksum": checksum, "size_bytes": size}
+    return {"name": source.flight, "file": source.shown, "checksum": checksum, "size_bytes": size}
