@@ -26,8 +26,9 @@ def log_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     imu = {"timestamp": time, "gyro_integral_dt": np.full(rows, 5000, np.uint32)}
     imu["accelerometer_integral_dt"] = imu["gyro_integral_dt"]
     for axis in range(3):
-        imu |= {f"gyro_rad[{axis}]": np.zeros(rows, np.float32)}
-        imu |= {f"accelerometer_m_s2[{axis}]": np.full(rows, -9.81 * (axis == 2), np.float32)}
+        noise = np.random.default_rng(axis).standard_normal(rows)
+        imu |= {f"gyro_rad[{axis}]": (0.01 * noise).astype(np.float32)}
+        imu |= {f"accelerometer_m_s2[{axis}]": (0.1 * noise - 9.81 * (axis == 2)).astype(np.float32)}
     slow = time[::40]
     gnss = {
         "timestamp": slow,
@@ -39,7 +40,7 @@ def log_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     topics = {
         ("sensor_combined", 0): imu,
         ("vehicle_gps_position", 0): gnss,
-        ("vehicle_air_data", 0): {"timestamp": slow, "baro_alt_meter": np.zeros(len(slow), np.float32)},
+        ("vehicle_air_data", 0): {"timestamp": slow, "baro_alt_meter": np.arange(len(slow), dtype=np.float32)},
         ("vehicle_land_detected", 0): {"timestamp": slow[:2], "landed": np.array([True, False])},
     }
     parameters = ParameterHistory(

@@ -2,6 +2,8 @@
 import csv
 import json
 
+from fusetune.cells import as_it_was
+
 REPLAY_PARTS = (
     "innovations.parquet",
     "states.parquet",
@@ -31,7 +33,7 @@ def replay_files(names):
 
 def read_csv(path):
     with open(path, encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+        return [{as_it_was(name): as_it_was(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
 
 
 def replayable_rows():

@@ -63,7 +63,7 @@ def recover_from_interruption():
 recover_from_interruption()
 
 # Changed sources run again what depends on them.
-BASE = ("errors.py", "files.py", "parquet.py", "px4")
+BASE = ("cells.py", "csv_file.py", "errors.py", "files.py", "parquet.py", "px4", "time_limit.py")
 REPLAY_SOURCES = (
     "ekf2",
     "save",

@@ -10,6 +10,7 @@ rule save_flight:
     params:
         code=DIGEST["save"],
         thresholds=SETTINGS["verdict"],
+        limits=SETTINGS["reading"],
     message:
         "Save: read {input.log}"
     script:

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from fusetune.px4.reading_limits import ReadingLimits
 from fusetune.save import VerdictThresholds, save_log
 
 from job import keep_out, logged_job
@@ -12,5 +13,6 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
     thresholds = VerdictThresholds.from_mapping(snakemake.params.thresholds)
-    verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds)
+    limits = ReadingLimits.from_mapping(snakemake.params.limits)
+    verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds, limits)
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.csv
 import pyarrow.parquet as pq
 
 from fusetune.apply.choice import Choice, choose, parameter_distance
@@ -22,6 +21,7 @@ from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
+from fusetune.csv_file import write_csv
 from fusetune.errors import UserError
 from fusetune.files import atomic_path
 
@@ -200,8 +200,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
     table = pa.Table.from_pylist([_rounded(row, keep_nan=True) for row in rows])
     with atomic_path(folder / "ranking.parquet") as temporary:
         pq.write_table(table, temporary)
-    with atomic_path(folder / "ranking.csv") as temporary:
-        pa.csv.write_csv(table, temporary)
+    write_csv(folder / "ranking.csv", table)
 
 
 def _flat_aims(one: RankedSet) -> dict[str, float]:

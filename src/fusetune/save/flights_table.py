@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 
+from fusetune.csv_file import write_csv
 from fusetune.errors import UserError
 from fusetune.files import atomic_path
 from fusetune.save.flight_folder import METADATA_FILE
@@ -62,8 +62,7 @@ def write_flights_table(
     rows = pa.Table.from_pylist(found, schema=SCHEMA)
     with atomic_path(table) as temporary:
         pq.write_table(rows, temporary)
-    with atomic_path(csv) as temporary:
-        pa_csv.write_csv(rows.drop_columns(["advice"]), temporary)
+    write_csv(csv, rows.drop_columns(["advice"]))
 
 
 def _row(folder: Path) -> dict[str, Any]:
