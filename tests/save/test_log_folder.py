@@ -212,3 +212,15 @@ def test_remedies_of_what_did_not_pass_are_in_the_table(tmp_path: Path, log: Pat
 def test_thresholds_decide(tmp_path: Path, log: Path) -> None:
     strict = VerdictThresholds.from_mapping({"min_imu_duration_s": 60})
     assert "at least 60 s" in save_log(log, tmp_path / "made", strict).reasons[0]
+
+
+def test_names_and_hardware_are_no_formulas_in_the_table_of_flights(tmp_path: Path, log_bytes: bytes) -> None:
+    name, hardware = "=1+1", b"@SUM(A1)"
+    (tmp_path / f"{name}.ulg").write_bytes(log_bytes.replace(b"PX4_SITL", hardware))
+    save_log(tmp_path / f"{name}.ulg", tmp_path / name)
+    write_flights_table([tmp_path / name], tmp_path / "flights.parquet", tmp_path / "flights.csv")
+    row = pa_csv.read_csv(tmp_path / "flights.csv").to_pylist()[0]
+    assert (row["flight"], row["hardware"]) == (f"'{name}", f"'{hardware.decode()}")
+    assert row["duration_s"] == pytest.approx(12.995)
+    kept = pq.read_table(tmp_path / "flights.parquet").to_pylist()[0]
+    assert (kept["flight"], kept["hardware"]) == (name, hardware.decode())

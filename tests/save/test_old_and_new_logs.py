@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from pathlib import Path
 
@@ -343,3 +344,69 @@ def test_shared_logs_with_damage(tmp_path: Path, shared_logs: Path, name: str, s
     verdict = save_log(shared_logs / f"{name}.ulg", tmp_path / name)
     assert verdict.status == status
     assert said in check_of(verdict, "readable").reason
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [np.zeros_like(TIME), TIME[::-1], TIME + 1_700_000_000_000_000, TIME - FIRST_US],
+    ids=["none", "backward", "unix", "another clock"],
+)
+def test_a_topic_of_another_time_that_outnumbers_the_imu_costs_at_most_itself(
+    tmp_path: Path, stamps: np.ndarray
+) -> None:
+    """As `sensor_preflight` of v1.5 and v1.6, which has more rows than the IMU and no time stamps."""
+    flight = flight_of((1, 16))
+    write_ulog(tmp_path / "sound.ulg", flight)
+    more = np.append(stamps, stamps[-2:])
+    flight.topics["sensor_preflight", 0] = {"timestamp": more, "accel": constant(0.0, rows=len(more))}
+    content = with_messages_at(tmp_path, flight, "sensor_preflight", np.append(TIME, TIME[-2:]))
+    verdict = saved(tmp_path, content)
+    assert verdict.status == "replayable", verdict.reasons
+    found, expected = load_flight(tmp_path / "log"), read_ulog(tmp_path / "sound.ulg")
+    assert (found.start_timestamp, found.last_timestamp) == (expected.start_timestamp, expected.last_timestamp)
+    assert {entry.topic for entry in found.left_out} <= {"sensor_preflight"}
+    for key, table in expected.topics.items():
+        for name, values in table.items():
+            np.testing.assert_array_equal(found.topics[key][name], values)
+    document = json.loads((tmp_path / "log" / "metadata.json").read_text(encoding="utf-8"))
+    assert document["duration_s"] == pytest.approx(SECONDS, abs=0.01)
+
+
+def with_messages_at(folder: Path, flight: Flight, topic: str, times: np.ndarray) -> bytes:
+    """The bytes of a flight whose messages of a topic lie in the file where other times would put them."""
+    table = flight.topics[topic, 0]
+    stamps = table["timestamp"].copy()
+    table["timestamp"] = np.sort(times)
+    write_ulog(folder / "placed.ulg", flight)
+    content = bytearray((folder / "placed.ulg").read_bytes())
+    message_id = sorted(flight.topics).index((topic, 0))
+    position, row = data_begin(bytes(content)), 0
+    while position < len(content):
+        if (
+            content[position + 2] == ord("D")
+            and int.from_bytes(content[position + 3 : position + 5], "little") == message_id
+        ):
+            content[position + 5 : position + 13] = int(stamps[row]).to_bytes(8, "little")
+            row += 1
+        position += 3 + int.from_bytes(content[position : position + 2], "little")
+    assert row == len(stamps)
+    return bytes(content)
+
+
+def test_a_sensor_by_another_clock_is_left_out(tmp_path: Path) -> None:
+    flight = flight_of((1, 16))
+    table = flight.topics["vehicle_magnetometer", 0]
+    table["timestamp"] = table["timestamp"] // 1000  # milliseconds
+    verdict = saved(tmp_path, with_messages_at(tmp_path, flight, "vehicle_magnetometer", SLOW))
+    assert "240 of vehicle_magnetometer: time stamps of another clock" in check_of(verdict, "time_stamps").reason
+    assert check_of(verdict, "magnetometer").status == "warning"
+    assert verdict.status == "replayable"
+
+
+def test_a_log_without_imu_samples_has_its_own_duration(tmp_path: Path) -> None:
+    flight = flight_of((1, 16))
+    del flight.topics["sensor_combined", 0]
+    write_ulog(tmp_path / "log.ulg", flight)
+    assert save_log(tmp_path / "log.ulg", tmp_path / "log").status == "refused"
+    document = json.loads((tmp_path / "log" / "metadata.json").read_text(encoding="utf-8"))
+    assert document["duration_s"] == pytest.approx(SECONDS, abs=0.1)
