@@ -11,6 +11,7 @@ from tests.save.made_flight import SLOW_HZ, check_of, judged, made_flight
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, LeftOut, ParameterChange
 from fusetune.px4.release_layouts import canonical
+from fusetune.px4.ulog_times import ANOTHER_CLOCK
 from fusetune.save.verdict import VerdictThresholds
 
 
@@ -377,3 +378,69 @@ def test_a_range_finder_that_looks_elsewhere_measures_no_height() -> None:
     down[:] = 0
     assert check_of(flight, "barometer").status == "fail"
     assert "not facing down" in check_of(flight, "samples_given").reason
+
+
+def slow_barometer(profile: int, *, lost: int = 0) -> Flight:
+    """A barometer of 2 Hz, of which `ekf2_timestamps` names every sample; some of them are not in the log."""
+    flight = made_flight()
+    baro = flight.topics["vehicle_air_data", 0]
+    taken = {name: values[:: SLOW_HZ // 2] for name, values in baro.items()}
+    flight.topics["vehicle_air_data", 0] = {name: values[lost:] for name, values in taken.items()}
+    updates = flight.topics["sensor_combined", 0]["timestamp"][::2]
+    rows = {"vehicle_air_data": taken["timestamp"], "vehicle_magnetometer": baro["timestamp"]}
+    table = {"timestamp": updates}
+    for topic, times in rows.items():
+        relative = np.full(len(updates), 0x7FFF, np.int16)
+        relative[np.searchsorted(updates, times)] = 0
+        table[f"{topic}_timestamp_rel"] = relative
+    flight.topics["ekf2_timestamps", 0] = table
+    flight.parameters.initial |= {"SDLOG_PROFILE": profile, "SDLOG_MODE": 2, "EKF2_LOG_VERBOSE": 1}
+    return flight
+
+
+def test_a_slow_sensor_is_no_thinned_log() -> None:
+    flight = slow_barometer(3)
+    check = check_of(flight, "logging_profile")
+    assert (check.status, check.reason) == ("pass", "every sample of magnetometer and barometer is in the log")
+    check = check_of(flight, "barometer")
+    assert (check.status, check.figure) == ("warning", pytest.approx(2.0))
+    assert "itself gives only 2.0 Hz" in check.reason
+    assert "SDLOG" not in check.remedy
+    assert "SENS_BARO_RATE" in check.remedy
+
+
+def test_samples_that_the_logger_lost_are_told_without_advice_to_set_what_is_set() -> None:
+    check = check_of(slow_barometer(3, lost=60), "logging_profile")
+    assert check.status == "warning"
+    assert "50% of the barometer's" in check.reason
+    assert "SD card" in check.remedy
+    assert "SDLOG" not in check.remedy
+
+
+@pytest.mark.parametrize(
+    ("mode", "words"), [(0, "Set SDLOG_MODE = 2"), (1, "Set SDLOG_MODE = 2"), (2, "at boot already")]
+)
+def test_a_late_log_is_not_told_to_set_what_is_set(mode: int, words: str) -> None:
+    flight = made_flight()
+    flight.parameters.initial["SDLOG_MODE"] = mode
+    flight.topics["vehicle_land_detected", 0]["timestamp"][1] -= 5_000_000
+    check = check_of(flight, "log_start")
+    assert check.status == "warning"
+    assert words in check.remedy
+
+
+def test_a_sensor_without_samples_under_the_profile_for_replay() -> None:
+    flight = made_flight()
+    del flight.topics["vehicle_magnetometer", 0]
+    remedy = check_of(flight, "magnetometer").remedy
+    assert "SDLOG_PROFILE = 3" in remedy
+    assert "Log with" not in remedy
+    flight.parameters.initial["SDLOG_PROFILE"] = 1
+    assert "Log with SDLOG_PROFILE = 3" in check_of(flight, "magnetometer").remedy
+
+
+def test_topics_by_another_clock_are_told_with_their_remedy() -> None:
+    left_out = (LeftOut("custom", 0, 9000, 9000, ANOTHER_CLOCK),)
+    check = check_of(replace(made_flight(), left_out=left_out), "time_stamps")
+    assert check.status == "warning"
+    assert "autopilot's time" in check.remedy

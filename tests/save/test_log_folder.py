@@ -27,8 +27,9 @@ def log_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     imu = {"timestamp": time, "gyro_integral_dt": np.full(rows, 5000, np.uint32)}
     imu["accelerometer_integral_dt"] = imu["gyro_integral_dt"]
     for axis in range(3):
-        imu |= {f"gyro_rad[{axis}]": np.zeros(rows, np.float32)}
-        imu |= {f"accelerometer_m_s2[{axis}]": np.full(rows, -9.81 * (axis == 2), np.float32)}
+        noise = np.random.default_rng(axis).standard_normal(rows)
+        imu |= {f"gyro_rad[{axis}]": (0.01 * noise).astype(np.float32)}
+        imu |= {f"accelerometer_m_s2[{axis}]": (0.1 * noise - 9.81 * (axis == 2)).astype(np.float32)}
     slow = time[::40]
     gnss = {
         "timestamp": slow,
@@ -40,7 +41,7 @@ def log_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     topics = {
         ("sensor_combined", 0): imu,
         ("vehicle_gps_position", 0): gnss,
-        ("vehicle_air_data", 0): {"timestamp": slow, "baro_alt_meter": np.zeros(len(slow), np.float32)},
+        ("vehicle_air_data", 0): {"timestamp": slow, "baro_alt_meter": np.arange(len(slow), dtype=np.float32)},
         ("vehicle_land_detected", 0): {"timestamp": slow[:2], "landed": np.array([True, False])},
     }
     parameters = ParameterHistory(
@@ -243,3 +244,15 @@ def test_a_log_that_is_not_that_of_its_checksum_is_refused(tmp_path: Path, log: 
     verdict = save_log(copy, tmp_path / "saved")
     assert verdict.status == "refused"
     assert "damaged" in verdict.reasons[0]
+
+
+def test_names_and_hardware_are_no_formulas_in_the_table_of_flights(tmp_path: Path, log_bytes: bytes) -> None:
+    name, hardware = "=1+1", b"@SUM(A1)"
+    (tmp_path / f"{name}.ulg").write_bytes(log_bytes.replace(b"PX4_SITL", hardware))
+    save_log(tmp_path / f"{name}.ulg", tmp_path / name)
+    write_flights_table([tmp_path / name], tmp_path / "flights.parquet", tmp_path / "flights.csv")
+    row = pa_csv.read_csv(tmp_path / "flights.csv").to_pylist()[0]
+    assert (row["flight"], row["hardware"]) == (f"'{name}", f"'{hardware.decode()}")
+    assert row["duration_s"] == pytest.approx(12.995)
+    kept = pq.read_table(tmp_path / "flights.parquet").to_pylist()[0]
+    assert (kept["flight"], kept["hardware"]) == (name, hardware.decode())

@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from benchmarks.mutated_logs import CaseError, Mutator, run_case, run_cases, sound_case
+from benchmarks.damage_cases import CaseError, sound_case
+from benchmarks.mutated_logs import Mutator, run_case, run_cases
 
 CASES = 60
 
 
 def test_every_case_ends_in_a_verdict(tmp_path: Path) -> None:
-    tally, failures, _ = run_cases(range(1, CASES + 1), tmp_path)
-    assert failures == {}
+    outcome = run_cases(range(1, CASES + 1), tmp_path)
+    tally = outcome.tally
+    assert outcome.failures == {}
     assert tally["replayable"] + tally["refused"] == CASES
     # both ends occur, so the cases neither spare the log nor destroy it
     assert min(tally["replayable"], tally["refused"]) > CASES // 10

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from pathlib import Path
 
@@ -27,10 +28,15 @@ def constant(value: float, dtype: type = np.float32, rows: int = len(SLOW)) -> n
     return np.full(rows, value, dtype)
 
 
+def living(value: float, dtype: type = np.float32, rows: int = len(SLOW), *, within: float = 0.01) -> np.ndarray:
+    """What a sensor says of something that stands still: no two samples are the same."""
+    return (value + within * np.random.default_rng(0).uniform(-1.0, 1.0, rows)).astype(dtype)
+
+
 def imu() -> TopicTable:
     rows = len(TIME)
-    values = {f"gyro_rad[{axis}]": constant(0.01, rows=rows) for axis in range(3)}
-    values |= {f"accelerometer_m_s2[{axis}]": constant(-9.81 * (axis == 2), rows=rows) for axis in range(3)}
+    values = {f"gyro_rad[{axis}]": living(0.01, rows=rows) for axis in range(3)}
+    values |= {f"accelerometer_m_s2[{axis}]": living(-9.81 * (axis == 2), rows=rows) for axis in range(3)}
     step = constant(5_000, np.uint32, rows)
     return {"timestamp": TIME, **values, "gyro_integral_dt": step, "accelerometer_integral_dt": step}
 
@@ -39,18 +45,18 @@ def gnss(release: tuple[int, int]) -> TopicTable:
     """Position in 1e-7 degrees and mm before v1.15, in degrees and m since."""
     if release < GNSS_IN_DEGREES:
         place = {
-            "lat": constant(473977420, np.int32),
-            "lon": constant(85455940, np.int32),
+            "lat": living(473977420, np.int32, within=5.0),
+            "lon": living(85455940, np.int32, within=5.0),
             "alt": constant(488_000, np.int32),
         }
     else:
         place = {
-            "latitude_deg": constant(47.397742, np.float64),
-            "longitude_deg": constant(8.545594, np.float64),
+            "latitude_deg": living(47.397742, np.float64, within=5e-7),
+            "longitude_deg": living(8.545594, np.float64, within=5e-7),
             "altitude_msl_m": constant(488.0, np.float64),
         }
     accuracy = {"eph": constant(0.8), "epv": constant(1.2), "s_variance_m_s": constant(0.2)}
-    velocity = {f"vel_{axis}_m_s": constant(0.0) for axis in "ned"}
+    velocity = {f"vel_{axis}_m_s": living(0.0) for axis in "ned"}
     fix = {"fix_type": constant(3, np.uint8), "satellites_used": constant(12, np.uint8)}
     return {"timestamp": SLOW, **fix, **place, **accuracy, **velocity}
 
@@ -71,9 +77,9 @@ def topics_of(release: tuple[int, int]) -> dict[TopicKey, TopicTable]:
         ("vehicle_magnetometer", 0): {
             "timestamp": SLOW,
             **sampled,
-            **{f"magnetometer_ga[{axis}]": constant(0.2) for axis in range(3)},
+            **{f"magnetometer_ga[{axis}]": living(0.2) for axis in range(3)},
         },
-        ("vehicle_air_data", 0): {"timestamp": SLOW, **sampled, "baro_alt_meter": constant(488.0)},
+        ("vehicle_air_data", 0): {"timestamp": SLOW, **sampled, "baro_alt_meter": living(488.0)},
         ("vehicle_land_detected", 0): land,
         ("vehicle_status", 0): status,
         ("estimator_status", 0): {"timestamp": SLOW, "control_mode_flags": flags},
@@ -132,7 +138,7 @@ def test_every_release_is_replayable_and_means_the_same(tmp_path: Path, release:
     assert check_of(verdict, "airborne").figure == pytest.approx(SECONDS - 1.0, abs=0.01)
     flight = canonical(load_flight(tmp_path / "old"))
     gnss_table = flight.topics["vehicle_gps_position", 0]
-    np.testing.assert_allclose(gnss_table["latitude_deg"], 47.397742, atol=1e-9)
+    np.testing.assert_allclose(gnss_table["latitude_deg"], 47.397742, atol=6e-7)
     np.testing.assert_allclose(gnss_table["altitude_msl_m"], 488.0)
     assert flight.topics["vehicle_status", 0]["vehicle_type"].tolist()[0] == 1
     assert flight.topics["vehicle_land_detected", 0]["at_rest"].tolist() == [True, False]
@@ -339,3 +345,69 @@ def test_shared_logs_with_damage(tmp_path: Path, shared_logs: Path, name: str, s
     verdict = save_log(shared_logs / f"{name}.ulg", tmp_path / name)
     assert verdict.status == status
     assert said in check_of(verdict, "readable").reason
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [np.zeros_like(TIME), TIME[::-1], TIME + 1_700_000_000_000_000, TIME - FIRST_US],
+    ids=["none", "backward", "unix", "another clock"],
+)
+def test_a_topic_of_another_time_that_outnumbers_the_imu_costs_at_most_itself(
+    tmp_path: Path, stamps: np.ndarray
+) -> None:
+    """As `sensor_preflight` of v1.5 and v1.6, which has more rows than the IMU and no time stamps."""
+    flight = flight_of((1, 16))
+    write_ulog(tmp_path / "sound.ulg", flight)
+    more = np.append(stamps, stamps[-2:])
+    flight.topics["sensor_preflight", 0] = {"timestamp": more, "accel": constant(0.0, rows=len(more))}
+    content = with_messages_at(tmp_path, flight, "sensor_preflight", np.append(TIME, TIME[-2:]))
+    verdict = saved(tmp_path, content)
+    assert verdict.status == "replayable", verdict.reasons
+    found, expected = load_flight(tmp_path / "log"), read_ulog(tmp_path / "sound.ulg")
+    assert (found.start_timestamp, found.last_timestamp) == (expected.start_timestamp, expected.last_timestamp)
+    assert {entry.topic for entry in found.left_out} <= {"sensor_preflight"}
+    for key, table in expected.topics.items():
+        for name, values in table.items():
+            np.testing.assert_array_equal(found.topics[key][name], values)
+    document = json.loads((tmp_path / "log" / "metadata.json").read_text(encoding="utf-8"))
+    assert document["duration_s"] == pytest.approx(SECONDS, abs=0.01)
+
+
+def with_messages_at(folder: Path, flight: Flight, topic: str, times: np.ndarray) -> bytes:
+    """The bytes of a flight whose messages of a topic lie in the file where other times would put them."""
+    table = flight.topics[topic, 0]
+    stamps = table["timestamp"].copy()
+    table["timestamp"] = np.sort(times)
+    write_ulog(folder / "placed.ulg", flight)
+    content = bytearray((folder / "placed.ulg").read_bytes())
+    message_id = sorted(flight.topics).index((topic, 0))
+    position, row = data_begin(bytes(content)), 0
+    while position < len(content):
+        if (
+            content[position + 2] == ord("D")
+            and int.from_bytes(content[position + 3 : position + 5], "little") == message_id
+        ):
+            content[position + 5 : position + 13] = int(stamps[row]).to_bytes(8, "little")
+            row += 1
+        position += 3 + int.from_bytes(content[position : position + 2], "little")
+    assert row == len(stamps)
+    return bytes(content)
+
+
+def test_a_sensor_by_another_clock_is_left_out(tmp_path: Path) -> None:
+    flight = flight_of((1, 16))
+    table = flight.topics["vehicle_magnetometer", 0]
+    table["timestamp"] = table["timestamp"] // 1000  # milliseconds
+    verdict = saved(tmp_path, with_messages_at(tmp_path, flight, "vehicle_magnetometer", SLOW))
+    assert "240 of vehicle_magnetometer: time stamps of another clock" in check_of(verdict, "time_stamps").reason
+    assert check_of(verdict, "magnetometer").status == "warning"
+    assert verdict.status == "replayable"
+
+
+def test_a_log_without_imu_samples_has_its_own_duration(tmp_path: Path) -> None:
+    flight = flight_of((1, 16))
+    del flight.topics["sensor_combined", 0]
+    write_ulog(tmp_path / "log.ulg", flight)
+    assert save_log(tmp_path / "log.ulg", tmp_path / "log").status == "refused"
+    document = json.loads((tmp_path / "log" / "metadata.json").read_text(encoding="utf-8"))
+    assert document["duration_s"] == pytest.approx(SECONDS, abs=0.1)

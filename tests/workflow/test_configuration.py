@@ -60,8 +60,11 @@ def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
     from fusetune.analyze.settings import ScoringSettings
     from fusetune.analyze.withheld_gaps import WithholdingSettings
     from fusetune.apply.settings import DecisionSettings
+    from fusetune.px4.reading_limits import ReadingLimits
     from fusetune.save import VerdictThresholds
 
+    assert ReadingLimits.from_mapping(shipped["reading"]) == ReadingLimits()
+    assert shipped["reading"].keys() == asdict(ReadingLimits()).keys()
     assert ScoringSettings.from_mapping(shipped["scoring"]) == ScoringSettings()
     assert DecisionSettings.from_mapping(shipped["decision"], seed=0) == DecisionSettings()
     assert VerdictThresholds.from_mapping(shipped["verdict"]) == VerdictThresholds()

@@ -6,6 +6,8 @@ from fusetune.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
 from fusetune.save import read_present
 
+from fusetune.cells import as_it_was
+
 REPLAY_PARTS = (
     "innovations.parquet",
     "states.parquet",
@@ -43,7 +45,7 @@ def replay_files(names):
 def read_csv(path):
     told_in_one_line(check_checksum, path, RUN_AGAIN)
     with open(path, encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+        return [{as_it_was(name): as_it_was(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
 
 
 def replayable_flights():

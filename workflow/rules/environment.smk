@@ -139,7 +139,17 @@ if not workflow.is_main_process:
         told_and_ended(error)
 
 # Changed sources run again what depends on them.
-BASE = ("checksum_file.py", "documents.py", "errors.py", "files.py", "parquet.py", "px4", "time_limit.py")
+BASE = (
+    "cells.py",
+    "checksum_file.py",
+    "csv_file.py",
+    "documents.py",
+    "errors.py",
+    "files.py",
+    "parquet.py",
+    "px4",
+    "time_limit.py",
+)
 GIVEN_SAMPLES = tuple(
     f"ekf2/{name}.py"
     for name in (

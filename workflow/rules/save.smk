@@ -12,6 +12,7 @@ rule save_flight:
         flown=lambda wildcards: flown_log(wildcards.flight),
         code=DIGEST["save"],
         thresholds=SETTINGS["verdict"],
+        limits=SETTINGS["reading"],
     message:
         "Save: read {wildcards.flight}"
     script:

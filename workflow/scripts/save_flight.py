@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from fusetune.px4.reading_limits import ReadingLimits
 from fusetune.save import VerdictThresholds, save_log
 
 from job import keep_out, logged_job
@@ -12,11 +13,12 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
     thresholds = VerdictThresholds.from_mapping(snakemake.params.thresholds)
+    limits = ReadingLimits.from_mapping(snakemake.params.limits)
     flown = snakemake.params.flown
     if flown is None:
-        verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds)
+        verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds, limits)
     else:
         verdict = save_log(
-            flown["path"], snakemake.output[0], thresholds, shown=flown["shown"], checksum=flown["checksum"]
+            flown["path"], snakemake.output[0], thresholds, limits, shown=flown["shown"], checksum=flown["checksum"]
         )
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")

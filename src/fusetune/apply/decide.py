@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.csv
 
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
@@ -20,6 +19,7 @@ from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
+from fusetune.csv_file import write_csv
 from fusetune.documents import write_document
 from fusetune.errors import UserError
 from fusetune.files import atomic_path
@@ -208,8 +208,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
     table = table.cast(pa.schema(schema))
     with atomic_path(folder / "ranking.parquet") as temporary:
         write_table(table, temporary)
-    with atomic_path(folder / "ranking.csv") as temporary:
-        pa.csv.write_csv(table, temporary)
+    write_csv(folder / "ranking.csv", table)
 
 
 def _flat_aims(one: RankedSet) -> dict[str, float | None]:

@@ -75,7 +75,7 @@ def clock_of(
     timestamps, places
         As `impossible_rows`.
     preferred
-        Of topics that as many others agree with, the one to take.
+        The one to take if half of the others agree with it.
     trusted
         Whose agreement counts, where there are any such topics.
     """
@@ -86,7 +86,9 @@ def clock_of(
     def votes(key: Key) -> int:
         return sum(not _by_another_clock(timestamps, places, one, key) for one in voters)
 
-    # of equal ones the first: the preferred one, then the one that is logged most often
+    if preferred in fit and 2 * votes(preferred) >= len(voters):
+        return preferred
+    # of equal ones the first, which is logged most often
     return max(fit[:_MOST_CANDIDATES], key=votes, default=None)
 
 

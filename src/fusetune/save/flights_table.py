@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.csv as pa_csv
 
 from fusetune.checksum_file import write_checksum
+from fusetune.csv_file import write_csv
 from fusetune.files import atomic_path
 from fusetune.parquet import write_table
 from fusetune.save.discovery import RefusedEntry
@@ -75,8 +75,7 @@ def write_flights_table(
     rows = pa.Table.from_pylist(found, schema=SCHEMA)
     with atomic_path(table) as temporary:
         write_table(rows, temporary)
-    with atomic_path(csv) as temporary:
-        pa_csv.write_csv(rows.drop_columns(["advice"]), temporary)
+    write_csv(csv, rows.drop_columns(["advice"]))
     write_checksum(csv)
     return found
 

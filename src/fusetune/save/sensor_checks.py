@@ -1,9 +1,8 @@
 """Checks of what the sensors say: values that stand still, and values that no vehicle on earth can have.
 
 A sensor that is stuck repeats its last value: real ones do not, for noise moves every sample. PX4's own check is of
-this kind (`DataValidator`: the same value a hundred times is stale). What a sensor does on the ground is left to
-simulations without noise; only where the log does not tell when the vehicle flew, or it never did, the whole log is
-judged.
+this kind (`DataValidator`: the same value a hundred times is stale). On the ground a simulation may be without noise,
+so the time in the air is judged, or the whole log where that is unknown; a log without flight gets a warning at most.
 """
 
 from __future__ import annotations
@@ -75,25 +74,30 @@ def _flying_steps(flight: Flight, table: TopicTable) -> np.ndarray:
     return np.any([(middle >= begin) & (middle < end) for begin, end in intervals], axis=0)
 
 
-def _stuck(
-    name: str,
-    what: str,
-    table: TopicTable,
-    groups: Sequence[Sequence[str]],
-    flying: np.ndarray,
-    limit_s: float,
-    limits: VerdictThresholds,
-) -> Check:
-    """Check of columns that must not stand still, each group for itself."""
-    found = [standstill(table, group, limit_s, flying) for group in groups]
+class _Subject(NamedTuple):
+    """What must not stand still."""
+
+    name: str
+    """Of the check."""
+    what: str
+    table: TopicTable
+    groups: Sequence[Sequence[str]]
+    """Columns that may not all stand still together."""
+    limit_s: float
+
+
+def _stuck(flight: Flight, subject: _Subject, limits: VerdictThresholds) -> Check:
+    flying = _flying_steps(flight, subject.table)
+    limit_s = subject.limit_s
+    found = [standstill(subject.table, group, limit_s, flying) for group in subject.groups]
     worst = max(found, key=lambda one: (one.share, one.longest_s))
     if worst.longest_s <= limit_s:
-        return Check(name, "pass", f"{what} never stands still", "", worst.longest_s, limit_s)
-    said = f"{what} holds one value ({worst.value:.7g}) for up to {worst.longest_s:.1f} s"
-    if worst.share > limits.max_stuck_share:
+        return Check(subject.name, "pass", f"{subject.what} never stands still", "", worst.longest_s, limit_s)
+    said = f"{subject.what} holds one value ({worst.value:.7g}) for up to {worst.longest_s:.1f} s"
+    if worst.share > limits.max_stuck_share and airborne_intervals(flight) != []:
         reason = f"{said}, in {worst.share:.0%} of the time: it is stuck, and the flight says nothing about the filter"
-        return Check(name, "fail", reason, _CHECK_SENSOR, worst.share, limits.max_stuck_share)
-    return Check(name, "warning", f"{said}: it was stuck", _CHECK_SENSOR, worst.longest_s, limit_s)
+        return Check(subject.name, "fail", reason, _CHECK_SENSOR, worst.share, limits.max_stuck_share)
+    return Check(subject.name, "warning", f"{said}: it was stuck", _CHECK_SENSOR, worst.longest_s, limit_s)
 
 
 def accelerometer_gravity(flight: Flight, limits: VerdictThresholds) -> Check:
@@ -138,7 +142,7 @@ def gyroscope_stuck(flight: Flight, limits: VerdictThresholds) -> Check:
 def _imu_stuck(flight: Flight, limits: VerdictThresholds, name: str, what: str, vector: str) -> Check:
     imu = flight.topics["sensor_combined", 0]
     groups = [[column] for column in field_names(imu, vector)]
-    return _stuck(name, what, imu, groups, _flying_steps(flight, imu), limits.high_stuck_imu_s, limits)
+    return _stuck(flight, _Subject(name, what, imu, groups, limits.high_stuck_imu_s), limits)
 
 
 def imu_repeats(flight: Flight, limits: VerdictThresholds) -> Check:
@@ -161,8 +165,7 @@ def magnetometer_stuck(flight: Flight, limits: VerdictThresholds) -> Check:
     if table is None or len(table["timestamp"]) < _FEWEST_STUCK_ROWS or not _uses_magnetometer(flight):
         return Check(name, "does-not-apply", "the magnetometer is switched off or not logged")
     groups = [[column] for column in field_names(table, "magnetometer_ga")]
-    flying = _flying_steps(flight, table)
-    return _stuck(name, "the magnetometer", table, groups, flying, limits.high_stuck_aid_s, limits)
+    return _stuck(flight, _Subject(name, "the magnetometer", table, groups, limits.high_stuck_aid_s), limits)
 
 
 def magnetometer_strength(flight: Flight, limits: VerdictThresholds) -> Check:
@@ -185,8 +188,8 @@ def barometer_stuck(flight: Flight, limits: VerdictThresholds) -> Check:
     name, table = "barometer_stuck", flight.topic("vehicle_air_data")
     if table is None or len(table["timestamp"]) < _FEWEST_STUCK_ROWS or not _parameters(flight)["EKF2_BARO_CTRL"]:
         return Check(name, "does-not-apply", "the barometer is switched off or not logged")
-    flying = _flying_steps(flight, table)
-    return _stuck(name, "the barometer", table, [["baro_alt_meter"]], flying, limits.high_stuck_aid_s, limits)
+    groups = [["baro_alt_meter"]]
+    return _stuck(flight, _Subject(name, "the barometer", table, groups, limits.high_stuck_aid_s), limits)
 
 
 def gnss_stuck(flight: Flight, limits: VerdictThresholds) -> Check:
@@ -200,7 +203,7 @@ def gnss_stuck(flight: Flight, limits: VerdictThresholds) -> Check:
         return Check(name, "does-not-apply", "GNSS never has a fix, or lacks position and velocity")
     if airborne_intervals(flight) == []:
         return Check(name, "does-not-apply", "on the ground a receiver may hold its position")
-    return _stuck(name, "GNSS", table, groups, _flying_steps(flight, table), limits.high_stuck_aid_s, limits)
+    return _stuck(flight, _Subject(name, "GNSS", table, groups, limits.high_stuck_aid_s), limits)
 
 
 def _uses_magnetometer(flight: Flight) -> bool:
