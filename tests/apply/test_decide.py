@@ -237,18 +237,17 @@ def test_flights_that_have_no_say_are_told_by_what_keeps_them_out(tmp_path: Path
     folders, table = make_study(tmp_path / "long", sets, 5)
     short, _ = make_study(tmp_path / "short", sets, 2, landing_s=12.0)
     for number, folder in enumerate(short):
-        (folder / "scoring.json").write_text(
-            (folder / "scoring.json").read_text().replace(f'"flight_{number}"', f'"short_{number}"')
-        )
+        summary = read_document(folder / "scoring.json")
+        write_document(folder / "scoring.json", summary | {"flight": f"short_{number}"})
     for folder in folders[:2]:
         fidelity = {"grade": "D", "trust": {"is_compared": True}}
-        (folder / "fidelity.json").write_text(json.dumps(fidelity))
+        write_document(folder / "fidelity.json", fidelity)
     decide([*folders, *short], table, tmp_path / "apply", sets=list(sets), newest_flight="flight_4")
     text = json.loads((tmp_path / "apply" / "decision.json").read_text())["paragraph"]
     assert "2 replayed flights could not be scored." in text
     assert "2 replayed flights do not count, as their replays have trust grades below C." in text
     for folder in folders:
-        (folder / "fidelity.json").write_text(json.dumps(fidelity))
+        write_document(folder / "fidelity.json", fidelity)
     decide(folders, table, tmp_path / "apply", sets=list(sets))
     text = json.loads((tmp_path / "apply" / "decision.json").read_text())["paragraph"]
     assert "none of the 5 replayed flights has a say (flight_0: its replay has trust grade D, and" in text

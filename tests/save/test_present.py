@@ -1,11 +1,11 @@
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from fusetune.documents import write_document
 from fusetune.errors import UserError
 from fusetune.save import Present, find_present, flight_folder, read_present, write_present
 
@@ -26,7 +26,7 @@ def folders(tmp_path: Path) -> dict[str, Path]:
             "checksum": f"sum of {flight}",
             "ekf2_parameters": parameters,
         }
-        (tmp_path / flight / "metadata.json").write_text(json.dumps(metadata), encoding="utf-8")
+        write_document(tmp_path / flight / "metadata.json", metadata)
     return found
 
 
