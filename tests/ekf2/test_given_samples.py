@@ -141,7 +141,15 @@ def test_the_count_is_what_the_inputs_hold():
 
 @pytest.mark.parametrize(
     ("release", "taken"),
-    [((1, 8, 0), True), ((1, 11, 0), True), ((1, 14, 4), True), ((1, 15, 0), False), ((1, 16, 0), False), ((), False)],
+    [
+        ((1, 8, 0), True),
+        ((1, 11, 0), True),
+        ((1, 13, 3), True),
+        ((1, 14, 0), False),
+        ((1, 15, 0), False),
+        ((1, 16, 0), False),
+        ((), False),
+    ],
 )
 def test_gnss_without_valid_velocity_is_used_as_the_release_that_flew_used_it(release, taken):
     flight = with_fields(made_flight(*release), "vehicle_gps_position", vel_ned_valid=constant(0, np.bool_))

@@ -40,8 +40,8 @@ FLOW_QUALITY_MAX = 255.0
 
 Release = tuple[int, int, int]
 
-GNSS_NEEDS_VELOCITY = (1, 15, 0)
-"""Since then (December 2023) GNSS without valid velocity is dropped; before, nothing read `vel_ned_valid`."""
+GNSS_NEEDS_VELOCITY = (1, 14, 0)
+"""Since then (November 2022) GNSS without valid velocity is dropped; before, `vel_ned_valid` decided nothing."""
 
 VISION_NEEDS_FRAMES = (1, 14, 0)
 """Since then vision of unknown frame is dropped, and quaternions that are no unit; before, any number was used."""
@@ -123,7 +123,7 @@ def baro_samples(table: TopicTable) -> tuple[np.ndarray, np.ndarray]:
 def gnss_refusals(table: TopicTable, release: Release | None = None) -> list[Refusal]:
     """Messages of `vehicle_gps_position` whose velocity is not valid, for releases that ask for it.
 
-    Of a log that does not tell its release, the fields do: latitude in whole numbers is older than the demand.
+    Of a log that does not tell its release, the fields do, nearly: latitude was whole numbers until mid-2023.
     """
     is_older = "lat" in table if release is None else release < GNSS_NEEDS_VELOCITY
     if is_older:

@@ -168,9 +168,10 @@ def gnss(aids: _Aids) -> Check:
             return Check(name, "does-not-apply", "the log holds no GNSS samples")
         return Check(name, "warning", why, remedy, 0.0, threshold)
     one = aids.given["gnss"]
-    refused = max((rows for _, rows in one.refused), default=0)
-    if refused > (1.0 - aids.limits.low_gnss_fix_share) * one.messages:
-        return Check(name, "warning", f"{_told(one)}, at {rate:.1f} Hz", _DROPPED, float(one.given), threshold)
+    share = 1.0 - max((rows for _, rows in one.refused), default=0) / one.messages
+    if share < aids.limits.low_gnss_fix_share:
+        reason = f"{_told(one)}, at {rate:.1f} Hz"
+        return Check(name, "warning", reason, _DROPPED, share, aids.limits.low_gnss_fix_share)
     if rate < threshold:
         return Check(name, "warning", f"GNSS is logged at only {rate:.1f} Hz", _LOG_MORE, rate, threshold)
     return Check(name, "pass", f"GNSS is logged at {rate:.1f} Hz", "", rate, threshold)
