@@ -141,7 +141,15 @@ def test_the_count_is_what_the_inputs_hold():
 
 @pytest.mark.parametrize(
     ("release", "taken"),
-    [((1, 8, 0), True), ((1, 11, 0), True), ((1, 14, 4), True), ((1, 15, 0), False), ((1, 16, 0), False), ((), False)],
+    [
+        ((1, 8, 0), True),
+        ((1, 11, 0), True),
+        ((1, 13, 3), True),
+        ((1, 14, 0), False),
+        ((1, 15, 0), False),
+        ((1, 16, 0), False),
+        ((), False),
+    ],
 )
 def test_gnss_without_valid_velocity_is_used_as_the_release_that_flew_used_it(release, taken):
     flight = with_fields(made_flight(*release), "vehicle_gps_position", vel_ned_valid=constant(0, np.bool_))
@@ -294,3 +302,31 @@ def test_sample_times_that_ekf2_does_not_read_may_be_anything():
     assert found["gnss"].given == found["airspeed"].given == ROWS
     moved["vehicle_magnetometer", 0] |= absurd
     assert canonical(replace(flight, topics=moved)).left_out[0].topic == "vehicle_magnetometer"
+
+
+def test_vision_that_has_lost_all_that_it_measures_is_left_out():
+    lost = [f"{name}[{axis}]" for name in ("position", "velocity", "q") for axis in range(4)]
+    flight = canonical(without(made_flight(1, 16, 0), "vehicle_visual_odometry", *lost))
+    assert [entry.reason for entry in flight.left_out] == ["lacks the field position[0]"]
+    only = canonical(without(made_flight(1, 16, 0), "vehicle_visual_odometry", *lost[:8]))
+    found = given_samples(only)
+    assert [found[name].given for name in ("ev_pos", "ev_vel", "ev_yaw")] == [0, 0, ROWS]
+    assert not found["ev_pos"].is_withheld
+
+
+@pytest.mark.parametrize(
+    ("topic", "fields", "sensor", "withheld"),
+    [
+        ("distance_sensor", whole(orientation=0), "range", False),
+        ("landing_target_pose", whole(is_static=0), "auxvel", False),
+        ("landing_target_pose", whole(rel_vel_valid=0), "auxvel", True),
+        ("vehicle_optical_flow", {"pixel_flow[0]": constant(np.nan)}, "flow", False),
+        ("vehicle_gps_position", {"vel_ned_valid": constant(0, np.bool_)}, "gnss", True),
+    ],
+)
+def test_what_a_sensor_does_not_measure_for_the_estimator_is_not_withheld(topic, fields, sensor, withheld):
+    flight = made_flight(1, 16, 0)
+    table = flight.topics[topic, 0] | fields
+    one = given_samples(canonical(flight.with_topics(flight.topics | {(topic, 0): table})))[sensor]
+    assert one.given == 0
+    assert one.is_withheld == withheld

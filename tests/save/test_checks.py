@@ -307,7 +307,7 @@ def test_gnss_of_which_a_part_is_not_taken_is_warned_of() -> None:
     valid = flight.topics["vehicle_gps_position", 0]["vel_ned_valid"]
     valid[: len(valid) // 2] = True
     check = check_of(flight, "gnss")
-    assert (check.status, check.figure) == ("warning", len(valid) // 2)
+    assert (check.status, check.figure, check.threshold) == ("warning", 0.5, 0.8)
     assert check_of(flight, "horizontal_aid").status == "pass"
 
 

@@ -31,6 +31,7 @@ from fusetune.ekf2.replay import Gap, ReplayResult, ReplaySummary, replay, repla
 from fusetune.errors import UserError
 from fusetune.px4.estimator_instances import of_one_instance
 from fusetune.px4.flight import Flight
+from fusetune.px4.logged_parameters import flown_limits, is_read, typed_value
 from fusetune.px4.logged_state import Handover, logged_handovers
 from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
@@ -217,11 +218,20 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: Repl
     prepared = prepare(canonical(flown), settings.reconstruction, settings.start)
     for file in set_files:
         params, overrides = _read_set(file)
+        _refuse_impossible(file, params | overrides)
         # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.
         params.pop(WRITTEN_BACK, None)
         values = complete(flight.parameters.initial, params | overrides, flight.release)
         write_replay(prepared, file.stem, overrides, values, output_folder)
     return [file.stem for file in set_files]
+
+
+def _refuse_impossible(file: Path, values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        if is_read(name) and typed_value(name, value) is None:
+            low, high = flown_limits(name)
+            reason = f"{name} = {value:g} is nothing that can be flown"
+            raise UserError(file, reason, f"Give a number from {low:g} to {high:g}; a whole one where the parameter is")
 
 
 def _read_set(file: Path) -> tuple[dict[str, float], dict[str, float]]:

@@ -13,8 +13,8 @@ from fusetune.ekf2.message_samples import Refusal
 from fusetune.ekf2.taken_samples import AIDING, TakenSamples
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count
 
-NO_NUMBER = convert.NO_NUMBER
-"""Reason of messages in which a sensor says itself that it has nothing to say."""
+_ORDINARY = (convert.NO_NUMBER, convert.NOT_DOWN, convert.NOT_STATIC)
+"""Reasons for which nobody need worry: the sensor says itself that it has nothing to say, or serves something else."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,11 @@ class GivenSamples:
     def refusals(self) -> str:
         """Reasons and numbers in words; empty where every message is taken."""
         return ", ".join(f"{rows} {reason}" for reason, rows in self.refused)
+
+    @property
+    def is_withheld(self) -> bool:
+        """Whether the estimator is given none, though the sensor measured for it."""
+        return not self.given and self.messages > sum(rows for reason, rows in self.refused if reason in _ORDINARY)
 
 
 def given_samples(flight: Flight) -> dict[str, GivenSamples]:
@@ -106,17 +111,17 @@ def _messages(flight: Flight, name: str) -> tuple[dict[TopicKey, TopicTable], li
 
 
 def _airspeed(flight: Flight) -> tuple[dict[TopicKey, TopicTable], list[Refusal]]:
-    keys = [key for key in (("airspeed_validated", 0), ("airspeed", 0)) if key in flight.topics]
+    """Validated airspeed; the raw sensor too where nothing of that is taken."""
+    topics: dict[TopicKey, TopicTable] = {}
     refusals: list[Refusal] = []
-    for key in keys:
-        table = flight.topics[key]
-        is_validated = key[0] == "airspeed_validated"
-        refusals += (
-            convert.validated_airspeed_refusals(table, flight.release)
-            if is_validated
-            else convert.airspeed_refusals(table)
-        )
-    return {key: flight.topics[key] for key in keys}, refusals
+    validated, raw = flight.topic("airspeed_validated"), flight.topic("airspeed")
+    if validated is not None:
+        topics["airspeed_validated", 0] = validated
+        refusals = convert.validated_airspeed_refusals(validated, flight.release)
+    if raw is not None and (validated is None or not convert.taken(validated, refusals).any()):
+        topics["airspeed", 0] = raw
+        refusals = refusals + convert.airspeed_refusals(raw)
+    return topics, refusals
 
 
 def _vision_parts(flight: Flight, samples: TakenSamples) -> Iterator[GivenSamples]:

@@ -40,8 +40,8 @@ FLOW_QUALITY_MAX = 255.0
 
 Release = tuple[int, int, int]
 
-GNSS_NEEDS_VELOCITY = (1, 15, 0)
-"""Since then (December 2023) GNSS without valid velocity is dropped; before, nothing read `vel_ned_valid`."""
+GNSS_NEEDS_VELOCITY = (1, 14, 0)
+"""Since then (November 2022) GNSS without valid velocity is dropped; before, `vel_ned_valid` decided nothing."""
 
 VISION_NEEDS_FRAMES = (1, 14, 0)
 """Since then vision of unknown frame is dropped, and quaternions that are no unit; before, any number was used."""
@@ -50,7 +50,7 @@ USES_VALIDATED_AIRSPEED, NEEDS_SELECTED_AIRSPEED = (1, 13, 0), (1, 14, 0)
 """Before the first the raw sensor alone was read; between the two nothing asked whether a sensor was selected."""
 
 
-NO_NUMBER = "no number"
+NO_NUMBER, NOT_DOWN, NOT_STATIC = "no number", "not facing down", "target not static"
 
 
 class Refusal(NamedTuple):
@@ -123,7 +123,7 @@ def baro_samples(table: TopicTable) -> tuple[np.ndarray, np.ndarray]:
 def gnss_refusals(table: TopicTable, release: Release | None = None) -> list[Refusal]:
     """Messages of `vehicle_gps_position` whose velocity is not valid, for releases that ask for it.
 
-    Of a log that does not tell its release, the fields do: latitude in whole numbers is older than the demand.
+    Of a log that does not tell its release, the fields do, nearly: latitude was whole numbers until mid-2023.
     """
     is_older = "lat" in table if release is None else release < GNSS_NEEDS_VELOCITY
     if is_older:
@@ -226,7 +226,7 @@ def flow_samples(table: TopicTable) -> tuple[np.ndarray, np.ndarray]:
 
 def range_refusals(table: TopicTable) -> list[Refusal]:
     """Messages of `distance_sensor` that measure no height above ground."""
-    return [Refusal("not facing down", column(table, "orientation", DOWNWARD_FACING) != DOWNWARD_FACING)]
+    return [Refusal(NOT_DOWN, column(table, "orientation", DOWNWARD_FACING) != DOWNWARD_FACING)]
 
 
 def range_samples(table: TopicTable) -> tuple[np.ndarray, np.ndarray]:
@@ -329,7 +329,7 @@ def auxvel_refusals(table: TopicTable) -> list[Refusal]:
     for axis in ("x", "y"):
         is_number &= np.isfinite(column(table, f"v{axis}_rel")) & np.isfinite(column(table, f"cov_v{axis}_rel"))
     return [
-        Refusal("target not static", ~(column(table, "is_static", 0.0) > 0)),
+        Refusal(NOT_STATIC, ~(column(table, "is_static", 0.0) > 0)),
         Refusal("velocity not valid", ~(column(table, "rel_vel_valid", 0.0) > 0)),
         Refusal(NO_NUMBER, ~is_number),
     ]

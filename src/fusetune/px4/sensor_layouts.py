@@ -176,8 +176,10 @@ def vehicle_visual_odometry(table: TopicTable) -> TopicTable:
         result["velocity_frame"] = _new_frames(velocity_frame)
     _add_variances(result, table, "pose_covariance", ("position", "orientation"))
     _add_variances(result, table, "velocity_covariance", ("velocity",))
-    absent = {"position": 3, "velocity": 3, "q": 4}
-    absent |= {f"{kind}_variance": 3 for kind in ("position", "orientation", "velocity")}
+    # a system may measure some of these only; one that measures none has lost them
+    measured = {"position": _AXES, "velocity": _AXES, "q": _QUATERNION_PARTS}
+    absent = measured if any(_has_any(result, vector) for vector in measured) else {}
+    absent = absent | {f"{kind}_variance": _AXES for kind in ("position", "orientation", "velocity")}
     result = _without_vectors(result, absent)
     if not field_names(table, "position") and "x" not in table:
         result = _with_defaults(result, pose_frame=np.uint8(0))

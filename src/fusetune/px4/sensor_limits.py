@@ -97,7 +97,7 @@ _NEEDED: Mapping[str, tuple[str, ...]] = {
     "vehicle_land_detected": ("landed",),
     "vehicle_status": ("arming_state",),
     "vehicle_attitude": _names("q", 4),
-    "vehicle_local_position": ("x", "y", "z", "vx", "vy", "vz"),
+    "vehicle_local_position": ("x", "y", "z"),
     "vehicle_imu": (*_names("delta_angle"), *_names("delta_velocity"), "delta_angle_dt", "delta_velocity_dt"),
     "vehicle_command": ("command", *(f"param{number}" for number in range(1, 8))),
     "distance_sensor": ("current_distance",),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from fusetune.ekf2.given_samples import NO_NUMBER, GivenSamples, given_samples
+from fusetune.ekf2.given_samples import GivenSamples, given_samples
 from fusetune.ekf2.message_samples import gnss_refusals, taken
 from fusetune.px4.ekf2_parameters import complete
 from fusetune.px4.flight import Flight, LeftOut, row_count
@@ -60,7 +60,7 @@ class _Aids:
 
     flight: Flight
     limits: VerdictThresholds
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: dict[str, float]
 
     @cached_property
     def given(self) -> dict[str, GivenSamples]:
@@ -171,9 +171,10 @@ def gnss(aids: _Aids) -> Check:
             return Check(name, "does-not-apply", "the log holds no GNSS samples")
         return Check(name, "warning", why, remedy, 0.0, threshold)
     one = aids.given["gnss"]
-    refused = max((rows for _, rows in one.refused), default=0)
-    if refused > (1.0 - aids.limits.low_gnss_fix_share) * one.messages:
-        return Check(name, "warning", f"{_told(one)}, at {rate:.1f} Hz", _DROPPED, float(one.given), threshold)
+    share = 1.0 - max((rows for _, rows in one.refused), default=0) / one.messages
+    if share < aids.limits.low_gnss_fix_share:
+        reason = f"{_told(one)}, at {rate:.1f} Hz"
+        return Check(name, "warning", reason, _DROPPED, share, aids.limits.low_gnss_fix_share)
     if rate < threshold:
         reason = f"GNSS is logged at only {rate:.1f} Hz"
         return Check(name, "warning", reason, log_more(aids.flight, _GNSS), rate, threshold)
@@ -280,7 +281,7 @@ def _unusable_aids(aids: _Aids) -> Iterator[tuple[str, str, str]]:
         if aids.lacks_fields(topic) and topic not in told:
             told.add(topic)
             yield sensor, *aids.why_no_samples(topic, words)
-        elif sensor in aids.given and _is_withheld(aids.given[sensor]):
+        elif sensor in aids.given and aids.given[sensor].is_withheld:
             yield sensor, _told(aids.given[sensor]), _DROPPED
 
 
@@ -308,17 +309,11 @@ def samples_given(aids: _Aids) -> Check:
     used = [one for sensor, one in aids.given.items() if switched_on[sensor]]
     if not used:
         return Check(name, "does-not-apply", "the log holds no messages of a sensor in use")
-    withheld = [one for one in used if _is_withheld(one) and one.sensor != "gnss"]
+    withheld = [one for one in used if one.is_withheld and one.sensor != "gnss"]
     if withheld:
         return Check(name, "warning", "; ".join(map(_told, withheld)), _DROPPED, float(len(withheld)), 0.0)
     counts = ", ".join(_count(one) for one in used)
     return Check(name, "pass", f"the estimator is given {counts}", "", 0.0, 0.0)
-
-
-def _is_withheld(one: GivenSamples) -> bool:
-    """Whether the estimator is given none, though the sensor did measure."""
-    numbers = one.messages - sum(rows for reason, rows in one.refused if reason == NO_NUMBER)
-    return not one.given and numbers > 0
 
 
 def _told(one: GivenSamples) -> str:
