@@ -108,6 +108,7 @@ def test_without_variance_there_is_no_interval_and_nobody_is_out(rows: list[list
     assert (found.lower, found.upper, found.p_value, found.behind_best_error) in ((None,) * 4, (None, None, None, 0.0))
     assert found.aims[AIDED].lower is None
     assert found.is_eligible
+    assert found.p_best is None
     assert not is_proved(found, DecisionSettings(multiplicity="none"))
 
 
@@ -118,6 +119,7 @@ def test_equal_within_rounding_is_equal(flights: int, difference: float) -> None
     assert (found.difference, found.p_value, found.flights_better) == (0.0, 1.0, 0)
     assert (found.lower, found.upper) == (None, None)
     assert found.improvement_percent == 0.0
+    assert found.p_best == (None if flights == 1 else 0.5)
 
 
 def test_holm_leaves_open_what_is_not_known_and_counts_it() -> None:

@@ -58,6 +58,7 @@ def test_every_key_is_described_and_in_the_manual(schema: dict[str, Any], projec
 
 def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
     from fusetune.analyze.settings import ScoringSettings
+    from fusetune.analyze.trust_settings import TrustSettings
     from fusetune.analyze.withheld_gaps import WithholdingSettings
     from fusetune.apply.settings import DecisionSettings
     from fusetune.px4.reading_limits import ReadingLimits
@@ -66,6 +67,7 @@ def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
     assert ReadingLimits.from_mapping(shipped["reading"]) == ReadingLimits()
     assert shipped["reading"].keys() == asdict(ReadingLimits()).keys()
     assert ScoringSettings.from_mapping(shipped["scoring"]) == ScoringSettings()
+    assert TrustSettings.from_mapping(shipped["trust"]) == TrustSettings()
     assert DecisionSettings.from_mapping(shipped["decision"], seed=0) == DecisionSettings()
     assert VerdictThresholds.from_mapping(shipped["verdict"]) == VerdictThresholds()
     assert shipped["verdict"].keys() == asdict(VerdictThresholds()).keys()

@@ -20,7 +20,7 @@ from fusetune.apply.bootstrap import (
     units_redrawn,
 )
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
-from fusetune.apply.rounding import without_rounding
+from fusetune.apply.rounding import EQUAL_WITHIN, without_rounding
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.sign_flips import family_p_values
 
@@ -266,19 +266,27 @@ def _with_family(
     adjusted = dict(zip((one.name for one in candidates), holm([one.p_value for one in candidates]), strict=True))
     family = _family_p_values([one.name for one in candidates if one.is_eligible], present, evidence, settings)
     able = [one.name for one in ranked if one.status != NOT_ELIGIBLE]
-    best = probability_best(scores[:, [complete.index(name) for name in able]])
     units = units_redrawn(evidence)
-    shares = dict(zip(able, best.tolist(), strict=True))
+    shares = _shares_of_best(able, complete, scores) if units > 1 else None
     ranked = [
         replace(
             one,
             p_holm=adjusted.get(one.name, 1.0),
             p_family=family.get(one.name, 1.0),
-            p_best=shares.get(one.name, 0.0) if units > 1 else None,
+            p_best=None if shares is None else shares.get(one.name, 0.0),
         )
         for one in ranked
     ]
     return _with_distance_to_the_best(ranked, complete, scores, units, settings)
+
+
+def _shares_of_best(able: Sequence[str], complete: Sequence[str], scores: Array) -> dict[str, float] | None:
+    """Share of draws in which each set is best; None where sets differ and no draw shows by how much that varies."""
+    drawn = scores[:, [complete.index(name) for name in able]]
+    differences = drawn - drawn[:, :1]
+    if not (differences.std(axis=0) > EQUAL_WITHIN).any() and without_rounding(differences).any():
+        return None
+    return dict(zip(able, probability_best(drawn).tolist(), strict=True))
 
 
 def _with_distance_to_the_best(

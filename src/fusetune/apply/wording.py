@@ -105,10 +105,11 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
             "would help."
         )
     p_value = best.p_holm if settings.multiplicity == "holm" else best.p_family
-    known = "that cannot be told from one flight" if p_value is None else f"p = {p_value:.2g}"
+    if p_value is None:
+        return f"{found}but one flight cannot show whether the best of several candidates is only favoured by chance."
     return (
         f"{found}but the best of several candidates is favoured by chance, and after allowing for that "
-        f"({known}) the difference is not certain enough for a change."
+        f"(p = {p_value:.2g}) the difference is not certain enough for a change."
     )
 
 

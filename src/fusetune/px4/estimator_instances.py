@@ -13,7 +13,7 @@ FULL_IMU_RATE_HZ = 100.0
 def primary_instance(flight: Flight) -> int:
     """The instance that the selector names in most of its messages; 0 where the log has no selector.
 
-    A replay follows one estimator, so a flight in which the selector switched is represented by one instance.
+    It stands for the flight where that has to be one of one estimator, see `of_one_instance`.
     """
     selector = flight.topic("estimator_selector_status")
     if selector is None or not len(selector["primary_instance"]):

@@ -161,7 +161,8 @@ def _holds(results: Results) -> str:
         return "Whichever flight is left out, no set does better than the present one on the others."
     change = float(percent_change(validated["difference"]))
     confidence = results.decision["rule"]["confidence"]
-    span = f"{confidence:.0%} interval {interval_text(validated['lower'], validated['upper'])} %"
+    ends = interval_text(validated["lower"], validated["upper"])
+    span = f"{confidence:.0%} interval {ends}{'' if ends == NOT_KNOWN else ' %'}"
     size = f"{abs(change):.1f} % {'larger' if change >= 0.0 else 'smaller'} than now"
     if stays == count:
         same = "the same set is best whichever flight is left out"

@@ -24,7 +24,7 @@ INTRODUCTION = (
     "estimator logged. The grade follows from the size of the innovations, velocity, heading, height, resets of height "
     "and flags; what the log does not let be compared limits it. A and B repeat the flight, of a C only clear "
     "differences between sets can be trusted. Logs that lack samples are repaired first; how they would stand as they "
-    "are is shown beside."
+    "are is shown beside. A flight of which nothing can be compared has a D, too, but counts in the decision."
 )
 
 
