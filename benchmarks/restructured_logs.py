@@ -395,6 +395,31 @@ def parameters(parts: Parts, rng: Rng) -> None:
             parts.data.insert(int(rng.integers(len(parts.data))), text)
 
 
+def many_changes(parts: Parts, rng: Rng) -> None:
+    """What is told once in a flight changes thousands of times: landed, selected, primary, parameters of the filter."""
+    count = int(_pick(rng, [100, 5000, 30_000]))
+    topics = {
+        "vehicle_land_detected": ("bool landed;", 1),
+        "sensor_selection": ("uint32_t accel_device_id;", 4),
+        "estimator_selector_status": ("uint8_t primary_instance;", 1),
+        "vehicle_status": ("uint8_t arming_state;", 1),
+    }
+    name = str(_pick(rng, [*topics, "parameter"]))
+    if name == "parameter":
+        parts.data[1:1] = [parameter("EKF2_BARO_NOISE", 2.0 + number % 2) for number in range(count)]
+        return
+    fields, size = topics[name]
+    parts.definitions.insert(1, definition(name, f"uint64_t timestamp;{fields}"))
+    parts.definitions.append(subscription(FIRST_FREE_ID, name))
+    each = -(-count // len(parts.data))
+    mixed = []
+    for number, one in enumerate(parts.data):
+        now = FIRST_US + 12_000_000 * number // len(parts.data)
+        rows = [data(FIRST_FREE_ID, now + turn, bytes([turn % 2]) + bytes(size - 1)) for turn in range(each)]
+        mixed += [one, *rows]
+    parts.data = mixed
+
+
 def spliced(parts: Parts, rng: Rng) -> None:
     """Records of another flight, a second later or years, in between or behind."""
     offset = int(_pick(rng, [0, 1_000_000, 60_000_000, 1 << 45]))
@@ -466,6 +491,7 @@ OTHERS = (
     subscriptions,
     message_lengths,
     parameters,
+    many_changes,
     spliced,
     whole_log_behind,
     cut_and_appended,

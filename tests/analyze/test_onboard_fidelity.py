@@ -6,7 +6,7 @@ import pytest
 
 from fusetune.analyze.onboard_fidelity import judge_onboard_fidelity
 from fusetune.parquet import write_table
-from fusetune.px4.flight import Flight
+from fusetune.px4.flight import Flight, ParameterHistory
 
 START = 10_000_000
 
@@ -56,6 +56,28 @@ def test_reasons_name_what_the_log_lacks(tmp_path):
     assert "magnetometer at only 2.0 Hz" in text
     assert "2 s before take-off" in text
     assert "v1.13.3" in text
+
+
+def test_a_slow_sensor_is_not_put_down_to_the_logger(tmp_path):
+    imu = START + 5_000 * np.arange(2000)
+    updates = {"timestamp": imu, "vehicle_air_data_timestamp_rel": np.full(2000, 0x7FFF, np.int16)}
+    updates["vehicle_air_data_timestamp_rel"][::100] = 0
+    landed = {"timestamp": np.array([START, START + 2_000_000]), "landed": np.array([1, 0])}
+    topics = {
+        ("sensor_combined", 0): {"timestamp": imu, "gyro_integral_dt": np.full(2000, 5_000)},
+        ("vehicle_air_data", 0): {"timestamp": imu[::100]},
+        ("vehicle_land_detected", 0): landed,
+        ("ekf2_timestamps", 0): updates,
+    }
+    flight = Flight("f", topics, ParameterHistory({"SDLOG_PROFILE": 3, "SDLOG_MODE": 2}))
+    text = " / ".join(judged(tmp_path, 2.0, flight=flight).reasons)
+    assert "barometer itself gives only 2.0 Hz" in text
+    assert "SDLOG" not in text
+    flight.parameters.initial |= {"SDLOG_PROFILE": 1, "SDLOG_MODE": 0}
+    del topics["ekf2_timestamps", 0]
+    text = " / ".join(judged(tmp_path, 2.0, flight=flight).reasons)
+    assert "SDLOG_PROFILE = 3" in text
+    assert "SDLOG_MODE = 2" in text
 
 
 def test_log_without_innovations_of_its_own_is_not_compared(tmp_path):

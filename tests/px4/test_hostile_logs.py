@@ -224,3 +224,22 @@ def test_what_later_rooms_read_is_kept() -> None:
     for topic in {*FIDELITY_TOPICS, *REPLAY_TOPICS, *SCORE_TOPICS}:
         assert is_used(topic), topic
     assert not is_used("actuator_outputs")
+
+
+def test_a_definition_that_comes_late_is_taken(tmp_path: Path) -> None:
+    """The part of a topic is defined behind its first subscription, which is lost, and before its second."""
+    whole, part = definition("whole", "uint64_t timestamp;part p;"), definition("part", "uint8_t a;")
+    records = (SOUND, subscription(2, "sound"), whole, subscription(1, "whole"), data(2, 1_000_000, b"\1"))
+    assert ("whole", 0) not in read(tmp_path, *records, part, data(1, 1_000_000, b"\5")).topics
+    flight = read(tmp_path, *records, part, subscription(1, "whole"), data(1, 1_000_000, b"\5"))
+    assert flight.topics["whole", 0]["p.a"].tolist() == [5]
+    assert flight.undefined_topics == ()
+
+
+def test_asking_for_a_faulty_definition_again_costs_nothing(tmp_path: Path) -> None:
+    """Thousands of subscriptions of a topic that lacks the last of its 3,900 fields, each after another definition."""
+    large = definition("large", "uint64_t timestamp;" + "".join(f"float f{n};" for n in range(3900)) + "nowhere x;")
+    records = [large, SOUND, subscription(60_000, "sound"), data(60_000, 1_000_000, b"\1")]
+    for number in range(5000):
+        records += [definition(f"other{number}", "float a;"), subscription(number, "large")]
+    assert read(tmp_path, *records).undefined_topics == ("large",)

@@ -12,6 +12,7 @@ from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, LeftOut, ParameterChange
 from fusetune.px4.release_layouts import canonical
 from fusetune.px4.ulog_times import ANOTHER_CLOCK
+from fusetune.save.log_facts import is_airborne
 from fusetune.save.verdict import VerdictThresholds
 
 
@@ -444,3 +445,27 @@ def test_topics_by_another_clock_are_told_with_their_remedy() -> None:
     check = check_of(replace(made_flight(), left_out=left_out), "time_stamps")
     assert check.status == "warning"
     assert "autopilot's time" in check.remedy
+
+
+def test_thousands_of_changes_are_told_in_short() -> None:
+    flight = made_flight()
+    imu = flight.topics["sensor_combined", 0]["timestamp"]
+    turns = {"timestamp": imu, "primary_instance": (np.arange(len(imu)) % 2).astype(np.uint8)}
+    flight.topics["estimator_selector_status", 0] = turns
+    flight.topics["sensor_selection", 0] = {"timestamp": imu, "gyro_device_id": np.arange(len(imu)) % 3}
+    flight.parameters.changed += [ParameterChange(int(time), "EKF2_BARO_NOISE", 2.0) for time in imu]
+    for name in ("estimator_instances", "imu_selection", "parameter_changes"):
+        check = check_of(flight, name)
+        assert check.status == "warning"
+        assert check.figure is not None
+        assert check.figure > 5000
+        assert len(check.reason) < 500
+
+
+def test_times_in_the_air_are_those_between_take_off_and_landing() -> None:
+    """In the air from 12 s to 42 s after the first sample at 1 s, the begin included and the end not."""
+    flight = made_flight()
+    times = np.array([12_999_999, 13_000_000, 42_999_999, 43_000_000, 0, 10**9])
+    assert is_airborne(flight, times).tolist() == [False, True, True, False, False, False]
+    del flight.topics["vehicle_land_detected", 0]
+    assert is_airborne(flight, times).all()

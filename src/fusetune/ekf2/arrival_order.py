@@ -11,22 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fusetune.px4.estimator_samples import RELATIVE_FIELDS, RELATIVE_TICK_US, RELATIVE_TIMESTAMP_INVALID
 from fusetune.px4.flight import Flight, TopicTable
 
-RELATIVE_TIMESTAMP_INVALID = 32767
-RELATIVE_TICK_US = 100
 TRUNCATION_SLACK_US = 99
 """`ekf2_timestamps` stores differences of times cut to 0.1 ms, so a message may be this much later than it says."""
-
-RELATIVE_FIELDS = {
-    "airspeed": "airspeed_timestamp_rel",
-    "airspeed_validated": "airspeed_validated_timestamp_rel",
-    "distance_sensor": "distance_sensor_timestamp_rel",
-    "vehicle_optical_flow": "optical_flow_timestamp_rel",
-    "vehicle_air_data": "vehicle_air_data_timestamp_rel",
-    "vehicle_magnetometer": "vehicle_magnetometer_timestamp_rel",
-    "vehicle_visual_odometry": "visual_odometry_timestamp_rel",
-}
 
 
 @dataclass(frozen=True)

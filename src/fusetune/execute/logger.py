@@ -9,9 +9,10 @@ import numpy as np
 from fusetune.execute.faults import DefaultProfile, Fault, LoggerDropout, of_kind
 from fusetune.execute.flight_plan import FlightEvents
 from fusetune.execute.noise import random_stream
+from fusetune.px4.estimator_samples import RELATIVE_TICK_US, RELATIVE_TIMESTAMP_INVALID
 from fusetune.px4.flight import Dropout, TopicKey, TopicTable, select_rows
 
-NO_SAMPLE = 32767
+NO_SAMPLE = RELATIVE_TIMESTAMP_INVALID
 ESTIMATOR_LATENCY_US = 450
 """From the end of an IMU sample to the run of the estimator that takes it."""
 LONGEST_LOSS = 4
@@ -71,7 +72,8 @@ def ekf2_timestamps(topics: dict[TopicKey, TopicTable]) -> TopicTable:
             published_us = topics[topic, 0]["timestamp"]
             run = np.searchsorted(imu_us + ESTIMATOR_LATENCY_US, published_us)
             taken = run < len(imu_us)
-            relative[run[taken]] = published_us[taken] // 100 - imu_us[run[taken]] // 100
+            ticks = published_us[taken] // RELATIVE_TICK_US
+            relative[run[taken]] = ticks - imu_us[run[taken]] // RELATIVE_TICK_US
         table[column] = relative
     return table
 

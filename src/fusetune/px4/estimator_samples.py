@@ -10,8 +10,19 @@ import numpy as np
 
 from fusetune.px4.flight import Flight
 
-_UNIT_US = 100
-_NONE = 0x7FFF
+RELATIVE_TICK_US = 100
+RELATIVE_TIMESTAMP_INVALID = 0x7FFF
+RELATIVE_FIELDS = {
+    "airspeed": "airspeed_timestamp_rel",
+    "airspeed_validated": "airspeed_validated_timestamp_rel",
+    "distance_sensor": "distance_sensor_timestamp_rel",
+    "vehicle_optical_flow": "optical_flow_timestamp_rel",
+    "vehicle_air_data": "vehicle_air_data_timestamp_rel",
+    "vehicle_magnetometer": "vehicle_magnetometer_timestamp_rel",
+    "vehicle_visual_odometry": "visual_odometry_timestamp_rel",
+}
+"""Fields of `ekf2_timestamps` by the topics whose messages they name."""
+
 _ROUNDING_US = 150
 _COMPLETE_SHARE = 0.98
 """A logger drops a message now and then."""
@@ -26,13 +37,13 @@ def logged_share(flight: Flight, topic: str) -> float | None:
         `vehicle_magnetometer`, `vehicle_air_data` or another that `ekf2_timestamps` has a field for.
     """
     updates = flight.topic("ekf2_timestamps")
-    relative = None if updates is None else updates.get(f"{topic}_timestamp_rel")
+    relative = None if updates is None else updates.get(RELATIVE_FIELDS.get(topic, ""))
     if updates is None or relative is None:
         return None
-    taken = relative != _NONE
+    taken = relative != RELATIVE_TIMESTAMP_INVALID
     if not taken.any():
         return None
-    named = np.sort(updates["timestamp"][taken] + relative[taken].astype(np.int64) * _UNIT_US)
+    named = np.sort(updates["timestamp"][taken] + relative[taken].astype(np.int64) * RELATIVE_TICK_US)
     # one sample named by two updates may be rounded to two neighbouring units
     named = named[np.append(True, np.diff(named) > _ROUNDING_US)]
     shares = [_share_in(named, flight.topics[topic, instance]["timestamp"]) for instance in flight.instances(topic)]

@@ -101,13 +101,27 @@ def _parse_field(text: str) -> Field:
     return Field(type_name, None if length is None else int(length), name)
 
 
+class _UndefinedError(ValueError):
+    """A definition that is missing, and may still come."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        super().__init__(f"{name} is not defined")
+
+
 class Definitions:
-    """All definitions of a log and what topics they make."""
+    """All definitions of a log and what topics they make.
+
+    What was found once, good or bad, is kept, so that asking again for thousands of subscriptions costs nothing.
+    """
 
     def __init__(self) -> None:
         self._formats: dict[str, tuple[Field, ...]] = {}
         self._sizes: dict[str, MessageSize] = {}
+        self._paddings: dict[str, int] = {}
         self._faults: dict[str, str] = {}
+        self._waiting: dict[str, list[str]] = {}
+        """Faulty definitions by the name of what they lack."""
 
     def add(self, payload: bytes) -> None:
         """Take the definition of a format record; of several for one name the first holds.
@@ -120,7 +134,8 @@ class Definitions:
         name, fields = parse_format(payload)
         if name not in self._formats:
             self._formats[name] = fields
-            self._faults.clear()
+            for waiting in self._waiting.pop(name, ()):
+                del self._faults[waiting]
 
     def size(self, name: str) -> MessageSize:
         """Size of a topic's data messages.
@@ -136,13 +151,15 @@ class Definitions:
             return self._size(name, 0)
         except ValueError as error:
             self._faults[name] = str(error)
+            if isinstance(error, _UndefinedError):
+                self._waiting.setdefault(error.name, []).append(name)
             raise
 
     def _size(self, name: str, depth: int) -> MessageSize:
         known = self._sizes.get(name)
         if known is None:
             if name not in self._formats:
-                raise ValueError(f"{name} is not defined")
+                raise _UndefinedError(name)
             if depth > _DEEPEST_NESTING:
                 raise ValueError(f"{name} is nested without end")
             known = self._sizes[name] = self._sum(name, depth)
@@ -178,16 +195,20 @@ class Definitions:
         ValueError
             As `size`, or the topic has no time stamp.
         """
+        if name in self._paddings:
+            return self._paddings[name]
         self.size(name)
         fields = self._formats[name]
         if not any((field.type_name, field.name) == ("uint64_t", "timestamp") and not field.length for field in fields):
-            raise ValueError(f"{name} has no time stamp")
+            self._faults[name] = f"{name} has no time stamp"
+            raise ValueError(self._faults[name])
         found = 0
         for field in reversed(fields):
             one = self._field_size(field, 0)
             if one.columns and not field.name.startswith(_PADDING):
                 break
             found += (field.length or 1) * one.size
+        self._paddings[name] = found
         return found
 
     def layout(self, name: str) -> MessageLayout:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from fusetune.px4.flight import Flight
-from fusetune.save.log_facts import airborne_intervals
+from fusetune.save.log_facts import airborne_intervals, is_airborne
 from fusetune.save.logging_advice import ONE_ESTIMATOR, log_from_boot
 from fusetune.save.verdict import Check, Status, VerdictThresholds
 
 _ONE_ESTIMATOR = f"Set {ONE_ESTIMATOR}, so that one estimator runs on one IMU"
 _SAVED_BY_EKF2 = ("EKF2_MAG_DECL", "EKF2_MAGBIAS_X", "EKF2_MAGBIAS_Y", "EKF2_MAGBIAS_Z")
 """Parameters that the estimator itself stores."""
+_MOST_TURNS_TOLD = 12
 _SELECTED_DEVICES = ("accel_device_id", "gyro_device_id")
 _OF_THE_ESTIMATOR = ("EKF2_", "SENS_", "CAL_", "IMU_")
 
@@ -70,7 +71,9 @@ def estimator_instances(flight: Flight, limits: VerdictThresholds) -> Check:
         return Check(name, status, words, "" if count == 1 else _ONE_ESTIMATOR, 0.0, 0.0)
     primary = np.asarray(selector["primary_instance"], np.int64)
     changes = _changes(flight, selector["timestamp"], primary)
-    turns = ", ".join([f"instance {primary[0]} first", *(f"{value} from {time:.1f} s on" for time, value in changes)])
+    later = [f"{value} from {time:.1f} s on" for time, value in changes[:_MOST_TURNS_TOLD]]
+    more = f", {len(changes) - len(later)} changes more" if len(changes) > len(later) else ""
+    turns = ", ".join([f"instance {primary[0]} first", *later]) + more
     reason = f"{max(count, 1)} estimators ran, primary: {turns}"
     if changes:
         return Check(name, "warning", reason, _ONE_ESTIMATOR, float(len(changes)), 0.0)
@@ -86,7 +89,7 @@ def imu_selection(flight: Flight, limits: VerdictThresholds) -> Check:
     times = sorted(
         {time for device in devices for time, _ in _changes(flight, selection["timestamp"], selection[device])}
     )
-    in_flight = [time for time in times if _is_airborne(flight, time)]
+    in_flight = [time for time, flying in zip(times, _are_airborne(flight, times), strict=True) if flying]
     if in_flight:
         said = ", ".join(list(dict.fromkeys(f"{time:.1f} s" for time in in_flight))[:5])
         reason = f"the selected IMU changed in flight (at {said}): its biases jump there"
@@ -97,13 +100,13 @@ def imu_selection(flight: Flight, limits: VerdictThresholds) -> Check:
 def parameter_changes(flight: Flight, limits: VerdictThresholds) -> Check:
     """Parameters of estimator and sensors that were changed in the air; a replay keeps one set."""
     name, begin = "parameter_changes", _begin_us(flight)
-    changed = [
+    relevant = [
         change
         for change in flight.parameters.changed
-        if change.name.startswith(_OF_THE_ESTIMATOR)
-        and change.name not in _SAVED_BY_EKF2
-        and _is_airborne(flight, (change.timestamp - begin) * 1e-6)
+        if change.name.startswith(_OF_THE_ESTIMATOR) and change.name not in _SAVED_BY_EKF2
     ]
+    flying = is_airborne(flight, np.array([change.timestamp for change in relevant], np.int64))
+    changed = [change for change, in_the_air in zip(relevant, flying, strict=True) if in_the_air]
     if not changed:
         return Check(name, "pass", "no parameter of estimator or sensors changed in flight", "", 0.0, 0.0)
     said = ", ".join(f"{one.name} = {one.value:g} at {(one.timestamp - begin) * 1e-6:.1f} s" for one in changed[:5])
@@ -122,11 +125,9 @@ def _begin_us(flight: Flight) -> int:
     return int(flight.topics["sensor_combined", 0]["timestamp"].min())
 
 
-def _is_airborne(flight: Flight, time_s: float) -> bool:
+def _are_airborne(flight: Flight, times_s: Sequence[float]) -> np.ndarray:
     """Whether the vehicle was in the air so long after the first IMU sample; assumed where nothing tells."""
-    intervals = airborne_intervals(flight)
-    time = _begin_us(flight) + time_s * 1e6
-    return intervals is None or any(begin <= time < end for begin, end in intervals)
+    return is_airborne(flight, _begin_us(flight) + (np.array(times_s, np.float64) * 1e6).round().astype(np.int64))
 
 
 CHECKS: tuple[Callable[[Flight, VerdictThresholds], Check], ...] = (

@@ -52,6 +52,16 @@ def airborne_intervals(flight: Flight) -> list[tuple[int, int]] | None:
     return [(begin, end) for begin, end, on_ground in zip(edges, edges[1:], states, strict=False) if not on_ground]
 
 
+def is_airborne(flight: Flight, times: np.ndarray) -> np.ndarray:
+    """Whether the vehicle was in the air at some times (N,) µs, (N,) bool; true where the log does not tell."""
+    intervals = airborne_intervals(flight)
+    if intervals is None:
+        return np.ones(len(times), np.bool_)
+    # behind the begin of an interval and before its end lies an odd number of edges
+    edges = np.array(intervals, np.int64).reshape(-1)
+    return np.searchsorted(edges, times, side="right") % 2 == 1
+
+
 def rate_hz(table: TopicTable | None) -> float | None:
     """Mean rate of a topic; `None` where there are no samples."""
     if table is None or not len(table["timestamp"]):

@@ -14,7 +14,7 @@ import numpy as np
 
 from fusetune.px4.ekf2_parameters import complete
 from fusetune.px4.flight import Flight, TopicTable, field_names, select_rows, stacked
-from fusetune.save.log_facts import airborne_intervals
+from fusetune.save.log_facts import airborne_intervals, is_airborne
 from fusetune.save.verdict import Check, VerdictThresholds
 
 STANDARD_GRAVITY_M_S2 = 9.80665
@@ -68,10 +68,9 @@ def standstill(table: TopicTable, columns: Sequence[str], limit_s: float, flying
 def _flying_steps(flight: Flight, table: TopicTable) -> np.ndarray:
     """Which steps from row to row are in the air, (rows - 1,) bool; all where that is unknown or never was."""
     middle = (table["timestamp"][1:] + table["timestamp"][:-1]) // 2
-    intervals = airborne_intervals(flight)
-    if not intervals:
+    if not airborne_intervals(flight):
         return np.ones(len(middle), np.bool_)
-    return np.any([(middle >= begin) & (middle < end) for begin, end in intervals], axis=0)
+    return is_airborne(flight, middle)
 
 
 class _Subject(NamedTuple):
