@@ -7,6 +7,9 @@ rule save_flight:
         "results/logs/save/{flight}.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB, 3.0),
+        runtime=of_its_logs(5, 0.05),
     params:
         code=DIGEST["save"],
         thresholds=SETTINGS["verdict"],
@@ -31,6 +34,9 @@ checkpoint list_flights:
         "results/logs/list_flights.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB),
+        runtime=of_its_logs(5),
     params:
         code=DIGEST["save"],
     message:
