@@ -30,6 +30,6 @@ def of_its_logs(fixed, for_each_mb=0.0):
 def replay_resources(replayed, scored=0):
     """Memory, MB, and time, minutes, of a job that replays some sets and scores some."""
     return {
-        "mem_mb": of_its_logs(KERNELS_MB, 4.0 + 0.03 * scored),
+        "mem_mb": of_its_logs(KERNELS_MB, 5.0 + 0.03 * scored),
         "runtime": of_its_logs(10, 0.02 * (replayed + scored)),
     }
