@@ -16,6 +16,7 @@ configfile: "config/config.yaml"
 
 include: "workflow/rules/configuration.smk"
 include: "workflow/rules/common.smk"
+include: "workflow/rules/resources.smk"
 include: "workflow/rules/design.smk"
 include: "workflow/rules/execute.smk"
 include: "workflow/rules/save.smk"

@@ -1,83 +1,134 @@
-"""Cost of long flights: saved, reconstructed and replayed, in CPU seconds per minute of flight, as Markdown.
+"""Cost of long flights: CPU seconds per minute of flight, and peak memory of the jobs that a flight takes, as Markdown.
 
-    python -m benchmarks.long_flights [--minutes 15 30 60]
+    python -m benchmarks.long_flights [--minutes 10 20 60]
 
 Simulated flights, laps of the survey mission with the vehicle's own estimator on board, at full rate and thinned as the
-default logging profile thins a log. Replayed with all gaps of the default configuration. Where the cost is linear in
-the length, the figures of a line agree.
+default logging profile thins a log. Each is saved, analysed with all sets of the shipped study and drawn, each job in a
+process of its own and as the workflow runs it; of the analysis the largest step is told, too. Where the cost is linear
+in the length, the figures of a column agree.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from benchmarks.save_speed import peak_bytes, simulated
+from benchmarks.save_speed import ROOT, peak_bytes, simulated
 from benchmarks.thinned_logs import Thinning, thinned
 
-from fusetune.analyze.flight_phases import airborne_intervals
-from fusetune.analyze.reconstruction import ReconstructionSettings, reconstruct
-from fusetune.analyze.replay_flight import prepare
-from fusetune.analyze.withheld_gaps import WithholdingSettings, plan_gaps
-from fusetune.ekf2.compilation import ensure_compiled
-from fusetune.ekf2.parameters import complete
-from fusetune.px4.flight import Flight
+from fusetune.design.study import load_study
+from fusetune.job_environment import JOB_ENVIRONMENT
 from fusetune.px4.release_layouts import canonical
-from fusetune.save import save_log
-from fusetune.save.flight_folder import load_flight
+from fusetune.px4.ulog_writer import write_ulog
+from fusetune.save.flight_folder import load_flight, read_metadata
+
+STUDY = ROOT / "config/studies/paper_table11.yaml"
+ANALYSIS_STEPS = ("replay_flight", "graded", "score_flight", "write_flight_fidelity")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, nargs="+", default=[15.0, 30.0, 60.0])
+    parser.add_argument("--minutes", type=float, nargs="+", default=[10.0, 20.0, 60.0])
+    parser.add_argument("--job", nargs=2, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    ensure_compiled()
-    print(
-        "| flight | MB | saved, MB/s | CPU s a minute: saved | replayed | thinned: reconstructed | replayed | peak GB |"
-    )
+    if options.job:
+        print(json.dumps(_measured(options.job[0], Path(options.job[1]))))
+        return
+    steps = ", ".join(step.replace("_", " ") for step in ANALYSIS_STEPS)
+    print(f"| flight | MB | CPU s a minute: save | analyse | draw | peak MB: save | analyse ({steps}) | draw |")
     print("|---|---|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as scratch:
-        for minutes in (2.0, *options.minutes):
-            log, _ = simulated(Path(scratch) / f"{minutes:g}.ulg", minutes, True)
-            cells = _row(log, Path(scratch) / f"{minutes:g}")
+    for minutes in (2.0, *options.minutes):
+        with tempfile.TemporaryDirectory() as scratch:
+            log, _ = simulated(Path(scratch) / "full_rate.ulg", minutes, True)
+            rows = [_row("full rate", log)]
+            small = thinned(canonical(load_flight(log.with_suffix(".saved"))), Thinning())
             log.unlink()
-            # the first flight is there to compile and to warm up
-            if minutes > 2.0:
-                print(f"| {' | '.join(cells)} |", flush=True)
+            log = log.with_name("thinned.ulg")
+            write_ulog(log, small)
+            rows.append(_row("thinned", log))
+        # the first flight is there to compile and to warm up
+        if minutes > 2.0:
+            print("\n".join(f"| {' | '.join(cells)} |" for cells in rows), flush=True)
 
 
-def _row(log: Path, folder: Path) -> list[str]:
-    size = log.stat().st_size / 1e6
-    saved_s = _cpu_s(lambda: save_log(log, folder))
-    flight = canonical(load_flight(folder))
-    small = thinned(flight, Thinning())
-    minutes = (flight.last_timestamp - flight.start_timestamp) / 6e7
-    replayed_s = _cpu_s(lambda: _replay(flight))
-    repaired: list[Flight] = []
-    reconstructed_s = _cpu_s(lambda: repaired.append(reconstruct(small, ReconstructionSettings()).flight))
-    thinned_s = _cpu_s(lambda: _replay(repaired[0]))
-    times = (saved_s, replayed_s, reconstructed_s, thinned_s)
+def _row(kind: str, log: Path) -> list[str]:
+    save, analyse, draw = (_in_own_process(job, log) for job in ("save", "analyse", "draw"))
+    metadata = read_metadata(log.with_suffix(".saved"))
+    minutes = (metadata["last_timestamp"] - metadata["start_timestamp"]) / 6e7
+    steps = ", ".join(f"{analyse['steps'][step] / 1e6:.0f}" for step in ANALYSIS_STEPS)
     return [
-        f"{minutes:.1f} min",
-        f"{size:.0f}",
-        f"{size / saved_s:.0f}",
-        *(f"{seconds / minutes:.3f}" for seconds in times),
-        f"{peak_bytes() / 1e9:.2f}",
+        f"{minutes:.1f} min, {kind}",
+        f"{log.stat().st_size / 1e6:.0f}",
+        *(f"{job['cpu_s'] / minutes:.2f}" for job in (save, analyse, draw)),
+        f"{save['peak'] / 1e6:.0f}",
+        f"{analyse['peak'] / 1e6:.0f} ({steps})",
+        f"{draw['peak'] / 1e6:.0f}",
     ]
 
 
-def _replay(flight: Flight) -> None:
-    gaps = plan_gaps(flight, airborne_intervals(flight, {}), WithholdingSettings())
-    prepare(flight, None, None, gaps).replay(complete(flight.parameters.initial, {}, flight.release))
+def _in_own_process(job: str, log: Path) -> dict[str, Any]:
+    command = [sys.executable, "-m", "benchmarks.long_flights", "--job", job, str(log)]
+    environment = os.environ | JOB_ENVIRONMENT
+    return json.loads(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
 
 
-def _cpu_s(work: Callable[[], object]) -> float:
+def _measured(job: str, log: Path) -> dict[str, Any]:
+    """CPU time and peak memory of one job; of the analysis also the peak of each step."""
+    saved, analysis = log.with_suffix(".saved"), log.with_suffix(".analysis")
+    steps: dict[str, int] = {}
+    if job == "save":
+        from fusetune.save import save_log
+
+        work: Callable[[], object] = lambda: save_log(log, saved)  # noqa: E731
+    elif job == "analyse":
+        work = _analysis(saved, analysis, steps)
+    else:
+        from fusetune.report.flight_figures import plot_flight
+
+        sets = [pset.name for pset in load_study(STUDY).sets]
+        work = lambda: plot_flight(saved, analysis, sets, log.with_suffix(".png"))  # noqa: E731
     begin = time.process_time()
+    peak = _peak_of(work)
+    return {"cpu_s": time.process_time() - begin, "peak": max(peak, *steps.values(), 0), "steps": steps}
+
+
+def _analysis(saved: Path, analysis: Path, steps: dict[str, int]) -> Callable[[], object]:
+    """The analysis of all sets; its steps enter their peak memory."""
+    from fusetune.analyze import analyze_flight as room
+    from fusetune.analyze.replay_settings import IN_USE
+
+    def noting(name: str, step: Callable[..., Any]) -> Callable[..., Any]:
+        def noted(*arguments: Any, **options: Any) -> Any:
+            results: list[Any] = []
+            steps[name] = _peak_of(lambda: results.append(step(*arguments, **options)))
+            return results.pop()
+
+        return noted
+
+    for name in ANALYSIS_STEPS:
+        setattr(room, name, noting(name, getattr(room, name)))
+    values = read_metadata(saved)["ekf2_parameters"]
+    overrides = {pset.name: dict(pset.overrides) for pset in load_study(STUDY).sets}
+    varied = {name for of_set in overrides.values() for name in of_set}
+    replayed = {"present": {name: values[name] for name in varied & values.keys()}, **overrides, "as_flown": {}}
+    settings = room.AnalysisSettings(replay=IN_USE)
+    scored = [name for name in replayed if name != "as_flown"]
+    return lambda: room.analyze_flight(saved, analysis, replayed, scored, settings=settings)
+
+
+def _peak_of(work: Callable[[], object]) -> int:
+    """Peak memory of this process, bytes, while it works; Linux counts anew when told to."""
+    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
     work()
-    return time.process_time() - begin
+    return peak_bytes()
 
 
 if __name__ == "__main__":

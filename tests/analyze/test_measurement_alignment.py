@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.analyze.made_flight import MadeSet, at, make_flight
 
-from fusetune.analyze.measurement_alignment import match, paired_samples
+from fusetune.analyze.measurement_alignment import FIGURES, match, narrowed, paired_samples
+from fusetune.analyze.sample_spool import SampleSpool
 from fusetune.analyze.scoring_window import ScoringWindow
 from fusetune.analyze.set_files import read_set
 
@@ -51,3 +52,28 @@ def test_match_finds_each_sample_that_is_there_and_no_other(dropped: set[int], j
     found = match(reference, time, 4000.0)
     expected = {k: row for row, k in enumerate(kept)}
     assert [int(row) for row in found] == [expected.get(k, -1) for k in range(100)]
+
+
+def test_samples_on_the_disk_are_those_in_memory(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(), "other": MadeSet(error=0.2)}
+    _, folder = make_flight(tmp_path, "flight", sets)
+    made = [read_set(folder, name) for name in sets]
+    in_memory, on_disk = (
+        paired_samples(made, ("gnss_vel", 0), "present", WINDOW, spool) for spool in (None, SampleSpool(tmp_path))
+    )
+    assert in_memory is not None
+    assert on_disk is not None
+    assert in_memory.winsor_limit == on_disk.winsor_limit
+    for one, other in zip(in_memory.each(), on_disk.each(), strict=True):
+        assert one.sets == other.sets
+        for name in FIGURES:
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+@given(values=st.lists(st.floats(width=64) | st.floats(width=32), max_size=20))
+def test_nothing_is_lost_where_single_precision_is_enough(values: list[float]) -> None:
+    given_values = np.array(values, np.float64)
+    np.testing.assert_array_equal(narrowed(given_values).astype(np.float64), given_values)
+    with np.errstate(over="ignore"):
+        single = given_values.astype(np.float32)
+    assert narrowed(single.astype(np.float64)).dtype == np.float32

@@ -258,3 +258,15 @@ def test_rate_without_a_grid_is_the_nominal_one():
     random = np.random.default_rng(3)
     times = np.cumsum(random.integers(400_000, 600_000, 200))
     assert sensor_rate_hz({"timestamp": times, "timestamp_sample": times}, 50.0) == 50.0
+
+
+def test_attitude_does_not_depend_on_how_many_rows_are_taken_at_once(survey_flight, monkeypatch):
+    imu = select_rows(survey_flight.topics["sensor_combined", 0], np.arange(5000, 8000))
+    logged = survey_flight.topics["vehicle_attitude", 0]
+    whole = attitude_history(logged, imu), steady_history(logged, imu)
+    monkeypatch.setattr("fusetune.analyze.reconstruction.attitude.ROWS_AT_ONCE", 700)
+    parts = attitude_history(logged, imu), steady_history(logged, imu)
+    for one, other in zip(whole, parts, strict=True):
+        assert len(one.q) == 3000
+        np.testing.assert_array_equal(one.q, other.q)
+        np.testing.assert_array_equal(one.known, other.known)

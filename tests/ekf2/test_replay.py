@@ -11,7 +11,8 @@ from fusetune.analyze.fidelity import compare_set
 from fusetune.analyze.replay_flight import replay_log
 from fusetune.ekf2.inputs import build_inputs
 from fusetune.ekf2.parameters import complete
-from fusetune.ekf2.replay import replay
+from fusetune.ekf2.recording import joined, with_fields
+from fusetune.ekf2.replay import RUNS_PER_STRETCH, replay, replay_into
 from fusetune.px4.ekf2_parameters import PARAMETERS
 from fusetune.px4.flight import Flight
 
@@ -52,6 +53,34 @@ def assert_equal_rows(left, right, names=None):
     """Field by field, bit by bit (the padding between fields is not part of the result)."""
     for name in names or left.dtype.names:
         np.testing.assert_array_equal(left[name], right[name])
+
+
+def test_rows_are_handed_on_a_stretch_at_a_time(flight, result):
+    pieces = []
+    parameters = complete(flight.parameters.initial, {}, flight.release)
+    summary = replay_into(pieces.append, build_inputs(flight), parameters)
+    assert len(pieces) > 2
+    assert all(len(piece.states) <= RUNS_PER_STRETCH for piece in pieces)
+    whole = joined(pieces)
+    for name in PUBLISHED:
+        assert_equal_rows(getattr(whole, name), getattr(result, name))
+    for field in dataclasses.fields(summary):
+        assert getattr(summary, field.name) == getattr(result, field.name)
+    assert summary.updates == len(result.states)
+    assert summary.update_interval_us == np.median(np.diff(result.states["timestamp_sample"]))
+    assert summary.resets["heading_reset_counter"] == result.local_position["heading_reset_counter"][-1]
+    assert not summary.diverged
+
+
+def test_only_what_is_asked_for_is_kept(flight, result):
+    def keep(rows):
+        vertical = rows.innovations[rows.innovations["axis"] == 2]
+        return rows._replace(innovations=vertical, states=with_fields(rows.states, ["timestamp"]))
+
+    kept = replay(build_inputs(flight), complete(flight.parameters.initial, {}, flight.release), keep=keep)
+    assert kept.states.dtype.names == ("timestamp",)
+    np.testing.assert_array_equal(kept.states["timestamp"], result.states["timestamp"])
+    assert_equal_rows(kept.innovations, result.innovations[result.innovations["axis"] == 2])
 
 
 def test_two_replays_give_the_same_bits(flight, result):

@@ -23,6 +23,8 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
             f"results/benchmarks/replay/{{flight}}.{number}.tsv"
         conda:
             "../envs/fusetune.yaml"
+        resources:
+            **replay_resources(len(chunk)),
         params:
             sets=overrides_of(chunk),
             replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},
@@ -51,6 +53,8 @@ rule analyze_flight:
     priority: 1
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        **replay_resources(len(REPLAY_CHUNKS[-1]), len(SETS)),
     params:
         sets=overrides_of(REPLAY_CHUNKS[-1]),
         replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},

@@ -34,6 +34,9 @@ rule decide:
         "results/logs/decide.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
+        runtime=of_its_logs(10, 0.01),
     params:
         sets=SETS,
         present=PRESENT,

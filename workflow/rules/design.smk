@@ -15,6 +15,9 @@ rule design:
         "results/logs/design.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB),
+        runtime=of_its_logs(5),
     params:
         contents=contents(SETTINGS["study"], SETTINGS["mission"]),
         code=DIGEST["design"],

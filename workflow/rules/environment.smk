@@ -26,18 +26,13 @@ def prepend_to_path_list(variable, folder):
 # Jobs inherit the environment: they import the package that lies beside this workflow, installed or not.
 sys.path.insert(0, str(PROJECT / "src"))
 prepend_to_path_list("PYTHONPATH", str(PROJECT / "src"))
-# The work is small matrices in sequence: threads of a numerics library would cost their start and gain nothing.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# The C library of Linux would keep freed arrays of up to 32 MB for later ones; others do not know these.
-os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", str(1 << 20))
-os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(1 << 20))
-
 from snakemake.exceptions import WorkflowError
 
 from fusetune.cluster_jobs import cancel_queued_jobs
 from fusetune.content import ContentDigests
 from fusetune.digest import source_digest
 from fusetune.errors import UserError, write_error
+from fusetune.job_environment import use_job_environment
 from fusetune.kernel_cache import use_kernel_cache
 from fusetune.recovery import (
     belong_together,
@@ -50,6 +45,8 @@ from fusetune.recovery import (
 from fusetune.run_lock import RUN_VARIABLE, claim_run, holder_of, join_run, new_run, wait_for_jobs
 
 CONTENT = ContentDigests(STATE / "fusetune_contents.json")
+
+use_job_environment()
 
 
 # A job knows by its name the run that it works for.

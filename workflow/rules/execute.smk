@@ -5,6 +5,9 @@ rule compile_kernels:
         "results/logs/compile_kernels.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(1500),
+        runtime=of_its_logs(30),
     message:
         "Compile the estimator (once for each version of its sources)"
     script:
@@ -22,6 +25,9 @@ rule simulate_flight:
         "results/logs/execute/{flight}.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(KERNELS_MB, 15.0),
+        runtime=of_its_logs(10, 0.5),
     params:
         overrides=lambda wildcards: OVERRIDES[DEMONSTRATION[wildcards.flight]],
         faults=lambda wildcards: FAULTS.get(wildcards.flight, []),

@@ -26,6 +26,9 @@ rule plot_flight:
         "results/logs/plot/{flight}.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB, 1.5),
+        runtime=of_its_logs(5, 0.05),
     params:
         sets=SETS,
         present=PRESENT,
@@ -54,6 +57,9 @@ rule plot_summary:
         "results/logs/plot_summary.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(2 * LIBRARIES_MB, 1.0),
+        runtime=of_its_logs(10, 0.01),
     params:
         code=DIGEST["report"],
     message:
@@ -80,6 +86,9 @@ rule build_report:
         "results/logs/build_report.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
+        runtime=of_its_logs(10, 0.01),
     params:
         code=DIGEST["report"],
     message:

@@ -8,6 +8,9 @@ rule save_flight:
         "results/logs/save/{flight}.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB, 3.0),
+        runtime=of_its_logs(5, 0.05),
     params:
         flown=lambda wildcards: flown_log(wildcards.flight),
         code=DIGEST["save"],
@@ -36,6 +39,9 @@ checkpoint list_flights:
         "results/logs/list_flights.log",
     conda:
         "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB),
+        runtime=of_its_logs(5),
     params:
         refused=[list(astuple(entry)) for entry in FOUND.refused],
         code=DIGEST["save"],

@@ -7,12 +7,13 @@ misses the next one is spread evenly over the interval.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
 
-from fusetune.px4.flight import TopicTable, stacked
+from fusetune.px4.flight import TopicTable, row_count, stacked
 
 MAX_INTERVAL_US = 1_000_000
 """Over a longer pause of the logged attitude nothing is interpolated."""
@@ -21,6 +22,8 @@ MAX_PUBLISH_DELAY_US = 20_000
 
 DRIFT_WINDOW_S = 20.0
 """Time over which the gyro's drift is taken to be constant."""
+
+ROWS_AT_ONCE = 1 << 15
 
 MIN_COVERED = 0.9
 """With a smaller share of an interval covered by IMU rows the gyro does not tell how the vehicle turned in it."""
@@ -65,17 +68,20 @@ def attitude_history(attitude: TopicTable | None, imu: TopicTable) -> AttitudeHi
     logged_time, logged = logged_attitude(attitude, time)
     if len(logged_time) < 2:
         return nothing
-    turned = integrated_gyro(imu)
+    q = integrated_gyro(imu)
     # rotation that takes the integrated gyro's frame into NED, at each logged attitude
-    frame = multiply(logged, conjugate(attitude_at(time, turned, logged_time)))
-    right = np.clip(np.searchsorted(logged_time, time), 1, len(logged_time) - 1)
-    left = right - 1
-    interval = logged_time[right] - logged_time[left]
-    share = (time - logged_time[left]) / np.maximum(interval, 1)
-    known = (share >= 0.0) & (share <= 1.0) & (interval <= MAX_INTERVAL_US)
-    drift = rotation_vector(multiply(frame[right], conjugate(frame[left])))
-    here = multiply(from_rotation_vector(drift * np.clip(share, 0.0, 1.0)[:, None]), frame[left])
-    return AttitudeHistory(time, normalised(multiply(here, turned)), known)
+    frame = multiply(logged, conjugate(attitude_at(time, q, logged_time)))
+    known = np.zeros(len(time), np.bool_)
+    for rows in blocks(len(time)):
+        right = np.clip(np.searchsorted(logged_time, time[rows]), 1, len(logged_time) - 1)
+        left = right - 1
+        interval = logged_time[right] - logged_time[left]
+        share = (time[rows] - logged_time[left]) / np.maximum(interval, 1)
+        known[rows] = (share >= 0.0) & (share <= 1.0) & (interval <= MAX_INTERVAL_US)
+        drift = rotation_vector(multiply(frame[right], conjugate(frame[left])))
+        here = multiply(from_rotation_vector(drift * np.clip(share, 0.0, 1.0)[:, None]), frame[left])
+        q[rows] = normalised(multiply(here, q[rows]))
+    return AttitudeHistory(time, q, known)
 
 
 def steady_history(attitude: TopicTable | None, imu: TopicTable) -> AttitudeHistory:
@@ -111,7 +117,9 @@ def steady_history(attitude: TopicTable | None, imu: TopicTable) -> AttitudeHist
     q = integrated_gyro(steady)
     start = int(np.searchsorted(time, logged_time[0]))
     frame = multiply(logged[0], conjugate(q[start]))
-    return AttitudeHistory(time, multiply(np.tile(frame, (len(q), 1)), q), history.known)
+    for rows in blocks(len(q)):
+        q[rows] = multiply(np.broadcast_to(frame, q[rows].shape), q[rows])
+    return AttitudeHistory(time, q, history.known)
 
 
 def logged_attitude(attitude: TopicTable, imu_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,24 +142,40 @@ def logged_attitude(attitude: TopicTable, imu_time: np.ndarray) -> tuple[np.ndar
 
 def integrated_gyro(imu: TopicTable) -> np.ndarray:
     """Rotation (N, 4) from before the first row to the end of each."""
-    steps = from_rotation_vector(
-        stacked(imu, "gyro_rad") * (imu["gyro_integral_dt"].astype(np.float64) * 1e-6)[:, None]
-    )
-    turned, reach = steps, 1
-    # each pass doubles the number of steps that a product covers (Hillis and Steele, 1986)
+    turned = np.zeros((row_count(imu), 4))
+    for rows in blocks(len(turned)):
+        part = {name: values[rows] for name, values in imu.items()}
+        dt_s = part["gyro_integral_dt"].astype(np.float64) * 1e-6
+        turned[rows] = from_rotation_vector(stacked(part, "gyro_rad") * dt_s[:, None])
+    reach = 1
+    # each pass doubles the number of steps that a product covers (Hillis and Steele, 1986); from the end on, so that
+    # what is multiplied is still that of the pass before
     while reach < len(turned):
-        turned = np.concatenate([turned[:reach], multiply(turned[:-reach], turned[reach:])])
+        for rows in reversed(list(blocks(len(turned) - reach))):
+            later = slice(rows.start + reach, rows.stop + reach)
+            turned[later] = multiply(turned[rows], turned[later])
         reach *= 2
-    return normalised(turned)
+    for rows in blocks(len(turned)):
+        turned[rows] = normalised(turned[rows])
+    return turned
 
 
 def attitude_at(time: np.ndarray, q: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Attitudes (M, 4) at the times `wanted`, turning evenly between those (N, 4) given at `time` (µs, ascending)."""
-    right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    left = right - 1
-    share = np.clip((wanted - time[left]) / np.maximum(time[right] - time[left], 1), 0.0, 1.0)
-    step = rotation_vector(multiply(conjugate(q[left]), q[right]))
-    return multiply(q[left], from_rotation_vector(step * share[:, None]))
+    found = np.zeros((len(wanted), 4))
+    for rows in blocks(len(wanted)):
+        right = np.clip(np.searchsorted(time, wanted[rows]), 1, len(time) - 1)
+        left = right - 1
+        share = np.clip((wanted[rows] - time[left]) / np.maximum(time[right] - time[left], 1), 0.0, 1.0)
+        step = rotation_vector(multiply(conjugate(q[left]), q[right]))
+        found[rows] = multiply(q[left], from_rotation_vector(step * share[:, None]))
+    return found
+
+
+def blocks(rows: int) -> Iterator[slice]:
+    """Some rows after the other: quaternions take several times their own memory while they are multiplied."""
+    for first in range(0, rows, ROWS_AT_ONCE):
+        yield slice(first, min(first + ROWS_AT_ONCE, rows))
 
 
 def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -197,9 +221,12 @@ def rotation_vector(q: np.ndarray) -> np.ndarray:
 
 def to_earth(q: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Rotate body vectors (N, 3) to NED by the attitudes (N, 4)."""
-    axis = q[..., 1:]
-    twice = 2.0 * np.cross(axis, vector)
-    return vector + q[..., :1] * twice + np.cross(axis, twice)
+    turned = np.zeros(vector.shape)
+    for rows in blocks(len(vector)):
+        axis = q[rows, 1:]
+        twice = 2.0 * np.cross(axis, vector[rows])
+        turned[rows] = vector[rows] + q[rows, :1] * twice + np.cross(axis, twice)
+    return turned
 
 
 def to_body(q: np.ndarray, vector: np.ndarray) -> np.ndarray:

@@ -1,0 +1,35 @@
+# What a job takes of memory and time, told from the sizes of the logs it works on, so that no more jobs run at once than
+# `--resources mem_mb=` allows and a cluster keeps enough for each. Memory is about what `benchmarks/long_flights.py`
+# measures and a third more; jobs that run out of either get twice as much at the next attempt, where there is one.
+import os
+
+KERNELS_MB = 350  # Python, its libraries and the compiled estimator
+LIBRARIES_MB = 200
+SIMULATED_LOG_MB = 10.0  # of a flight that is not simulated yet
+
+
+def log_mb(flight):
+    """Size of a flight's log, MB; of one that is not there it is that of the demonstration's."""
+    try:
+        return os.path.getsize(LOGS[flight]) / 1e6
+    except OSError:
+        return SIMULATED_LOG_MB
+
+
+def of_its_logs(fixed, for_each_mb=0.0):
+    """Resource function: a fixed part and one for each MB of the job's log, or of all where it is no job of a flight."""
+
+    def needed(wildcards, attempt):
+        flight = getattr(wildcards, "flight", None)
+        size = sum(log_mb(one) for one in ([flight] if flight else LOGS))
+        return round((fixed + for_each_mb * size) * attempt)
+
+    return needed
+
+
+def replay_resources(replayed, scored=0):
+    """Memory, MB, and time, minutes, of a job that replays some sets and scores some."""
+    return {
+        "mem_mb": of_its_logs(KERNELS_MB, 5.0 + 0.03 * scored),
+        "runtime": of_its_logs(10, 0.02 * (replayed + scored)),
+    }
