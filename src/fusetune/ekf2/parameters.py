@@ -29,6 +29,13 @@ DELAY_PARAMETERS = (
 )
 
 
+def taken_value(name: str, value: float) -> float:
+    """A parameter's value as PX4 takes it, at start and whenever it changes: an obsolete EKF2_MAG_TYPE is replaced."""
+    if name == "EKF2_MAG_TYPE" and int(value) not in VALID_MAG_TYPES:
+        return float(OBSOLETE_MAG_TYPE_DEFAULT)
+    return value
+
+
 def parameter_record(values: Mapping[str, float]) -> np.ndarray:
     """One-element array of EKF2_PARAMETERS from a complete set, with the corrections PX4 makes at start.
 
@@ -41,8 +48,6 @@ def parameter_record(values: Mapping[str, float]) -> np.ndarray:
     """
     record = np.zeros(1, EKF2_PARAMETERS)
     for name in PARAMETER_NAMES:
-        record[name] = values[name]
-    if int(values["EKF2_MAG_TYPE"]) not in VALID_MAG_TYPES:
-        record["EKF2_MAG_TYPE"] = OBSOLETE_MAG_TYPE_DEFAULT
+        record[name] = taken_value(name, values[name])
     record["EKF2_DELAY_MAX"] = max(values[name] for name in ("EKF2_DELAY_MAX", *DELAY_PARAMETERS))
     return record

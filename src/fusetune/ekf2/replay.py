@@ -27,7 +27,7 @@ from fusetune.ekf2.imu_down_sampler import accumulate_imu, initialise_down_sampl
 from fusetune.ekf2.inputs import EstimatorInputs
 from fusetune.ekf2.kernel import entry_kernel, kernel
 from fusetune.ekf2.output_predictor import initialise_output_predictor, predict_output
-from fusetune.ekf2.parameters import PARAMETER_NAMES, parameter_record
+from fusetune.ekf2.parameters import PARAMETER_NAMES, parameter_record, taken_value
 from fusetune.ekf2.recording import (
     FLAG_COLUMNS,
     LOCAL_POSITION_ROW,
@@ -340,7 +340,7 @@ class Course:
         for start, stop in pairwise(sorted(edges)):
             for run, change in self.changes:
                 if run == start:
-                    self.params[change.name] = change.value
+                    self.params[change.name] = taken_value(change.name, change.value)
             for run, state in self.handovers:
                 if run == start:
                     take_sensor_states(self.ekf[0], state)
