@@ -66,19 +66,24 @@ def read_table(
         return parquet.read(columns=columns if columns is None else list(columns), use_threads=False)
 
 
-def read_schema(path: str | os.PathLike[str]) -> pa.Schema:
-    """Names and types of the columns of a Parquet file; raises what `read_table` does."""
-    with _opened(path) as parquet:
+def read_schema(path: str | os.PathLike[str], *, remedy: str = RUN_AGAIN, sealed: bool = True) -> pa.Schema:
+    """Names and types of the columns of a Parquet file; parameters and errors are those of `read_table`."""
+    with _opened(path, remedy, sealed) as parquet:
         return parquet.schema_arrow
 
 
-def read_pieces(path: str | os.PathLike[str], columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """Read a Parquet file, or some of its columns, one row group at a time; raises what `read_table` does."""
-    with _opened(path) as parquet:
+def read_pieces(
+    path: str | os.PathLike[str],
+    columns: Sequence[str] | None = None,
+    *,
+    remedy: str = RUN_AGAIN,
+    sealed: bool = True,
+) -> Iterator[pa.Table]:
+    """Read a Parquet file one row group at a time; parameters and errors are those of `read_table`."""
+    chosen = columns if columns is None else list(columns)
+    with _opened(path, remedy, sealed) as parquet:
         for number in range(parquet.num_row_groups):
-            yield parquet.read_row_group(
-                number, columns=columns if columns is None else list(columns), use_threads=False
-            )
+            yield parquet.read_row_group(number, columns=chosen, use_threads=False)
 
 
 def seal(path: str | os.PathLike[str]) -> None:
@@ -93,7 +98,7 @@ def seal(path: str | os.PathLike[str]) -> None:
 
 
 @contextmanager
-def _opened(path: str | os.PathLike[str], remedy: str = RUN_AGAIN, sealed: bool = True) -> Iterator[pq.ParquetFile]:
+def _opened(path: str | os.PathLike[str], remedy: str, sealed: bool) -> Iterator[pq.ParquetFile]:
     """A Parquet file whose seal has been found sound."""
     try:
         _check_seal(path, remedy, sealed)

@@ -75,7 +75,7 @@ def test_a_changed_present_replays_only_the_present_set_and_jobs_elsewhere_find_
 def slurm() -> None:
     """A Slurm that takes jobs; the test is skipped where none answers."""
     if find_spec("snakemake_executor_plugin_slurm") is None:
-        pytest.skip("needs Snakemake's executor for Slurm: pip install -c requirements.lock -e '.[slurm]'")
+        pytest.skip("needs Snakemake's executor for Slurm: pip install --require-hashes -r requirements-slurm.lock")
     if shutil.which("sbatch") is None:
         pytest.skip("needs Slurm (sbatch, squeue), which is not installed")
     nodes = subprocess.run(["sinfo", "--noheader", "--format=%T"], capture_output=True, text=True, check=False)

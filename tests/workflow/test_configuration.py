@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import jsonschema
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 
 @pytest.fixture
@@ -87,9 +89,42 @@ def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: di
         assert [axis for axis in "xyz" if pattern.match(f"{source}.{axis}")] == list(axes)
 
 
+LOCK_FILES = {"requirements.lock": "dev", "requirements-slurm.lock": "slurm"}
+
+
+def locked(file: Path) -> dict[str, tuple[str, list[str]]]:
+    """Name of each package of a lock file -> version and hashes; anything else in the file fails."""
+    entries = re.split(r"(?<!\\)\n", file.read_text(encoding="utf-8").strip())
+    found = {}
+    for entry in entries:
+        match = re.fullmatch(r"([\w.-]+)==([\w.]+)(?: ; [^\\/]+?)?((?: \\\n    --hash=sha256:[0-9a-f]{64})+)", entry)
+        assert match, entry[:200]
+        name, version, hashes = match.groups()
+        found[name.lower().replace("_", "-")] = version, re.findall(r"[0-9a-f]{64}", hashes)
+    assert len(found) == len(entries)
+    return found
+
+
+@pytest.mark.parametrize("name", LOCK_FILES)
+def test_a_lock_file_pins_all_that_the_project_asks_for(project_root: Path, name: str) -> None:
+    pins = locked(project_root / name)
+    project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    asked = [Requirement(text) for text in project["dependencies"]]
+    asked += [Requirement(text) for text in project["optional-dependencies"][LOCK_FILES[name]]]
+    for requirement in asked:
+        version, hashes = pins[requirement.name.lower()]
+        assert version in requirement.specifier, requirement
+        assert len(set(hashes)) == len(hashes) >= 1
+
+
+def test_the_lock_files_agree(project_root: Path) -> None:
+    pins, beside = (locked(project_root / name) for name in LOCK_FILES)
+    assert {name for name in pins.keys() & beside.keys() if pins[name] != beside[name]} == set()
+
+
 def test_the_conda_environment_has_the_locked_versions(project_root: Path) -> None:
-    locked = set((project_root / "requirements.lock").read_text(encoding="utf-8").lower().split())
+    pins = locked(project_root / "requirements.lock")
     environment = yaml.safe_load((project_root / "workflow" / "envs" / "fusetune.yaml").read_text(encoding="utf-8"))
     pinned = environment["dependencies"][-1]["pip"]
     assert pinned
-    assert set(pinned) <= locked
+    assert set(pinned) <= {f"{name}=={version}" for name, (version, _) in pins.items()}

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from fusetune.checksum_file import check_checksum
+from fusetune.errors import RUN_AGAIN
 from fusetune.px4.reading_limits import ReadingLimits
 from fusetune.save import VerdictThresholds, save_log
 
@@ -16,6 +18,7 @@ with logged_job(snakemake.log[0]):
     limits = ReadingLimits.from_mapping(snakemake.params.limits)
     flown = snakemake.params.flown
     if flown is None:
+        check_checksum(snakemake.input.log, RUN_AGAIN)
         verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds, limits)
     else:
         verdict = save_log(

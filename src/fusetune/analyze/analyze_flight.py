@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from fusetune.analyze.onboard_fidelity import FIDELITY_TOPICS, graded, write_flight_fidelity
 from fusetune.analyze.replay_flight import REPLAY_TOPICS, replay_flight
@@ -18,6 +17,7 @@ from fusetune.analyze.score_flight import SCORE_TOPICS, score_flight
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.trust_grade import TRUST_TOPICS, TrustGrade
 from fusetune.analyze.trust_settings import TrustSettings
+from fusetune.files import AnyPath
 from fusetune.save.flight_folder import load_flight
 
 
@@ -31,8 +31,8 @@ class AnalysisSettings:
 
 
 def analyze_flight(
-    flight_folder: Path,
-    output_folder: Path,
+    flight_folder: AnyPath,
+    output_folder: AnyPath,
     replayed: Mapping[str, Mapping[str, float]],
     scored: Sequence[str],
     *,
@@ -67,8 +67,8 @@ def analyze_flight(
 
 
 def _replay_and_grade(
-    flight_folder: Path,
-    output_folder: Path,
+    flight_folder: AnyPath,
+    output_folder: AnyPath,
     replayed: Mapping[str, Mapping[str, float]],
     settings: AnalysisSettings,
 ) -> TrustGrade:

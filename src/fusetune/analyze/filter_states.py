@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.set_files import read_columns_in_pieces
 from fusetune.ekf2 import state
+from fusetune.files import AnyPath
 
 Array = npt.NDArray[np.float64]
 
@@ -43,7 +44,7 @@ _BLOCKS = {
 """Columns of the file that make an array: prefix, first index, number."""
 
 
-def read_states(folder: Path, name: str) -> FilterStates:
+def read_states(folder: AnyPath, name: str) -> FilterStates:
     """Read `<folder>/<name>.states.parquet`.
 
     Raises
@@ -57,7 +58,7 @@ def read_states(folder: Path, name: str) -> FilterStates:
         *(f"{prefix}_{i}" for prefix, first, size in blocks for i in range(first, first + size)),
     ]
     parts: dict[str, list[npt.NDArray]] = {name: [] for name in ("time", *_BLOCKS)}
-    for piece in read_columns_in_pieces(folder / f"{name}.states.parquet", columns):
+    for piece in read_columns_in_pieces(Path(folder) / f"{name}.states.parquet", columns):
         parts["time"].append(piece["timestamp_sample"].astype(np.int64))
         for block, (prefix, first, size) in _BLOCKS.items():
             values = np.column_stack([piece[f"{prefix}_{i}"] for i in range(first, first + size)])

@@ -10,6 +10,7 @@ import pyarrow as pa
 from fusetune.analyze.row_groups import tables_in_groups
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
 from fusetune.analyze.sources import AID_SOURCES
+from fusetune.files import AnyPath
 from fusetune.px4.estimator_instances import rows_of_primary
 from fusetune.px4.flight import Flight, TopicTable
 
@@ -99,11 +100,11 @@ def _axis_samples(table: TopicTable, column: str) -> AxisSamples:
     )
 
 
-def write_onboard(path: Path, samples: Mapping[SourceAxis, AxisSamples]) -> None:
+def write_onboard(path: AnyPath, samples: Mapping[SourceAxis, AxisSamples]) -> None:
     """Write the vehicle's own innovations in the layout of `<set>.innovations.parquet`."""
     keys = sorted(samples)
     names = list(dict.fromkeys(source for source, _ in keys))
-    with tables_in_groups(path, ONBOARD_SCHEMA) as write:
+    with tables_in_groups(Path(path), ONBOARD_SCHEMA) as write:
         for source, axis in keys:
             one = samples[source, axis]
             index = np.full(one.timestamp_sample.size, names.index(source), np.int32)

@@ -20,7 +20,7 @@ from fusetune.analyze.set_files import AxisSamples, SourceAxis, read_innovations
 from fusetune.analyze.trust_grade import TRUST_TOPICS, TrustGrade, grade_flight
 from fusetune.analyze.trust_settings import TrustSettings
 from fusetune.documents import write_document
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.estimator_samples import is_complete, logged_share
 from fusetune.px4.flight import Flight
@@ -82,7 +82,7 @@ class OnboardFidelity:
 
 def write_flight_fidelity(
     flight: Flight,
-    analyze_folder: Path,
+    analyze_folder: AnyPath,
     replay: ReplaySettings,
     trust: TrustSettings | None = None,
     grade: TrustGrade | None = None,
@@ -103,6 +103,7 @@ def write_flight_fidelity(
     grade : TrustGrade, optional
         Of `graded`, where it has been made already.
     """
+    analyze_folder = Path(analyze_folder)
     grade = grade or graded(flight, replay, trust)
     flight = canonical(flight)
     result = judge_onboard_fidelity(
@@ -120,7 +121,7 @@ def graded(
     return grade_flight(canonical(flight), replay, trust, prepared)
 
 
-def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> OnboardFidelity:
+def judge_onboard_fidelity(flight: Flight, replayed: AnyPath, onboard: AnyPath) -> OnboardFidelity:
     """Compare the as-flown replay with the vehicle's own innovations.
 
     Parameters

@@ -21,7 +21,7 @@ from fusetune.documents import write_document
 from fusetune.ekf2.recording import FLAGS_ROW, INNOVATION_ROW, LOCAL_POSITION_ROW, STATE_ROW, RecordArrays
 from fusetune.ekf2.replay import ReplaySummary
 from fusetune.ekf2.replay_tables import flags_table, innovation_table, local_position_table, state_table
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.parquet import write_table
 
 TABLES = {
@@ -49,8 +49,9 @@ class ReplayIdentity:
     """How the replay started and what was reconstructed for it; stands in the JSON file."""
 
 
-def replay_files(folder: Path, set_name: str) -> list[Path]:
+def replay_files(folder: AnyPath, set_name: str) -> list[Path]:
     """All files of one replay."""
+    folder = Path(folder)
     return [folder / f"{set_name}.{table}.parquet" for table in (*TABLES, *GAP_TABLES)] + [folder / f"{set_name}.json"]
 
 
@@ -94,7 +95,7 @@ class ReplayWriter:
 
 
 @contextmanager
-def replay_writer(folder: Path, set_name: str, *, told_apart: bool = False) -> Iterator[ReplayWriter]:
+def replay_writer(folder: AnyPath, set_name: str, *, told_apart: bool = False) -> Iterator[ReplayWriter]:
     """Write the tables of a replay while it goes on; each appears when all are whole.
 
     Parameters
@@ -102,6 +103,7 @@ def replay_writer(folder: Path, set_name: str, *, told_apart: bool = False) -> I
     told_apart : whether some samples may have been reconstructed. Which ones can be told only at the end of the replay,
         so the innovations wait on the disk, and `ReplayWriter.write_spooled` must be called.
     """
+    folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     targets = {name: folder / f"{set_name}.{name}.parquet" for name in TABLES}
     with ExitStack() as stack:
@@ -114,8 +116,9 @@ def replay_writer(folder: Path, set_name: str, *, told_apart: bool = False) -> I
         yield ReplayWriter(takers, spool, targets["innovations"])
 
 
-def finish_replay(folder: Path, identity: ReplayIdentity, summary: ReplaySummary) -> None:
+def finish_replay(folder: AnyPath, identity: ReplayIdentity, summary: ReplaySummary) -> None:
     """Write what the replay predicted in gaps, and last the JSON that says the set is complete."""
+    folder = Path(folder)
     for name, to_table in GAP_TABLES.items():
         table = to_table(summary.gaps)
         with atomic_path(folder / f"{identity.set}.{name}.parquet") as path:

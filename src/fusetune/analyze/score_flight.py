@@ -49,7 +49,7 @@ from fusetune.analyze.withheld_scores import (
     withheld_rows,
 )
 from fusetune.documents import write_document
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.parquet import write_table
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
@@ -87,21 +87,22 @@ SCORE_TOPICS = (
 
 
 def score_saved_flight(
-    flight_folder: Path,
-    analyze_folder: Path,
+    flight_folder: AnyPath,
+    analyze_folder: AnyPath,
     sets: Sequence[str],
     *,
     present: str = "present",
     settings: ScoringSettings | None = None,
 ) -> None:
     """Score the sets on a saved flight, `results/save/<flight>`; all else as in `score_flight`."""
+    flight_folder, analyze_folder = Path(flight_folder), Path(analyze_folder)
     flight = load_flight(flight_folder, topics=SCORE_TOPICS)
     score_flight(flight, analyze_folder, sets, present=present, settings=settings)
 
 
 def score_flight(
     flight: Flight,
-    analyze_folder: Path,
+    analyze_folder: AnyPath,
     sets: Sequence[str],
     *,
     present: str = "present",

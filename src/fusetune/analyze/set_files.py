@@ -12,6 +12,7 @@ import numpy.typing as npt
 from fusetune.analyze.sample_spool import AxisSamples, SampleSpool, SourceAxis, SpooledSamples
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.parquet import read_pieces, read_schema, read_table
 
 __all__ = [
@@ -108,7 +109,7 @@ class ColumnsOnDisk(Mapping[str, npt.NDArray[Any]]):
         return len(self._names)
 
 
-def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.NDArray[Any]]:
+def read_columns(path: AnyPath, columns: list[str] | None = None) -> dict[str, npt.NDArray[Any]]:
     """Read a Parquet table of plain columns as NumPy arrays.
 
     Raises
@@ -120,24 +121,25 @@ def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
-def read_columns_in_pieces(path: Path, columns: list[str]) -> Iterator[dict[str, npt.NDArray[Any]]]:
+def read_columns_in_pieces(path: AnyPath, columns: list[str]) -> Iterator[dict[str, npt.NDArray[Any]]]:
     """The same, one part of the rows after the other."""
     for table in read_pieces(path, columns):
         yield {name: table[name].to_numpy() for name in table.column_names}
 
 
-def column_names(path: Path) -> list[str]:
+def column_names(path: AnyPath) -> list[str]:
     """Names of the columns of a Parquet table; raises what `read_columns` does."""
     return list(read_schema(path).names)
 
 
-def read_set(folder: Path, name: str, spool: SampleSpool | None = None) -> SetRecord:
+def read_set(folder: AnyPath, name: str, spool: SampleSpool | None = None) -> SetRecord:
     """Read `<folder>/<name>.*`; the states are read only where truth is compared (`true_errors`).
 
     Parameters
     ----------
     spool : where the samples are kept; by default in a file of their own
     """
+    folder = Path(folder)
     summary = read_document(folder / f"{name}.json")
     parameters = {key: float(value) for key, value in summary.get("params", {}).items()}
     return SetRecord(
@@ -151,7 +153,7 @@ def read_set(folder: Path, name: str, spool: SampleSpool | None = None) -> SetRe
     )
 
 
-def read_innovations(path: Path, parameters: dict[str, float], spool: SampleSpool | None = None) -> SpooledSamples:
+def read_innovations(path: AnyPath, parameters: dict[str, float], spool: SampleSpool | None = None) -> SpooledSamples:
     """Read an innovations table, split by source and axis; sources that measure nothing are left out.
 
     Innovations of reconstructed samples are left out, too: they are no witnesses.
@@ -161,7 +163,7 @@ def read_innovations(path: Path, parameters: dict[str, float], spool: SampleSpoo
     parameters : of this set; where the table has no test ratio, it follows from the source's gate
     spool : where the samples are kept; by default in a nameless file in the folder of the table
     """
-    samples = SpooledSamples(spool or SampleSpool(path.parent), lambda source: _gate(source, parameters))
+    samples = SpooledSamples(spool or SampleSpool(Path(path).parent), lambda source: _gate(source, parameters))
     for piece in read_pieces(path):
         samples.add(piece)
     return samples

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 
 FALLING = ("flags_equal", "height_flags_equal")
 """Figures of which more is better."""
@@ -56,7 +56,7 @@ class TrustSettings:
     causes: bool = setting(True, None, None, "", "measure what each cause costs, by a replay each")
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any] | None, file: Path | str = "config/config.yaml") -> TrustSettings:
+    def from_mapping(cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml") -> TrustSettings:
         """Read the section `trust`; a missing section or key means the default."""
         given = {name: _as_tuple(name, value, file) for name, value in (values or {}).items()}
         settings = settings_from_mapping(cls, given, "trust", file)
@@ -71,7 +71,7 @@ class TrustSettings:
         return settings
 
 
-def _as_tuple(name: str, value: Any, file: Path | str) -> Any:
+def _as_tuple(name: str, value: Any, file: AnyPath) -> Any:
     """A list of the configuration as limits, or as names of figures."""
     if not isinstance(value, list):
         return value

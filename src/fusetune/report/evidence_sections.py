@@ -7,6 +7,7 @@ import pandas as pd
 
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.apply.evidence import AIDED, UNAIDED
+from fusetune.files import AnyPath
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, signed, table
 from fusetune.report.ranking_tables import (
@@ -22,8 +23,9 @@ from fusetune.report.results import Results
 from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY, Withheld, drift_summary
 
 
-def evidence_section(results: Results, figures: Path) -> str:
+def evidence_section(results: Results, figures: AnyPath) -> str:
     """Forest plot, heat map, signs per flight, ranking and objections."""
+    figures = Path(figures)
     rule = results.decision["rule"]
     title = "What the flights say"
     if not results.flights:
@@ -55,8 +57,9 @@ def evidence_section(results: Results, figures: Path) -> str:
     )
 
 
-def withheld_section(results: Results, figures: Path) -> str:
+def withheld_section(results: Results, figures: AnyPath) -> str:
     """Drift while sensors are withheld, and the two aims against each other; empty where no flight has a say."""
+    figures = Path(figures)
     if not results.flights:
         return ""
     parts = [

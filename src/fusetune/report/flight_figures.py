@@ -14,6 +14,7 @@ from fusetune.analyze.sample_spool import SampleSpool
 from fusetune.analyze.set_files import AxisSamples, ColumnsOnDisk, SourceAxis, read_innovations
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.px4.flight import Flight
 from fusetune.report.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
@@ -65,7 +66,7 @@ class _FlightData:
 
 
 def plot_flight(
-    flight_folder: Path, analyze_folder: Path, sets: Sequence[str], output: Path, *, present: str = "present"
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str], output: AnyPath, *, present: str = "present"
 ) -> None:
     """Draw one flight as a PNG.
 

@@ -15,6 +15,7 @@ from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.apply.evidence import AIMS
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.parquet import read_pieces, read_table
 
 OUT = (NOT_ELIGIBLE, NOT_SCORED)
@@ -82,7 +83,7 @@ def worse_aims(row: Mapping[Hashable, Any]) -> list[str]:
     return [aim for aim in AIMS if row.get(f"{aim}_lower", 0.0) > 0.0]
 
 
-def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results:
+def read_results(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath) -> Results:
     """Read the results of the rooms; nothing is searched for, only what is named is read."""
     apply_folder = Path(apply_folder)
     decision = read_document(apply_folder / "decision.json")

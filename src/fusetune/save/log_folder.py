@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusetune.checksum_file import check_checksum, has_checksum
 from fusetune.documents import write_document
-from fusetune.errors import RUN_AGAIN, UserError
+from fusetune.errors import UserError
 from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
 from fusetune.px4.logged_parameters import checked_history
@@ -58,9 +57,10 @@ def save_log(
     Raises
     ------
     UserError
-        The folder cannot be written.
+        The folder cannot be written, or is there already and holds something else than a saved flight.
     """
     target, limits = Path(folder), limits or ReadingLimits()
+    _demand_own(target)
     partial = target.with_name(f".{target.name}.partial")
     try:
         shutil.rmtree(partial, ignore_errors=True)
@@ -83,11 +83,19 @@ class _Source:
     checksum: str | None
 
 
+def _demand_own(folder: Path) -> None:
+    """What is replaced is a saved flight, or what is left of one; never anything else that bears the log's name."""
+    if not folder.exists() or (folder / METADATA_FILE).exists() or (folder / VERDICT_FILE).exists():
+        return
+    if not folder.is_dir() or any(
+        not file.name.startswith(".") and file.suffix != ".parquet" for file in folder.iterdir()
+    ):
+        raise UserError(folder, "is there already and holds no saved flight", "Save elsewhere, or remove it yourself")
+
+
 def _write(source: _Source, folder: Path, thresholds: VerdictThresholds, limits: ReadingLimits) -> Verdict:
     deadline = Deadline(limits.time_limit_s)
     try:
-        if has_checksum(source.log):
-            check_checksum(source.log, RUN_AGAIN)
         verdict = _write_readable(source, folder, thresholds, limits, deadline)
     except (UserError, TimeLimitError) as error:
         told = error if isinstance(error, UserError) else takes_too_long(source.log, deadline)
