@@ -111,6 +111,15 @@ def test_biases_that_the_log_also_tells_as_rates_decide_what_the_states_are():
     np.testing.assert_allclose(state.variances[9:15], 1e-6)
 
 
+@pytest.mark.parametrize("lost", ["gyro_bias[0]", "gyro_bias[2]", "accel_bias[1]"])
+def test_a_table_of_biases_that_lost_a_component_is_not_asked(lost):
+    flight = made_flight(release(1, 13), states_with(24, s10=2e-4), INCREMENTS)
+    rates = table(timestamp=HORIZON, gyro_bias=[0.3, 0.0, 0.0], accel_bias=[0.1, 0.0, 0.0])
+    del rates[lost]
+    flight = flight.with_topics(flight.topics | {("estimator_sensor_bias", 0): rates})
+    assert next(logged_states(flight)).gyro_bias[0] == pytest.approx(0.02)
+
+
 def test_unreadable_and_unaligned_states_are_told_apart():
     sound = made_flight(release(1, 15), states_with(24), np.ones(23))
     assert why_no_state(sound) == ""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fusetune.px4.estimator_instances import primary_instance_at
 from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows, stacked
-from fusetune.px4.state_layout import UPDATE_INTERVAL_S, StateLayout, state_counts, state_layout
+from fusetune.px4.state_layout import UPDATE_INTERVAL_S, StateLayout, state_counts, state_layout, tells_bias_rates
 
 LOGGED_STATE_TOPICS = (
     "estimator_states",
@@ -278,7 +278,7 @@ def _biases(
     if layout.has_bias_rates:
         return states[10:13], states[13:16]
     table = flight.topic("estimator_sensor_bias", instance)
-    if table is not None and row_count(table) and {"gyro_bias[2]", "accel_bias[2]"} <= table.keys():
+    if table is not None and tells_bias_rates(table):
         row = int(np.argmin(np.abs(table["timestamp"].astype(np.int64) - time)))
         nearest = select_rows(table, np.array([row]))
         return stacked(nearest, "gyro_bias")[0], stacked(nearest, "accel_bias")[0]

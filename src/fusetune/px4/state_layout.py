@@ -29,6 +29,7 @@ UPDATE_INTERVAL_S = 0.01
 """Update interval of the estimator in the releases whose bias states are increments per update."""
 
 _STATE_COUNTS = (24, 25)
+_BIAS_RATES, _AXES = ("gyro_bias", "accel_bias"), 3
 _BIASES = slice(10, 16)
 _ACCEL_BIAS_VARIANCES = slice(13, 16)
 """Of a vector that begins with the four variances of a quaternion."""
@@ -90,11 +91,15 @@ def state_counts(table: TopicTable) -> tuple[int, int]:
     return used, min(variances, used)
 
 
+def tells_bias_rates(sensor_bias: TopicTable) -> bool:
+    """Whether `estimator_sensor_bias` holds both biases, as rates."""
+    return bool(row_count(sensor_bias)) and all(len(field_names(sensor_bias, name)) == _AXES for name in _BIAS_RATES)
+
+
 def _has_bias_rates(table: TopicTable, sensor_bias: TopicTable | None) -> bool:
-    names = ("gyro_bias", "accel_bias")
-    if sensor_bias is not None and row_count(sensor_bias) and all(f"{name}[2]" in sensor_bias for name in names):
+    if sensor_bias is not None and tells_bias_rates(sensor_bias):
         nearest = np.searchsorted(sensor_bias["timestamp"], table["timestamp"]).clip(0, row_count(sensor_bias) - 1)
-        rates = np.linalg.norm(np.hstack([stacked(sensor_bias, name)[nearest] for name in names]), axis=1)
+        rates = np.linalg.norm(np.hstack([stacked(sensor_bias, name)[nearest] for name in _BIAS_RATES]), axis=1)
         biases = np.linalg.norm(stacked(table, "states")[:, _BIASES], axis=1)
         known = np.isfinite(rates) & np.isfinite(biases) & (rates > 0.0) & (biases > 0.0)
         if known.any():
