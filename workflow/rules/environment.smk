@@ -159,10 +159,8 @@ DIGEST = {
     "report": source_digest(*BASE, "apply", "report"),
 }
 
-# Kernels are compiled once by a rule; the folder is named by the state of their sources. On a node that may not write
-# there, a job keeps to the folder of the process that sent it.
-KERNEL_CACHE = None if workflow.is_main_process else os.environ.get("NUMBA_CACHE_DIR")
-KERNELS_READY = os.path.join(KERNEL_CACHE or use_kernel_cache(), "ready.json")
+# Kernels are compiled once by a rule; the folder is named by the state of their sources.
+KERNELS_READY = os.path.join(use_kernel_cache(inherit=not workflow.is_main_process), "ready.json")
 
 # What this workflow makes; and of that, what Snakemake takes for up to date when it has no memory of it. Replays are not
 # among it: they are made from a saved flight, and keep a record of their own.
