@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
+import tempfile
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
+_MAKE_ROOM = "Make room on that disk and start again; what is finished stays"
 
 
 class UserError(Exception):
@@ -32,6 +35,25 @@ class UserError(Exception):
         return f"{self.file}: {self.reason}. {self.remedy}."
 
 
+def demand_room(folder: str | os.PathLike[str], least_bytes: int) -> None:
+    """See that a folder can be written and that its disk has room, before anything is begun.
+
+    Raises
+    ------
+    UserError
+        It cannot, or there is less.
+    """
+    try:
+        os.makedirs(folder, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            free_bytes = shutil.disk_usage(folder).free
+    except OSError as error:
+        reason = f"cannot be written ({error.strerror})"
+        raise UserError(folder, reason, "Mend its permissions, or make room on that disk") from error
+    if free_bytes < least_bytes:
+        raise UserError(folder, f"the disk has only {free_bytes / 1e6:.1f} MB left", _MAKE_ROOM)
+
+
 def write_error(error: OSError, place: str | os.PathLike[str]) -> UserError | None:
     """What a failure to write means for the user; `None` for one that is no matter of room or of permissions.
 
@@ -43,7 +65,7 @@ def write_error(error: OSError, place: str | os.PathLike[str]) -> UserError | No
     # libraries in C++ hand the reason on as text only
     number = error.errno or next((code for code in _NO_ROOM if os.strerror(code) in str(error)), None)
     if number in _NO_ROOM:
-        remedy = "Make room on that disk and start again; what is finished stays"
+        remedy = _MAKE_ROOM
     elif number in _NOT_ALLOWED:
         remedy = "Mend the permissions, or work in a folder that can be written"
     else:

@@ -72,9 +72,9 @@ class Workspace:
         assert result.returncode == 0, result.stdout
         return result.stdout
 
-    def planned_jobs(self) -> dict[str, int]:
+    def planned_jobs(self, *targets: str) -> dict[str, int]:
         """Jobs by rule that a dry run counts; empty where there is nothing to do."""
-        printed = self.run_ok("--dry-run")
+        printed = self.run_ok("--dry-run", *targets)
         if "Nothing to be done" in printed:
             return {}
         table = re.search(r"^Job stats:\njob +count\n[- ]+\n((?:\w+ +\d+\n)+)", printed, re.MULTILINE)

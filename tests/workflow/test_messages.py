@@ -49,14 +49,3 @@ def test_an_unknown_present_flight_is_named(demonstration: Workspace) -> None:
     result = demonstration.run("--dry-run", "--config", "present_flight=flight_7")
     assert result.returncode != 0
     assert "config.yaml: present_flight is 'flight_7', which is no flight" in result.stdout
-
-
-def test_two_logs_of_one_name_are_told_apart(workspace: Workspace) -> None:
-    for folder in ("monday", "tuesday"):
-        (workspace.folder / "flights" / folder).mkdir()
-        (workspace.folder / "flights" / folder / "10_20_30.ulg").write_bytes(b"ULog")
-    result = workspace.run("--dry-run")
-    assert result.returncode != 0
-    assert "monday" in result.stdout
-    assert "tuesday" in result.stdout
-    assert "Rename one of the two" in result.stdout

@@ -1,4 +1,5 @@
 # Where jobs find the package and its compiled kernels, and how a run goes on after one that was killed.
+import logging
 import os
 import signal
 import sys
@@ -9,6 +10,11 @@ PROJECT = Path(workflow.basedir)
 STATE = Path(".snakemake")
 RESULTS = Path("results")
 LONGEST_JOB_S = 600.0
+# With less, Snakemake's own notes cannot be written either, and what it says of that is hard to read.
+LEAST_FREE_BYTES = 20_000_000
+
+# Where Snakemake's log cannot be written, the run itself tells of it.
+logging.raiseExceptions = False
 
 
 def end_quietly(number, frame):
@@ -16,7 +22,8 @@ def end_quietly(number, frame):
 
 
 # Python would show where it was, which helps nobody. Snakemake ends its jobs on this as on a KeyboardInterrupt.
-signal.signal(signal.SIGINT, end_quietly)
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, end_quietly)
 
 
 def prepend_to_path_list(variable, folder):
@@ -34,7 +41,7 @@ from snakemake.exceptions import WorkflowError
 from fusetune.cluster_jobs import cancel_queued_jobs
 from fusetune.content import ContentDigests
 from fusetune.digest import source_digest
-from fusetune.errors import UserError, write_error
+from fusetune.errors import UserError, demand_room, write_error
 from fusetune.kernel_cache import use_kernel_cache
 from fusetune.recovery import (
     belong_together,
@@ -107,6 +114,8 @@ def take_the_folder():
         tell_what_a_run_would_mend()
         return
     try:
+        for folder in (STATE, RESULTS):
+            demand_room(folder, LEAST_FREE_BYTES)
         claim = claim_run(STATE, RUN)
         if not claim.locked:
             print("No locks in this file system: after a killed run use snakemake --unlock.", file=sys.stderr)

@@ -15,7 +15,7 @@ from fusetune.run_lock import join_run
 @contextmanager
 def logged_job(log: str) -> Iterator[None]:
     """Send what the body prints to `log`; end the process with status 1 where the input or the disk is at fault."""
-    console = sys.stderr
+    failure: Exception | None = None
     try:
         with (
             open(log, "w", encoding="utf-8", errors="backslashreplace") as file,
@@ -25,25 +25,26 @@ def logged_job(log: str) -> Iterator[None]:
             join_run(".snakemake")
             try:
                 yield
-            except (UserError, OSError) as error:
-                told = error if isinstance(error, UserError) else write_error(error, "results")
-                if told is None:
-                    traceback.print_exc(file=file)
-                    raise
-                print(told, file=console)
-                print(told, file=file)
-                raise SystemExit(1) from None
-            except Exception:
-                traceback.print_exc(file=file)
+            except Exception as error:
+                failure = error
+                print(_fault_of_the_user(error) or traceback.format_exc())
                 raise
     except KeyboardInterrupt:
         raise SystemExit(128 + signal.SIGINT) from None
-    except (UserError, OSError) as error:  # the log itself cannot be written, or this job is no longer asked for
-        told = error if isinstance(error, UserError) else write_error(error, log)
-        if told is None:
+    except Exception as error:
+        # where the disk is full, closing the log fails, too; what the job itself failed by is what counts
+        fault = _fault_of_the_user(failure or error)
+        if fault is None:
             raise
-        print(told, file=console)
+        print(fault, file=sys.stderr)
         raise SystemExit(1) from None
+
+
+def _fault_of_the_user(error: Exception) -> UserError | None:
+    """What is to be told in one line; `None` for what is a fault of ours."""
+    if isinstance(error, OSError):
+        return write_error(error, "results")
+    return error if isinstance(error, UserError) else None
 
 
 class _Absent:

@@ -63,6 +63,7 @@ def save_log(
         shutil.rmtree(target, ignore_errors=True)
         os.replace(partial, target)
     except OSError as error:
+        shutil.rmtree(partial, ignore_errors=True)
         raise UserError(target, f"cannot be written: {error.strerror}", "Make room or mend its permissions") from error
     return verdict
 
