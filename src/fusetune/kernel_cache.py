@@ -34,8 +34,14 @@ def kernel_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fusetune" / below
 
 
-def use_kernel_cache() -> Path:
+def use_kernel_cache(inherit: bool = False) -> Path:
     """Let this process and its children keep compiled kernels in `kernel_cache`; call it before Numba is imported.
+
+    Parameters
+    ----------
+    inherit
+        Keep to the folder of the process that started this one, if it told one for these sources: on a machine that may
+        not write there, this process would choose another.
 
     Returns
     -------
@@ -43,6 +49,9 @@ def use_kernel_cache() -> Path:
         The folder; it is made when there is something to keep.
     """
     folder = kernel_cache()
+    told = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
+    if inherit and told.name == folder.name:
+        folder = told
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     os.environ["NUMBA_CACHE_LOCATOR_CLASSES"] = LOCATOR
     return folder

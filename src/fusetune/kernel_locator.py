@@ -39,3 +39,8 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc]
         if not file.is_relative_to(PACKAGE):
             return str(super().get_suitable_cache_subpath(py_file))
         return os.path.join(target_name(), file.relative_to(PACKAGE).parent)
+
+    def ensure_cache_path(self) -> None:
+        """As Numba's, but kernels that are there may be loaded from where this process cannot write."""
+        if not os.path.isdir(self.get_cache_path()):
+            super().ensure_cache_path()

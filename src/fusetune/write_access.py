@@ -18,7 +18,7 @@ def others_may_write(path: Path, like: Path) -> bool:
     """Whether others may change a file, or put something into a folder; False where it does not exist."""
     try:
         state, trusted = path.stat(), like.stat()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return False
     return state.st_uid not in (0, os.getuid(), trusted.st_uid) or bool(_excess(state, trusted))
 

@@ -15,6 +15,8 @@ from fusetune import kernel_cache
 from fusetune.ekf2 import compilation
 from fusetune.ekf2.compilation import ensure_compiled
 from fusetune.ekf2.warm_up import compile_kernels
+from fusetune.errors import UserError
+from fusetune.kernel_locator import KernelLocator
 
 LOADS = """
 import fusetune.ekf2.compilation
@@ -110,6 +112,33 @@ def test_kernels_that_others_could_have_written_are_deleted_and_compiled_out_of_
     assert len(compilations) == 1
     assert list(cache.iterdir()) == []
     assert not kernel_cache.others_may_write_kernels(cache)
+
+
+def test_kernels_are_loaded_from_where_nothing_can_be_written(
+    cache: Path, compilations: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locator = KernelLocator.from_function(compilation.main, compilation.__file__)
+    assert locator is not None
+    assert Path(locator.get_cache_path()) == cache
+
+    def refuse(**_: object) -> None:
+        raise PermissionError("read-only file system")
+
+    monkeypatch.setattr("numba.core.caching.tempfile.TemporaryFile", refuse)
+    assert KernelLocator.from_function(compilation.main, compilation.__file__) is not None
+    ensure_compiled()
+    assert compilations == []
+
+
+def test_a_cache_without_kernels_that_cannot_be_made_is_named(
+    tmp_path: Path, compilations: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "file" / "cache"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", config.CACHE_DIR)
+    with pytest.raises(UserError, match="does not hold the estimator for this processor"):
+        ensure_compiled()
+    assert compilations == []
 
 
 def test_the_processor_is_part_of_the_place(kernels: Path) -> None:

@@ -191,7 +191,7 @@ DIGEST = {
 }
 
 # Kernels are compiled once by a rule; the folder is named by the state of their sources.
-KERNELS_READY = os.path.join(use_kernel_cache(), "ready.json")
+KERNELS_READY = os.path.join(use_kernel_cache(inherit=not workflow.is_main_process), "ready.json")
 
 # What this workflow makes; and of that, what Snakemake takes for up to date when it has no memory of it. Replays are not
 # among it: they are made from a saved flight, and keep a record of their own.

@@ -22,6 +22,7 @@ from typing import Any
 
 from numba.core import codegen, compiler, config, types
 
+from fusetune.errors import UserError
 from fusetune.files import atomic_path
 from fusetune.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
 from fusetune.kernel_locator import KernelLocator
@@ -42,15 +43,20 @@ def ensure_compiled() -> None:
     Raises
     ------
     UserError
-        The cache belongs to another user.
+        The cache belongs to another user, or it lacks the kernels and cannot be written.
     """
     if _setting("DISABLE_JIT") or CHILD_MARK in os.environ:
         return
     caches, folder = Path(_setting("CACHE_DIR")), kernel_folder()
     if _may_be_loaded(folder):
         return
-    caches.mkdir(parents=True, exist_ok=True)
-    with (caches / LOCK_NAME).open("w") as lock:
+    try:
+        caches.mkdir(parents=True, exist_ok=True)
+        lock = (caches / LOCK_NAME).open("w")
+    except OSError as error:
+        reason = f"does not hold the estimator for this processor, and cannot be written ({error.strerror})"
+        raise UserError(caches, reason, "Start the pipeline where it can, or make room") from error
+    with lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not _may_be_loaded(folder):
             keep_others_out(folder)
