@@ -23,7 +23,7 @@ from fusetune.errors import RUN_AGAIN, UserError
 
 _TAIL_BYTES = 8
 """Length of the footer (4 bytes, little-endian) and the magic, which end the file."""
-_SEAL_MARK = b"SHA-256:"
+_SEAL_MARK = b"fusetune SHA-256:"
 _SEAL_BYTES = len(_SEAL_MARK) + hashlib.sha256().digest_size
 
 
@@ -55,7 +55,8 @@ def read_table(
     remedy
         What the user can do about a damaged file.
     sealed
-        Whether the file must carry its seal, as all that the package wrote do. One of another program may lack it.
+        Whether the file must carry its seal, as all that the package wrote do. One of another program may lack it; of
+        one that had it, a single changed bit is found all the same, unless it is one of the seal's mark.
 
     Raises
     ------
@@ -119,8 +120,20 @@ def _check_seal(path: str | os.PathLike[str], remedy: str, sealed: bool) -> None
         is_sealed = footer >= _SEAL_BYTES and stamp.startswith(_SEAL_MARK)
         if is_sealed and stamp != _SEAL_MARK + _digest_around(file, footer - _SEAL_BYTES, footer):
             raise UserError(path, "is damaged: its bytes are no longer those that were written", remedy)
-    if sealed and not is_sealed:
+        # a seal at another place than the footer tells is one whose footer, or its length, has changed
+        is_cut = not is_sealed and (sealed or _holds_mark(file))
+    if is_cut:
         raise UserError(path, "is cut or damaged: it does not end with the checksum it was written with", remedy)
+
+
+def _holds_mark(file: BinaryIO) -> bool:
+    file.seek(0)
+    before = b""
+    while chunk := file.read(1 << 20):
+        if _SEAL_MARK in before + chunk:
+            return True
+        before = chunk[-len(_SEAL_MARK) :]
+    return False
 
 
 def _footer_start(file: BinaryIO) -> int:

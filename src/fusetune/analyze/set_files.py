@@ -1,4 +1,7 @@
-"""Reads what the replay of one (flight, parameter set) wrote: innovations, status flags, local position, summary."""
+"""Reads what the replay of one (flight, parameter set) wrote: innovations, status flags, local position, summary.
+
+Replays of another program in the same layout, as of PX4's own estimator, are read, too: they need no digest.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -117,19 +120,19 @@ def read_columns(path: AnyPath, columns: list[str] | None = None) -> dict[str, n
     UserError
         If the file is missing or damaged.
     """
-    table = read_table(path, columns)
+    table = read_table(path, columns, sealed=False)
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
 def read_columns_in_pieces(path: AnyPath, columns: list[str]) -> Iterator[dict[str, npt.NDArray[Any]]]:
     """The same, one part of the rows after the other."""
-    for table in read_pieces(path, columns):
+    for table in read_pieces(path, columns, sealed=False):
         yield {name: table[name].to_numpy() for name in table.column_names}
 
 
 def column_names(path: AnyPath) -> list[str]:
     """Names of the columns of a Parquet table; raises what `read_columns` does."""
-    return list(read_schema(path).names)
+    return list(read_schema(path, sealed=False).names)
 
 
 def read_set(folder: AnyPath, name: str, spool: SampleSpool | None = None) -> SetRecord:
@@ -140,7 +143,7 @@ def read_set(folder: AnyPath, name: str, spool: SampleSpool | None = None) -> Se
     spool : where the samples are kept; by default in a file of their own
     """
     folder = Path(folder)
-    summary = read_document(folder / f"{name}.json")
+    summary = read_document(folder / f"{name}.json", sealed=False)
     parameters = {key: float(value) for key, value in summary.get("params", {}).items()}
     return SetRecord(
         name=name,
@@ -164,7 +167,7 @@ def read_innovations(path: AnyPath, parameters: dict[str, float], spool: SampleS
     spool : where the samples are kept; by default in a nameless file in the folder of the table
     """
     samples = SpooledSamples(spool or SampleSpool(Path(path).parent), lambda source: _gate(source, parameters))
-    for piece in read_pieces(path):
+    for piece in read_pieces(path, sealed=False):
         samples.add(piece)
     return samples
 
