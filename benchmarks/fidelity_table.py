@@ -1,9 +1,11 @@
 """Replay every reference flight with every reference set and print how close the replay is, as Markdown.
 
     python benchmarks/fidelity_table.py LOGS_DIR REFERENCE_DIR > table.md
+    python benchmarks/fidelity_table.py LOGS_DIR RANDOM_REFERENCE_DIR --by-set > table.md
 
 REFERENCE_DIR holds one folder per log (its stem), with what PX4's own estimator computed, in the layout of
-`results/analyze/<flight>`.
+`results/analyze/<flight>`. A line stands for a flight with all its sets, or with `--by-set` for a single set:
+where sets are drawn at random, each asks something else of the estimator.
 """
 
 from __future__ import annotations
@@ -29,16 +31,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("logs", type=Path)
     parser.add_argument("reference", type=Path)
+    parser.add_argument("--by-set", action="store_true", help="a line for each parameter set")
+    parser.add_argument("--skip", metavar="FLIGHT", action="append", default=[], help="leave a flight out")
     options = parser.parse_args()
     print(HEADER)
     print("|---" * HEADER.count(" | ") + "|---|")
     everything: list[ReplayFidelity] = []
-    for folder in sorted(path for path in options.reference.iterdir() if path.is_dir()):
+    for folder in sorted(
+        path for path in options.reference.iterdir() if path.is_dir() and path.name not in options.skip
+    ):
         with tempfile.TemporaryDirectory() as scratch:
             replay_log(options.logs / f"{folder.name}.ulg", folder, Path(scratch))
             results = compare_folders(folder, Path(scratch))
         everything += results
-        print(row(folder.name, results), flush=True)
+        lines = [(f"{folder.name} {one.set}", [one]) for one in results] if options.by_set else [(folder.name, results)]
+        for name, line in lines:
+            print(row(name, line), flush=True)
     print(row("**all**", everything, with_order=False))
 
 
