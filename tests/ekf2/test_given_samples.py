@@ -252,6 +252,15 @@ def test_without_any_one_field_nothing_that_is_given_is_no_number(topic):
         assert np.isfinite(arrays.air_density).all()
 
 
+@pytest.mark.parametrize("topic", SENSORS)
+def test_a_topic_without_messages_gives_nothing_and_stops_nothing(topic):
+    flight = made_flight(1, 16, 0)
+    empty = {name: values[:0] for name, values in flight.topics[topic, 0].items()}
+    flight = canonical(flight.with_topics(flight.topics | {(topic, 0): empty}))
+    assert len(build_inputs(flight).arrays.imu) == ROWS
+    assert all(one.topic != topic for one in given_samples(flight).values())
+
+
 def _arrivals(arrays):
     return [(name, arrays.arrivals[name]) for name in ("gnss", "mag", "baro", "range", "flow", "airspeed", "auxvel")]
 

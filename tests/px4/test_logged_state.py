@@ -6,6 +6,7 @@ import pytest
 from fusetune.px4.flight import Flight, ParameterHistory
 from fusetune.px4.logged_state import logged_handovers, logged_states, rotation_variances, why_no_state
 from fusetune.px4.release_layouts import canonical
+from fusetune.px4.state_layout import state_layout
 
 HORIZON = 5_000_000
 
@@ -109,6 +110,19 @@ def test_biases_that_the_log_also_tells_as_rates_decide_what_the_states_are():
     state = next(logged_states(flight))
     assert state.gyro_bias[0] == 0.02
     np.testing.assert_allclose(state.variances[9:15], 1e-6)
+
+
+def test_damaged_rows_do_not_change_the_layout():
+    """One row in twenty with flipped bits: a place where none is a state, variances of rates, a count of states."""
+    sound = made_flight(release(1, 16), states_with(25, s9=-509.0), np.full(24, 1e-3))
+    rows = {name: np.repeat(values, 20) for name, values in sound.topics["estimator_states", 0].items()}
+    rows["n_states"] = np.full(20, 25.0)
+    rows["states[7]"][3], rows["states[8]"][4], rows["n_states"][5] = 1e9, np.nan, np.nan
+    assert not state_layout(rows).has_local_position
+    old = made_flight(release(1, 13), states_with(24, s10=2e-4, **QUATERNION), INCREMENTS)
+    rows = {name: np.repeat(values, 20) for name, values in old.topics["estimator_states", 0].items()}
+    rows["covariances[14]"][3], rows["covariances[13]"][4] = 1e30, np.nan
+    assert not state_layout(rows).has_bias_rates
 
 
 @pytest.mark.parametrize("lost", ["gyro_bias[0]", "gyro_bias[2]", "accel_bias[1]"])

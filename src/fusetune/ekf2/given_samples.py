@@ -115,10 +115,12 @@ def _airspeed(flight: Flight) -> tuple[dict[TopicKey, TopicTable], list[Refusal]
     topics: dict[TopicKey, TopicTable] = {}
     refusals: list[Refusal] = []
     validated, raw = flight.topic("airspeed_validated"), flight.topic("airspeed")
-    if validated is not None:
+    any_taken = False
+    if validated is not None and row_count(validated):
         topics["airspeed_validated", 0] = validated
         refusals = convert.validated_airspeed_refusals(validated, flight.release)
-    if raw is not None and (validated is None or not convert.taken(validated, refusals).any()):
+        any_taken = bool(convert.taken(validated, refusals).any())
+    if raw is not None and not any_taken:
         topics["airspeed", 0] = raw
         refusals = refusals + convert.airspeed_refusals(raw)
     return topics, refusals

@@ -23,7 +23,7 @@ from fusetune.ekf2.sensor_samples import (
     GNSS_SAMPLE,
     MAG_SAMPLE,
 )
-from fusetune.px4.flight import Flight, TopicTable
+from fusetune.px4.flight import Flight, TopicTable, row_count
 
 AIRSPEED_VALIDATED_MAX_AGE_US = 3_000_000
 
@@ -46,6 +46,8 @@ class TakenSamples:
 
 def only_usable(newest: np.ndarray, usable: np.ndarray) -> np.ndarray:
     """The newest messages, -1 where the estimator is not given it."""
+    if not len(usable):
+        return newest
     return np.where((newest >= 0) & usable[newest], newest, -1)
 
 
@@ -108,7 +110,7 @@ def _airspeed(flight: Flight, runs: RunSchedule) -> TakenSamples:
     never = 0 if reads_validated else -AIRSPEED_VALIDATED_MAX_AGE_US
     last_validated = np.full(len(runs.timestamp), never, np.int64)
     is_validated = np.zeros(len(runs.timestamp), dtype=bool)
-    if validated is not None:
+    if validated is not None and row_count(validated):
         samples = convert.validated_airspeed_samples(validated)
         usable = convert.taken(validated, convert.validated_airspeed_refusals(validated, flight.release))
         newest = runs.newest_message("airspeed_validated", validated["timestamp"])

@@ -41,6 +41,10 @@ _MAX_INCREMENT_VARIANCE = (0.5 * UPDATE_INTERVAL_S) ** 2
 """(m/s)²: EKF2_ABIAS_INIT is at most 0.5 m/s². Biases as rates never come to be known so well along all three axes."""
 
 
+_MIN_SHARE_WITH_PLACE = 0.1
+"""Of rows with a horizontal position: where that is no state, it is zero throughout, but for damage."""
+
+
 @dataclass(frozen=True)
 class StateLayout:
     """What stands where in `states` and `covariances`.
@@ -72,7 +76,8 @@ def state_layout(table: TopicTable, sensor_bias: TopicTable | None = None) -> St
     if states not in _STATE_COUNTS or variances not in (states - 1, states):
         return None
     has_rotation = variances == states - 1
-    has_place = bool(np.any(table["states[7]"]) or np.any(table["states[8]"]))
+    place = stacked(table, "states")[:, 7:9]
+    has_place = bool(np.mean(np.isfinite(place).all(axis=1) & np.any(place, axis=1)) > _MIN_SHARE_WITH_PLACE)
     return StateLayout(
         states=states,
         variances=variances,
@@ -86,8 +91,8 @@ def state_layout(table: TopicTable, sensor_bias: TopicTable | None = None) -> St
 def state_counts(table: TopicTable) -> tuple[int, int]:
     """How many states are in use and how many variances there are; `n_states` of v1.6 and damaged ones say nothing."""
     states, variances = len(field_names(table, "states")), len(field_names(table, "covariances"))
-    told = int(np.median(table["n_states"])) if "n_states" in table else 0
-    used = told if 0 < told <= states else states
+    told = float(np.median(table["n_states"])) if "n_states" in table else 0.0
+    used = int(told) if 0.0 < told <= states else states
     return used, min(variances, used)
 
 
@@ -104,5 +109,6 @@ def _has_bias_rates(table: TopicTable, sensor_bias: TopicTable | None) -> bool:
         known = np.isfinite(rates) & np.isfinite(biases) & (rates > 0.0) & (biases > 0.0)
         if known.any():
             return bool(np.median(biases[known] / rates[known]) > _RATE_NOT_INCREMENT)
-    variances = stacked(table, "covariances")[:, _ACCEL_BIAS_VARIANCES]
-    return bool(np.nanmax(variances, initial=0.0) > _MAX_INCREMENT_VARIANCE)
+    largest = stacked(table, "covariances")[:, _ACCEL_BIAS_VARIANCES].max(axis=1)
+    known = largest[np.isfinite(largest)]
+    return bool(len(known) and np.median(known) > _MAX_INCREMENT_VARIANCE)
