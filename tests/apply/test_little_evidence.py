@@ -19,7 +19,7 @@ from tests.apply.test_bootstrap import evidence
 from tests.apply.test_ranking import analyzed
 
 from fusetune.analyze.metrics_schema import METRICS_SCHEMA
-from fusetune.apply.bootstrap import expanded_interval, holm, p_value, units_redrawn
+from fusetune.apply.bootstrap import FEWEST_REDRAWN, expanded_interval, holm, p_value, units_redrawn
 from fusetune.apply.choice import choose
 from fusetune.apply.decide import decide
 from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight, FlightEvidence, _Sums, flight_evidence
@@ -86,6 +86,7 @@ def test_few_flights_have_students_interval(flights: int) -> None:
     scatter = 0.02 * (high - low)
     assert (found.lower, found.upper) == (pytest.approx(low, abs=scatter), pytest.approx(high, abs=scatter))
     assert found.p_value == pytest.approx(stats.ttest_1samp(differences, 0.0).pvalue, rel=0.05)
+    assert found.p_best is None
 
 
 def test_few_flights_are_seldom_called_different_where_nothing_is() -> None:
@@ -119,7 +120,7 @@ def test_equal_within_rounding_is_equal(flights: int, difference: float) -> None
     assert (found.difference, found.p_value, found.flights_better) == (0.0, 1.0, 0)
     assert (found.lower, found.upper) == (None, None)
     assert found.improvement_percent == 0.0
-    assert found.p_best == (None if flights == 1 else 0.5)
+    assert found.p_best == (0.5 if flights >= FEWEST_REDRAWN else None)
 
 
 def test_holm_leaves_open_what_is_not_known_and_counts_it() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.apply.bootstrap import (
+    FEWEST_REDRAWN,
     Redrawn,
     bootstrap_scores,
     expanded_interval,
@@ -61,7 +62,8 @@ class RankedSet:
     difference, lower, upper : score less that of the present set, and its interval; below 0 is better
     p_value, p_holm : of the difference against 0, alone and by Holm's correction for all candidates
     p_family : that the best of the candidates is so much better by luck, see `fusetune.apply.sign_flips`
-    p_best : share of bootstrap draws in which no set that may be flown scores lower
+    p_best : share of bootstrap draws in which no set that may be flown scores lower; not known with few units, of which
+        the draws are so much alike that a set which is best on all of them would be best for sure
     flights, flights_better : flights behind the score, and on how many of them it beats the present set
     equal_to_present : same results on every flight
     improvement_percent : by how much smaller its typical prediction error is than the present set's
@@ -267,7 +269,7 @@ def _with_family(
     family = _family_p_values([one.name for one in candidates if one.is_eligible], present, evidence, settings)
     able = [one.name for one in ranked if one.status != NOT_ELIGIBLE]
     units = units_redrawn(evidence)
-    shares = _shares_of_best(able, complete, scores) if units > 1 else None
+    shares = _shares_of_best(able, complete, scores) if units >= FEWEST_REDRAWN else None
     ranked = [
         replace(
             one,

@@ -28,7 +28,8 @@ def _failures(name: str, flights: Sequence[AnalyzedFlight]) -> list[str]:
         assert flight.evidence is not None
         if name not in flight.evidence.sets:
             why = flight.summary["sets"].get(name, {}).get("reason")
-            reasons.append(f"{flight.name}: {why or 'not scored on the same samples as the present set'}")
+            unknown = "not scored on the same samples as the present set, or with errors that are no numbers"
+            reasons.append(f"{flight.name}: {why or unknown}")
     return reasons
 
 
