@@ -63,7 +63,16 @@ def recover_from_interruption():
 recover_from_interruption()
 
 # Changed sources run again what depends on them.
-BASE = ("cells.py", "csv_file.py", "errors.py", "files.py", "parquet.py", "px4", "time_limit.py")
+BASE = (
+    "cells.py",
+    "csv_file.py",
+    "errors.py",
+    "files.py",
+    "number_settings.py",
+    "parquet.py",
+    "px4",
+    "time_limit.py",
+)
 REPLAY_SOURCES = (
     "ekf2",
     "save",
