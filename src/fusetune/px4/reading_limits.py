@@ -15,6 +15,7 @@ from fusetune.number_settings import checked_numbers
 from fusetune.px4.flight import TopicKey
 from fusetune.px4.release_layouts import ESTIMATOR_TOPICS
 
+RAISE_LIMITS = "Log fewer topics, or raise reading.max_tables and reading.max_columns in the configuration"
 _USED_TOPICS = frozenset(
     {
         *ESTIMATOR_TOPICS,
