@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -19,18 +18,13 @@ from fusetune.time_limit import Deadline, TimeLimitError
 
 HEADER = b"ULog\x01\x12\x35\x01" + (1_000_000).to_bytes(8, "little")
 SOUND = definition("sound", "uint64_t timestamp;uint8_t a;")
-MOST_SECONDS = 5.0
-"""Far more than any of these takes, and far less than what each took or takes without a limit."""
 
 
 def read(folder: Path, *records: bytes, limits: ReadingLimits | None = None) -> Flight:
     content = HEADER + b"".join(records)
     assert len(HEADER) == HEADER_BYTES
     (folder / "hostile.ulg").write_bytes(content)
-    begin = time.monotonic()
-    flight = read_ulog(folder / "hostile.ulg", limits)
-    assert time.monotonic() - begin < MOST_SECONDS
-    return flight
+    return read_ulog(folder / "hostile.ulg", limits)
 
 
 def with_sound_topic(folder: Path, definitions: list[bytes], topic: str, rest: bytes = b"") -> Flight:
@@ -236,10 +230,16 @@ def test_a_definition_that_comes_late_is_taken(tmp_path: Path) -> None:
     assert flight.undefined_topics == ()
 
 
-def test_asking_for_a_faulty_definition_again_costs_nothing(tmp_path: Path) -> None:
+def test_asking_for_a_faulty_definition_again_costs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Thousands of subscriptions of a topic that lacks the last of its 3,900 fields, each after another definition."""
     large = definition("large", "uint64_t timestamp;" + "".join(f"float f{n};" for n in range(3900)) + "nowhere x;")
     records = [large, SOUND, subscription(60_000, "sound"), data(60_000, 1_000_000, b"\1")]
     for number in range(5000):
         records += [definition(f"other{number}", "float a;"), subscription(number, "large")]
+    summed: list[str] = []
+    whole_sum = Definitions._sum
+    monkeypatch.setattr(
+        Definitions, "_sum", lambda self, name, depth: summed.append(name) or whole_sum(self, name, depth)
+    )
     assert read(tmp_path, *records).undefined_topics == ("large",)
+    assert summed.count("large") == 1

@@ -152,6 +152,7 @@ BASE = (
     "documents.py",
     "errors.py",
     "files.py",
+    "number_settings.py",
     "parquet.py",
     "px4",
     "time_limit.py",

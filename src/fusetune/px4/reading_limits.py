@@ -7,15 +7,15 @@ their own: each lies in the file, so tables are never larger than it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
-from fusetune.errors import UserError
+from fusetune.number_settings import checked_numbers
 from fusetune.px4.flight import TopicKey
 from fusetune.px4.release_layouts import ESTIMATOR_TOPICS
 
+RAISE_LIMITS = "Log fewer topics, or raise reading.max_tables and reading.max_columns in the configuration"
 _USED_TOPICS = frozenset(
     {
         *ESTIMATOR_TOPICS,
@@ -50,15 +50,9 @@ class ReadingLimits:
         Raises
         ------
         UserError
-            A key is no limit, or its value no number from 0 on.
+            A key is no limit, or its value no finite number from 0 on.
         """
-        known = {field.name: type(getattr(cls, field.name)) for field in fields(cls)}
-        for name, value in values.items():
-            if name not in known:
-                raise UserError("reading", f"{name} is no limit", f"Use one of {', '.join(known)}")
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < math.inf:
-                raise UserError("reading", f"{name} is {value!r}, expected a number from 0 on", "Mend the value")
-        return cls(**{name: known[name](value) for name, value in values.items()})
+        return cls(**checked_numbers("reading", "limit", cls, values))
 
 
 def is_used(topic: str) -> bool:

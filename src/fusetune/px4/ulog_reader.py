@@ -22,7 +22,7 @@ from fusetune.px4.flight import (
     TopicKey,
     TopicTable,
 )
-from fusetune.px4.reading_limits import ReadingLimits, is_used, within_limits
+from fusetune.px4.reading_limits import RAISE_LIMITS, ReadingLimits, is_used, within_limits
 from fusetune.px4.release_layouts import ESTIMATOR_TOPICS
 from fusetune.px4.ulog_definitions import MessageLayout, is_padding
 from fusetune.px4.ulog_records import DATA_HEAD_BYTES, HEADER_BYTES, Scan, Scanner
@@ -94,9 +94,10 @@ def _read(file: Path, limits: ReadingLimits, deadline: Deadline) -> Flight:
     values = logged_values(content, scan, deadline)
     notes += _damage(scan, values, len(content))
     messages, beyond = _messages(content, scan, limits, deadline)
+    if not messages and beyond:
+        raise UserError(file, "holds too many topics, and none that is used", RAISE_LIMITS)
     if not messages:
-        reason = "holds too many topics, and none that is used" if beyond else "holds no message that can be read"
-        raise UserError(file, reason, _COPY_AGAIN)
+        raise UserError(file, "holds no message that can be read", _COPY_AGAIN)
     times, places = _times(messages), _places(messages)
     clock = clock_of(times, places, _IMU, trusted=lambda key: is_used(key[0]))
     left_out = _without_impossible_rows(messages, impossible_rows(times, places, clock, _is_input))

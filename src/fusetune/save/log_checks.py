@@ -8,6 +8,7 @@ from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.estimator_samples import is_complete, logged_share
 from fusetune.px4.flight import Flight
 from fusetune.px4.logger_settings import ESTIMATOR_REPLAY_BIT, MODES, logging_mode_of, logging_profile_of
+from fusetune.px4.reading_limits import RAISE_LIMITS
 from fusetune.px4.sensor_limits import LACKS_FIELD, NO_ADVANCE
 from fusetune.px4.ulog_times import ANOTHER_CLOCK, IMPOSSIBLE
 from fusetune.save.log_facts import rate_hz
@@ -55,8 +56,7 @@ def tables(flight: Flight, limits: VerdictThresholds) -> Check:
         return Check(name, "pass", "all topics became tables", "", 0.0, 0.0)
     shown = f"{', '.join(beyond[:5])}{' …' if len(beyond) > 5 else ''}"
     reason = f"the log has more topics than it may: {len(beyond)} of them did not become tables ({shown})"
-    remedy = "Log fewer topics, or raise reading.max_tables and reading.max_columns in the configuration"
-    return Check(name, "warning", reason, remedy, float(len(beyond)), 0.0)
+    return Check(name, "warning", reason, RAISE_LIMITS, float(len(beyond)), 0.0)
 
 
 def time_stamps(flight: Flight, limits: VerdictThresholds) -> Check:

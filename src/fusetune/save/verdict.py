@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from fusetune.errors import UserError
+from fusetune.number_settings import checked_numbers
 from fusetune.px4.flight import Flight
 from fusetune.time_limit import Deadline
 
@@ -80,15 +81,9 @@ class VerdictThresholds:
         Raises
         ------
         UserError
-            A key is no threshold, or its value no number.
+            A key is no threshold, or its value no finite number from 0 on.
         """
-        known = [field.name for field in fields(cls)]
-        for name, value in values.items():
-            if name not in known:
-                raise UserError("verdict", f"{name} is no threshold", f"Use one of {', '.join(known)}")
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise UserError("verdict", f"{name} is {value!r}, expected a number", "Mend the value")
-        return cls(**{name: float(value) for name, value in values.items()})
+        return cls(**checked_numbers("verdict", "threshold", cls, values))
 
 
 @dataclass(frozen=True)
