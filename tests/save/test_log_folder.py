@@ -68,6 +68,20 @@ def log(tmp_path: Path, log_bytes: bytes) -> Path:
     return tmp_path / "made.ulg"
 
 
+def test_a_disk_that_takes_only_a_part_of_a_table_is_told_of(log: Path, tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    save_log(log, tmp_path / "whole")
+    largest = max(file.stat().st_size for file in (tmp_path / "whole").glob("*.parquet"))
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest - 1, usual[1]))
+        with pytest.raises(UserError, match="cannot be written: File too large"):
+            save_log(log, tmp_path / "saved" / "made")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+    assert list((tmp_path / "saved").iterdir()) == []
+
+
 def test_flight_comes_back_as_it_was_read(tmp_path: Path, log: Path) -> None:
     assert save_log(log, tmp_path / "saved" / "made").status == "replayable"
     saved, read = load_flight(tmp_path / "saved" / "made"), read_ulog(log)
