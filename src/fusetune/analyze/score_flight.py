@@ -29,7 +29,7 @@ from fusetune.analyze.reference_truth import TRUTH_TOPICS, Truth, read_reference
 from fusetune.analyze.row_groups import tables_in_groups
 from fusetune.analyze.sample_spool import SampleSpool
 from fusetune.analyze.scoring_window import Cut, Interval, ScoringWindow, scoring_window, subtract
-from fusetune.analyze.set_files import AxisSamples, SetRecord, SourceAxis, read_set
+from fusetune.analyze.set_files import AxisSamples, SetRecord, SourceAxis, read_innovations, read_set
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.source_whiteness import Whiteness, source_whiteness
 from fusetune.analyze.sources import AID_SOURCES, AXES
@@ -70,6 +70,9 @@ SAMPLES_SCHEMA = pa.schema(
 _NOT_IN_SAMPLES = ("gravity",)
 """Sampled at every update: the samples would fill the disk and no plot shows them."""
 
+_AID_SOURCE_TOPICS = tuple(f"estimator_aid_src_{name}" for name in AID_SOURCES)
+_LARGE_TOPICS = (*IMU_TOPICS, *_AID_SOURCE_TOPICS)
+
 SCORE_TOPICS = (
     "vehicle_land_detected",
     "sensor_combined",
@@ -81,7 +84,7 @@ SCORE_TOPICS = (
     "estimator_innovation_test_ratios",
     "ekf2_innovations",
     "estimator_status",
-    *(f"estimator_aid_src_{name}" for name in AID_SOURCES),
+    *_AID_SOURCE_TOPICS,
 )
 """What the metrics need of a saved flight."""
 
@@ -126,9 +129,11 @@ def score_flight(
     settings, folder = settings or ScoringSettings(), Path(analyze_folder)
     flight = canonical(flight)
     log_gaps = imu_gaps(flight, settings.log_gap_s)
-    # nothing below asks for the IMU, and nothing of a flight is larger
-    flight = flight.with_topics({key: table for key, table in flight.topics.items() if key[0] not in IMU_TOPICS})
-    spool = SampleSpool(folder)
+    onboard_file, spool = folder / f"{ONBOARD}.innovations.parquet", SampleSpool(folder)
+    write_onboard(onboard_file, onboard_samples(flight))
+    onboard = read_innovations(onboard_file, {}, spool)
+    # nothing below asks the flight for the IMU or for innovations, and nothing of it is larger
+    flight = flight.with_topics({key: table for key, table in flight.topics.items() if key[0] not in _LARGE_TOPICS})
     records = [read_set(folder, name, spool) for name in dict.fromkeys((present, *sets))]
     airborne = airborne_intervals(flight, records[0].flags)
     window = scoring_window(records, present, airborne, log_gaps, settings)
@@ -144,7 +149,6 @@ def score_flight(
     add_ground_metrics(table, records, present, ground, settings.confidence)
     for record in records:
         add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
-    onboard = onboard_samples(flight)
     blocks: list[pa.Table] = []
     windows: list[pa.Table] = []
     whiteness: dict[tuple[str, int], Whiteness] = {}
@@ -172,7 +176,6 @@ def score_flight(
         if np.isfinite(one.white_share)
     }
     _write(folder, table, blocks, windows, withheld, summary)
-    write_onboard(folder / f"{ONBOARD}.innovations.parquet", onboard)
 
 
 def _flight_after_warm_up(airborne: Sequence[Interval], window: ScoringWindow) -> tuple[Interval, ...]:
