@@ -166,6 +166,33 @@ def test_obsolete_magnetometer_type_set_in_flight_counts_as_automatic(flight, re
     assert_equal_rows(replayed(changed).states, result.states, ("states", "covariances"))
 
 
+@pytest.mark.parametrize(
+    ("source", "switched_off"), [("mag", {"EKF2_MAG_TYPE": 5.0}), ("drag", {"EKF2_DRAG_CTRL": 0.0})]
+)
+def test_sensor_switched_on_in_flight_starts_with_what_waits(flight, source, switched_off):
+    """PX4 takes no sample of what is switched off: the newest of the last 0.1 s is there when it is switched on.
+
+    Of drag not even means are made while it is off, so that the first one is still to come.
+    """
+    from fusetune.px4.flight import ParameterChange
+
+    times = flight.topics["sensor_combined", 0]["timestamp"]
+    ((name, off),) = switched_off.items()
+    on = {"EKF2_MAG_TYPE": 0.0, "EKF2_DRAG_CTRL": 1.0}[name]
+    initial = complete(flight.parameters.initial, {name: off}, flight.release)
+    for run in range(6000, 6004):
+        changed = [ParameterChange(int(times[run]), name, on)]
+        parameters = dataclasses.replace(flight.parameters, changed=changed)
+        after = replay(build_inputs(dataclasses.replace(flight, parameters=parameters)), initial)
+        rows = after.innovations[after.source_names() == source]
+        first_update = np.searchsorted(after.states["timestamp"], times[run])
+        horizon = after.states["timestamp_sample"][first_update]
+        if source == "mag":
+            assert horizon - 100_000 < rows["timestamp_sample"][0] <= horizon
+        else:
+            assert rows["timestamp_sample"][0] > horizon
+
+
 LOGS = (
     "JAParedes__TestFlight1", "Parham-Oveissi__log_40_2023-5-25-12-28-14", "SkyRats__log_29_2021-7-9-16-25-06",
     "Chainplain__log_9_2024-10-14-15-00-06", "erdemarslan380__sitl_windy", "synthetic__mc_gnss", "synthetic__mc_range",

@@ -44,6 +44,9 @@ IMU_RING = np.dtype(
 
 DRAG_RING = np.dtype([("ring", RING), ("sample", DRAG_SAMPLE, (RING_CAPACITY,)), ("written", "i8")], align=True)
 
+EV_NOISE = np.dtype([("position", "f8"), ("velocity", "f8"), ("attitude", "f8"), ("mode", "i8")], align=True)
+"""EKF2_EVP_NOISE (m), EKF2_EVV_NOISE (m/s), EKF2_EVA_NOISE (rad) and EKF2_EV_NOISE_MD."""
+
 AIDING_RINGS = ("gnss", "mag", "baro", "range", "flow", "ev", "airspeed", "auxvel", "system_flags")
 
 BUFFERS_MEMORY = np.dtype(
@@ -51,6 +54,9 @@ BUFFERS_MEMORY = np.dtype(
     + [(name, RING) for name in AIDING_RINGS]
     + [
         ("drag", DRAG_RING),
+        # parameters that act on a sample when it arrives, by its place in the ring
+        ("gnss_yaw_offset", "f8", (RING_CAPACITY,)),
+        ("ev_noise", EV_NOISE, (RING_CAPACITY,)),
         ("imu_length", "i8"),
         ("observation_length", "i8"),
         ("min_observation_interval_us", "i8"),

@@ -11,6 +11,7 @@ from fusetune.ekf2.aid_sources.fake_position import control_fake_pos_fusion
 from fusetune.ekf2.aid_sources.gnss.gnss_control import control_gnss_fusion
 from fusetune.ekf2.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.aid_sources.magnetometer.mag_control import control_mag_fusion
+from fusetune.ekf2.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
 from fusetune.ekf2.aid_sources.optical_flow.optical_flow_control import control_optical_flow_fusion
 from fusetune.ekf2.aid_sources.sideslip.sideslip_fusion import control_beta_fusion
 from fusetune.ekf2.aid_sources.zero_gyro import control_zero_gyro_update
@@ -73,19 +74,29 @@ def control_fusion_modes(ekf, params, inputs):
 
 @kernel
 def _pop_due_samples(ekf, params, inputs):
-    """Take from every buffer the newest sample that the fusion time horizon has passed."""
+    """Take from every buffer the newest sample that the fusion time horizon has passed.
+
+    What is switched off leaves its samples there; switched on again, it starts with the newest of the last 0.1 s.
+    """
+    ekf.mag_data_ready = False
+    ekf.flow_data_ready = False
+    ekf.gnss_data_ready = False
+    ekf.airspeed_data_ready = False
+    ekf.drag_data_ready = False
     pop_system_flags(ekf, inputs)
-    pop_mag(ekf, inputs)
-    pop_flow(ekf, inputs)
+    if int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE:
+        pop_mag(ekf, inputs)
+    if int(params.EKF2_OF_CTRL) == 1:
+        pop_flow(ekf, inputs)
     if int(params.EKF2_GPS_CTRL) != 0:
-        pop_gnss(ekf, params, inputs)
-    else:
-        ekf.gnss_data_ready = False
-    pop_airspeed(ekf, inputs)
-    pop_drag(ekf)
+        pop_gnss(ekf, inputs)
+    if params.EKF2_ARSP_THR > 0.0:
+        pop_airspeed(ekf, inputs)
+    if int(params.EKF2_DRAG_CTRL) > 0:
+        pop_drag(ekf)
     pop_baro(ekf, inputs)
     pop_range(ekf, inputs)
-    pop_ev(ekf, params, inputs)
+    pop_ev(ekf, inputs)
     pop_auxvel(ekf, inputs)
 
 

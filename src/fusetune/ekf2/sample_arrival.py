@@ -3,6 +3,7 @@
 `receive_…` runs when a sample arrives; `pop_…` when the horizon moves. `inputs` is the named tuple of sample arrays
 that `fusetune.ekf2.inputs` builds. After a `pop_…`, `ekf.<sensor>_data_ready` says whether a sample was due, and
 `ekf.<sensor>_sample` holds it. `ekf.<sensor>_newest_time_us` is the IMU time at which a sample last arrived.
+What parameters say of a sample's noise or mounting is what they said when it arrived.
 """
 
 import numpy as np
@@ -14,7 +15,9 @@ from fusetune.ekf2.kernel import kernel
 @kernel
 def receive_gnss(ekf, params, inputs, slot):
     """Buffer a GNSS sample; note when one with a heading came."""
-    if offer(ekf, ekf.buffers.gnss, inputs.gnss[slot].time_us, params.EKF2_GPS_DELAY, slot):
+    ring = ekf.buffers.gnss
+    if offer(ekf, ring, inputs.gnss[slot].time_us, params.EKF2_GPS_DELAY, slot):
+        ekf.buffers.gnss_yaw_offset[ring.head] = params.EKF2_GPS_YAW_OFF
         ekf.gnss_newest_time_us = ekf.time_latest_us
         if np.isfinite(inputs.gnss[slot].yaw):
             ekf.gnss_yaw_newest_time_us = ekf.time_latest_us
@@ -62,7 +65,13 @@ def receive_flow(ekf, params, inputs, slot):
 @kernel
 def receive_ev(ekf, params, inputs, slot):
     """Buffer an external vision sample."""
-    if offer(ekf, ekf.buffers.ev, inputs.ev[slot].time_us, params.EKF2_EV_DELAY, slot):
+    ring = ekf.buffers.ev
+    if offer(ekf, ring, inputs.ev[slot].time_us, params.EKF2_EV_DELAY, slot):
+        noise = ekf.buffers.ev_noise[ring.head]
+        noise.position = params.EKF2_EVP_NOISE
+        noise.velocity = params.EKF2_EVV_NOISE
+        noise.attitude = params.EKF2_EVA_NOISE
+        noise.mode = int(params.EKF2_EV_NOISE_MD)
         ekf.ev_newest_time_us = ekf.time_latest_us
         ekf.ev.time_last_buffer_push_us = ekf.time_latest_us
         ekf.ev.newest_quality = inputs.ev[slot].quality
@@ -93,7 +102,7 @@ def receive_system_flags(ekf, inputs, slot):
 
 
 @kernel
-def pop_gnss(ekf, params, inputs):
+def pop_gnss(ekf, inputs):
     """Take the GNSS sample that is due."""
     ring = ekf.buffers.gnss
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -101,14 +110,14 @@ def pop_gnss(ekf, params, inputs):
     if index >= 0:
         ekf.gnss_sample = inputs.gnss[ring.slot[index]]
         ekf.gnss_sample.time_us = ring.time_us[index]
-        _apply_antenna_yaw_offset(ekf.gnss_sample, params)
+        _apply_antenna_yaw_offset(ekf.gnss_sample, ekf.buffers.gnss_yaw_offset[index])
         take(ring, index)
 
 
 @kernel
-def _apply_antenna_yaw_offset(sample, params):
+def _apply_antenna_yaw_offset(sample, offset_deg):
     """Use EKF2_GPS_YAW_OFF where the receiver reports a heading but no offset of its own."""
-    offset = np.deg2rad(params.EKF2_GPS_YAW_OFF)
+    offset = np.deg2rad(offset_deg)
     if abs(offset) > 0.0 and not np.isfinite(sample.yaw_offset) and np.isfinite(sample.yaw):
         offset = np.arctan2(np.sin(offset), np.cos(offset))
         sample.yaw_offset = offset
@@ -164,7 +173,7 @@ def pop_flow(ekf, inputs):
 
 
 @kernel
-def pop_ev(ekf, params, inputs):
+def pop_ev(ekf, inputs):
     """Take the external vision sample that is due."""
     ring = ekf.buffers.ev
     index = find_newest_due(ring, ekf.time_delayed_us)
@@ -172,17 +181,17 @@ def pop_ev(ekf, params, inputs):
     if index >= 0:
         ekf.ev_sample = inputs.ev[ring.slot[index]]
         ekf.ev_sample.time_us = ring.time_us[index]
-        _apply_vision_noise(ekf.ev_sample, params)
+        _apply_vision_noise(ekf.ev_sample, ekf.buffers.ev_noise[index])
         take(ring, index)
 
 
 @kernel
-def _apply_vision_noise(sample, params):
+def _apply_vision_noise(sample, noise):
     """Replace the variances by the noise parameters, or floor them, as EKF2_EV_NOISE_MD asks."""
-    use_reported = int(params.EKF2_EV_NOISE_MD) == 0
-    _floor_variance(sample.position_var, params.EKF2_EVP_NOISE, use_reported)
-    _floor_variance(sample.velocity_var, params.EKF2_EVV_NOISE, use_reported)
-    _floor_variance(sample.orientation_var, params.EKF2_EVA_NOISE, use_reported)
+    use_reported = noise.mode == 0
+    _floor_variance(sample.position_var, noise.position, use_reported)
+    _floor_variance(sample.velocity_var, noise.velocity, use_reported)
+    _floor_variance(sample.orientation_var, noise.attitude, use_reported)
 
 
 @kernel
