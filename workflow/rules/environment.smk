@@ -54,7 +54,6 @@ from fusetune.run_lock import RUN_VARIABLE, claim_run, holder_of, join_run, new_
 
 CONTENT = ContentDigests(STATE / "fusetune_contents.json")
 
-
 # A job knows by its name the run that it works for.
 if workflow.is_main_process:
     RUN = new_run()
@@ -108,6 +107,8 @@ def take_the_folder():
             print("No locks in this file system: after a killed run use snakemake --unlock.", file=sys.stderr)
         elif not workflow.touch:
             recover_from_interruption(claim)
+            for log in FOUND.logs:
+                CONTENT.of(log.path)
             CONTENT.save()
     except UserError as error:
         told_and_ended(error)

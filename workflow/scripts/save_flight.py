@@ -12,11 +12,10 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
     thresholds = VerdictThresholds.from_mapping(snakemake.params.thresholds)
-    flown = snakemake.params.flown
+    flown, folder = snakemake.params.flown, snakemake.output[0]
     if flown is None:
-        verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds)
+        verdict = save_log(snakemake.input.log, folder, thresholds)
     else:
-        verdict = save_log(
-            flown["path"], snakemake.output[0], thresholds, shown=flown["shown"], checksum=flown["checksum"]
-        )
+        checksum = snakemake.params.checksum
+        verdict = save_log(flown["path"], folder, thresholds, shown=flown["shown"], checksum=checksum)
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")
