@@ -63,6 +63,14 @@ def test_a_folder_is_claimed_by_one_process_and_others_are_told_by_which(tmp_pat
         assert "start again" in refusal
 
 
+def test_a_process_that_has_a_folder_can_begin_another_run_there(tmp_path: Path) -> None:
+    for run in ("first", "second"):
+        assert claim_run(tmp_path, run) == Claim(locked=True, former=None)
+        assert json.loads((tmp_path / RUN_LOCK).read_text(encoding="utf-8"))["run"] == run
+    with process_that("claim_run(folder, 'third')", tmp_path) as third:
+        assert "another run is at work here" in answer(third)
+
+
 def test_after_a_run_that_was_killed_the_next_one_knows_of_it_and_after_one_that_ended_does_not(tmp_path: Path) -> None:
     with process_that("claim_run(folder, 'first').former", tmp_path) as first:
         answer(first)

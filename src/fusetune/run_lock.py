@@ -36,6 +36,7 @@ _TAKEN = {errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES}
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 _held: list[IO[bytes]] = []
+_claimed: dict[Path, IO[bytes]] = {}
 
 
 class LocksUnavailableError(Exception):
@@ -98,7 +99,10 @@ def claim_run(folder: str | os.PathLike[str], run: str) -> Claim:
     UserError
         Another run is at work there, or one on another machine that may still be; or the folder cannot be written.
     """
-    path = Path(folder) / RUN_LOCK
+    path = Path(folder).absolute() / RUN_LOCK
+    if path in _claimed:
+        _write(_claimed[path], _record(run))
+        return Claim(locked=True, former=None)
     try:
         file = _open_and_lock(path, exclusive=True)
     except LocksUnavailableError:
@@ -114,8 +118,8 @@ def claim_run(folder: str | os.PathLike[str], run: str) -> Claim:
         file.close()
         reason = f"a run on another machine ({former}) never said that it ended, and from here that cannot be seen"
         raise UserError(path, reason, "Make sure that it has ended, delete this file, and start again")
-    _write(file, json.dumps(asdict(Holder.here(run))).encode())
-    _held.append(file)
+    _write(file, _record(run))
+    _claimed[path] = file
     atexit.register(_leave, file, os.getpid())
     return Claim(locked=True, former=former)
 
@@ -211,12 +215,18 @@ def _holder_in(path: Path) -> Holder | None:
         return None
 
 
+def _record(run: str) -> bytes:
+    return json.dumps(asdict(Holder.here(run))).encode()
+
+
 def _write(file: IO[bytes], content: bytes) -> None:
     # Not a temporary file that is moved into place: the lock belongs to this very file.
     file.seek(0)
     file.truncate()
     file.write(content)
     file.flush()
+    # jobs on other machines read it while this process keeps it open
+    os.fsync(file.fileno())
 
 
 def _leave(file: IO[bytes], pid: int) -> None:

@@ -54,14 +54,6 @@ def replayable_flights():
     return [row["flight"] for row in rows if row["status"] == "replayable" and row["flight"] in LOGS]
 
 
-def flown_log(flight):
-    """Path, name to show and content of a log that was flown; None for a simulated one, which is an input."""
-    if DEMONSTRATED:
-        return None
-    log = FLOWN_LOGS[flight]
-    return {"path": log.path, "shown": log.shown, "checksum": CONTENT.of(log.path)}
-
-
 def of_replayable_flights(patterns):
     """Input function: some files of every flight that can be replayed."""
     return lambda wildcards: expand(patterns, flight=replayable_flights())

@@ -121,6 +121,8 @@ def take_the_folder():
             print("No locks in this file system: after a killed run use snakemake --unlock.", file=sys.stderr)
         elif not workflow.touch:
             recover_from_interruption(claim)
+            for log in FOUND.logs:
+                CONTENT.of(log.path)
             CONTENT.save()
     except UserError as error:
         told_and_ended(error)

@@ -16,12 +16,11 @@ keep_out("pandas")
 with logged_job(snakemake.log[0]):
     thresholds = VerdictThresholds.from_mapping(snakemake.params.thresholds)
     limits = ReadingLimits.from_mapping(snakemake.params.limits)
-    flown = snakemake.params.flown
+    flown, folder = snakemake.params.flown, snakemake.output[0]
     if flown is None:
         check_checksum(snakemake.input.log, RUN_AGAIN)
-        verdict = save_log(snakemake.input.log, snakemake.output[0], thresholds, limits)
+        verdict = save_log(snakemake.input.log, folder, thresholds, limits)
     else:
-        verdict = save_log(
-            flown["path"], snakemake.output[0], thresholds, limits, shown=flown["shown"], checksum=flown["checksum"]
-        )
+        checksum = snakemake.params.checksum
+        verdict = save_log(flown["path"], folder, thresholds, limits, shown=flown["shown"], checksum=checksum)
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")
