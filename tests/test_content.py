@@ -74,6 +74,20 @@ def test_a_file_that_has_just_changed_is_not_remembered(tmp_path: Path) -> None:
     assert time.time_ns() - file.stat().st_mtime_ns < content.SETTLED_NS
 
 
+def test_files_that_change_after_they_were_asked_for_are_known(tmp_path: Path) -> None:
+    for name in ("stays", "grows", "goes", "comes"):
+        (tmp_path / name).write_bytes(b"one")
+    (tmp_path / "comes").unlink()
+    digests = ContentDigests(tmp_path / "cache.json")
+    for name in ("stays", "grows", "goes", "comes"):
+        digests.of(tmp_path / name)
+    assert digests.changed() == []
+    (tmp_path / "grows").write_bytes(b"more")
+    (tmp_path / "goes").unlink()
+    (tmp_path / "comes").write_bytes(b"one")
+    assert [Path(name).name for name in digests.changed()] == ["grows", "goes", "comes"]
+
+
 def test_what_cannot_be_read_differs_from_what_can(tmp_path: Path) -> None:
     assert ContentDigests(tmp_path / "cache.json").of(tmp_path / "absent") == (
         "cannot be read (No such file or directory)"

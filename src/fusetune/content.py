@@ -32,6 +32,7 @@ class ContentDigests:
         self._cache = Path(cache)
         self._known = _read(self._cache)
         self._digests: dict[str, str] = {}
+        self._stamps: dict[str, _Stamp | None] = {}
         self._settled: dict[str, tuple[_Stamp, str]] = {}
 
     def of(self, path: str | os.PathLike[str]) -> str:
@@ -44,6 +45,10 @@ class ContentDigests:
             self._digests[name] = self._digest(name)
         return self._digests[name]
 
+    def changed(self) -> list[str]:
+        """Absolute paths of the files that are no longer as they were when they were asked for."""
+        return [name for name, stamp in self._stamps.items() if _stamp_of(name) != stamp]
+
     def save(self) -> None:
         """Keep for later processes what was asked for, and nothing else."""
         if self._settled != self._known:
@@ -52,6 +57,7 @@ class ContentDigests:
 
     def _digest(self, name: str) -> str:
         begun = time.time_ns()
+        self._stamps[name] = _stamp_of(name)
         try:
             with open(name, "rb") as file:
                 before = _stamp(os.fstat(file.fileno()))
@@ -69,6 +75,13 @@ class ContentDigests:
 
 def _stamp(status: os.stat_result) -> _Stamp:
     return (status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino, status.st_dev)
+
+
+def _stamp_of(name: str) -> _Stamp | None:
+    try:
+        return _stamp(os.stat(name))
+    except OSError:
+        return None
 
 
 def _read(cache: Path) -> dict[str, tuple[_Stamp, str]]:

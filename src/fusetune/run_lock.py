@@ -180,7 +180,7 @@ def _open_and_lock(path: Path, exclusive: bool, wait: bool = False) -> IO[bytes]
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             # open for writing, without which network file systems give no exclusive lock
-            file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+            file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
         except OSError as error:
             reason = f"cannot be written ({error.strerror})"
             raise UserError(path, reason, "Make room, or mend the permissions of its folder") from error
@@ -216,6 +216,7 @@ def _write(file: IO[bytes], content: bytes) -> None:
     file.seek(0)
     file.truncate()
     file.write(content)
+    file.flush()
 
 
 def _leave(file: IO[bytes], pid: int) -> None:

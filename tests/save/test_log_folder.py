@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange,
 from fusetune.px4.ulog_reader import read_ulog
 from fusetune.px4.ulog_writer import write_ulog
 from fusetune.save import VerdictThresholds, load_flight, save_log, write_flights_table
+from fusetune.save.discovery import RefusedEntry
+from fusetune.save.log_facts import recorded_at
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +69,48 @@ def log_bytes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 def log(tmp_path: Path, log_bytes: bytes) -> Path:
     (tmp_path / "made.ulg").write_bytes(log_bytes)
     return tmp_path / "made.ulg"
+
+
+def test_a_log_that_is_not_the_one_that_was_asked_for_is_refused(log: Path, tmp_path: Path) -> None:
+    checksum = hashlib.sha256(log.read_bytes()).hexdigest()
+    assert save_log(log, tmp_path / "same", shown="card/made.ulg", checksum=checksum).status == "replayable"
+    metadata = json.loads((tmp_path / "same" / "metadata.json").read_text(encoding="utf-8"))
+    assert (metadata["name"], metadata["file"]) == ("same", "card/made.ulg")
+    log.write_bytes(log.read_bytes()[:-1])
+    verdict = save_log(log, tmp_path / "other", checksum=checksum)
+    assert verdict.reasons == ("the log changed between the start of the run and its reading",)
+    assert not list((tmp_path / "other").glob("*.parquet"))
+
+
+def test_entries_that_could_not_be_saved_are_rows_of_the_table(log: Path, tmp_path: Path) -> None:
+    save_log(log, tmp_path / "made")
+    entry = RefusedEntry("gone", "card/gone.ulg", "is a link to nothing (x)", "Mend the link or remove it")
+    write_flights_table([tmp_path / "made"], tmp_path / "flights.parquet", tmp_path / "flights.csv", [entry])
+    rows = pa_csv.read_csv(tmp_path / "flights.csv").to_pylist()
+    assert [(row["flight"], row["file"], row["status"]) for row in rows] == [
+        ("made", "made.ulg", "replayable"),
+        ("gone", "card/gone.ulg", "refused"),
+    ]
+    assert (rows[1]["reason"], rows[1]["remedy"]) == (entry.reason, entry.remedy)
+
+
+@pytest.mark.parametrize("name", ["flight_2024-1-31-10-20-30", "2024-01-31_10_20_30", "card_2024-01-31_10_20_30"])
+def test_without_gnss_the_date_is_that_of_the_name(name: str) -> None:
+    assert recorded_at(Flight(name, {}, ParameterHistory({}, [], {}, {}))) == "2024-01-31T10:20:30Z"
+
+
+def test_a_disk_that_takes_only_a_part_of_a_table_is_told_of(log: Path, tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    save_log(log, tmp_path / "whole")
+    largest = max(file.stat().st_size for file in (tmp_path / "whole").glob("*.parquet"))
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest - 1, usual[1]))
+        with pytest.raises(UserError, match="cannot be written: File too large"):
+            save_log(log, tmp_path / "saved" / "made")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+    assert list((tmp_path / "saved").iterdir()) == []
 
 
 def test_flight_comes_back_as_it_was_read(tmp_path: Path, log: Path) -> None:

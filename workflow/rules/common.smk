@@ -3,6 +3,7 @@ import csv
 from dataclasses import astuple
 
 from fusetune.save import read_present
+from fusetune.save.discovery import printable
 
 REPLAY_PARTS = (
     "innovations.parquet",
@@ -76,6 +77,9 @@ def closing_words():
     kind = "simulated flights" if DEMONSTRATED else "flights"
     refused = len(statuses) - statuses.count("replayable")
     flights = f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv)."
+    changed = [printable(os.path.relpath(name)) for name in CONTENT.changed()]
+    if changed:
+        flights = f"Changed while the run was at work: {', '.join(changed)}. Run the pipeline again.\n{flights}"
     if not os.path.exists("results/report.html"):
         return flights
     return f"{flights} The decision and its evidence: results/report.html"

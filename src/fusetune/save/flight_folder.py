@@ -129,7 +129,8 @@ def _write_table(file: Path, table: TopicTable) -> None:
     options = {"use_dictionary": False, "write_statistics": False, "store_schema": False}
     sink = pa.BufferOutputStream()
     pq.write_table(rows, sink, compression="lz4", **options)
-    with open(file, "wb", buffering=0) as target:
+    # not unbuffered: what a full disk does not take any more would be left out without a word
+    with open(file, "wb") as target:
         target.write(sink.getvalue())
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from fusetune.px4.flight import Flight, TopicTable
 
-_NAME_DATE = re.compile(r"(20\d\d)-(\d{1,2})-(\d{1,2})-(\d{1,2})-(\d{1,2})-(\d{1,2})")
+# as people write it, or as PX4 names folder and file of a log: 2024-01-31/10_20_30.ulg
+_NAME_DATE = re.compile(r"(20\d\d)-(\d{1,2})-(\d{1,2})[-_](\d{1,2})[-_](\d{1,2})[-_](\d{1,2})")
 _PLAUSIBLE_UTC_S = (datetime(2010, 1, 1, tzinfo=UTC).timestamp(), datetime(2100, 1, 1, tzinfo=UTC).timestamp())
 _VERSION_KEYS = (
     "ver_sw",
