@@ -71,7 +71,7 @@ def test_a_changed_present_replays_only_the_present_set_and_jobs_elsewhere_find_
     assert summary["overrides"] == present["parameters"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # so that it is asked for before a demonstration is made
 def slurm() -> None:
     """A Slurm that takes jobs; the test is skipped where none answers."""
     if find_spec("snakemake_executor_plugin_slurm") is None:
@@ -80,7 +80,8 @@ def slurm() -> None:
         pytest.skip("needs Slurm (sbatch, squeue), which is not installed")
     nodes = subprocess.run(["sinfo", "--noheader", "--format=%T"], capture_output=True, text=True, check=False)
     if nodes.returncode != 0 or not {"idle", "mixed", "allocated"} & set(nodes.stdout.split()):
-        pytest.skip(f"needs a node of Slurm that takes jobs; sinfo says {(nodes.stdout + nodes.stderr).strip()!r}")
+        said = (nodes.stdout + nodes.stderr).strip().splitlines() or ["nothing"]
+        pytest.skip(f"needs a node of Slurm that takes jobs; sinfo says {said[-1]!r}")
 
 
 def wait_until(true: Callable[[], bool], run: subprocess.Popen[bytes]) -> None:
