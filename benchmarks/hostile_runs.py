@@ -203,7 +203,8 @@ def main() -> int:
             place.exchange()
             TRIALS[kind](place, trial, chance, usual_s)
             place.demand(reference[place.flown], f"{kind} {trial}")
-            print(*place.faults[before:], sep="\n", end="", flush=True)
+            for fault in place.faults[before:]:
+                print(fault, flush=True)
             failed += len(place.faults) > before
         print(f"{kind}: {options.trials} trials, {failed} of them with faults", flush=True)
     if not place.faults:
