@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,7 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from tests.workflow.conftest import ROOT, Workspace
+from tests.workflow.conftest import ROOT, Workspace, make_workspace
+
+from fusetune.run_lock import RUN_VARIABLE
 
 TABLE = "results/save/flights.csv"
 
@@ -38,11 +41,20 @@ def process_in(workspace: Workspace, call: str) -> Iterator[subprocess.Popen[str
         process.communicate()
 
 
-@pytest.fixture
-def unfinished(workspace: Workspace) -> Workspace:
-    """A folder in which a job never ended: its output lies there, marked as Snakemake marks it."""
+@pytest.fixture(scope="module")
+def listed(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """A finished run over one file that is no log; tests work in copies of it."""
+    workspace = make_workspace(tmp_path_factory.mktemp("listed") / "work")
     (workspace.folder / "flights" / "first.ulg").write_bytes(b"no log")
     workspace.run_ok("--cores", "1", TABLE)
+    return workspace
+
+
+@pytest.fixture
+def unfinished(listed: Workspace, tmp_path: Path) -> Workspace:
+    """A folder in which a job never ended: its output lies there, marked as Snakemake marks it."""
+    workspace = Workspace(tmp_path / "work")
+    shutil.copytree(listed.folder, workspace.folder)
     name = base64.urlsafe_b64encode(b"results/save/first").decode()
     (workspace.folder / ".snakemake" / "incomplete" / name).write_text('{"external_jobid": null}', encoding="ascii")
     (workspace.folder / "results" / "save" / "first" / "half").write_bytes(b"half of a table")
@@ -86,6 +98,19 @@ def test_a_living_run_is_not_taken_for_dead(unfinished: Workspace) -> None:
     assert contents(unfinished) == before
     unfinished.run_ok("--cores", "1", TABLE)
     assert not half(unfinished).exists()
+
+
+def test_a_job_that_starts_after_its_run_has_ended_changes_nothing(
+    unfinished: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a cluster may start it, which had it in its queue."""
+    before = contents(unfinished)
+    monkeypatch.setenv(RUN_VARIABLE, "the run before")
+    with process_in(unfinished, "claim_run('.snakemake', 'other')"):
+        late = unfinished.run("--mode", "remote", "--nolock", "--force", "--cores", "1", "results/save/first")
+    assert late.returncode == 1
+    assert "the run that asked for this job has ended" in late.stdout
+    assert contents(unfinished) == before
 
 
 def test_of_two_runs_at_once_one_works_and_the_other_says_so(workspace: Workspace) -> None:
