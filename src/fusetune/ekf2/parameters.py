@@ -31,7 +31,7 @@ DELAY_PARAMETERS = (
 
 def taken_value(name: str, value: float) -> float:
     """A parameter's value as PX4 takes it, at start and whenever it changes: an obsolete EKF2_MAG_TYPE is replaced."""
-    if name == "EKF2_MAG_TYPE" and int(value) not in VALID_MAG_TYPES:
+    if name == "EKF2_MAG_TYPE" and value not in VALID_MAG_TYPES:
         return float(OBSOLETE_MAG_TYPE_DEFAULT)
     return value
 
