@@ -78,7 +78,9 @@ FOUND = told_in_one_line(discovery)
 FLOWN_LOGS = {log.flight: log for log in FOUND.logs}
 # A folder with nothing but entries that cannot be flown is not empty: its user waits for a word on those.
 DEMONSTRATED = not (FOUND.logs or FOUND.refused)
-LOGS = {flight: f"results/execute/{flight}.ulg" for flight in DEMONSTRATION} if DEMONSTRATED else list(FLOWN_LOGS)
+LOGS = {flight: log.path for flight, log in FLOWN_LOGS.items()}
+if DEMONSTRATED:
+    LOGS = {flight: f"results/execute/{flight}.ulg" for flight in DEMONSTRATION}
 if SETTINGS["present_flight"] not in (None, *LOGS):
     raise WorkflowError(
         f"{CONFIG_FILE}: present_flight is {SETTINGS['present_flight']!r}, which is no flight in "
