@@ -14,7 +14,6 @@ Default-profile logs are compared with what the vehicle's own estimator logged.
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import sys
 from collections.abc import Iterable, Mapping
@@ -28,7 +27,8 @@ from fusetune.analyze.as_flown_figures import replayed_innovations
 from fusetune.analyze.fidelity import NLL_CAP, NLL_SOURCES
 from fusetune.analyze.flight_phases import airborne_intervals
 from fusetune.analyze.reconstruction import ReconstructionSettings
-from fusetune.analyze.replay_flight import WRITTEN_BACK, PreparedFlight, prepare
+from fusetune.analyze.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.set_input import WRITTEN_BACK, read_set_files
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.start_choice import StartSettings
 from fusetune.analyze.trust_grade import grade_flight
@@ -293,11 +293,11 @@ def _print_order(flights: list[Flight], reference: Path) -> None:
 
 def _sets(folder: Path) -> dict[str, dict[str, float]]:
     """Overrides of each set of a folder."""
-    found = {}
-    for file in sorted(folder.glob("*.json")):
-        values = json.loads(file.read_text(encoding="utf-8")).get("overrides", {})
-        found[file.stem] = {name: float(value) for name, value in values.items() if name != WRITTEN_BACK}
-    return found
+    found = read_set_files(folder)
+    return {
+        name: {key: value for key, value in overrides.items() if key != WRITTEN_BACK}
+        for name, (_, overrides) in found.items()
+    }
 
 
 def _totals(prepared: PreparedFlight, flight: Flight, sets: Mapping[str, Mapping[str, float]]) -> list[float]:

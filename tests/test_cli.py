@@ -18,7 +18,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 def test_save_lists_a_file_that_is_no_log_with_its_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "broken.ulg"
     log.write_bytes(b"this is no ULog")
-    assert main(["save", str(log), "--out", str(tmp_path / "saved")]) == 0
+    assert main(["save", str(log), "--out", str(tmp_path / "saved")]) == 1
     assert capsys.readouterr().out.startswith("broken: refused\n  ")
     assert (tmp_path / "saved" / "broken" / "verdict.json").exists()
 

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fusetune.errors import UserError
-from fusetune.parquet import read_table, table_writer, write_table
+from fusetune.parquet import read_pieces, read_schema, read_table, table_writer, write_table
 
 TABLE = pa.table(
     {
@@ -36,6 +36,13 @@ def test_a_table_written_in_pieces_is_sealed_too(tmp_path: Path) -> None:
         for first in range(0, 40, 10):
             writer.write_table(TABLE.slice(first, 10))
     assert read_table(file).equals(TABLE)
+    assert [len(piece) for piece in read_pieces(file)] == [10] * 4
+    assert pa.concat_tables(read_pieces(file)).equals(TABLE)
+    assert read_schema(file) == TABLE.schema
+    file.write_bytes(file.read_bytes().replace(b"innovation", b"innovatjon"))
+    for read in (read_schema, lambda damaged: list(read_pieces(damaged))):
+        with pytest.raises(UserError, match=r"a\.parquet"):
+            read(file)
 
 
 @pytest.mark.parametrize("options", [OPTIONS, WITHOUT_OPTIONS])

@@ -1,14 +1,21 @@
 """The command `fusetune`: single steps of the pipeline on single files.
 
-Each sub-command loads only the rooms it needs. Bad input ends it with status 2 and one line that says what to do.
+Each sub-command loads only the rooms it needs. Its exit status:
+
+0    all is done
+1    all that could be done is: at least one log was refused, and the lines printed say why and what to do about it
+2    nothing more could be done, because of the command line or a file: one line says what to do
+130  interrupted (Ctrl-C)
+141  who read the output has gone
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,28 +24,60 @@ from fusetune.errors import UserError
 
 if TYPE_CHECKING:
     from fusetune.analyze.fidelity import ReplayFidelity
+    from fusetune.save.verdict import Check
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
+DONE_STATUS = 0
+REFUSED_STATUS = 1
 USER_ERROR_STATUS = 2
+INTERRUPTED_STATUS = 130
+NO_READER_STATUS = 141
+
+LARGEST_SEED = 2**53
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command; returns the exit status."""
     # read when NumPy is first imported; the matrices are too small for threads, which would only cost time
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _print_any_name()
     options = _parser().parse_args(arguments)
     try:
-        options.run(options)
+        status: int = options.run(options)
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except UserError as error:
-        print(f"fusetune: {error}", file=sys.stderr)
-        return USER_ERROR_STATUS
-    return 0
+        return _failed(str(error))
+    except KeyboardInterrupt:
+        print("fusetune: interrupted", file=sys.stderr)
+        return INTERRUPTED_STATUS
+    except BrokenPipeError:
+        # else Python tries once more to write what is left, and complains
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return NO_READER_STATUS
+    except OSError as error:
+        return _failed(f"{error.filename or 'the output'}: {error.strerror or error}. Mend the path or make room.")
+    return status
+
+
+def _print_any_name() -> None:
+    """Let names of files that the terminal cannot show be printed as escapes instead of ending the command."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _failed(message: str) -> int:
+    print(f"fusetune: {message}", file=sys.stderr)
+    return USER_ERROR_STATUS
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="fusetune", description="Single steps of the pipeline; `snakemake` runs them all."
+        prog="fusetune",
+        description="Single steps of the pipeline; `snakemake` runs them all.",
+        epilog="Exit status: 0 all is done; 1 a log was refused; 2 the command or a file cannot be used.",
     )
     parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
@@ -58,10 +97,11 @@ def _add_design(commands: Commands) -> None:
     parser.set_defaults(run=_design)
 
 
-def _design(options: argparse.Namespace) -> None:
+def _design(options: argparse.Namespace) -> int:
     from fusetune.design import write_design
 
     write_design(options.mission, options.study, options.out)
+    return DONE_STATUS
 
 
 def _add_simulate(commands: Commands) -> None:
@@ -73,28 +113,34 @@ def _add_simulate(commands: Commands) -> None:
         "--set", metavar="NAME", help="set of the study to fly; without it the vehicle's own parameters"
     )
     parser.add_argument("--faults", type=Path, metavar="FILE", help="YAML file with a list `faults`")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=_seed, default=1, metavar="NUMBER", help="whole number from 0 (1)")
     parser.add_argument("--out", type=Path, required=True, metavar="LOG.ulg")
     parser.set_defaults(run=_simulate)
 
 
-def _simulate(options: argparse.Namespace) -> None:
+def _seed(text: str) -> int:
+    """A seed, as the configuration takes it."""
+    if not text.isascii() or not text.isdigit() or int(text) > LARGEST_SEED:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0 to {LARGEST_SEED}")
+    return int(text)
+
+
+def _simulate(options: argparse.Namespace) -> int:
     from fusetune.design.mission import load_mission
-    from fusetune.design.yaml_reader import read_yaml
     from fusetune.execute import simulate
-    from fusetune.execute.faults import parse_faults
+    from fusetune.execute.faults import load_faults
     from fusetune.execute.vehicle import load_vehicle
 
-    faults = parse_faults(read_yaml(options.faults).get("faults", []), options.faults) if options.faults else ()
     flight = simulate(
         load_mission(options.mission),
         load_vehicle(options.vehicle),
         _flown_set(options.study, options.set),
         options.seed,
-        faults,
+        load_faults(options.faults) if options.faults else (),
         options.out,
     )
     print(f"{options.out}: {flight.duration_s:.1f} s")
+    return DONE_STATUS
 
 
 def _flown_set(study_file: Path | None, name: str | None) -> dict[str, float]:
@@ -119,12 +165,32 @@ def _add_save(commands: Commands) -> None:
     parser.set_defaults(run=_save)
 
 
-def _save(options: argparse.Namespace) -> None:
+def _save(options: argparse.Namespace) -> int:
     from fusetune.save import save_log
 
+    _check_names(options.logs)
+    verdicts = []
     for log in options.logs:
         verdict = save_log(log, options.out / log.stem)
-        print(f"{log.stem}: {verdict.status}", *verdict.reasons, sep="\n  ")
+        print(f"{log.stem}: {verdict.status}", *_advice(verdict.checks), sep="\n  ")
+        verdicts.append(verdict)
+    return DONE_STATUS if all(verdict.status == "replayable" for verdict in verdicts) else REFUSED_STATUS
+
+
+def _check_names(logs: Sequence[Path]) -> None:
+    """Each log gets a folder by its name."""
+    first: dict[str, Path] = {}
+    for log in logs:
+        if log.stem in ("", ".", ".."):
+            raise UserError(log, "gives no name to a folder", "Rename it")
+        other = first.setdefault(log.stem.casefold(), log)
+        if other is not log:
+            raise UserError(log, f"would be saved into the same folder as {other}", "Rename one, or save it elsewhere")
+
+
+def _advice(checks: Iterable[Check]) -> list[str]:
+    """What did not pass, and what to do about it."""
+    return [f"{check.reason}. {check.remedy}." for check in checks if check.status == "fail"]
 
 
 def _add_replay(commands: Commands) -> None:
@@ -150,7 +216,7 @@ def _add_replay(commands: Commands) -> None:
     parser.set_defaults(run=_replay)
 
 
-def _replay(options: argparse.Namespace) -> None:
+def _replay(options: argparse.Namespace) -> int:
     from fusetune.analyze.reconstruction import ReconstructionSettings
     from fusetune.analyze.replay_flight import replay_log
     from fusetune.analyze.replay_settings import ReplaySettings
@@ -159,6 +225,7 @@ def _replay(options: argparse.Namespace) -> None:
     reconstruction = ReconstructionSettings() if options.reconstruct else None
     settings = ReplaySettings(reconstruction=reconstruction, start=StartSettings(mode=options.start))
     print("replayed:", *replay_log(options.log, options.sets, options.out, settings))
+    return DONE_STATUS
 
 
 def _add_fidelity(commands: Commands) -> None:
@@ -168,7 +235,7 @@ def _add_fidelity(commands: Commands) -> None:
     parser.set_defaults(run=_fidelity)
 
 
-def _fidelity(options: argparse.Namespace) -> None:
+def _fidelity(options: argparse.Namespace) -> int:
     from fusetune.analyze.fidelity import compare_folders, order_agreement
 
     results = compare_folders(options.reference, options.replay)
@@ -176,6 +243,7 @@ def _fidelity(options: argparse.Namespace) -> None:
         _print_fidelity(result)
     if len(results) > 2:
         print(f"order of the sets by NLL, Kendall tau: {order_agreement(results):.2f}")
+    return DONE_STATUS
 
 
 def _print_fidelity(result: ReplayFidelity) -> None:

@@ -7,9 +7,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+AnyPath = str | os.PathLike[str]
+"""What public functions take for a path."""
+
 
 @contextmanager
-def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_path(path: AnyPath) -> Iterator[Path]:
     """Yield a temporary path in the folder of `path`; on success it replaces `path` in one step.
 
     The folder is made where it does not exist. The temporary file is hidden, keeps the suffix (writers that choose

@@ -63,11 +63,30 @@ def read_table(
     UserError
         The file does not exist, is no Parquet file, or a byte of it has changed since it was written.
     """
+    with _opened(path, remedy, sealed) as parquet:
+        return parquet.read(columns=columns if columns is None else list(columns), use_threads=False)
+
+
+def read_schema(path: str | os.PathLike[str], *, remedy: str = RUN_AGAIN, sealed: bool = True) -> pa.Schema:
+    """Names and types of the columns of a Parquet file; parameters and errors are those of `read_table`."""
+    with _opened(path, remedy, sealed) as parquet:
+        return parquet.schema_arrow
+
+
+def read_pieces(path: str | os.PathLike[str], *, remedy: str = RUN_AGAIN, sealed: bool = True) -> Iterator[pa.Table]:
+    """Read a Parquet file one row group at a time; parameters and errors are those of `read_table`."""
+    with _opened(path, remedy, sealed) as parquet:
+        for number in range(parquet.num_row_groups):
+            yield parquet.read_row_group(number, use_threads=False)
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str], remedy: str, sealed: bool) -> Iterator[pq.ParquetFile]:
     try:
         content = _mapped(path)
         _check_seal(memoryview(content), path, remedy, sealed)
         with pq.ParquetFile(pa.BufferReader(pa.py_buffer(content)), page_checksum_verification=True) as parquet:
-            return parquet.read(columns=columns if columns is None else list(columns), use_threads=False)
+            yield parquet
     except OSError as error:
         raise UserError(path, f"cannot be read: {error.strerror or error}", remedy) from error
     except (pa.ArrowException, ValueError) as error:

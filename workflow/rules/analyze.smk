@@ -13,6 +13,8 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
             f"replay_{number}"
         input:
             flight="results/save/{flight}",
+            # what the values of the present set are read from
+            listed=ancient("results/save/flights.csv"),
             kernels=ancient(KERNELS_READY),
         output:
             update(replay_files(chunk)),
@@ -36,6 +38,8 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
 rule analyze_flight:
     input:
         flight="results/save/{flight}",
+        # what the values of the present set are read from
+        listed=ancient("results/save/flights.csv"),
         kernels=ancient(KERNELS_READY),
         replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
     output:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from fusetune.analyze.onboard_fidelity import FIDELITY_TOPICS, write_flight_fidelity
 from fusetune.analyze.replay_flight import REPLAY_TOPICS, replay_flight
@@ -16,6 +15,7 @@ from fusetune.analyze.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.score_flight import SCORE_TOPICS, score_flight
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.trust_settings import TrustSettings
+from fusetune.files import AnyPath
 from fusetune.px4.flight import Flight
 from fusetune.save.flight_folder import load_flight
 
@@ -30,8 +30,8 @@ class AnalysisSettings:
 
 
 def analyze_flight(
-    flight_folder: Path,
-    output_folder: Path,
+    flight_folder: AnyPath,
+    output_folder: AnyPath,
     replayed: Mapping[str, Mapping[str, float]],
     scored: Sequence[str],
     *,

@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from fusetune.analyze.set_input import existing_folder
 from fusetune.documents import read_document
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 from fusetune.parquet import read_table
 
 COMPARED_SOURCES = (
@@ -92,22 +94,33 @@ class Innovations:
         return Innovations(*(getattr(self, name)[selected] for name in self.__dataclass_fields__))
 
 
-def compare_folders(reference: Path, replay: Path) -> list[ReplayFidelity]:
+def compare_folders(reference: AnyPath, replay: AnyPath) -> list[ReplayFidelity]:
     """Compare every set of a reference folder that the replay folder also holds.
 
     Raises
     ------
     UserError
-        The reference folder holds no set, or the replay folder none of its sets.
+        A folder does not exist; the reference folder holds no set, or the replay folder none of its sets; a file of a
+        set is damaged, or lacks what is compared.
     """
+    reference = existing_folder(reference, "Name the folder of one flight's reference")
+    replay = existing_folder(replay, REMEDY)
     suffix = ".innovations.parquet"
     sets = sorted(path.name.removesuffix(suffix) for path in reference.glob("*" + suffix))
     if not sets:
-        raise UserError(reference, "holds no SET.innovations.parquet", "Name the folder of one flight's reference")
+        raise UserError(reference, f"holds no SET{suffix}", "Name the folder of one flight's reference")
     common = [name for name in sets if (replay / (name + suffix)).exists()]
     if not common:
         raise UserError(replay, f"holds none of the sets {', '.join(sets)}", "Replay them first: fusetune replay")
-    return [compare_set(reference, replay, name) for name in common]
+    return [_compared(reference, replay, name) for name in common]
+
+
+def _compared(reference: Path, replay: Path, name: str) -> ReplayFidelity:
+    try:
+        return compare_set(reference, replay, name)
+    except (LookupError, ValueError, TypeError) as error:
+        reason = f"its set {name}, or that of {reference}, lacks what is compared ({error})"
+        raise UserError(replay, reason, REMEDY) from error
 
 
 def order_agreement(results: list[ReplayFidelity]) -> float:
@@ -120,8 +133,9 @@ def order_agreement(results: list[ReplayFidelity]) -> float:
     return float(tau.statistic)
 
 
-def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
+def compare_set(reference: AnyPath, replay: AnyPath, name: str) -> ReplayFidelity:
     """Compare one set of two folders."""
+    reference, replay = Path(reference), Path(replay)
     ref, rep = (_innovations(_read(folder, f"{name}.innovations.parquet")) for folder in (reference, replay))
     start = comparison_start(ref)
     # An innovation that is no number, as of a vision system that measures no height, cannot be repeated.
@@ -151,7 +165,7 @@ def compare_set(reference: Path, replay: Path, name: str) -> ReplayFidelity:
     )
 
 
-def load_innovations(path: Path) -> Innovations:
+def load_innovations(path: AnyPath) -> Innovations:
     """Read a `<set>.innovations.parquet`; innovations of reconstructed samples are left out."""
     return _innovations(read_table(path))
 

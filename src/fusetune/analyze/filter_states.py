@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.set_files import read_columns
 from fusetune.ekf2 import state
+from fusetune.files import AnyPath
 
 Array = npt.NDArray[np.float64]
 
@@ -33,7 +34,7 @@ class FilterStates:
     position_variance: Array
 
 
-def read_states(folder: Path, name: str) -> FilterStates:
+def read_states(folder: AnyPath, name: str) -> FilterStates:
     """Read `<folder>/<name>.states.parquet`.
 
     Raises
@@ -41,6 +42,7 @@ def read_states(folder: Path, name: str) -> FilterStates:
     UserError
         If the file is missing or damaged.
     """
+    folder = Path(folder)
     published = [*_indices(state.PUBLISHED_QUATERNION, 4), *_indices(state.PUBLISHED_VELOCITY, 3)]
     blocks = (state.ATTITUDE, state.VELOCITY, state.POSITION)
     columns = ["timestamp_sample", *(f"states_{i}" for i in published)]

@@ -1,14 +1,12 @@
 """As flown: the innovations that the vehicle's own estimator logged, brought to the layout of a replay."""
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.set_files import AxisSamples, SourceAxis
 from fusetune.analyze.sources import AID_SOURCES
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.parquet import write_table
 from fusetune.px4.estimator_instances import rows_of_primary
 from fusetune.px4.flight import Flight, TopicTable
@@ -68,7 +66,7 @@ def _axis_samples(table: TopicTable, column: str) -> AxisSamples:
     )
 
 
-def write_onboard(path: Path, samples: dict[SourceAxis, AxisSamples]) -> None:
+def write_onboard(path: AnyPath, samples: dict[SourceAxis, AxisSamples]) -> None:
     """Write the vehicle's own innovations in the layout of `<set>.innovations.parquet`."""
     columns: dict[str, list[npt.NDArray]] = {name: [] for name in ("timestamp_sample", *_FIELDS, "rejected", "fused")}
     keys = sorted(samples)

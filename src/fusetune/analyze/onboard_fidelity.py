@@ -19,7 +19,7 @@ from fusetune.analyze.replay_settings import ReplaySettings
 from fusetune.analyze.trust_grade import TRUST_TOPICS, grade_flight
 from fusetune.analyze.trust_settings import TrustSettings
 from fusetune.documents import write_document
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.px4.ekf2_parameters import BASELINE_RELEASE
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
@@ -70,7 +70,7 @@ class OnboardFidelity:
 
 def write_flight_fidelity(
     flight: Flight,
-    analyze_folder: Path,
+    analyze_folder: AnyPath,
     replay: ReplaySettings,
     trust: TrustSettings | None = None,
     prepared: PreparedFlight | None = None,
@@ -91,6 +91,7 @@ def write_flight_fidelity(
     prepared : PreparedFlight, optional
         What these replays shared.
     """
+    analyze_folder = Path(analyze_folder)
     flight = canonical(flight, follow_primary=True)
     result = judge_onboard_fidelity(
         flight, analyze_folder / f"{AS_FLOWN}.innovations.parquet", analyze_folder / "onboard.innovations.parquet"
@@ -101,7 +102,7 @@ def write_flight_fidelity(
         write_document(path, document)
 
 
-def judge_onboard_fidelity(flight: Flight, replayed: Path, onboard: Path) -> OnboardFidelity:
+def judge_onboard_fidelity(flight: Flight, replayed: AnyPath, onboard: AnyPath) -> OnboardFidelity:
     """Compare the as-flown replay with the vehicle's own innovations.
 
     Parameters

@@ -17,7 +17,7 @@ from fusetune.analyze.withheld_gaps import gap_table, prediction_table
 from fusetune.documents import write_document
 from fusetune.ekf2.replay import ReplayResult
 from fusetune.ekf2.replay_tables import flags_table, innovation_table, local_position_table, state_table
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.parquet import write_table
 
 TABLES = {
@@ -43,13 +43,14 @@ class ReplayIdentity:
     """How the replay started and what was reconstructed for it; stands in the JSON file."""
 
 
-def replay_files(folder: Path, set_name: str) -> list[Path]:
+def replay_files(folder: AnyPath, set_name: str) -> list[Path]:
     """All files of one replay."""
+    folder = Path(folder)
     return [folder / f"{set_name}.{table}.parquet" for table in TABLES] + [folder / f"{set_name}.json"]
 
 
 def write_replay(
-    folder: Path, identity: ReplayIdentity, result: ReplayResult, measured: np.ndarray | None = None
+    folder: AnyPath, identity: ReplayIdentity, result: ReplayResult, measured: np.ndarray | None = None
 ) -> None:
     """Write the tables of a replay, and last the JSON that says the set is complete.
 
@@ -58,6 +59,7 @@ def write_replay(
     measured : for each innovation row whether its measurement stands in the log; None: all of them. The column
         `measured` is written only where some do not.
     """
+    folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for name, to_table in TABLES.items():
         table = to_table(result)
@@ -68,7 +70,7 @@ def write_replay(
         write_document(path, _summary(identity, result))
 
 
-def write_replay_table(table: pa.Table, target: Path) -> None:
+def write_replay_table(table: pa.Table, target: AnyPath) -> None:
     """Write a Parquet file that is either whole or not there."""
     with atomic_path(target) as path:
         # Figures hardly ever repeat: a dictionary of them, and their extremes, would only take time.

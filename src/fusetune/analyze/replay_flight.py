@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,18 +21,18 @@ from fusetune.analyze.reconstruction import (
 )
 from fusetune.analyze.replay_files import ReplayIdentity, write_replay
 from fusetune.analyze.replay_settings import ReplaySettings
+from fusetune.analyze.set_input import read_set_files
 from fusetune.analyze.start_choice import COLD, START_TOPICS, WARM, Start, StartSettings, choose_start
 from fusetune.analyze.withheld_gaps import plan_gaps
 from fusetune.ekf2.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.parameters import complete
 from fusetune.ekf2.replay import Gap, ReplayResult, replay
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 from fusetune.px4.flight import Flight
 from fusetune.px4.logged_state import Handover, logged_handovers
 from fusetune.px4.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
-
-WRITTEN_BACK = "EKF2_MAG_DECL"
 
 REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
 """What a replay reads of a saved flight."""
@@ -105,9 +104,9 @@ def prepare(
 
 
 def replay_saved_flight(
-    flight_folder: Path,
+    flight_folder: AnyPath,
     sets: Mapping[str, Mapping[str, float]],
-    output_folder: Path,
+    output_folder: AnyPath,
     settings: ReplaySettings | None = None,
 ) -> PreparedFlight:
     """Replay sets on a saved flight, `results/save/<flight>`; all else as in `replay_flight`."""
@@ -117,7 +116,7 @@ def replay_saved_flight(
 def replay_flight(
     flight: Flight,
     sets: Mapping[str, Mapping[str, float]],
-    output_folder: Path,
+    output_folder: AnyPath,
     settings: ReplaySettings | None = None,
 ) -> PreparedFlight:
     """Replay sets on a flight in memory.
@@ -138,6 +137,7 @@ def replay_flight(
     PreparedFlight
         For further replays.
     """
+    output_folder = Path(output_folder)
     settings = settings or ReplaySettings()
     flight = canonical(flight, follow_primary=settings.reconstruction is not None)
     gaps = plan_gaps(flight, airborne_intervals(flight, {}), settings.withholding) if settings.withholding else ()
@@ -155,7 +155,12 @@ def _replay_and_write(
     write_replay(folder, ReplayIdentity(name, overrides, params, prepared.description(result)), result, measured)
 
 
-def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: ReplaySettings | None = None) -> list[str]:
+def replay_log(
+    log: AnyPath,
+    sets_folder: AnyPath,
+    output_folder: AnyPath,
+    settings: ReplaySettings | None = None,
+) -> list[str]:
     """Replay every set that a folder holds as `SET.json` on one ULog file.
 
     `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log.
@@ -177,27 +182,18 @@ def replay_log(log: Path, sets_folder: Path, output_folder: Path, settings: Repl
     """
     from fusetune.px4.ulog_reader import read_ulog
 
-    set_files = sorted(sets_folder.glob("*.json"))
-    if not set_files:
-        raise UserError(sets_folder, "holds no parameter set", "Put one SET.json with a params object per set there")
+    sets = read_set_files(sets_folder)
+    Path(output_folder).mkdir(parents=True, exist_ok=True)
     settings = settings or ReplaySettings()
     flight = read_ulog(log)
-    followed = canonical(flight, follow_primary=settings.reconstruction is not None)
-    prepared = prepare(followed, settings.reconstruction, settings.start)
-    for file in set_files:
-        params, overrides = _read_set(file)
-        # The estimator writes this one back once it knows its place, so a recorded set holds the value at the end.
-        params.pop(WRITTEN_BACK, None)
-        values = complete(flight.parameters.initial, params | overrides, flight.release)
-        _replay_and_write(prepared, file.stem, overrides, values, output_folder)
-    return [file.stem for file in set_files]
-
-
-def _read_set(file: Path) -> tuple[dict[str, float], dict[str, float]]:
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-        params, overrides = content.get("params", {}), content.get("overrides", {})
-        return {k: float(v) for k, v in params.items()}, {k: float(v) for k, v in overrides.items()}
-    except (ValueError, AttributeError, TypeError) as error:
-        remedy = 'Expected {"params": {NAME: number, …}, "overrides": {NAME: number, …}}'
-        raise UserError(file, f"is not a parameter set: {error}", remedy) from error
+        followed = canonical(flight, follow_primary=settings.reconstruction is not None)
+        prepared = prepare(followed, settings.reconstruction, settings.start)
+    except (LookupError, ValueError, TypeError, ArithmeticError) as error:
+        # damage, or the logger, can take any topic and any field away
+        reason = f"cannot be replayed ({type(error).__name__}: {error})"
+        raise UserError(log, reason, "See what the command `fusetune save` says of it") from error
+    for name, (params, overrides) in sets.items():
+        values = complete(flight.parameters.initial, params | overrides, flight.release)
+        _replay_and_write(prepared, name, overrides, values, Path(output_folder))
+    return list(sets)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.replay_files import replay_files
+from fusetune.files import AnyPath
 from fusetune.ledger import Ledger, key_of
 from fusetune.save.flight_folder import read_metadata
 
@@ -22,9 +23,9 @@ class ReplayLedger:
     made_with : what beside the log and the values of a set the replays follow from: settings, state of the sources
     """
 
-    def __init__(self, file: Path, flight_folder: Path, output_folder: Path, made_with: Any) -> None:
+    def __init__(self, file: AnyPath, flight_folder: AnyPath, output_folder: AnyPath, made_with: Any) -> None:
         self._ledger = Ledger(file)
-        self._folder = output_folder
+        self._folder = Path(output_folder)
         self._source = [read_metadata(flight_folder)["checksum"], made_with]
 
     def outdated(self, sets: Mapping[str, Mapping[str, float]]) -> dict[str, Mapping[str, float]]:

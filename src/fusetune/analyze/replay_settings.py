@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.reconstruction import ReconstructionSettings
 from fusetune.analyze.start_choice import StartSettings
 from fusetune.analyze.withheld_gaps import WithholdingSettings
+from fusetune.files import AnyPath
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class ReplaySettings:
 
     @classmethod
     def from_mapping(
-        cls, sections: Mapping[str, Mapping[str, Any]], file: Path | str = "config/config.yaml"
+        cls, sections: Mapping[str, Mapping[str, Any]], file: AnyPath = "config/config.yaml"
     ) -> ReplaySettings:
         """Read the sections `withheld`, `reconstruction` and `start`; a missing one means its defaults."""
         return cls(

@@ -47,7 +47,7 @@ from fusetune.analyze.withheld_scores import (
     withheld_rows,
 )
 from fusetune.documents import write_document
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.parquet import write_table
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
@@ -85,21 +85,22 @@ SCORE_TOPICS = (
 
 
 def score_saved_flight(
-    flight_folder: Path,
-    analyze_folder: Path,
+    flight_folder: AnyPath,
+    analyze_folder: AnyPath,
     sets: Sequence[str],
     *,
     present: str = "present",
     settings: ScoringSettings | None = None,
 ) -> None:
     """Score the sets on a saved flight, `results/save/<flight>`; all else as in `score_flight`."""
+    flight_folder, analyze_folder = Path(flight_folder), Path(analyze_folder)
     flight = load_flight(flight_folder, topics=SCORE_TOPICS)
     score_flight(flight, analyze_folder, sets, present=present, settings=settings)
 
 
 def score_flight(
     flight: Flight,
-    analyze_folder: Path,
+    analyze_folder: AnyPath,
     sets: Sequence[str],
     *,
     present: str = "present",
@@ -120,9 +121,10 @@ def score_flight(
     UserError
         If a file of a replay is missing or damaged. A flight that cannot be scored is no error: its files say why.
     """
+    analyze_folder = Path(analyze_folder)
     settings = settings or ScoringSettings()
     flight = canonical(flight)
-    records = [read_set(Path(analyze_folder), name) for name in dict.fromkeys((present, *sets))]
+    records = [read_set(analyze_folder, name) for name in dict.fromkeys((present, *sets))]
     airborne = airborne_intervals(flight, records[0].flags)
     log_gaps = imu_gaps(flight, settings.log_gap_s)
     window = scoring_window(records, present, airborne, log_gaps, settings)

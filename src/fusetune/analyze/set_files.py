@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.parquet import read_table
 
 SourceAxis = tuple[str, int]
@@ -63,7 +64,7 @@ class SetRecord:
         return bool(self.summary.get("start", {}).get("mode") == "warm")
 
 
-def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.NDArray[Any]]:
+def read_columns(path: AnyPath, columns: list[str] | None = None) -> dict[str, npt.NDArray[Any]]:
     """Read a Parquet table of plain columns as NumPy arrays.
 
     Raises
@@ -75,8 +76,9 @@ def read_columns(path: Path, columns: list[str] | None = None) -> dict[str, npt.
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
-def read_set(folder: Path, name: str) -> SetRecord:
+def read_set(folder: AnyPath, name: str) -> SetRecord:
     """Read `<folder>/<name>.*`; the states are read only where truth is compared (`true_errors`)."""
+    folder = Path(folder)
     summary = read_document(folder / f"{name}.json")
     parameters = {key: float(value) for key, value in summary.get("params", {}).items()}
     return SetRecord(
@@ -90,7 +92,7 @@ def read_set(folder: Path, name: str) -> SetRecord:
     )
 
 
-def read_innovations(path: Path, parameters: dict[str, float]) -> dict[SourceAxis, AxisSamples]:
+def read_innovations(path: AnyPath, parameters: dict[str, float]) -> dict[SourceAxis, AxisSamples]:
     """Read an innovations table, split by source and axis; sources that measure nothing are left out.
 
     Innovations of reconstructed samples are left out, too: they are no witnesses.

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import Any, TypeVar
 
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 
 Settings = TypeVar("Settings")
 
@@ -16,7 +16,7 @@ def setting(default: Any, minimum: float | None, maximum: float | None, unit: st
 
 
 def settings_from_mapping(
-    kind: type[Settings], values: Mapping[str, Any] | None, section: str, file: Path | str
+    kind: type[Settings], values: Mapping[str, Any] | None, section: str, file: AnyPath
 ) -> Settings:
     """Build a settings dataclass from a section of the configuration.
 
@@ -34,7 +34,7 @@ def settings_from_mapping(
     return kind(**values)
 
 
-def _checked(item: Any, value: Any, section: str, file: Path | str) -> Any:
+def _checked(item: Any, value: Any, section: str, file: AnyPath) -> Any:
     expected = type(item.default)
     if expected is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
@@ -69,8 +69,6 @@ class ScoringSettings:
     confidence: float = setting(0.95, 0.5, 0.999, "", "level of all intervals and bounds")
 
     @classmethod
-    def from_mapping(
-        cls, values: Mapping[str, Any] | None, file: Path | str = "config/config.yaml"
-    ) -> "ScoringSettings":
+    def from_mapping(cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml") -> "ScoringSettings":
         """Read the section `scoring`; a missing section or key means the default."""
         return settings_from_mapping(cls, values, "scoring", file)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 from fusetune.px4.flight import Flight, row_count
 from fusetune.px4.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states
 
@@ -31,7 +31,7 @@ class StartSettings:
     warm_within_s: float = setting(15.0, 0.0, 300.0, "s", "after log start; auto takes no later state than this")
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any] | None, file: Path | str = "config/config.yaml") -> StartSettings:
+    def from_mapping(cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml") -> StartSettings:
         """Read the section `start`; a missing section or key means the default."""
         settings = settings_from_mapping(cls, values, "start", file)
         if settings.mode not in (AUTO, WARM, COLD):

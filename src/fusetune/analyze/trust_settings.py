@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class TrustSettings:
     causes: bool = setting(True, None, None, "", "measure what each cause costs, by a replay each")
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any] | None, file: Path | str = "config/config.yaml") -> TrustSettings:
+    def from_mapping(cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml") -> TrustSettings:
         """Read the section `trust`; a missing section or key means the default."""
         given = {name: tuple(map(float, v)) if isinstance(v, list) else v for name, v in (values or {}).items()}
         settings = settings_from_mapping(cls, given, "trust", file)

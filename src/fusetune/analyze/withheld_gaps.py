@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay import Gap, GapResult
 from fusetune.ekf2.withholding import WITHHOLDABLE
+from fusetune.files import AnyPath
 from fusetune.px4.flight import Flight
 
 HORIZONS = 3
@@ -48,7 +48,7 @@ class WithholdingSettings:
 
     @classmethod
     def from_mapping(
-        cls, values: Mapping[str, Any] | None, file: Path | str = "config/config.yaml"
+        cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml"
     ) -> WithholdingSettings:
         """Read the section `withheld`; a missing section or key means the default."""
         return settings_from_mapping(cls, values, "withheld", file)

@@ -17,6 +17,7 @@ from fusetune.analyze.set_files import SetRecord, read_columns
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.analyze.true_errors import Truth, interpolate
 from fusetune.ekf2.withholding import WITHHOLDABLE
+from fusetune.files import AnyPath
 
 Array = npt.NDArray[np.float64]
 
@@ -63,7 +64,7 @@ class PairedGaps:
     variance: Array
 
 
-def paired_gaps(records: Sequence[SetRecord], folder: Path, present: str, window: ScoringWindow) -> list[PairedGaps]:
+def paired_gaps(records: Sequence[SetRecord], folder: AnyPath, present: str, window: ScoringWindow) -> list[PairedGaps]:
     """Predictions in the gaps that lie wholly in the scored part of the flight.
 
     Parameters
@@ -72,6 +73,7 @@ def paired_gaps(records: Sequence[SetRecord], folder: Path, present: str, window
     folder : holds `<set>.withheld.parquet`
     present : a gap counts if this set used the sensor when the gap began
     """
+    folder = Path(folder)
     names = [record.name for record in records]
     tables = [_read(folder / f"{name}.withheld.parquet") for name in names]
     present_record = records[names.index(present)]
@@ -188,9 +190,10 @@ def add_withheld_metrics(table: MetricsTable, groups: Sequence[PairedGaps]) -> N
 
 
 def add_true_drift(
-    table: MetricsTable, records: Sequence[SetRecord], folder: Path, truth: Truth, window: ScoringWindow
+    table: MetricsTable, records: Sequence[SetRecord], folder: AnyPath, truth: Truth, window: ScoringWindow
 ) -> None:
     """Append by how much the true horizontal error of position and velocity grew over the gaps without GNSS (RMS)."""
+    folder = Path(folder)
     for record in records:
         gaps = read_columns(folder / f"{record.name}.gaps.parquet")
         rows = (gaps["sensor"] == "gnss") & _inside(gaps["start"], gaps["stop"], window)

@@ -22,22 +22,22 @@ from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.documents import write_document
 from fusetune.errors import UserError
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.parquet import write_table
 
 _SIGNIFICANT_DIGITS = 9
 
 
 def decide(
-    analyze_folders: Sequence[Path],
-    flights_table: Path,
-    output_folder: Path,
+    analyze_folders: Sequence[AnyPath],
+    flights_table: AnyPath,
+    output_folder: AnyPath,
     *,
     sets: Sequence[str],
     present: str = "present",
     newest_flight: str | None = None,
     descriptions: Mapping[str, str] | None = None,
-    configuration_files: Sequence[Path] = (),
+    configuration_files: Sequence[AnyPath] = (),
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
@@ -91,7 +91,7 @@ def decide(
         write_document(temporary, _rounded(decision), allow_nan=False)
 
 
-def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: Path) -> AnalyzedFlight | None:
+def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: AnyPath) -> AnalyzedFlight | None:
     if not flights:
         return None
     if name is None:

@@ -18,6 +18,7 @@ from fusetune.analyze.likelihood import profile_nll
 from fusetune.analyze.sources import AXES
 from fusetune.apply.settings import DecisionSettings
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.parquet import read_table
 
 Array = npt.NDArray[np.float64]
@@ -104,20 +105,19 @@ class _Sums:
     sum_log_variance: Array
 
 
-def read_flights(folders: Sequence[Path], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
+def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
     """Read `results/analyze/<flight>` of all flights, ordered by name so that the order of arguments does not matter.
 
     A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
     """
-    folders = [Path(folder) for folder in folders]
-    metrics = {folder: read_table(folder / "metrics.parquet") for folder in folders}
+    metrics = {folder: read_table(folder / "metrics.parquet") for folder in map(Path, folders)}
     shares = {folder: white_shares(table, present) for folder, table in metrics.items()}
     known: dict[str, list[float]] = {}
     for one in shares.values():
         for source, share in one.items():
             known.setdefault(source, []).append(share)
     usual = {source: float(np.mean(sorted(found))) for source, found in known.items()}
-    flights = (_read_flight(folder, metrics[folder], settings, present, usual | shares[folder]) for folder in folders)
+    flights = (_read_flight(one, table, settings, present, usual | shares[one]) for one, table in metrics.items())
     return sorted(flights, key=lambda one: one.name)
 
 
@@ -150,8 +150,9 @@ def _evidence_of(
     return evidence, ""
 
 
-def trust_grade(folder: Path) -> str | None:
+def trust_grade(folder: AnyPath) -> str | None:
     """How far the replay of a flight can be trusted, "A" to "D"; None where there was nothing to compare it with."""
+    folder = Path(folder)
     path = folder / "fidelity.json"
     if not path.is_file():
         return None

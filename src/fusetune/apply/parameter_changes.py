@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from fusetune.files import AnyPath
 from fusetune.px4.ekf2_parameters import PARAMETERS
 from fusetune.px4.params_file import ParamEntry, ParamsHeader, write_params
 
@@ -35,7 +36,7 @@ def parameter_changes(overrides: dict[str, float], previous: dict[str, float]) -
 
 
 def write_parameter_files(
-    folder: Path, changes: Sequence[ParameterChange], reason: str, firmware: str, origin: Sequence[str]
+    folder: AnyPath, changes: Sequence[ParameterChange], reason: str, firmware: str, origin: Sequence[str]
 ) -> list[Path]:
     """Write `best_params.params` and `rollback.params`; returns the two files.
 
@@ -49,6 +50,7 @@ def write_parameter_files(
     -----
     Where the present set is kept both files hold no parameter, and say so.
     """
+    folder = Path(folder)
     forward = [_entry(change, change.value, (_was(change), reason, *_reboot(change))) for change in changes]
     back = [_entry(change, change.previous, (f"back from {_number(change.value, change)}",)) for change in changes]
     kept = () if changes else ("The present parameters are kept: there is nothing to load.",)

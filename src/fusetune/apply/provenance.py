@@ -8,12 +8,13 @@ from typing import Any
 import fusetune
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 from fusetune.parquet import read_table
 
 _FLIGHT_COLUMNS = ("flight", "status", "reason", "firmware", "checksum", "duration_s", "airborne_s")
 
 
-def file_hash(path: Path) -> str:
+def file_hash(path: AnyPath) -> str:
     """SHA-256 of a file.
 
     Raises
@@ -27,7 +28,7 @@ def file_hash(path: Path) -> str:
         raise UserError(path, f"cannot be read: {error.strerror}", "Name configuration files that exist") from error
 
 
-def flight_rows(flights_table: Path, flights: Sequence[AnalyzedFlight]) -> list[dict[str, Any]]:
+def flight_rows(flights_table: AnyPath, flights: Sequence[AnalyzedFlight]) -> list[dict[str, Any]]:
     """One row per log, refused ones too: verdict, firmware, checksum, and whether it entered the decision."""
     analyzed = {flight.name: flight for flight in flights}
     rows = []
@@ -42,7 +43,7 @@ def flight_rows(flights_table: Path, flights: Sequence[AnalyzedFlight]) -> list[
     return sorted(rows, key=lambda entry: str(entry["flight"]))
 
 
-def provenance(configuration_files: Sequence[Path]) -> dict[str, Any]:
+def provenance(configuration_files: Sequence[AnyPath]) -> dict[str, Any]:
     """Version of the product and hashes of the configuration."""
     return {
         "product": f"fusetune {fusetune.__version__}",

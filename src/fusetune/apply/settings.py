@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 
 MULTIPLICITY = ("sign_flips", "holm", "none")
 """Ways to allow for the best of many candidates looking better than it is, see `fusetune.apply.choice`."""
@@ -54,7 +54,7 @@ class DecisionSettings:
 
     @classmethod
     def from_mapping(
-        cls, values: Mapping[str, Any] | None, seed: int | None = None, file: Path | str = "config/config.yaml"
+        cls, values: Mapping[str, Any] | None, seed: int | None = None, file: AnyPath = "config/config.yaml"
     ) -> "DecisionSettings":
         """Read the section `decision`; `seed` is the one of the whole configuration, where the section has none.
 
@@ -88,7 +88,7 @@ def _withheld_sources() -> tuple[str, ...]:
     return (*sources, *(f"{source}.{axis}" for source in sources for axis in AXES[: AID_SOURCES[source].axes]))
 
 
-def _weights(value: Any, key: str, allowed: tuple[str, ...], file: Path | str) -> dict[str, float]:
+def _weights(value: Any, key: str, allowed: tuple[str, ...], file: AnyPath) -> dict[str, float]:
     if not isinstance(value, Mapping) or not value:
         raise UserError(file, f"decision.{key} is {value!r}", "Give one or more aid sources with their weights")
     for source, weight in value.items():

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 
 EPOCH_YEAR = 2024.41257
 COEFFICIENTS = "wmm/WMM_2020.COF"
@@ -54,8 +54,9 @@ def compute_tables(decimal_year: float = EPOCH_YEAR) -> dict[str, MagneticTable]
     return tables
 
 
-def write_tables(tables: dict[str, MagneticTable], path: Path = TABLE_PATH) -> None:
+def write_tables(tables: dict[str, MagneticTable], path: AnyPath = TABLE_PATH) -> None:
     """Write the tables as text: one row per quantity and latitude."""
+    path = Path(path)
     header = ["quantity", "scale", "latitude_deg", *(str(longitude) for longitude in LONGITUDES_DEG)]
     lines = [",".join(header)]
     for quantity, table in tables.items():
@@ -65,8 +66,9 @@ def write_tables(tables: dict[str, MagneticTable], path: Path = TABLE_PATH) -> N
         temporary.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
-def read_tables(path: Path = TABLE_PATH) -> dict[str, MagneticTable]:
+def read_tables(path: AnyPath = TABLE_PATH) -> dict[str, MagneticTable]:
     """Read what `write_tables` wrote."""
+    path = Path(path)
     rows = [line.split(",") for line in path.read_text(encoding="ascii").splitlines()[1:]]
     tables = {}
     for quantity in QUANTITIES:

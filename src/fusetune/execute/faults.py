@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fusetune.design.config_file import load_schema, validate
+from fusetune.design.yaml_reader import read_yaml
 
 Vector = tuple[float, float, float]
 F = TypeVar("F")
@@ -91,6 +92,25 @@ _KINDS: dict[str, type[Any]] = {
     "logger_dropout": LoggerDropout,
     "default_profile": DefaultProfile,
 }
+
+
+def load_faults(path: str | os.PathLike[str]) -> tuple[Fault, ...]:
+    """Read a YAML file that holds a list `faults`.
+
+    Raises
+    ------
+    UserError
+        The file is broken; the message names the entry, the key and what was expected.
+    """
+    document = read_yaml(path)
+    schema = {
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["faults"],
+        "properties": {"faults": {"type": "array", "description": "list of faults"}},
+    }
+    validate(document, schema, path)
+    return parse_faults(document["faults"], path)
 
 
 def parse_faults(entries: Sequence[dict[str, Any]], file: str | os.PathLike[str] = "faults") -> tuple[Fault, ...]:

@@ -101,7 +101,7 @@ def check_value(name: str, value: object) -> None:
         With the reason and the remedy in words.
     """
     metadata = metadata_of(name)
-    number = _number(metadata, value)
+    number = number_of(metadata, value)
     if metadata.kind == "bitmask":
         _check_bits(metadata, int(number))
     elif metadata.values and int(number) not in metadata.values:
@@ -177,7 +177,8 @@ def complete(
     return values
 
 
-def _number(metadata: ParameterMetadata, value: object) -> float:
+def number_of(metadata: ParameterMetadata, value: object) -> float:
+    """The value of a parameter as a finite number, whole where its type is INT32; raises `ParameterError`."""
     expected = "a whole number" if metadata.type == "INT32" else "a number"
     if metadata.kind == "boolean" and isinstance(value, bool):
         return float(value)

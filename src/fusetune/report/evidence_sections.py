@@ -7,6 +7,7 @@ import pandas as pd
 
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.apply.evidence import AIDED, UNAIDED
+from fusetune.files import AnyPath
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, signed, table
 from fusetune.report.ranking_tables import (
@@ -23,8 +24,9 @@ from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY
 NOT_KNOWN = "not known"
 
 
-def evidence_section(results: Results, figures: Path) -> str:
+def evidence_section(results: Results, figures: AnyPath) -> str:
     """Forest plot, heat map, signs per flight, ranking and objections."""
+    figures = Path(figures)
     rule = results.decision["rule"]
     return section(
         "What the flights say",
@@ -53,8 +55,9 @@ def evidence_section(results: Results, figures: Path) -> str:
     )
 
 
-def withheld_section(results: Results, figures: Path) -> str:
+def withheld_section(results: Results, figures: AnyPath) -> str:
     """Drift while sensors are withheld, and the two aims against each other."""
+    figures = Path(figures)
     parts = [
         paragraph(
             "Several times in each flight GNSS, and at other times the barometer or the magnetometer, was kept from "

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 
 STYLE = Path(__file__).with_name("figures.mplstyle")
 
@@ -42,13 +42,13 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     return figure
 
 
-def save_svg(figure: Figure, path: Path) -> None:
+def save_svg(figure: Figure, path: AnyPath) -> None:
     """Write an SVG without date or random names."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="svg", metadata={"Date": None, "Creator": None})
 
 
-def save_png(figure: Figure, path: Path) -> None:
+def save_png(figure: Figure, path: AnyPath) -> None:
     """Write a PNG with a small palette: a third of the size of full colour, and no difference to see in a plot."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})

@@ -13,6 +13,7 @@ from fusetune.analyze.ground_truth import Truth, read_truth
 from fusetune.analyze.set_files import AxisSamples, SourceAxis, read_columns, read_innovations
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.px4.flight import Flight
 from fusetune.report.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
@@ -63,7 +64,7 @@ class _FlightData:
 
 
 def plot_flight(
-    flight_folder: Path, analyze_folder: Path, sets: Sequence[str], output: Path, *, present: str = "present"
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str], output: AnyPath, *, present: str = "present"
 ) -> None:
     """Draw one flight as a PNG.
 

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from fusetune.analyze.sources import AID_SOURCES
+from fusetune.files import AnyPath
 from fusetune.parquet import read_table
 from fusetune.report.advice import advice_table
 from fusetune.report.innovation_figures import rms_table
@@ -32,7 +33,7 @@ _AS_FLOWN_GROUPS = (
 )
 
 
-def flights_section(results: Results, flights_table: Path) -> str:
+def flights_section(results: Results, flights_table: AnyPath) -> str:
     """Every log with its verdict."""
     verdicts = read_table(flights_table).to_pandas().to_dict("records")
     judged = {row["flight"]: row for row in results.decision["flights"]}
@@ -68,8 +69,9 @@ def _flight_row(
     )
 
 
-def innovations_section(results: Results, figures: Path) -> str:
+def innovations_section(results: Results, figures: AnyPath) -> str:
     """RMS per variable and set as in the paper's table 12, box plots, consistency, breaks."""
+    figures = Path(figures)
     rms = rms_table(results)
     rows: list[list[Cell | str]] = []
     for variable, values in rms.iterrows():
@@ -167,7 +169,7 @@ def as_flown_section(results: Results) -> str:
     return section("As flown", paragraph(text), table(head, rows))
 
 
-def single_flights_section(results: Results, flight_figures: dict[str, Path]) -> str:
+def single_flights_section(results: Results, flight_figures: Mapping[str, AnyPath]) -> str:
     """One picture and the cuts per flight, closed until asked for."""
     parts = []
     for name, summary in results.scoring.items():
@@ -219,6 +221,6 @@ def provenance_section(results: Results) -> str:
     )
 
 
-def flight_figure_paths(names: Sequence[str], paths: Sequence[Path]) -> dict[str, Path]:
+def flight_figure_paths(names: Sequence[str], paths: Sequence[AnyPath]) -> dict[str, Path]:
     """Pictures by flight, from two sequences of one order."""
     return {name: Path(path) for name, path in zip(names, paths, strict=True)}

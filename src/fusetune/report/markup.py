@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
+from fusetune.files import AnyPath
+
 _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 
 
@@ -60,7 +62,7 @@ def _cell(cell: Cell | str) -> str:
     return f"<td{kind}>{escape(cell.text)}</td>"
 
 
-def figure(path: Path, caption: str) -> str:
+def figure(path: AnyPath, caption: str) -> str:
     """A picture inside the page."""
     path = Path(path)
     data = base64.b64encode(path.read_bytes()).decode("ascii")

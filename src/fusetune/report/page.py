@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.report.decision_sections import decision_section, sets_section
 from fusetune.report.evidence_sections import (
     evidence_section,
@@ -30,12 +30,12 @@ _PRINT = "addEventListener('beforeprint',()=>document.querySelectorAll('details'
 
 
 def build_report(
-    flights_table: Path,
-    analyze_folders: Sequence[Path],
-    flight_figures: Sequence[Path],
-    apply_folder: Path,
-    figure_folder: Path,
-    output: Path,
+    flights_table: AnyPath,
+    analyze_folders: Sequence[AnyPath],
+    flight_figures: Sequence[AnyPath],
+    apply_folder: AnyPath,
+    figure_folder: AnyPath,
+    output: AnyPath,
 ) -> None:
     """Write the report as one HTML file with its figures inside.
 

@@ -14,6 +14,7 @@ from fusetune.analyze.onboard import ONBOARD
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.apply.evidence import AIMS
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.parquet import read_table
 
 MOST_SETS_SHOWN = 14
@@ -66,7 +67,7 @@ def worse_aims(row: Mapping[Hashable, Any]) -> list[str]:
     return [aim for aim in AIMS if row.get(f"{aim}_lower", 0.0) > 0.0]
 
 
-def read_results(analyze_folders: Sequence[Path], apply_folder: Path) -> Results:
+def read_results(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath) -> Results:
     """Read the results of the rooms; nothing is searched for, only what is named is read."""
     apply_folder = Path(apply_folder)
     decision = read_document(apply_folder / "decision.json")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from fusetune.files import AnyPath
 from fusetune.report.difference_figures import differences, flights_by_sets, pareto
 from fusetune.report.figures import empty_figure, figure_style, save_svg
 from fusetune.report.innovation_figures import boxes, breaks, consistency, rms_by_variable
@@ -25,7 +26,7 @@ SUMMARY_FIGURES = (
 """Files that `plot_summary` writes."""
 
 
-def plot_summary(analyze_folders: Sequence[Path], apply_folder: Path, figure_folder: Path) -> None:
+def plot_summary(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath, figure_folder: AnyPath) -> None:
     """Draw `SUMMARY_FIGURES` into `figure_folder`.
 
     Parameters

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from fusetune.documents import read_document
+from fusetune.files import AnyPath
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
 
 GRADE_KINDS = {"A": "good", "B": "good", "C": "", "D": "bad"}
@@ -22,7 +23,7 @@ INTRODUCTION = (
 )
 
 
-def trust_section(analyze_folders: Sequence[Path]) -> str:
+def trust_section(analyze_folders: Sequence[AnyPath]) -> str:
     """Table of all flights, and the figures of each behind a click; empty where no flight was compared."""
     found = [file for folder in analyze_folders if (file := Path(folder) / "fidelity.json").exists()]
     flights = [read_document(file) for file in found]

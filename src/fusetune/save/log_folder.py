@@ -41,9 +41,10 @@ def save_log(
     Raises
     ------
     UserError
-        The folder cannot be written.
+        The folder cannot be written, or is there already and holds something else than a saved flight.
     """
     target = Path(folder)
+    _demand_own(target)
     partial = target.with_name(f".{target.name}.partial")
     try:
         shutil.rmtree(partial, ignore_errors=True)
@@ -54,6 +55,16 @@ def save_log(
     except OSError as error:
         raise UserError(target, f"cannot be written: {error.strerror}", "Make room or mend its permissions") from error
     return verdict
+
+
+def _demand_own(folder: Path) -> None:
+    """What is replaced is a saved flight, or what is left of one; never anything else that bears the log's name."""
+    if not folder.exists() or (folder / METADATA_FILE).exists() or (folder / VERDICT_FILE).exists():
+        return
+    if not folder.is_dir() or any(
+        not file.name.startswith(".") and file.suffix != ".parquet" for file in folder.iterdir()
+    ):
+        raise UserError(folder, "is there already and holds no saved flight", "Save elsewhere, or remove it yourself")
 
 
 def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.settings import setting, settings_from_mapping
+from fusetune.files import AnyPath
 
 RAW = {"imu": False, "magnetometer": False, "barometer": False}
 """Every step switched off."""
@@ -33,7 +33,7 @@ class ReconstructionSettings:
 
     @classmethod
     def from_mapping(
-        cls, values: Mapping[str, Any] | None, file: Path | str = "config/config.yaml"
+        cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml"
     ) -> ReconstructionSettings:
         """Read the section `reconstruction`; a missing section or key means the default."""
         return settings_from_mapping(cls, values, "reconstruction", file)
