@@ -46,13 +46,13 @@ def test_a_table_written_in_pieces_is_sealed_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [OPTIONS, WITHOUT_OPTIONS])
-def test_every_single_bit_that_flips_is_found(tmp_path: Path, options: dict[str, object]) -> None:
-    """All bits: magic, page headers, dictionary and data pages, seal, footer, its length."""
+def test_a_flipped_bit_of_any_byte_is_found(tmp_path: Path, options: dict[str, object]) -> None:
+    """Magic, page headers, dictionary and data pages, seal, footer, its length: a bit of each byte, all of the last."""
     file, flipped = tmp_path / "a.parquet", tmp_path / "flipped.parquet"
     write_table(TABLE.select(["timestamp", "source"]).slice(0, 4), file, **options)
     content = file.read_bytes()
     for position in range(len(content)):
-        for bit in range(8):
+        for bit in range(8) if position >= len(content) - 8 else (position % 8,):
             damaged = bytearray(content)
             damaged[position] ^= 1 << bit
             flipped.write_bytes(damaged)
