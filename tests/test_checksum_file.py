@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from tests.flipped_bits import with_flipped_bits
 
 from fusetune.checksum_file import check_checksum, checksum_file, has_checksum, write_checksum
 from fusetune.errors import UserError
@@ -28,13 +29,10 @@ def test_the_checksum_is_that_of_sha256sum(file: Path) -> None:
 def test_every_single_bit_that_flips_in_either_file_is_found(file: Path) -> None:
     for one in (file, checksum_file(file)):
         content = one.read_bytes()
-        for position in range(len(content)):
-            for bit in range(8):
-                damaged = bytearray(content)
-                damaged[position] ^= 1 << bit
-                one.write_bytes(damaged)
-                with pytest.raises(UserError, match=r"flights\.csv: is damaged.*Delete it"):
-                    check_checksum(file, "Delete it")
+        for damaged in with_flipped_bits(content):
+            one.write_bytes(damaged)
+            with pytest.raises(UserError, match=r"flights\.csv: is damaged.*Delete it"):
+                check_checksum(file, "Delete it")
         one.write_bytes(content)
 
 

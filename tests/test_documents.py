@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.flipped_bits import with_flipped_bits
 
 from fusetune.documents import read_document, write_document
 from fusetune.errors import UserError
@@ -47,14 +48,10 @@ def test_a_name_that_is_no_text_comes_back(tmp_path: Path) -> None:
 def test_every_single_bit_that_flips_is_found(tmp_path: Path) -> None:
     file, flipped = tmp_path / "a.json", tmp_path / "flipped.json"
     write_document(file, {"grade": "B", "é": 1e-300})
-    content = file.read_bytes()
-    for position in range(len(content)):
-        for bit in range(8):
-            damaged = bytearray(content)
-            damaged[position] ^= 1 << bit
-            flipped.write_bytes(damaged)
-            with pytest.raises(UserError, match=r"flipped\.json.*Delete it and run the pipeline again"):
-                read_document(flipped)
+    for damaged in with_flipped_bits(file.read_bytes()):
+        flipped.write_bytes(damaged)
+        with pytest.raises(UserError, match=r"flipped\.json.*Delete it and run the pipeline again"):
+            read_document(flipped)
 
 
 def test_a_file_that_was_cut_or_is_missing_is_named(tmp_path: Path) -> None:

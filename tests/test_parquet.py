@@ -6,6 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from tests.flipped_bits import with_flipped_bits
 
 from fusetune.errors import UserError
 from fusetune.parquet import read_pieces, read_schema, read_table, table_writer, write_table
@@ -51,13 +52,10 @@ def test_a_flipped_bit_of_any_byte_is_found(tmp_path: Path, options: dict[str, o
     file, flipped = tmp_path / "a.parquet", tmp_path / "flipped.parquet"
     write_table(TABLE.select(["timestamp", "source"]).slice(0, 4), file, **options)
     content = file.read_bytes()
-    for position in range(len(content)):
-        for bit in range(8) if position >= len(content) - 8 else (position % 8,):
-            damaged = bytearray(content)
-            damaged[position] ^= 1 << bit
-            flipped.write_bytes(damaged)
-            with pytest.raises(UserError, match=r"flipped\.parquet.*Delete it and run the pipeline again"):
-                read_table(flipped)
+    for damaged in with_flipped_bits(content, all_from=len(content) - 8):
+        flipped.write_bytes(damaged)
+        with pytest.raises(UserError, match=r"flipped\.parquet.*Delete it and run the pipeline again"):
+            read_table(flipped)
 
 
 @pytest.mark.parametrize("left", [0, 3, 8, 60, -1])

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fusetune.checksum_file import write_checksum
 from fusetune.errors import UserError
 from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory
 from fusetune.px4.ulog_reader import read_ulog
@@ -230,16 +229,3 @@ def test_a_file_of_a_saved_flight_that_is_damaged_or_gone_asks_for_a_new_folder(
         assert Path(raised.value.file) == folder / name
         assert f"Delete the whole folder {folder} and" in str(raised.value)
         (folder / name).unlink(missing_ok=True)
-
-
-def test_a_log_that_is_not_that_of_its_checksum_is_refused(tmp_path: Path, log: Path) -> None:
-    copy = tmp_path / "copy.ulg"
-    copy.write_bytes(log.read_bytes())
-    write_checksum(copy)
-    assert save_log(copy, tmp_path / "saved").status == save_log(log, tmp_path / "made").status
-    content = bytearray(copy.read_bytes())
-    content[-9] ^= 1
-    copy.write_bytes(content)
-    verdict = save_log(copy, tmp_path / "saved")
-    assert verdict.status == "refused"
-    assert "damaged" in verdict.reasons[0]

@@ -44,6 +44,7 @@ def test_deleting_what_the_messages_name_leads_back_to_the_same_results(
     harmed = {
         "results/save/flights.csv",
         "results/save/flight_1_low/vehicle_air_data_0.parquet",
+        "results/execute/flight_1_low.ulg",
         "results/analyze/flight_2_high/scores.parquet",
     }
     for name in harmed:

@@ -10,6 +10,7 @@ rule save_flight:
     params:
         code=DIGEST["save"],
         thresholds=SETTINGS["verdict"],
+        simulated=not FLOWN_LOGS,
     message:
         "Save: read {input.log}"
     script:

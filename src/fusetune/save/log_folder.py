@@ -7,9 +7,8 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from fusetune.checksum_file import check_checksum, has_checksum
 from fusetune.documents import write_document
-from fusetune.errors import RUN_AGAIN, UserError
+from fusetune.errors import UserError
 from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
 from fusetune.px4.release_layouts import canonical
@@ -69,8 +68,6 @@ def _demand_own(folder: Path) -> None:
 
 def _write(log: Path, folder: Path, thresholds: VerdictThresholds) -> Verdict:
     try:
-        if has_checksum(log):
-            check_checksum(log, RUN_AGAIN)
         flight = read_ulog(log)
     except UserError as error:
         verdict = unreadable(log.stem, error)
