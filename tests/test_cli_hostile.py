@@ -200,7 +200,7 @@ def test_fidelity_names_the_folder_that_lacks_something(tmp_path: Path, capsys: 
     for name in ("nope", "empty"):
         if name == "empty":
             (tmp_path / name).mkdir()
-        status, error = status_and_error(capsys, "fidelity", tmp_path / name, tmp_path / "nope")
+        status, error = status_and_error(capsys, "fidelity", tmp_path / name, tmp_path)
         assert status == 2
         assert str(tmp_path / name) in error
     pq.write_table(pa.table({"source": ["mag"]}), tmp_path / "empty" / "a.innovations.parquet")
@@ -238,7 +238,8 @@ def test_an_output_that_is_full_is_told(tmp_path: Path) -> None:
 
 def test_an_interrupted_command_says_so() -> None:
     script = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
 from fusetune import cli
 cli._design = lambda options: print("at work", flush=True) or time.sleep(60)
 sys.exit(cli.main(["design", "--mission", "m", "--study", "s", "--out", "o"]))

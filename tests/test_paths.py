@@ -9,15 +9,16 @@ from pathlib import Path
 
 def public_parameters(source: str) -> Iterator[tuple[str, str]]:
     """Names and annotations of the parameters of all public functions and public methods of a module."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ClassDef) and node.name.startswith("_"):
-            continue
-        if not isinstance(node, ast.FunctionDef) or (node.name.startswith("_") and node.name != "__init__"):
-            continue
-        arguments = node.args
-        for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
-            if argument.annotation is not None:
-                yield f"{node.name}({argument.arg})", ast.unparse(argument.annotation)
+    scopes: list[ast.Module | ast.ClassDef] = [ast.parse(source)]
+    while scopes:
+        for node in scopes.pop().body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                scopes.append(node)
+            if isinstance(node, ast.FunctionDef) and (node.name == "__init__" or not node.name.startswith("_")):
+                arguments = node.args
+                for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
+                    if argument.annotation is not None:
+                        yield f"{node.name}({argument.arg})", ast.unparse(argument.annotation)
 
 
 def takes_only_path_objects(annotation: str) -> bool:
@@ -28,9 +29,13 @@ def test_what_counts_as_a_path_only() -> None:
     source = """
 def f(a: Path, b: str | os.PathLike[str], c: Sequence[Path], d: AnyPath, *, e: Path | None): ...
 def _g(a: Path): ...
+class _C:
+    def __init__(self, a: Path): ...
+class D:
+    def __init__(self, a: Path): ...
 """
     found = [name for name, annotation in public_parameters(source) if takes_only_path_objects(annotation)]
-    assert found == ["f(a)", "f(c)", "f(e)"]
+    assert found == ["f(a)", "f(c)", "f(e)", "__init__(a)"]
 
 
 def test_every_public_function_takes_text_for_a_path(project_root: Path) -> None:

@@ -24,7 +24,7 @@ from fusetune.errors import RUN_AGAIN, UserError
 
 _TAIL_BYTES = 8
 """Length of the footer (4 bytes, little-endian) and the magic, which end the file."""
-_SEAL_MARK = b"SHA-256:"
+_SEAL_MARK = b"fusetune SHA-256:"
 _SEAL_BYTES = len(_SEAL_MARK) + hashlib.sha256().digest_size
 
 
@@ -56,7 +56,8 @@ def read_table(
     remedy
         What the user can do about a damaged file.
     sealed
-        Whether the file must carry its seal, as all that the package wrote do. One of another program may lack it.
+        Whether the file must carry its seal, as all that the package wrote do. One of another program may lack it; of
+        one that had it, a single changed bit is found all the same, unless it is one of the seal's mark.
 
     Raises
     ------
@@ -84,7 +85,7 @@ def read_pieces(path: str | os.PathLike[str], *, remedy: str = RUN_AGAIN, sealed
 def _opened(path: str | os.PathLike[str], remedy: str, sealed: bool) -> Iterator[pq.ParquetFile]:
     try:
         content = _mapped(path)
-        _check_seal(memoryview(content), path, remedy, sealed)
+        _check_seal(content, path, remedy, sealed)
         with pq.ParquetFile(pa.BufferReader(pa.py_buffer(content)), page_checksum_verification=True) as parquet:
             yield parquet
     except OSError as error:
@@ -118,14 +119,16 @@ def _mapped(path: str | os.PathLike[str]) -> bytes | mmap.mmap:
         return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
 
-def _check_seal(content: memoryview, path: str | os.PathLike[str], remedy: str, sealed: bool) -> None:
+def _check_seal(content: bytes | mmap.mmap, path: str | os.PathLike[str], remedy: str, sealed: bool) -> None:
     footer = len(content) - _TAIL_BYTES - int.from_bytes(content[-_TAIL_BYTES:-4], "little")
-    stamp = bytes(content[footer - _SEAL_BYTES : footer]) if footer >= _SEAL_BYTES else b""
+    stamp = content[footer - _SEAL_BYTES : footer] if footer >= _SEAL_BYTES else b""
     if not stamp.startswith(_SEAL_MARK):
-        if sealed:
+        # a seal at another place than the footer tells is one whose footer, or its length, has changed
+        if sealed or content.find(_SEAL_MARK) >= 0:
             raise UserError(path, "is cut or damaged: it does not end with the checksum it was written with", remedy)
         return
-    digest = hashlib.sha256(content[: footer - _SEAL_BYTES])
-    digest.update(content[footer:])
+    view = memoryview(content)
+    digest = hashlib.sha256(view[: footer - _SEAL_BYTES])
+    digest.update(view[footer:])
     if stamp != _SEAL_MARK + digest.digest():
         raise UserError(path, "is damaged: its bytes are no longer those that were written", remedy)

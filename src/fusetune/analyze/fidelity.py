@@ -167,7 +167,7 @@ def compare_set(reference: AnyPath, replay: AnyPath, name: str) -> ReplayFidelit
 
 def load_innovations(path: AnyPath) -> Innovations:
     """Read a `<set>.innovations.parquet`; innovations of reconstructed samples are left out."""
-    return _innovations(read_table(path))
+    return _innovations(read_table(path, sealed=False))
 
 
 def _read(folder: Path, name: str, columns: list[str] | None = None) -> pa.Table:

@@ -1,4 +1,7 @@
-"""Reads what the replay of one (flight, parameter set) wrote: innovations, status flags, local position, summary."""
+"""Reads what the replay of one (flight, parameter set) wrote: innovations, status flags, local position, summary.
+
+Replays of another program in the same layout, as of PX4's own estimator, are read, too: they need no digest.
+"""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -72,14 +75,14 @@ def read_columns(path: AnyPath, columns: list[str] | None = None) -> dict[str, n
     UserError
         If the file is missing or damaged.
     """
-    table = read_table(path, columns)
+    table = read_table(path, columns, sealed=False)
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
 def read_set(folder: AnyPath, name: str) -> SetRecord:
     """Read `<folder>/<name>.*`; the states are read only where truth is compared (`true_errors`)."""
     folder = Path(folder)
-    summary = read_document(folder / f"{name}.json")
+    summary = read_document(folder / f"{name}.json", sealed=False)
     parameters = {key: float(value) for key, value in summary.get("params", {}).items()}
     return SetRecord(
         name=name,
@@ -101,7 +104,7 @@ def read_innovations(path: AnyPath, parameters: dict[str, float]) -> dict[Source
     ----------
     parameters : of this set; where the table has no test ratio, it follows from the source's gate
     """
-    table = read_table(path)
+    table = read_table(path, sealed=False)
     if "measured" in table.column_names:
         table = table.filter(table["measured"]).drop_columns("measured")
     if table.num_rows == 0:
