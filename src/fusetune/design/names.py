@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-DEVICES = frozenset(
-    {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
-)
-"""Names that Windows keeps for devices, with any ending and in any case."""
+from fusetune.files import DEVICES
 
 
 def name_problem(name: str) -> str | None:

@@ -20,6 +20,8 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from fusetune.files import DEVICES
+
 _LOG = re.compile(r"\.ulg$", re.IGNORECASE | re.DOTALL)
 _PACKED = re.compile(r"\.ulg\.(gz|xz|bz2|zst|lz4|zip|7z)$", re.IGNORECASE | re.DOTALL)
 
@@ -33,8 +35,6 @@ _NO_PART_OF_A_NAME = set("/\\{}<>,")
 """Separators, and what Snakemake takes for an end of a wildcard, of a variable or of a value on a command line."""
 _NO_PART_OF_A_NAME_CATEGORIES = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 _ONE_LINE_HAS_NO = {"Cc", "Cf", "Zl", "Zp"}
-_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
-"""Names that Windows keeps for itself, with any suffix."""
 
 _REMEDY_LINK = "Mend the link or remove it"
 
@@ -198,7 +198,7 @@ def _name(parts: tuple[str, ...]) -> str:
     )
     # Windows, and many who write lists by hand, lose what stands at the ends
     name = allowed.strip().rstrip(". ") or "_"
-    if name.partition(".")[0].strip().casefold() in _DEVICES:
+    if name.partition(".")[0].strip().casefold() in DEVICES:
         name = f"{name}_" if "." not in name else name.replace(".", "_.", 1)
     if len(name.encode()) > LONGEST_NAME_BYTES:
         name = f"{name.encode()[:LONGEST_NAME_BYTES].decode(errors='ignore')}_{_digest(parts)[:6]}"
