@@ -13,6 +13,7 @@ import os
 from pathlib import Path
 
 from fusetune.digest import source_digest
+from fusetune.files import AnyPath
 from fusetune.write_access import others_may_write, others_may_write_below, take_write_access
 
 LOCATOR = "fusetune.kernel_locator.KernelLocator"
@@ -57,12 +58,12 @@ def use_kernel_cache(inherit: bool = False) -> Path:
     return folder
 
 
-def others_may_write_kernels(folder: Path) -> bool:
+def others_may_write_kernels(folder: AnyPath) -> bool:
     """Whether what is in a folder of the cache in use could have been put there by others."""
     return others_may_write_below(_top(), folder, PACKAGE)
 
 
-def keep_others_out(folder: Path) -> None:
+def keep_others_out(folder: AnyPath) -> None:
     """Take from others the right to write to a folder of the cache in use, and on the way to it.
 
     Raises

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.run_lock import Claim
 
 MADE_UNDER = "fusetune_results.id"
@@ -34,7 +34,7 @@ class Unfinished:
     marker: Path
 
 
-def unfinished_files(state: Path, parts: Iterable[Path]) -> Iterator[Unfinished]:
+def unfinished_files(state: AnyPath, parts: Iterable[AnyPath]) -> Iterator[Unfinished]:
     """What jobs that never ended were to make.
 
     Parameters
@@ -44,7 +44,7 @@ def unfinished_files(state: Path, parts: Iterable[Path]) -> Iterator[Unfinished]
     parts
         Files and folders of this workflow. Others, which other workflows in the same place make, are left out.
     """
-    own = [Path(os.path.abspath(part)) for part in parts]
+    state, own = Path(state), [Path(os.path.abspath(part)) for part in parts]
     # Snakemake names a marker by the name of the file in base 64, cut into folders that begin with '@'.
     for marker in sorted((state / _INCOMPLETE).rglob("*")):
         if not marker.is_file():
@@ -66,32 +66,33 @@ def remove_unfinished(files: Iterable[Unfinished]) -> None:
         unfinished.marker.unlink(missing_ok=True)
 
 
-def remove_stale_locks(state: Path, claim: Claim) -> None:
+def remove_stale_locks(state: AnyPath, claim: Claim) -> None:
     """Take away the locks that Snakemake keeps as files, where the run that made them was ended.
 
     After a run that ended by itself there are none of its own: those that are there belong to someone else.
     """
     if claim.locked and claim.former is not None:
-        for lock in (state / "locks").glob("*.lock"):
+        for lock in (Path(state) / "locks").glob("*.lock"):
             lock.unlink(missing_ok=True)
 
 
-def belong_together(state: Path, results: Path) -> bool:
+def belong_together(state: AnyPath, results: AnyPath) -> bool:
     """Whether what Snakemake remembers is about these results; without it, it takes any file for up to date."""
-    known, made = _text(state / MADE_UNDER), _text(results / f".{MADE_UNDER}")
+    known, made = _text(Path(state) / MADE_UNDER), _text(Path(results) / f".{MADE_UNDER}")
     return known == made and known != ""
 
 
-def bind_together(state: Path, results: Path) -> None:
+def bind_together(state: AnyPath, results: AnyPath) -> None:
     """Mark that what Snakemake will remember is about these results."""
     name = uuid.uuid4().hex + "\n"
-    for file in (state / MADE_UNDER, results / f".{MADE_UNDER}"):
+    for file in (Path(state) / MADE_UNDER, Path(results) / f".{MADE_UNDER}"):
         with atomic_path(file) as temporary:
             temporary.write_text(name, encoding="ascii")
 
 
-def remove(path: Path) -> None:
+def remove(path: AnyPath) -> None:
     """Remove a file, link or folder, if it is there."""
+    path = Path(path)
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

@@ -12,23 +12,24 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fusetune.errors import UserError
+from fusetune.files import AnyPath
 
 
-def others_may_write(path: Path, like: Path) -> bool:
+def others_may_write(path: AnyPath, like: AnyPath) -> bool:
     """Whether others may change a file, or put something into a folder; False where it does not exist."""
     try:
-        state, trusted = path.stat(), like.stat()
+        state, trusted = os.stat(path), os.stat(like)
     except (FileNotFoundError, NotADirectoryError):
         return False
     return state.st_uid not in (0, os.getuid(), trusted.st_uid) or bool(_excess(state, trusted))
 
 
-def others_may_write_below(top: Path, folder: Path, like: Path) -> bool:
+def others_may_write_below(top: AnyPath, folder: AnyPath, like: AnyPath) -> bool:
     """Whether others may change anything on the way from `top` to `folder`, both included, or anything in `folder`."""
-    return any(others_may_write(path, like) for path in (*_way(top, folder), *_content(folder)))
+    return any(others_may_write(path, like) for path in (*_way(Path(top), Path(folder)), *_content(Path(folder))))
 
 
-def take_write_access(top: Path, folder: Path, like: Path) -> None:
+def take_write_access(top: AnyPath, folder: AnyPath, like: AnyPath) -> None:
     """Make the way from `top` to `folder`, both included, such that others may not write there.
 
     Raises
@@ -36,11 +37,11 @@ def take_write_access(top: Path, folder: Path, like: Path) -> None:
     UserError
         Something on the way belongs to somebody else.
     """
-    for path in _way(top, folder):
+    for path in _way(Path(top), Path(folder)):
         path.mkdir(mode=0o755, parents=True, exist_ok=True)
         state = path.stat()
         if state.st_uid in (os.getuid(), 0):
-            path.chmod(stat.S_IMODE(state.st_mode) & ~_excess(state, like.stat()))
+            path.chmod(stat.S_IMODE(state.st_mode) & ~_excess(state, os.stat(like)))
         if others_may_write(path, like):
             raise UserError(
                 path,

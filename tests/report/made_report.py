@@ -1,6 +1,5 @@
 """The whole report of a made study."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +7,7 @@ from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
+from fusetune.documents import write_document
 from fusetune.report.flight_figures import plot_flight
 from fusetune.report.page import build_report
 from fusetune.report.summary_figures import plot_summary
@@ -34,7 +34,7 @@ def make_report(
     """
     folders, table = make_study(root, sets, flights, refused=("bad",), landing_s=landing_s)
     for folder in folders if fidelity else ():
-        (folder / "fidelity.json").write_text(json.dumps(fidelity))
+        write_document(folder / "fidelity.json", fidelity)
     decide(folders, table, root / "apply", sets=list(sets))
     pictures = []
     for folder in folders:

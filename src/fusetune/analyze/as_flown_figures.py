@@ -184,7 +184,7 @@ def compared_rows(onboard: Mapping[SourceAxis, AxisSamples]) -> Callable[[Record
         return RecordArrays(
             innovations=rows.innovations[np.isin(rows.innovations["source"], sources)],
             states=with_fields(rows.states if by_heading else rows.states[:0], ("timestamp_sample", "states")),
-            local_position=with_fields(rows.local_position, ("timestamp", "vx", "vy", "heading")),
+            local_position=with_fields(rows.local_position, _COMPARED_FIELDS),
             flags=rows.flags,
         )
 
@@ -253,6 +253,9 @@ def _inside(time: np.ndarray, intervals: tuple[Interval, ...]) -> np.ndarray:
     for start, stop in intervals:
         inside |= (time >= start) & (time < stop)
     return inside
+
+
+_COMPARED_FIELDS = ("timestamp", "vx", "vy", "vz", "z", "heading", *HEIGHT_RESETS)
 
 
 class _LocalPositions:

@@ -1,7 +1,6 @@
 """As flown: the innovations that the vehicle's own estimator logged, brought to the layout of a replay."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -104,7 +103,7 @@ def write_onboard(path: AnyPath, samples: Mapping[SourceAxis, AxisSamples]) -> N
     """Write the vehicle's own innovations in the layout of `<set>.innovations.parquet`."""
     keys = sorted(samples)
     names = list(dict.fromkeys(source for source, _ in keys))
-    with tables_in_groups(Path(path), ONBOARD_SCHEMA) as write:
+    with tables_in_groups(path, ONBOARD_SCHEMA) as write:
         for source, axis in keys:
             one = samples[source, axis]
             index = np.full(one.timestamp_sample.size, names.index(source), np.int32)

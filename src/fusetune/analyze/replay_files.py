@@ -58,7 +58,7 @@ def replay_files(folder: AnyPath, set_name: str) -> list[Path]:
 class ReplayWriter:
     """Takes the rows of a replay while it goes on; `replay_writer` makes one."""
 
-    def __init__(self, takers: Sequence[Callable[[np.ndarray], None]], spool: BinaryIO | None, innovations: Path):
+    def __init__(self, takers: Sequence[Callable[[np.ndarray], None]], spool: BinaryIO | None, innovations: AnyPath):
         self._takers, self._spool, self._innovations = takers, spool, innovations
 
     def take(self, rows: RecordArrays) -> None:

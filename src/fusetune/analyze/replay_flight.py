@@ -167,7 +167,7 @@ def replay_flight(
 
 
 def write_replay(
-    prepared: PreparedFlight, name: str, overrides: Mapping[str, float], params: Mapping[str, float], folder: Path
+    prepared: PreparedFlight, name: str, overrides: Mapping[str, float], params: Mapping[str, float], folder: AnyPath
 ) -> None:
     """Replay a complete set and write its files while it goes on.
 

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
 from fusetune.ekf2.recording import joined_rows
-from fusetune.files import atomic_path
+from fusetune.files import AnyPath, atomic_path
 from fusetune.parquet import table_writer
 
 ROWS_PER_GROUP = 1 << 15
@@ -28,7 +27,7 @@ def replay_table_options(schema: pa.Schema) -> dict[str, object]:
 
 @contextmanager
 def written_in_groups(
-    target: Path, dtype: np.dtype, to_table: Callable[[np.ndarray], pa.Table]
+    target: AnyPath, dtype: np.dtype, to_table: Callable[[np.ndarray], pa.Table]
 ) -> Iterator[Callable[[np.ndarray], None]]:
     """Write a Parquet file that is either whole or not there.
 
@@ -60,7 +59,7 @@ def written_in_groups(
 
 
 @contextmanager
-def tables_in_groups(target: Path, schema: pa.Schema) -> Iterator[Callable[[pa.Table], None]]:
+def tables_in_groups(target: AnyPath, schema: pa.Schema) -> Iterator[Callable[[pa.Table], None]]:
     """Write a Parquet file that is either whole or not there, out of tables that are small or large.
 
     Yields

@@ -10,7 +10,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.sources import AID_SOURCES
+from fusetune.files import AnyPath
 
 SourceAxis = tuple[str, int]
 
@@ -52,7 +52,7 @@ class AxisSamples:
 class SampleSpool:
     """A nameless file that rows are put into and read from."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: AnyPath) -> None:
         self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - lives as long as the samples in it
 
     def put(self, rows: np.ndarray) -> int:

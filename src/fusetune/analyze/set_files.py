@@ -97,7 +97,7 @@ class SetRecord:
 class ColumnsOnDisk(Mapping[str, npt.NDArray[Any]]):
     """Columns of a Parquet table, each read when it is asked for and not kept."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: AnyPath) -> None:
         self._path, self._names = path, column_names(path)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
