@@ -130,7 +130,14 @@ def test_of_two_runs_at_once_one_works_and_the_other_says_so(workspace: Workspac
 def test_an_interrupt_before_the_first_job_shows_no_traceback(workspace: Workspace) -> None:
     pipe = subprocess.PIPE
     with process_in(workspace, "join_run('.snakemake')"):
-        run = subprocess.Popen(workspace.command("--cores", "1"), stdout=pipe, stderr=subprocess.STDOUT, text=True)
+        run = subprocess.Popen(
+            workspace.command("--cores", "1"),
+            stdout=pipe,
+            stderr=subprocess.STDOUT,
+            text=True,
+            # ignored where tests run in the background, and what is ignored is inherited
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )
         assert run.stdout
         printed = []
         for line in run.stdout:
