@@ -71,7 +71,9 @@ def save_log(
         os.replace(partial, target)
     except OSError as error:
         shutil.rmtree(partial, ignore_errors=True)
-        raise UserError(target, f"cannot be written: {error.strerror}", "Make room or mend its permissions") from error
+        # libraries tell in their own words what the number says in the system's
+        reason = f"cannot be written: {os.strerror(error.errno) if error.errno else error}"
+        raise UserError(target, reason, "Make room or mend its permissions") from error
     return verdict
 
 
