@@ -77,7 +77,7 @@ class Place:
         """Run to the end; what was printed."""
         run = self.start_to_target()
         printed, _ = run.communicate()
-        if run.returncode:
+        if run.returncode or not (self.folder / self.target).is_file():
             self.faults.append(f"a run failed:\n{printed}")
         return printed
 
@@ -194,6 +194,9 @@ def main() -> int:
         begun = time.monotonic()
         place.run()
         usual_s = time.monotonic() - begun
+        if place.faults:
+            print(*place.faults, sep="\n")
+            return 1
         expected.append((place.flown, place.results()))
     reference = dict(expected)
     for kind in options.kinds or TRIALS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import signal
 import struct
 import subprocess
@@ -11,6 +12,8 @@ import time
 from pathlib import Path
 
 from tests.workflow.conftest import STUDY, Workspace
+
+from fusetune.kernel_cache import kernel_cache
 
 SUMMARIES = {"list_flights": 1, "decide": 1, "plot_summary": 1, "build_report": 1, "all": 1}
 DECISION = "results/apply/decision.json"
@@ -125,3 +128,12 @@ def kill_when_seen(workspace: Workspace, trace: str) -> None:
         run.send_signal(signal.SIGKILL)
         run.wait()
     assert set(results.glob(trace)) - seen, Path(printed.name).read_text(encoding="utf-8")
+
+
+def test_an_old_mark_of_compiled_kernels_keeps_nothing_from_being_made(flown: Workspace) -> None:
+    """Snakemake then compiles anew, as after an update of the sources; what needs the kernels has to follow."""
+    ready = kernel_cache() / "ready.json"
+    os.utime(ready, (1, 1))
+    flown.run_ok("--cores", "1", "results/apply/decision.json")
+    assert ready.stat().st_mtime > 1
+    assert (flown.folder / "results" / "apply" / "decision.json").is_file()

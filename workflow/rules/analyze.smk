@@ -14,7 +14,7 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
         input:
             flight="results/save/{flight}",
             present=ancient("results/save/present.json"),
-            kernels=ancient(KERNELS_READY),
+            kernels=KERNELS_READY,
         output:
             update(replay_files(chunk)),
         log:
@@ -40,7 +40,7 @@ rule analyze_flight:
         flight="results/save/{flight}",
         # what it says comes in as a parameter, so that only other values make anything again
         present=ancient("results/save/present.json"),
-        kernels=ancient(KERNELS_READY),
+        kernels=KERNELS_READY,
         replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
     output:
         update(replay_files(REPLAY_CHUNKS[-1])),
