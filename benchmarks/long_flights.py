@@ -22,13 +22,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.save_speed import ROOT, peak_bytes, simulated
-from benchmarks.thinned_logs import Thinning, thinned
 
 from fusetune.design.study import load_study
 from fusetune.job_environment import JOB_ENVIRONMENT
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_writer import write_ulog
-from fusetune.save.flight_folder import load_flight, read_metadata
+from fusetune.save.flight_folder import read_metadata
+
+# All else is imported where it is needed: what a job does not load must not count as its memory.
 
 STUDY = ROOT / "config/studies/paper_table11.yaml"
 ANALYSIS_STEPS = ("replay_flight", "graded", "score_flight", "write_flight_fidelity")
@@ -42,6 +41,12 @@ def main() -> None:
     if options.job:
         print(json.dumps(_measured(options.job[0], Path(options.job[1]))))
         return
+    from benchmarks.thinned_logs import Thinning, thinned
+
+    from fusetune.px4.release_layouts import canonical
+    from fusetune.px4.ulog_writer import write_ulog
+    from fusetune.save.flight_folder import load_flight
+
     steps = ", ".join(step.replace("_", " ") for step in ANALYSIS_STEPS)
     print(f"| flight | MB | CPU s a minute: save | analyse | draw | peak MB: save | analyse ({steps}) | draw |")
     print("|---|---|---|---|---|---|---|---|")
