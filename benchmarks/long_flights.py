@@ -87,6 +87,10 @@ def _in_own_process(job: str, log: Path) -> dict[str, Any]:
 
 def _measured(job: str, log: Path) -> dict[str, Any]:
     """CPU time and peak memory of one job; of the analysis also the peak of each step."""
+    sys.path.insert(0, str(ROOT / "workflow" / "scripts"))
+    from job import keep_out
+
+    keep_out("pandas")
     saved, analysis = log.with_suffix(".saved"), log.with_suffix(".analysis")
     steps: dict[str, int] = {}
     if job == "save":
