@@ -21,6 +21,11 @@ def write_checksum(path: str | os.PathLike[str]) -> None:
         temporary.write_bytes(_line(Path(path)))
 
 
+def has_checksum(path: str | os.PathLike[str]) -> bool:
+    """Whether a checksum stands beside a file."""
+    return checksum_file(path).is_file()
+
+
 def check_checksum(path: str | os.PathLike[str], remedy: str) -> None:
     """Compare a file with the checksum beside it.
 
