@@ -28,7 +28,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fusetune.checksum_file import check_checksum, checksum_file, has_checksum
+from fusetune.checksum_file import check_checksum, checksum_file
 from fusetune.documents import read_document
 from fusetune.errors import RUN_AGAIN, UserError
 from fusetune.parquet import read_table
@@ -70,7 +70,7 @@ def kind_of(file: Path) -> str | None:
         return "tables (.parquet)"
     if file.suffix == ".json" and not file.name.startswith("."):
         return "documents (.json)"
-    if has_checksum(file):
+    if checksum_file(file).is_file():
         return "files with a checksum (.csv, .ulg)"
     return "checksums (.sha256)" if file.suffix == ".sha256" else None
 

@@ -1,6 +1,5 @@
 """Cells of a CSV file that a spreadsheet shows and does not run.
 
-
 Spreadsheets take a cell that begins with ``=``, ``+``, ``-`` or ``@`` for a formula, tab and carriage return before it
 notwithstanding (https://owasp.org/www-community/attacks/CSV_Injection), and names of files or of hardware come from
 elsewhere. Such cells get an apostrophe in front, which spreadsheets do not show. Some split the cells of a file by

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from pathlib import Path
 
 from fusetune.errors import UserError
-from fusetune.files import atomic_path
+from fusetune.files import atomic_path, sha256_of
 
 
 def checksum_file(path: str | os.PathLike[str]) -> Path:
@@ -19,11 +18,6 @@ def write_checksum(path: str | os.PathLike[str]) -> None:
     """Write the checksum of a file beside it."""
     with atomic_path(checksum_file(path)) as temporary:
         temporary.write_bytes(_line(Path(path)))
-
-
-def has_checksum(path: str | os.PathLike[str]) -> bool:
-    """Whether a checksum stands beside a file."""
-    return checksum_file(path).is_file()
 
 
 def check_checksum(path: str | os.PathLike[str], remedy: str) -> None:
@@ -44,5 +38,4 @@ def check_checksum(path: str | os.PathLike[str], remedy: str) -> None:
 
 
 def _line(path: Path) -> bytes:
-    with open(path, "rb") as file:
-        return f"{hashlib.file_digest(file, 'sha256').hexdigest()}  ".encode() + os.fsencode(path.name) + b"\n"
+    return f"{sha256_of(path)}  ".encode() + os.fsencode(path.name) + b"\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,6 +15,12 @@ DEVICES = frozenset(
 
 AnyPath = str | os.PathLike[str]
 """What public functions take for a path."""
+
+
+def sha256_of(path: AnyPath) -> str:
+    """SHA-256 of what a file holds, hexadecimal; raises `OSError` where it cannot be read."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextmanager

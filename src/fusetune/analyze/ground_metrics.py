@@ -14,7 +14,7 @@ from fusetune.analyze.filter_events import FilterEvents
 from fusetune.analyze.innovation_metrics import rms_innovation, rms_norm
 from fusetune.analyze.measurement_alignment import PairedSamples, SamplesOfSet, each_of, paired_samples
 from fusetune.analyze.metrics_table import FEWEST_SAMPLES, MetricsTable, groups_of
-from fusetune.analyze.scoring_window import Cut, Interval, ScoringWindow, cuts_within, subtract
+from fusetune.analyze.scoring_window import Cut, Interval, ScoringWindow, cuts_within, merged, subtract
 from fusetune.analyze.set_files import SetRecord
 from fusetune.analyze.settings import ScoringSettings
 from fusetune.analyze.sources import AID_SOURCES, AXES
@@ -47,7 +47,7 @@ def ground_window(
     if window.warm_up_end is None or not standing:
         return ScoringWindow((), (), window.excluded, window.warm_up_end, "no time on the ground after the warm-up")
     excluded = dict(window.excluded)
-    cuts = cuts_within(records, excluded, standing, present, gaps, settings)
+    cuts = merged(cuts_within(records, excluded, standing, present, gaps, settings))
     return ScoringWindow(subtract(standing, cuts), cuts, excluded, window.warm_up_end)
 
 

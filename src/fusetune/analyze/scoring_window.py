@@ -126,8 +126,8 @@ def scoring_window(
     settle_s = settings.warm_settle_s if present_record.is_warm_started else settings.settle_s
     warm_up_end = max(starts.values()) + round(settle_s * 1e6)
     flying = subtract(airborne, [Cut(-(2**62), warm_up_end, "warm-up")])
-    single_cuts = _cuts(records, excluded, flying, present, gaps, settings)
-    cuts = _merged(single_cuts)
+    single_cuts = cuts_within(records, excluded, flying, present, gaps, settings)
+    cuts = merged(single_cuts)
     intervals = subtract(flying, cuts)
     window = ScoringWindow(intervals, cuts, excluded, warm_up_end)
     if window.duration_s < settings.minimum_scored_s:
@@ -171,23 +171,11 @@ def cuts_within(
     present: str,
     gaps: Sequence[Interval],
     settings: ScoringSettings,
-) -> tuple[Cut, ...]:
-    """Cuts around the resets of all sets and the gaps of the log inside `flying`.
+) -> list[Cut]:
+    """Cuts around the resets of all sets and the gaps of the log inside `flying`; those at one time are one.
 
     `excluded` takes sets whose own resets would cost the others too much of what the present set leaves of the flight.
     """
-    return _merged(_cuts(records, excluded, flying, present, gaps, settings))
-
-
-def _cuts(
-    records: Sequence[SetRecord],
-    excluded: dict[str, str],
-    flying: Sequence[Interval],
-    present: str,
-    gaps: Sequence[Interval],
-    settings: ScoringSettings,
-) -> list[Cut]:
-    """One cut for each reset and gap; those of several sets at one time are one."""
     after = round(settings.reset_cut_s * 1e6)
     cuts = [Cut(start, stop + after, "gap in the log") for start, stop in gaps]
     of_set = {record.name: _around_resets(record, after) for record in records if record.name not in excluded}
@@ -215,13 +203,14 @@ def _duration(intervals: Sequence[Interval]) -> int:
     return sum(stop - start for start, stop in intervals)
 
 
-def _merged(cuts: list[Cut]) -> tuple[Cut, ...]:
-    merged: list[Cut] = []
+def merged(cuts: list[Cut]) -> tuple[Cut, ...]:
+    """Cuts that touch or overlap as one, with the reasons of all."""
+    found: list[Cut] = []
     for cut in sorted(cuts, key=lambda cut: (cut.start, cut.stop, cut.reason)):
-        if merged and cut.start <= merged[-1].stop:
-            last = merged[-1]
+        if found and cut.start <= found[-1].stop:
+            last = found[-1]
             reasons = sorted({*last.reason.split(", "), cut.reason})
-            merged[-1] = Cut(last.start, max(last.stop, cut.stop), ", ".join(reasons))
+            found[-1] = Cut(last.start, max(last.stop, cut.stop), ", ".join(reasons))
         else:
-            merged.append(cut)
-    return tuple(merged)
+            found.append(cut)
+    return tuple(found)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,8 +27,6 @@ __all__ = [
     "read_innovations",
     "read_set",
 ]
-
-Result = TypeVar("Result")
 
 RESET_COUNTERS = {
     "horizontal_position": "xy_reset_counter",

@@ -1,6 +1,5 @@
 """Where a decision comes from: every log by checksum, every configuration file by hash, product and firmware."""
 
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import fusetune
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.errors import UserError
-from fusetune.files import AnyPath
+from fusetune.files import AnyPath, sha256_of
 from fusetune.parquet import read_table
 
 _FLIGHT_COLUMNS = ("flight", "status", "reason", "firmware", "checksum", "duration_s", "airborne_s")
@@ -23,7 +22,7 @@ def file_hash(path: AnyPath) -> str:
         If the file cannot be read.
     """
     try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return sha256_of(path)
     except OSError as error:
         raise UserError(path, f"cannot be read: {error.strerror}", "Name configuration files that exist") from error
 

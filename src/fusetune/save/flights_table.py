@@ -56,7 +56,6 @@ def write_flights_table(
 
     What was `refused` before it could be saved comes last.
 
-
     Of flights whose logs have equal bytes the first by name stays; the others are refused, so that no flight counts
     twice. Which is first depends on neither the order given nor that of the jobs.
 
