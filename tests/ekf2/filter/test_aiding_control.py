@@ -79,12 +79,12 @@ def test_gravity_beyond_a_quarter_sigma_is_rejected() -> None:
 
 def _offer_flow(ekf: np.void, rate: tuple[float, float], time_us: int, quality: int = 255) -> None:
     set_time(ekf, time_us)
-    ekf["flow_buffer_exists"] = True
-    ekf["flow_data_ready"] = True
-    ekf["flow_sample"]["time_us"] = time_us
-    ekf["flow_sample"]["flow_rate"] = rate
-    ekf["flow_sample"]["gyro_rate"] = 0.0
-    ekf["flow_sample"]["quality"] = quality
+    ekf["sensors"]["flow"]["exists"] = True
+    ekf["sensors"]["flow"]["data_ready"] = True
+    ekf["sensors"]["flow"]["sample"]["time_us"] = time_us
+    ekf["sensors"]["flow"]["sample"]["flow_rate"] = rate
+    ekf["sensors"]["flow"]["sample"]["gyro_rate"] = 0.0
+    ekf["sensors"]["flow"]["sample"]["quality"] = quality
 
 
 def test_flow_starts_after_ten_samples_and_resets_velocity_to_them() -> None:
@@ -120,7 +120,7 @@ def test_flow_continues_rejects_and_stops() -> None:
     assert ekf["time_last_terrain_fuse"] == now
 
     # without data the flag stays for 7 s
-    ekf["flow_data_ready"] = False
+    ekf["sensors"]["flow"]["data_ready"] = False
     set_time(ekf, now + 7_000_000)
     control_optical_flow_fusion(ekf, params[0])
     assert ekf["cs"]["opt_flow"]
@@ -148,24 +148,24 @@ def test_flow_gyro_bias_follows_the_imu_within_its_step_limit() -> None:
     memory = hovering(params)
     ekf = memory[0]
     _offer_flow(ekf, (0.0, 0.0), START_US)
-    ekf["flow_sample"]["gyro_rate"] = [0.05, 3.0, np.nan]
+    ekf["sensors"]["flow"]["sample"]["gyro_rate"] = [0.05, 3.0, np.nan]
     control_optical_flow_fusion(ekf, params[0])
     np.testing.assert_allclose(ekf["flow"]["gyro_bias"], [0.01 * 0.05, 0.01 * 0.1, 0.0], atol=1e-12)
 
     internal = parameters(EKF2_OF_CTRL=1, EKF2_OF_GYR_SRC=1)
     memory = hovering(internal)
     _offer_flow(memory[0], (0.0, 0.0), START_US)
-    memory[0]["flow_sample"]["gyro_rate"] = [0.05, 3.0, 1.0]
+    memory[0]["sensors"]["flow"]["sample"]["gyro_rate"] = [0.05, 3.0, 1.0]
     control_optical_flow_fusion(memory[0], internal[0])
     np.testing.assert_array_equal(memory[0]["flow"]["gyro_bias"], 0.0)
 
 
 def _offer_airspeed(ekf: np.void, speed: float, time_us: int) -> None:
     set_time(ekf, time_us)
-    ekf["airspeed_data_ready"] = True
-    ekf["airspeed_sample"]["time_us"] = time_us
-    ekf["airspeed_sample"]["true_airspeed"] = speed
-    ekf["airspeed_sample"]["eas2tas"] = 1.0
+    ekf["sensors"]["airspeed"]["data_ready"] = True
+    ekf["sensors"]["airspeed"]["sample"]["time_us"] = time_us
+    ekf["sensors"]["airspeed"]["sample"]["true_airspeed"] = speed
+    ekf["sensors"]["airspeed"]["sample"]["eas2tas"] = 1.0
 
 
 def test_airspeed_starts_with_the_wind_of_level_flight() -> None:
@@ -205,7 +205,7 @@ def test_slow_airspeed_is_ignored_and_data_stop_after_a_second() -> None:
     _offer_airspeed(ekf, 15.0, START_US + 100_000)
     control_air_data_fusion(ekf, params[0])
     assert ekf["cs"]["fuse_aspd"]
-    ekf["airspeed_data_ready"] = False
+    ekf["sensors"]["airspeed"]["data_ready"] = False
     set_time(ekf, START_US + 100_000 + 999_999)
     control_air_data_fusion(ekf, params[0])
     assert ekf["cs"]["fuse_aspd"]
@@ -252,13 +252,13 @@ def test_drag_estimates_the_headwind_of_a_hover() -> None:
     memory = hovering(params)
     ekf = memory[0]
     ekf["P"][WIND, WIND] = ekf["P"][WIND + 1, WIND + 1] = 100.0
-    ekf["drag_buffer_exists"] = True
-    ekf["drag_data_ready"] = True
+    ekf["sensors"]["drag"]["exists"] = True
+    ekf["sensors"]["drag"]["data_ready"] = True
     ekf["cs"]["wind"] = True
     for i in range(400):
         set_time(ekf, START_US + 25_000 * i)
-        ekf["drag_sample"]["time_us"] = START_US + 25_000 * i
-        ekf["drag_sample"]["accel_xy"] = [-1.5, 0.0]
+        ekf["sensors"]["drag"]["sample"]["time_us"] = START_US + 25_000 * i
+        ekf["sensors"]["drag"]["sample"]["accel_xy"] = [-1.5, 0.0]
         control_drag_fusion(ekf, params[0])
         ekf["vel"] = 0.0
         ekf["accel_bias"] = 0.0
@@ -272,7 +272,7 @@ def test_drag_starts_the_wind_in_flight_only() -> None:
     params = parameters(EKF2_DRAG_CTRL=1)
     memory = hovering(params)
     ekf = memory[0]
-    ekf["drag_buffer_exists"] = True
+    ekf["sensors"]["drag"]["exists"] = True
     ekf["cs"]["in_air"] = False
     control_drag_fusion(ekf, params[0])
     assert not ekf["cs"]["wind"]

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from fusetune.ekf2.feed.buffers import BUFFERS_MEMORY, initialise_buffers, push_imu
 from fusetune.ekf2.feed.message_samples import imu_samples
 from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE
+from fusetune.ekf2.feed.sensors import SENSORS
 from fusetune.ekf2.filter.common.parameters import complete, parameter_record
 from fusetune.ekf2.filter.imu_down_sampler import (
     DOWN_SAMPLER_MEMORY,
@@ -22,6 +23,7 @@ DT = np.float32(0.004)
 HORIZON = np.dtype(
     [
         ("buffers", BUFFERS_MEMORY),
+        ("sensors", SENSORS),
         ("down_sampler", DOWN_SAMPLER_MEMORY),
         ("imu_newest", IMU_SAMPLE),
         ("imu_delayed", IMU_SAMPLE),

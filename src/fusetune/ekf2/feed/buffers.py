@@ -12,7 +12,7 @@ the horizon moves through the ring are refused.
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE, IMU_SAMPLE
+from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE
 
 RING_CAPACITY = 256
 """PX4 counts buffer entries in eight bits, so no buffer can be longer."""
@@ -42,21 +42,9 @@ IMU_RING = np.dtype(
     align=True,
 )
 
-DRAG_RING = np.dtype([("ring", RING), ("sample", DRAG_SAMPLE, (RING_CAPACITY,)), ("written", "i8")], align=True)
-
-EV_NOISE = np.dtype([("position", "f8"), ("velocity", "f8"), ("attitude", "f8"), ("mode", "i8")], align=True)
-"""EKF2_EVP_NOISE (m), EKF2_EVV_NOISE (m/s), EKF2_EVA_NOISE (rad) and EKF2_EV_NOISE_MD."""
-
-AIDING_RINGS = ("gnss", "mag", "baro", "range", "flow", "ev", "airspeed", "auxvel", "system_flags")
-
 BUFFERS_MEMORY = np.dtype(
-    [("imu", IMU_RING)]
-    + [(name, RING) for name in AIDING_RINGS]
-    + [
-        ("drag", DRAG_RING),
-        # parameters that act on a sample when it arrives, by its place in the ring
-        ("gnss_yaw_offset", "f8", (RING_CAPACITY,)),
-        ("ev_noise", EV_NOISE, (RING_CAPACITY,)),
+    [
+        ("imu", IMU_RING),
         ("imu_length", "i8"),
         ("observation_length", "i8"),
         ("min_observation_interval_us", "i8"),
@@ -64,7 +52,7 @@ BUFFERS_MEMORY = np.dtype(
     ],
     align=True,
 )
-"""The estimator's sub-record `ekf.buffers`."""
+"""The estimator's sub-record `ekf.buffers`: the IMU's ring, and the lengths of all; those of the sensors are theirs."""
 
 
 @kernel
@@ -144,16 +132,17 @@ def initialise_buffers(ekf, params, time_us):
     buffers.imu.tail = 0
     buffers.imu.size = imu_length
     buffers.imu.first_write = True
-    reset_ring(buffers.gnss, observation_length)
-    reset_ring(buffers.mag, observation_length)
-    reset_ring(buffers.baro, observation_length)
-    reset_ring(buffers.range, observation_length)
-    reset_ring(buffers.flow, imu_length)
-    reset_ring(buffers.ev, observation_length)
-    reset_ring(buffers.airspeed, observation_length)
-    reset_ring(buffers.auxvel, observation_length)
-    reset_ring(buffers.system_flags, observation_length)
-    reset_ring(buffers.drag.ring, observation_length)
+    sensors = ekf.sensors
+    reset_ring(sensors.gnss.ring, observation_length)
+    reset_ring(sensors.mag.ring, observation_length)
+    reset_ring(sensors.baro.ring, observation_length)
+    reset_ring(sensors.range.ring, observation_length)
+    reset_ring(sensors.flow.ring, imu_length)
+    reset_ring(sensors.ev.ring, observation_length)
+    reset_ring(sensors.airspeed.ring, observation_length)
+    reset_ring(sensors.auxvel.ring, observation_length)
+    reset_ring(sensors.system_flags.ring, observation_length)
+    reset_ring(sensors.drag.ring, observation_length)
     buffers.initialised = True
     ekf.time_delayed_us = time_us
     ekf.time_latest_us = time_us
@@ -184,13 +173,3 @@ def offer(ekf, ring, sample_time_us, delay_ms, slot):
         return False
     push(ring, time_us, slot)
     return True
-
-
-@kernel
-def push_drag(ekf, sample):
-    """Buffer a down-sampled specific force, which is made from IMU data and so stands in no input array."""
-    drag = ekf.buffers.drag
-    slot = drag.written % RING_CAPACITY
-    drag.sample[slot] = sample
-    drag.written += 1
-    push(drag.ring, sample.time_us, slot)

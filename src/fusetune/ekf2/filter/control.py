@@ -3,18 +3,7 @@
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.feed.sample_arrival import (
-    pop_airspeed,
-    pop_auxvel,
-    pop_baro,
-    pop_drag,
-    pop_ev,
-    pop_flow,
-    pop_gnss,
-    pop_mag,
-    pop_range,
-    pop_system_flags,
-)
+from fusetune.ekf2.feed.sample_arrival import apply_antenna_yaw_offset, apply_vision_noise, pop
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_control import control_air_data_fusion
 from fusetune.ekf2.filter.aid_sources.auxvel.auxvel_fusion import control_aux_vel_fusion
 from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import control_drag_fusion
@@ -74,38 +63,28 @@ def control_fusion_modes(ekf, params, inputs):
 
 @kernel
 def _pop_due_samples(ekf, params, inputs):
-    """Take from every buffer the newest sample that the fusion time horizon has passed.
-
-    What is switched off leaves its samples there; switched on again, it starts with the newest of the last 0.1 s.
-    """
-    ekf.mag_data_ready = False
-    ekf.flow_data_ready = False
-    ekf.gnss_data_ready = False
-    ekf.airspeed_data_ready = False
-    ekf.drag_data_ready = False
-    pop_system_flags(ekf, inputs)
-    if int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE:
-        pop_mag(ekf, inputs)
-    if int(params.EKF2_OF_CTRL) == 1:
-        pop_flow(ekf, inputs)
-    if int(params.EKF2_GPS_CTRL) != 0:
-        pop_gnss(ekf, inputs)
-    if params.EKF2_ARSP_THR > 0.0:
-        pop_airspeed(ekf, inputs)
-    if int(params.EKF2_DRAG_CTRL) > 0:
-        pop_drag(ekf)
-    pop_baro(ekf, inputs)
-    pop_range(ekf, inputs)
-    pop_ev(ekf, inputs)
-    pop_auxvel(ekf, inputs)
+    """Take from every buffer the newest sample that the fusion time horizon has passed, unless it is switched off."""
+    sensors = ekf.sensors
+    pop(ekf, sensors.system_flags, inputs.system_flags, True)
+    pop(ekf, sensors.mag, inputs.mag, int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE)
+    pop(ekf, sensors.flow, inputs.flow, int(params.EKF2_OF_CTRL) == 1)
+    place = pop(ekf, sensors.gnss, inputs.gnss, int(params.EKF2_GPS_CTRL) != 0)
+    apply_antenna_yaw_offset(sensors.gnss, place)
+    pop(ekf, sensors.airspeed, inputs.airspeed, params.EKF2_ARSP_THR > 0.0)
+    pop(ekf, sensors.drag, sensors.drag.made, int(params.EKF2_DRAG_CTRL) > 0)
+    pop(ekf, sensors.baro, inputs.baro, True)
+    pop(ekf, sensors.range, inputs.range, True)
+    place = pop(ekf, sensors.ev, inputs.ev, True)
+    apply_vision_noise(sensors.ev, place)
+    pop(ekf, sensors.auxvel, inputs.auxvel, True)
 
 
 @kernel
 def _follow_system_flags(ekf):
     """Apply what the vehicle's status and land detector said at the fusion time horizon."""
-    if not ekf.system_flags_data_ready:
+    if not ekf.sensors.system_flags.data_ready:
         return
-    flags = ekf.system_flags_sample
+    flags = ekf.sensors.system_flags.sample
     ekf.cs.vehicle_at_rest = flags.at_rest
     set_in_air_status(ekf, flags.in_air)
     ekf.cs.fixed_wing = flags.is_fixed_wing

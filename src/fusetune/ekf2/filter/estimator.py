@@ -11,18 +11,7 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.buffers import BUFFERS_MEMORY
-from fusetune.ekf2.feed.sensor_samples import (
-    AIRSPEED_SAMPLE,
-    AUXVEL_SAMPLE,
-    BARO_SAMPLE,
-    DRAG_SAMPLE,
-    EV_SAMPLE,
-    FLOW_SAMPLE,
-    GNSS_SAMPLE,
-    MAG_SAMPLE,
-    RANGE_SAMPLE,
-    SYSTEM_FLAGS_SAMPLE,
-)
+from fusetune.ekf2.feed.sensors import SENSORS
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_MEMORY
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
@@ -53,36 +42,10 @@ from fusetune.ekf2.filter.wind import WIND_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
 from fusetune.ekf2.numerics.rotations import quat_aligning_with_up, quat_to_dcm
 
-SAMPLES = {
-    "gnss": GNSS_SAMPLE,
-    "mag": MAG_SAMPLE,
-    "baro": BARO_SAMPLE,
-    "range": RANGE_SAMPLE,
-    "flow": FLOW_SAMPLE,
-    "ev": EV_SAMPLE,
-    "airspeed": AIRSPEED_SAMPLE,
-    "auxvel": AUXVEL_SAMPLE,
-    "drag": DRAG_SAMPLE,
-    "system_flags": SYSTEM_FLAGS_SAMPLE,
-}
-
-SAMPLE_FIELDS = [
-    field
-    for name, sample in SAMPLES.items()
-    for field in (
-        (f"{name}_sample", sample),
-        (f"{name}_data_ready", "?"),
-        (f"{name}_newest_time_us", "i8"),
-        (f"{name}_buffer_exists", "?"),
-    )
-]
-"""Per sensor: the sample at the fusion time horizon, whether it is new, when one last arrived, whether any ever did."""
-
 EKF = np.dtype(
     [
         *CORE_FIELDS,
-        *SAMPLE_FIELDS,
-        ("gnss_yaw_newest_time_us", "i8"),
+        ("sensors", SENSORS),
         ("air_density", "f8"),
         ("origin", LOCAL_ORIGIN),
         ("baro_b_est", HEIGHT_BIAS_ESTIMATOR),

@@ -120,9 +120,9 @@ def estimate_inertial_nav_falling_likelihood(ekf):
     ground) exceeds 1 as well. Range is measured towards the ground, so its innovation counts with opposite sign.
     """
     cs, aid = ekf.cs, ekf.aid
-    knows_gnss = not ekf.withheld.gnss
+    knows_gnss = not ekf.sensors.gnss.withheld
     pressure = _normalised(
-        cs.baro_hgt and not ekf.withheld.baro, aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0]
+        cs.baro_hgt and not ekf.sensors.baro.withheld, aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0]
     )
     gnss = max(
         _normalised(cs.gps_hgt and knows_gnss, aid.gnss_hgt.innovation[0], aid.gnss_hgt.innovation_variance[0]),

@@ -8,18 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import entry_kernel, kernel
-from fusetune.ekf2.feed.buffers import initialise_buffers, push_drag, push_imu
-from fusetune.ekf2.feed.sample_arrival import (
-    receive_airspeed,
-    receive_auxvel,
-    receive_baro,
-    receive_ev,
-    receive_flow,
-    receive_gnss,
-    receive_mag,
-    receive_range,
-    receive_system_flags,
-)
+from fusetune.ekf2.feed.buffers import initialise_buffers, push_imu
+from fusetune.ekf2.feed.sample_arrival import receive_aiding, receive_drag
 from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import save_declination
 from fusetune.ekf2.filter.covariance import reset_accel_bias, reset_gyro_bias
@@ -27,9 +17,8 @@ from fusetune.ekf2.filter.estimator import initialise_estimator, update
 from fusetune.ekf2.filter.imu_down_sampler import accumulate_imu, initialise_down_sampler, reset_down_sampler
 from fusetune.ekf2.filter.output_predictor import initialise_output_predictor, predict_output
 from fusetune.ekf2.replay.commands import handle_command
-from fusetune.ekf2.replay.recording import (
-    record_update,
-)
+from fusetune.ekf2.replay.recording import record_update
+from fusetune.ekf2.replay.withholding import pretend_fused
 
 MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
 
@@ -47,6 +36,7 @@ def run_estimator(ekf, params, inputs, views, recorder, records, runs):
             reset_gyro_bias(ekf, params)
         receive_imu(ekf, params, inputs.imu[run])
         receive_aiding(ekf, params, inputs, arrivals)
+        pretend_fused(ekf)
         if update(ekf, params, inputs):
             save_declination(ekf, params)
             record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
@@ -73,27 +63,4 @@ def receive_imu(ekf, params, imu):
         ekf.imu_updated = True
     buffers = ekf.buffers
     if accumulate_drag(ekf, params, imu, buffers.imu_length, buffers.observation_length):
-        push_drag(ekf, ekf.drag.produced)
-
-
-@kernel
-def receive_aiding(ekf, params, inputs, arrivals):
-    """Buffer what arrived with this IMU sample, in the order of PX4's module."""
-    if arrivals.airspeed >= 0:
-        receive_airspeed(ekf, params, inputs, arrivals.airspeed)
-    if arrivals.auxvel >= 0:
-        receive_auxvel(ekf, params, inputs, arrivals.auxvel)
-    if arrivals.baro >= 0:
-        receive_baro(ekf, params, inputs, arrivals.baro)
-    if arrivals.ev >= 0:
-        receive_ev(ekf, params, inputs, arrivals.ev)
-    if arrivals.flow >= 0:
-        receive_flow(ekf, params, inputs, arrivals.flow)
-    if arrivals.gnss >= 0:
-        receive_gnss(ekf, params, inputs, arrivals.gnss)
-    if arrivals.mag >= 0:
-        receive_mag(ekf, params, inputs, arrivals.mag)
-    if arrivals.range >= 0:
-        receive_range(ekf, params, inputs, arrivals.range)
-    if arrivals.system_flags >= 0:
-        receive_system_flags(ekf, inputs, arrivals.system_flags)
+        receive_drag(ekf.sensors.drag, ekf.drag.produced)

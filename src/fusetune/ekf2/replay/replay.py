@@ -151,7 +151,7 @@ def _continue_into_gap(course: Course, gap: Gap, first: int, last: int) -> GapRe
     if not course.ekf["filter_initialised"][0]:
         return None
     branch = course.branch()
-    branch.ekf["withheld"][gap.sensor] = True
+    branch.ekf["sensors"][gap.sensor]["withheld"] = True
     start = int(branch.ekf["time_delayed_us"][0])
     innovations, _, local_position, _ = joined([branch.run(*stretch) for stretch in branch.stretches(first, last)])
     if not len(local_position):

@@ -18,7 +18,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import earth_fiel
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES
 from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MAG_BODY, MAG_EARTH, TERRAIN, WIND
-from fusetune.ekf2.filter.estimator import SAMPLES
 from fusetune.ekf2.filter.prediction import GRAVITY
 from fusetune.ekf2.numerics.geodesy import reproject
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
@@ -26,10 +25,12 @@ from fusetune.px4.layouts.logged_state import LoggedState
 
 CARRIED = (
     "time_delayed_us", "time_latest_us", "imu_delayed", "imu_newest", "imu_updated", "dt_ekf_avg", "accel_lpf",
-    "gyro_lpf", "air_density", "gnss_yaw_newest_time_us", "down_sampler", "buffers", "output", "drag", "range", "flow",
-    *(f"{name}_{part}" for name in SAMPLES for part in ("newest_time_us", "buffer_exists")),
+    "gyro_lpf", "air_density", "sensors", "down_sampler", "buffers", "output", "drag", "range", "flow",
 )  # fmt: skip
 """What belongs to the arrival of samples and not to the filter."""
+
+OF_THE_FILTER = ("sample", "data_ready")
+"""What, of a sensor, belongs to the filter: the sample that it had in hand."""
 
 TAKEN_FLAGS = (
     "tilt_align", "yaw_align", "gnss_pos", "gnss_vel", "in_air", "wind", "baro_hgt", "gps_hgt", "fixed_wing",
@@ -78,6 +79,9 @@ def take_over(ekf: np.ndarray, fresh: np.ndarray, params: np.void, inputs: Estim
     ekf[:] = fresh
     for name in CARRIED:
         ekf[name] = arrived[name]
+    for name in ekf["sensors"].dtype.names or ():
+        for part in OF_THE_FILTER:
+            ekf["sensors"][name][part] = fresh["sensors"][name][part]
     e = ekf[0]
     e["filter_initialised"] = True
     e["is_first_imu_sample"] = False

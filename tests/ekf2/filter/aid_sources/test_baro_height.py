@@ -25,11 +25,11 @@ def _feed(ekf: np.void, params: np.void, height: float, samples: int = 1, reset:
     for _ in range(samples):
         at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.05)
         ekf["time_good_vert_accel"] = ekf["time_delayed_us"]
-        ekf["baro_sample"]["time_us"] = ekf["time_delayed_us"] - 4_000
-        ekf["baro_sample"]["hgt"] = height
-        ekf["baro_sample"]["reset"] = reset
-        ekf["baro_data_ready"] = True
-        ekf["baro_newest_time_us"] = ekf["time_latest_us"]
+        ekf["sensors"]["baro"]["sample"]["time_us"] = ekf["time_delayed_us"] - 4_000
+        ekf["sensors"]["baro"]["sample"]["hgt"] = height
+        ekf["sensors"]["baro"]["sample"]["reset"] = reset
+        ekf["sensors"]["baro"]["data_ready"] = True
+        ekf["sensors"]["baro"]["newest_time_us"] = ekf["time_latest_us"]
         control_baro_height_fusion(ekf, params)
 
 
@@ -199,8 +199,8 @@ def test_lasting_rejection_of_the_reference_resets_the_height():
 
 def test_stops_without_data():
     ekf, params = _started(BARO)
-    ekf["baro_data_ready"] = False
-    last = ekf["baro_newest_time_us"]
+    ekf["sensors"]["baro"]["data_ready"] = False
+    last = ekf["sensors"]["baro"]["newest_time_us"]
     for seconds, running in ((0.39, True), (0.41, False)):
         ekf["time_latest_us"] = last + round(seconds * 1e6)
         control_baro_height_fusion(ekf, params)

@@ -33,7 +33,7 @@ class Vision:
         velocity_frame: int | None = None,
     ) -> None:
         self.now += SAMPLE_INTERVAL_US
-        ekf, sample = self.ekf, self.ekf["ev_sample"]
+        ekf, sample = self.ekf, self.ekf["sensors"]["ev"]["sample"]
         set_time(ekf, self.now)
         ekf["time_last_hgt_fuse"] = max(ekf["time_last_hgt_fuse"], self.now - 1)
         sample["time_us"] = self.now
@@ -43,15 +43,15 @@ class Vision:
         sample["pos_frame"] = self.frame
         sample["vel_frame"] = self.frame if velocity_frame is None else velocity_frame
         sample["reset_counter"], sample["quality"] = reset_counter, quality
-        ekf["ev_data_ready"] = ekf["ev_buffer_exists"] = True
-        ekf["ev"]["time_last_buffer_push_us"] = self.now
+        ekf["sensors"]["ev"]["data_ready"] = ekf["sensors"]["ev"]["exists"] = True
+        ekf["sensors"]["ev"]["newest_time_us"] = self.now
         ekf["ev"]["newest_quality"] = quality
         self._run()
 
     def wait(self, seconds: float) -> None:
         self.now += round(seconds * 1e6)
         set_time(self.ekf, self.now)
-        self.ekf["ev_data_ready"] = False
+        self.ekf["sensors"]["ev"]["data_ready"] = False
         self._run()
 
     def _run(self) -> None:

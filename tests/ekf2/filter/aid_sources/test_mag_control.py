@@ -33,11 +33,11 @@ def _feed(ekf: np.void, params: np.void, body_field: np.ndarray, samples: int = 
         at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.02)
         ekf["cs_prev"] = ekf["cs"].copy()
         ekf["state_reset_prev"]["quat_counter"] = ekf["state_reset"]["quat_counter"]
-        ekf["mag_sample"]["time_us"] = ekf["time_delayed_us"] - 5_000
-        ekf["mag_sample"]["mag"][:] = body_field
-        ekf["mag_sample"]["reset"] = reset
-        ekf["mag_data_ready"] = True
-        ekf["mag_newest_time_us"] = ekf["time_latest_us"]
+        ekf["sensors"]["mag"]["sample"]["time_us"] = ekf["time_delayed_us"] - 5_000
+        ekf["sensors"]["mag"]["sample"]["mag"][:] = body_field
+        ekf["sensors"]["mag"]["sample"]["reset"] = reset
+        ekf["sensors"]["mag"]["data_ready"] = True
+        ekf["sensors"]["mag"]["newest_time_us"] = ekf["time_latest_us"]
         control_mag_fusion(ekf, params)
 
 
@@ -122,8 +122,8 @@ def test_type_none_stops():
 def test_stops_after_a_second_without_data():
     ekf, params = _levelled(), make_parameters(EKF2_MAG_CHECK=0)
     _feed(ekf, params, FIELD, samples=5)
-    ekf["mag_data_ready"] = False
-    last = ekf["mag_newest_time_us"]
+    ekf["sensors"]["mag"]["data_ready"] = False
+    last = ekf["sensors"]["mag"]["newest_time_us"]
     for seconds, running in ((0.9, True), (1.1, False)):
         ekf["time_latest_us"] = last + round(seconds * 1e6)
         control_mag_fusion(ekf, params)

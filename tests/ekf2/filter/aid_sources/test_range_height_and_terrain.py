@@ -33,7 +33,7 @@ def _flying(time_s: float = 5.0, altitude: float = 2.0) -> np.void:
     ekf["height_sensor_ref"] = HEIGHT_REF_GNSS
     ekf["gpos_alt"] = altitude
     ekf["P"][...] = np.eye(24) * 0.01
-    ekf["range_buffer_exists"] = True
+    ekf["sensors"]["range"]["exists"] = True
     ekf["range"]["sensor_min_distance"] = 0.1
     ekf["range"]["sensor_max_distance"] = 40.0
     return ekf
@@ -43,11 +43,11 @@ def _feed(ekf: np.void, params: np.void, distance: float, samples: int = 1, qual
     for _ in range(samples):
         at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.05)
         ekf["time_good_vert_accel"] = ekf["time_last_hgt_fuse"] = ekf["time_delayed_us"]
-        ekf["range_sample"]["time_us"] = ekf["time_delayed_us"] - 3_000
-        ekf["range_sample"]["range"] = distance
-        ekf["range_sample"]["quality"] = quality
-        ekf["range_data_ready"] = True
-        ekf["range_newest_time_us"] = ekf["time_latest_us"]
+        ekf["sensors"]["range"]["sample"]["time_us"] = ekf["time_delayed_us"] - 3_000
+        ekf["sensors"]["range"]["sample"]["range"] = distance
+        ekf["sensors"]["range"]["sample"]["quality"] = quality
+        ekf["sensors"]["range"]["data_ready"] = True
+        ekf["sensors"]["range"]["newest_time_us"] = ekf["time_latest_us"]
         control_range_hagl_fusion(ekf, params)
 
 
@@ -188,7 +188,8 @@ def test_height_that_failed_too_long_is_taken_from_the_distance():
     ekf["vel"][2] = 1.0
     at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.05)
     ekf["time_last_hgt_fuse"] = ekf["time_delayed_us"] - 5_100_000
-    ekf["range_sample"]["time_us"] = ekf["range_newest_time_us"] = ekf["time_delayed_us"] - 3_000
+    sensor, measured_us = ekf["sensors"]["range"], ekf["time_delayed_us"] - 3_000
+    sensor["sample"]["time_us"] = sensor["newest_time_us"] = measured_us
     control_range_hagl_fusion(ekf, params)
     assert ekf["gpos_alt"] == pytest.approx(2.0, abs=1e-6)
     assert ekf["vel"][2] == 0.0
@@ -261,8 +262,8 @@ def test_disabled_range_finder_is_only_observed():
 def test_stops_without_data():
     ekf, params = _flying(), make_parameters(EKF2_RNG_CTRL=CONDITIONAL)
     _feed(ekf, params, 2.0, samples=3)
-    ekf["range_data_ready"] = False
-    last = ekf["range_newest_time_us"]
+    ekf["sensors"]["range"]["data_ready"] = False
+    last = ekf["sensors"]["range"]["newest_time_us"]
     for seconds, running in ((0.39, True), (0.41, False)):
         ekf["time_latest_us"] = last + round(seconds * 1e6)
         control_range_hagl_fusion(ekf, params)

@@ -15,7 +15,6 @@ from fusetune.ekf2.filter.common.control_status import (
     INNOVATION_REJECTION,
 )
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
-from fusetune.ekf2.replay.withholding import WITHHELD
 
 HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_RANGE, HEIGHT_REF_EV, HEIGHT_REF_UNKNOWN = 0, 1, 2, 3, 4
 """Height reference: the values of `EKF2_HGT_REF`, and the unknown one at start."""
@@ -91,7 +90,6 @@ CORE_FIELDS = [
     ("reject", INNOVATION_REJECTION),
     ("events", INFORMATION_EVENTS),
     ("aid", AID_SOURCES),
-    ("withheld", WITHHELD),
     ("state_reset", STATE_RESET),
     ("state_reset_prev", STATE_RESET_COUNTERS),
     ("height_sensor_ref", "i8"),

@@ -35,9 +35,9 @@ def control_air_data_fusion(ekf, params):
     _assume_yaw_estimator_airspeed(ekf, params)
     if params.EKF2_ARSP_THR <= 0.0:
         stop_airspeed_fusion(ekf)
-    elif ekf.airspeed_data_ready:
+    elif ekf.sensors.airspeed.data_ready:
         _use_airspeed_sample(ekf, params)
-    elif ekf.cs.fuse_aspd and not is_recent(ekf, ekf.airspeed_sample.time_us, DATA_STOPPED_US):
+    elif ekf.cs.fuse_aspd and not is_recent(ekf, ekf.sensors.airspeed.sample.time_us, DATA_STOPPED_US):
         stop_airspeed_fusion(ekf)
 
 
@@ -53,7 +53,7 @@ def _assume_yaw_estimator_airspeed(ekf, params):
 
 @kernel
 def _use_airspeed_sample(ekf, params):
-    aid, sample = ekf.aid.airspeed, ekf.airspeed_sample
+    aid, sample = ekf.aid.airspeed, ekf.sensors.airspeed.sample
     update_airspeed(ekf, params)
     ekf.reject.airspeed = aid.innovation_rejected
     continuing_conditions_passing = ekf.cs.in_air and not ekf.cs.fake_pos

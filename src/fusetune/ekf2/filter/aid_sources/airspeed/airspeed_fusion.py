@@ -41,7 +41,7 @@ def compute_airspeed_jacobian(ekf, H):
 @kernel
 def update_airspeed(ekf, params):
     """Judge the airspeed that is due now."""
-    sample, H = ekf.airspeed_sample, ekf.airspeed.H
+    sample, H = ekf.sensors.airspeed.sample, ekf.airspeed.H
     variance = airspeed_variance(params, sample.eas2tas)
     compute_airspeed_jacobian(ekf, H)
     innovation = predict_airspeed(ekf) - sample.true_airspeed

@@ -31,8 +31,8 @@ def reset_wind_using_airspeed(ekf, params):
     Its covariance takes in the variances of velocity, heading, airspeed and an assumed sideslip of 15° (one sigma),
     to first order.
     """
-    airspeed = ekf.airspeed_sample.true_airspeed
-    along = airspeed_variance(params, ekf.airspeed_sample.eas2tas)
+    airspeed = ekf.sensors.airspeed.sample.true_airspeed
+    along = airspeed_variance(params, ekf.sensors.airspeed.sample.eas2tas)
     across = airspeed * airspeed * (yaw_variance(ekf) + SIDESLIP_VARIANCE_AT_RESET)
     var_north, var_east = ekf.P[VELOCITY, VELOCITY], ekf.P[VELOCITY + 1, VELOCITY + 1]
     yaw = euler_yaw(ekf.R_to_earth)
@@ -50,7 +50,7 @@ def reset_wind_using_airspeed(ekf, params):
 @kernel
 def reset_vel_using_airspeed(ekf, params):
     """Set the velocity as for level flight without sideslip in the wind last known; its variance stays."""
-    airspeed = ekf.airspeed_sample.true_airspeed
+    airspeed = ekf.sensors.airspeed.sample.true_airspeed
     yaw = euler_yaw(ekf.R_to_earth)
     north = ekf.wind_vel[0] + airspeed * math.cos(yaw)
     east = ekf.wind_vel[1] + airspeed * math.sin(yaw)

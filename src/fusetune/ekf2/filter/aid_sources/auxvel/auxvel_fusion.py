@@ -16,9 +16,9 @@ AUXVEL_GATE = 5.0
 @kernel
 def control_aux_vel_fusion(ekf, params):
     """Judge the auxiliary velocity due now, and fuse it beside another horizontal aid."""
-    if not ekf.auxvel_data_ready:
+    if not ekf.sensors.auxvel.data_ready:
         return
-    aid, sample = ekf.aid.aux_vel, ekf.auxvel_sample
+    aid, sample = ekf.aid.aux_vel, ekf.sensors.auxvel.sample
     for i in range(2):
         variance = sample.vel_var[i]
         innovation_variance = ekf.P[VELOCITY + i, VELOCITY + i] + variance

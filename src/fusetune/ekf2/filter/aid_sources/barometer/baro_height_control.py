@@ -3,6 +3,7 @@
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import apply_ground_effect_deadzone
 from fusetune.ekf2.filter.aid_sources.barometer.static_pressure import compensate_baro_for_dynamic_pressure
 from fusetune.ekf2.filter.bias_estimator.bias_estimator import (
@@ -26,7 +27,6 @@ from fusetune.ekf2.filter.common.timing import (
 from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.filter.resets.origin_resets import initialise_altitude_to
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_vertical_velocity_to_zero
-from fusetune.ekf2.replay.withholding import pretend_height_fused
 
 BARO_LPF_ALPHA = 0.1
 BARO_BIAS_NSD = 0.13
@@ -37,20 +37,19 @@ def control_baro_height_fusion(ekf, params):
     """Process the barometer sample that reached the fusion time horizon, if any."""
     predict_height_bias(ekf, ekf.baro_b_est, HEIGHT_REF_BARO, ekf.dt_ekf_avg)
 
-    if ekf.baro_data_ready:
-        measurement = compensate_baro_for_dynamic_pressure(ekf, params, ekf.baro_sample.hgt)
+    if ekf.sensors.baro.data_ready:
+        measurement = compensate_baro_for_dynamic_pressure(ekf, params, ekf.sensors.baro.sample.hgt)
         variance = params.EKF2_BARO_NOISE * params.EKF2_BARO_NOISE
         valid = math.isfinite(measurement) and math.isfinite(variance)
         if valid:
             _filter_measurement(ekf, measurement)
         _update_baro_status(ekf, params, measurement, variance)
-        if ekf.withheld.baro:
-            pretend_height_fused(ekf, ekf.aid.baro_hgt, ekf.cs.baro_hgt)
+        if not is_fusion_due(ekf.sensors.baro):
             return
         if valid:
             _update_bias(ekf, measurement, variance)
         _control_with_sample(ekf, params, measurement, variance, valid)
-    elif ekf.cs.baro_hgt and not is_newer_than_latest(ekf, ekf.baro_newest_time_us, 2 * BARO_MAX_INTERVAL):
+    elif ekf.cs.baro_hgt and not is_newer_than_latest(ekf, ekf.sensors.baro.newest_time_us, 2 * BARO_MAX_INTERVAL):
         stop_baro_hgt_fusion(ekf)
 
 
@@ -58,7 +57,7 @@ def control_baro_height_fusion(ekf, params):
 def _filter_measurement(ekf, measurement):
     """Low-pass the height; while the filter fills, the bias is what the height differs from the estimate by."""
     baro = ekf.baro
-    if baro.counter == 0 or ekf.baro_sample.reset:
+    if baro.counter == 0 or ekf.sensors.baro.sample.reset:
         baro.lpf = measurement
         baro.counter = 1
         ekf.cs.baro_fault = False
@@ -76,7 +75,7 @@ def _update_baro_status(ekf, params, measurement, variance):
     update_vertical_position_aid_status(
         ekf,
         aid,
-        ekf.baro_sample.time_us,
+        ekf.sensors.baro.sample.time_us,
         -(measurement - bias.bias),
         variance + bias.bias_var,
         max(params.EKF2_BARO_GATE, 1.0),
@@ -108,7 +107,7 @@ def _control_with_sample(ekf, params, measurement, variance, valid):
             _fuse_or_recover(ekf, params, variance)
         else:
             stop_baro_hgt_fusion(ekf)
-    elif continuing and is_newer_than_latest(ekf, ekf.baro_newest_time_us, 2 * BARO_MAX_INTERVAL):
+    elif continuing and is_newer_than_latest(ekf, ekf.sensors.baro.newest_time_us, 2 * BARO_MAX_INTERVAL):
         _start(ekf, params, measurement, variance)
 
 

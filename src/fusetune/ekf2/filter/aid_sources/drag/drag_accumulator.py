@@ -25,7 +25,7 @@ def accumulate_drag(ekf, params, imu, imu_buffer_length, obs_buffer_length):
     """
     if int(params.EKF2_DRAG_CTRL) <= 0:
         return False
-    ekf.drag_buffer_exists = True
+    ekf.sensors.drag.exists = True
     drag = ekf.drag
     if imu.delta_vel_clipping[0] != 0 or imu.delta_vel_clipping[1] != 0 or imu.delta_vel_clipping[2] != 0:
         _restart(drag)

@@ -94,13 +94,13 @@ def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
 @kernel
 def control_drag_fusion(ekf, params):
     """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
-    if int(params.EKF2_DRAG_CTRL) <= 0 or not ekf.drag_buffer_exists:
+    if int(params.EKF2_DRAG_CTRL) <= 0 or not ekf.sensors.drag.exists:
         return
     if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
         ekf.cs.wind = True
         if not ekf.wind.external_init:
             reset_wind_cov(ekf)
-    if ekf.drag_data_ready:
+    if ekf.sensors.drag.data_ready:
         _fuse_drag(ekf, params)
 
 
@@ -123,7 +123,7 @@ def _fuse_drag(ekf, params):
     for axis in range(2):
         compute_drag_jacobian(ekf, axis, rho, inverse_bcoef[axis], mcoef, drag.H[axis])
     for axis in range(2):
-        measured = ekf.drag_sample.accel_xy[axis] - ekf.accel_bias[axis]
+        measured = ekf.sensors.drag.sample.accel_xy[axis] - ekf.accel_bias[axis]
         innovation = predicted[axis] - measured
         innovation_variance = compute_innovation_variance(ekf, drag.H[axis], R_acc)
         set_axis(aid, axis, measured, R_acc, innovation, innovation_variance)
@@ -135,6 +135,6 @@ def _fuse_drag(ekf, params):
         if ekf.cs.in_air and ekf.cs.wind and not ekf.cs.fake_pos and test_ratio < 1.0:
             compute_kalman_gain(ekf, drag.H[axis], innovation_variance, ekf.scratch.K)
             measurement_update(ekf, params, ekf.scratch.K, drag.H[axis], R_acc, innovation)
-    update_aid_source_status(ekf, aid, 2, ekf.drag_sample.time_us, DRAG_GATE)
+    update_aid_source_status(ekf, aid, 2, ekf.sensors.drag.sample.time_us, DRAG_GATE)
     aid.fused = True
     aid.time_last_fuse = ekf.time_delayed_us

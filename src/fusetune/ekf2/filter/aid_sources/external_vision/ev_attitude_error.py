@@ -21,7 +21,7 @@ FILTER_ALPHA = FILTER_INTERVAL_S / (FILTER_INTERVAL_S + FILTER_TIME_CONSTANT_S)
 def update_ev_attitude_error_filter(ekf, ev_reset):
     """Filter the rotation between the vision attitude and the estimate; restart it when vision was reset."""
     error = ekf.scratch.quat_error
-    quat = ekf.ev_sample.quat
+    quat = ekf.sensors.ev.sample.quat
     error[0], error[1], error[2], error[3] = quat[0], -quat[1], -quat[2], -quat[3]
     quat_multiply(ekf.q, error, error)
     quat_normalise(error)

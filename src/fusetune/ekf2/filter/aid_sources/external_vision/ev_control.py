@@ -37,22 +37,22 @@ def _assume_missing_frames(sample):
 @kernel
 def _are_starting_conditions_passing(ekf, minimum_quality):
     """Whether samples come regularly, and this, the one before and the newest are good enough."""
-    ev, sample = ekf.ev, ekf.ev_sample
+    ev, sample = ekf.ev, ekf.sensors.ev.sample
     quality = min(sample.quality, ev.prev.quality, ev.newest_quality)
     return (
         (minimum_quality <= 0 or quality >= minimum_quality)
         and sample.time_us - ev.prev.time_us < EV_MAX_INTERVAL
-        and is_newer_than_latest(ekf, ev.time_last_buffer_push_us, EV_MAX_INTERVAL)
+        and is_newer_than_latest(ekf, ekf.sensors.ev.newest_time_us, EV_MAX_INTERVAL)
     )
 
 
 @kernel
 def control_external_vision_fusion(ekf, params):
     """Use the external vision sample due now, if there is one; stop when none has come for two intervals."""
-    ev, sample = ekf.ev, ekf.ev_sample
+    ev, sample = ekf.ev, ekf.sensors.ev.sample
     predict_position_bias(ekf, ekf.ev_pos_b_est, POSITION_REF_EV, ekf.dt_ekf_avg)
     predict_height_bias(ekf, ekf.ev_hgt_b_est, HEIGHT_REF_EV, ekf.dt_ekf_avg)
-    if ekf.ev_data_ready:
+    if ekf.sensors.ev.data_ready:
         _assume_missing_frames(sample)
         minimum_quality = int(params.EKF2_EV_QMIN)
         ev_reset = sample.reset_counter != ev.prev.reset_counter

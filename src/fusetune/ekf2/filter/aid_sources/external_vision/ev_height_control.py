@@ -41,7 +41,7 @@ BIAS_NOISE_SPECTRAL_DENSITY = 0.13
 @kernel
 def _measured_height(ekf, params):
     """Down position (m) of the IMU by external vision, and its variance."""
-    sample = ekf.ev_sample
+    sample = ekf.sensors.ev.sample
     position, variance = sample.pos[2], sample.position_var[2]
     if not (ekf.cs.ev_yaw and ekf.cs.ev_pos):
         # not working entirely in the vision frame
@@ -79,7 +79,7 @@ def control_ev_height_fusion(ekf, params, common_starting_conditions_passing, ev
     update_vertical_position_aid_status(
         ekf,
         aid,
-        ekf.ev_sample.time_us,
+        ekf.sensors.ev.sample.time_us,
         measurement - bias.bias,
         variance + bias.bias_var,
         max(params.EKF2_EVP_GATE, 1.0),
@@ -133,7 +133,7 @@ def _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_suffi
 @kernel
 def _reset_vertical_velocity(ekf, params):
     """To that of external vision where it is to be used, else to rest."""
-    sample, R = ekf.ev_sample, ekf.R_to_earth
+    sample, R = ekf.sensors.ev.sample, ekf.R_to_earth
     vel = sample.vel
     finite = math.isfinite(vel[0]) and math.isfinite(vel[1]) and math.isfinite(vel[2])
     if not finite or (int(params.EKF2_EV_CTRL) & EV_CTRL_VEL) == 0:

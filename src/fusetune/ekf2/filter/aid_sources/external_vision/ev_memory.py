@@ -9,7 +9,6 @@ EV_MEMORY = np.dtype(
     [
         ("prev", EV_SAMPLE),
         ("newest_quality", "i8"),
-        ("time_last_buffer_push_us", "i8"),
         ("q_error_filt", "f8", (4,)),
         ("q_error_initialized", "?"),
         ("R_ev_to_ekf", "f8", (3, 3)),
@@ -24,8 +23,7 @@ EV_MEMORY = np.dtype(
 )
 """Sub-record `ekf.ev`.
 
-`prev` is the last sample of sufficient quality, `newest_quality` that of the sample pushed last
-into the buffer, at the IMU time `time_last_buffer_push_us`.
+`prev` is the last sample of sufficient quality, `newest_quality` that of the sample buffered last.
 `q_error_filt` is the filtered rotation from the vision frame to NED, `R_ev_to_ekf` work space for its matrix.
 The position and height biases are `ekf.ev_pos_b_est` and `ekf.ev_hgt_b_est`.
 """
@@ -43,7 +41,6 @@ def initialise_ev_memory(ev):
     ev.prev.reset_counter = 0
     ev.prev.quality = 0
     ev.newest_quality = 0
-    ev.time_last_buffer_push_us = 0
     ev.q_error_filt[0] = 1.0
     for i in range(1, 4):
         ev.q_error_filt[i] = 0.0

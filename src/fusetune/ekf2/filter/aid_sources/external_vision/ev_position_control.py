@@ -46,7 +46,7 @@ def _position_in_ekf_frame(ekf, params, axis):
 
     NaN while the sample's frame cannot be related to it.
     """
-    sample = ekf.ev_sample
+    sample = ekf.sensors.ev.sample
     px, py, pz = sensor_offset_body(params)
     position, variance = np.nan, 0.0
     if (sample.pos_frame == EV_FRAME_NED and ekf.cs.yaw_align) or (sample.pos_frame == EV_FRAME_FRD and ekf.cs.ev_yaw):
@@ -71,7 +71,7 @@ def _position_in_ekf_frame(ekf, params, axis):
 @kernel
 def _select_bias_fusion(ekf):
     """Estimate the bias of vision where GNSS position is the reference; return whether the frame is usable."""
-    frame, estimator = ekf.ev_sample.pos_frame, ekf.ev_pos_b_est
+    frame, estimator = ekf.sensors.ev.sample.pos_frame, ekf.ev_pos_b_est
     if frame == EV_FRAME_NED and ekf.cs.yaw_align:
         estimator.fusion_active = ekf.cs.gnss_pos
         return True
@@ -99,7 +99,7 @@ def _update_ev_pos(ekf, params, north, east, var_north, var_east):
             estimate[i] - measurement[i],
             ekf.P[POSITION + i, POSITION + i] + variance[i],
         )
-    update_aid_source_status(ekf, aid, 2, ekf.ev_sample.time_us, max(params.EKF2_EVP_GATE, 1.0))
+    update_aid_source_status(ekf, aid, 2, ekf.sensors.ev.sample.time_us, max(params.EKF2_EVP_GATE, 1.0))
 
 
 @kernel
@@ -134,7 +134,7 @@ def _reset_position_to_ev(ekf, params, north, east, var_north, var_east):
 @kernel
 def control_ev_pos_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the horizontal position of external vision for one sample."""
-    sample, estimator = ekf.ev_sample, ekf.ev_pos_b_est
+    sample, estimator = ekf.sensors.ev.sample, ekf.ev_pos_b_est
     yaw_alignment_changed = is_yaw_alignment_changed(ekf)
     bias_fusion_was_active = estimator.fusion_active
     frame_usable = _select_bias_fusion(ekf)

@@ -47,7 +47,7 @@ START_GATE_FACTOR = math.sqrt(10.0)
 @kernel
 def _prepare_measurement(ekf, params):
     """Refer the velocity to the IMU, in the frame in which it is fused; NaN while that frame is not aligned."""
-    sample, ev, R = ekf.ev_sample, ekf.ev, ekf.R_to_earth
+    sample, ev, R = ekf.sensors.ev.sample, ekf.ev, ekf.R_to_earth
     ox, oy, oz = sensor_velocity_body(ekf, params)
     min_variance = max(params.EKF2_EVV_NOISE * params.EKF2_EVV_NOISE, MIN_NOISE * MIN_NOISE)
     offset_body = (ox, oy, oz)
@@ -74,7 +74,7 @@ def _prepare_measurement(ekf, params):
 
 @kernel
 def _is_measurement_valid(ekf, params):
-    sample, ev = ekf.ev_sample, ekf.ev
+    sample, ev = ekf.sensors.ev.sample, ekf.ev
     speed_squared = 0.0
     for i in range(3):
         if not math.isfinite(ev.vel_measurement[i]) or not math.isfinite(ev.vel_measurement_var[i]):
@@ -86,12 +86,12 @@ def _is_measurement_valid(ekf, params):
 @kernel
 def _fuse_ev_velocity(ekf, params, gate):
     aid, ev = ekf.aid.ev_vel, ekf.ev
-    if ekf.ev_sample.vel_frame == EV_FRAME_BODY_FRD:
+    if ekf.sensors.ev.sample.vel_frame == EV_FRAME_BODY_FRD:
         fuse_body_frame_velocity(
             ekf,
             params,
             aid,
-            ekf.ev_sample.time_us,
+            ekf.sensors.ev.sample.time_us,
             ev.vel_measurement,
             ev.vel_measurement_var,
             gate,
@@ -111,7 +111,7 @@ def _fuse_ev_velocity(ekf, params, gate):
 def _reset_velocity_to_ev(ekf, params):
     ev, R = ekf.ev, ekf.R_to_earth
     ekf.events.reset_vel_to_vision = True
-    if ekf.ev_sample.vel_frame == EV_FRAME_BODY_FRD:
+    if ekf.sensors.ev.sample.vel_frame == EV_FRAME_BODY_FRD:
         velocity, variance = ekf.scratch.PH[:3], ekf.scratch.PH_reduce[:3]
         m = ev.vel_measurement
         for i in range(3):

@@ -24,7 +24,7 @@ RESTART_INTERVAL_US = 1_000_000
 @kernel
 def control_ev_yaw_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the yaw of external vision for one sample."""
-    sample, aid = ekf.ev_sample, ekf.aid.ev_yaw
+    sample, aid = ekf.sensors.ev.sample, ekf.aid.ev_yaw
     _update_ev_yaw(ekf, params)
     if ev_reset:
         ekf.cs.ev_yaw_fault = False
@@ -55,13 +55,13 @@ def control_ev_yaw_fusion(ekf, params, common_starting_conditions_passing, ev_re
 @kernel
 def _update_ev_yaw(ekf, params):
     R = ekf.scratch.R
-    quat_to_dcm(ekf.ev_sample.quat, R)
+    quat_to_dcm(ekf.sensors.ev.sample.quat, R)
     observation = euler_yaw(R)
-    variance = max(ekf.ev_sample.orientation_var[2], params.EKF2_EVA_NOISE, MIN_NOISE * MIN_NOISE)
+    variance = max(ekf.sensors.ev.sample.orientation_var[2], params.EKF2_EVA_NOISE, MIN_NOISE * MIN_NOISE)
     innovation = wrap_pi(euler_yaw(ekf.R_to_earth) - observation)
     innovation_variance = compute_yaw_innov_var_and_h(ekf, variance, ekf.scratch.H)
     set_axis(ekf.aid.ev_yaw, 0, observation, variance, innovation, innovation_variance)
-    update_aid_source_status(ekf, ekf.aid.ev_yaw, 1, ekf.ev_sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
+    update_aid_source_status(ekf, ekf.aid.ev_yaw, 1, ekf.sensors.ev.sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
 
 
 @kernel
@@ -95,7 +95,7 @@ def _continue_ev_yaw(ekf, params, ev_reset, quality_sufficient):
 
 @kernel
 def _start_ev_yaw(ekf, params):
-    frame = ekf.ev_sample.pos_frame
+    frame = ekf.sensors.ev.sample.pos_frame
     if frame == EV_FRAME_NED:
         if ekf.cs.yaw_align:
             ekf.cs.ev_yaw = fuse_yaw(ekf, params, ekf.aid.ev_yaw, ekf.scratch.H)

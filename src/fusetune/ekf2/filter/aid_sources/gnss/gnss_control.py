@@ -1,6 +1,7 @@
 """What GNSS does at each update: checks, yaw estimator, heading, velocity and position, in the order of PX4 v1.16."""
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_checks import check_gnss_sample
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import stop_gps_hgt_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS
@@ -29,7 +30,6 @@ from fusetune.ekf2.filter.common.timing import (
 )
 from fusetune.ekf2.filter.yaw_estimator.gaussian_sum import predict_gsf
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import reset_gsf, set_gyro_bias
-from fusetune.ekf2.replay.withholding import pretend_gnss_fused
 
 YAW_EMERGENCY_DELAY = 1_000_000
 """How long (µs) horizontal velocity must have been rejected before the yaw is blamed."""
@@ -37,31 +37,29 @@ YAW_EMERGENCY_DELAY = 1_000_000
 
 @kernel
 def control_gnss_fusion(ekf, params):
-    """Run GNSS for one update, with the sample in `ekf.gnss_sample` if `ekf.gnss_data_ready`.
+    """Run GNSS for one update, with the sample in `ekf.sensors.gnss.sample` if `ekf.sensors.gnss.data_ready`.
 
-    A sample that fails the checks is not used: `ekf.gnss_data_ready` is cleared, for the height, too.
+    A sample that fails the checks is not used: `ekf.sensors.gnss.data_ready` is cleared, for the height, too.
     """
-    if not ekf.gnss_buffer_exists or int(params.EKF2_GPS_CTRL) == 0:
+    if not ekf.sensors.gnss.exists or int(params.EKF2_GPS_CTRL) == 0:
         stop_gnss_fusion(ekf)
         return
 
     _run_yaw_estimator(ekf)
-    ekf.gnss.intermittent = not is_newer_than_latest(ekf, ekf.gnss_newest_time_us, 2 * GNSS_MAX_INTERVAL)
+    ekf.gnss.intermittent = not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL)
 
-    if ekf.gnss_data_ready:
-        if not check_gnss_sample(ekf, params, ekf.gnss_sample):
-            ekf.gnss_data_ready = False
+    if ekf.sensors.gnss.data_ready:
+        if not check_gnss_sample(ekf, params, ekf.sensors.gnss.sample):
+            ekf.sensors.gnss.data_ready = False
             if _uses_gnss(ekf) and is_timed_out(ekf, ekf.gnss.last_pass_us, RESET_TIMEOUT_MAX):
                 stop_gnss_fusion(ekf)
-        update_gnss_position(ekf, params, ekf.gnss_sample)
-        update_gnss_velocity(ekf, params, ekf.gnss_sample)
-    elif _uses_gnss(ekf) and not is_newer_than_latest(ekf, ekf.gnss_newest_time_us, RESET_TIMEOUT_MAX):
+        update_gnss_position(ekf, params, ekf.sensors.gnss.sample)
+        update_gnss_velocity(ekf, params, ekf.sensors.gnss.sample)
+    elif _uses_gnss(ekf) and not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, RESET_TIMEOUT_MAX):
         stop_gnss_fusion(ekf)
 
-    if ekf.withheld.gnss:
-        pretend_gnss_fused(ekf)
-    elif ekf.gnss_data_ready:
-        control_gnss_yaw_fusion(ekf, params, ekf.gnss_sample)
+    if is_fusion_due(ekf.sensors.gnss):
+        control_gnss_yaw_fusion(ekf, params, ekf.sensors.gnss.sample)
         control_gnss_yaw_estimator(ekf, params)
         force_reset = _is_reset_due(ekf, params)
         control_gnss_vel_fusion(ekf, params, force_reset)

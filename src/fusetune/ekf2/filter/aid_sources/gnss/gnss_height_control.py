@@ -3,6 +3,7 @@
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VPOS
 from fusetune.ekf2.filter.bias_estimator.bias_estimator import (
@@ -28,7 +29,6 @@ from fusetune.ekf2.filter.common.timing import (
 from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.filter.resets.origin_resets import initialise_altitude_to
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to
-from fusetune.ekf2.replay.withholding import pretend_height_fused
 
 TYPICAL_VACC_PER_HACC = 1.5
 HEIGHT_BIAS_NOISE_DENSITY = 0.13
@@ -37,11 +37,11 @@ HEIGHT_BIAS_NOISE_DENSITY = 0.13
 
 @kernel
 def control_gnss_height_fusion(ekf, params):
-    """Run GNSS height for one update, with the sample in `ekf.gnss_sample` if `ekf.gnss_data_ready`."""
+    """Run GNSS height for one update, with the sample in `ekf.sensors.gnss.sample` if `ekf.sensors.gnss.data_ready`."""
     predict_height_bias(ekf, ekf.gps_hgt_b_est, HEIGHT_REF_GNSS, ekf.dt_ekf_avg)
-    if ekf.gnss_data_ready:
-        _use_gnss_height(ekf, params, ekf.gnss_sample)
-    elif ekf.cs.gps_hgt and not is_newer_than_latest(ekf, ekf.gnss_newest_time_us, 2 * GNSS_MAX_INTERVAL):
+    if ekf.sensors.gnss.data_ready:
+        _use_gnss_height(ekf, params, ekf.sensors.gnss.sample)
+    elif ekf.cs.gps_hgt and not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL):
         stop_gps_hgt_fusion(ekf)
 
 
@@ -66,8 +66,7 @@ def _use_gnss_height(ekf, params, sample):
         variance + bias_est.bias_var,
         max(params.EKF2_GPS_P_GATE, 1.0),
     )
-    if ekf.withheld.gnss:
-        pretend_height_fused(ekf, aid, ekf.cs.gps_hgt)
+    if not is_fusion_due(ekf.sensors.gnss):
         return
     # the bias follows once the innovation has been formed with its old value, but before the filter is corrected
     if valid:
@@ -84,7 +83,7 @@ def _use_gnss_height(ekf, params, sample):
     usable = valid and ekf.origin.lat_lon_valid and ekf.gnss.checks_passed
     continuing = usable and int(params.EKF2_GPS_CTRL) & GPS_CTRL_VPOS != 0
     if not ekf.cs.gps_hgt:
-        recent = is_newer_than_latest(ekf, ekf.gnss_newest_time_us, 2 * GNSS_MAX_INTERVAL)
+        recent = is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL)
         _start_gnss_height(ekf, params, measurement, variance, continuing and recent, usable and recent)
     elif continuing:
         _continue_gnss_height(ekf, params, measurement, variance)

@@ -34,7 +34,7 @@ def update_gnss_velocity(ekf, params, sample):
 
     # while the vertical acceleration is bad, an accurate velocity is what can still hold the height: limit, not reject
     only_vertical_rejected = aid.test_ratio[2] > 1.0 and aid.test_ratio[0] < 1.0 and aid.test_ratio[1] < 1.0
-    relied_on = ekf.fs.bad_acc_vertical and not ekf.withheld.gnss
+    relied_on = ekf.fs.bad_acc_vertical and not ekf.sensors.gnss.withheld
     if relied_on and only_vertical_rejected and sample.sacc < params.EKF2_REQ_SACC:
         limit = gate * math.sqrt(aid.innovation_variance[2])
         aid.innovation[2] = min(max(aid.innovation[2], -limit), limit)

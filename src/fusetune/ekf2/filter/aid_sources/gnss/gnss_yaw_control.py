@@ -69,7 +69,7 @@ def control_gnss_yaw_fusion(ekf, params, sample):
         stop_gnss_yaw_fusion(ekf)
         return
     if not np.isfinite(sample.yaw):
-        if ekf.cs.gnss_yaw and not is_newer_than_latest(ekf, ekf.gnss_yaw_newest_time_us, RESET_TIMEOUT_MAX):
+        if ekf.cs.gnss_yaw and not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_yaw_time_us, RESET_TIMEOUT_MAX):
             stop_gnss_yaw_fusion(ekf)
         return
 
@@ -85,7 +85,7 @@ def control_gnss_yaw_fusion(ekf, params, sample):
         continuing
         and ekf.gnss.checks_passed
         and not ekf.gnss.intermittent
-        and is_newer_than_latest(ekf, ekf.gnss_yaw_newest_time_us, 2 * GNSS_YAW_MAX_INTERVAL)
+        and is_newer_than_latest(ekf, ekf.sensors.gnss.newest_yaw_time_us, 2 * GNSS_YAW_MAX_INTERVAL)
     ):
         _start_gnss_yaw(ekf, params, sample)
 

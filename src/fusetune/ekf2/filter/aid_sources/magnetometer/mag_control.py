@@ -7,6 +7,7 @@ was aligned in flight). `cs.mag_3d`: every state. `cs.mag_dec`: declination too,
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_checks import check_mag_field
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     R_MAG_MIN,
@@ -45,7 +46,6 @@ from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.common.timing import MAG_MAX_INTERVAL, RESET_TIMEOUT_MAX, is_newer_than_latest, is_timed_out
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance
-from fusetune.ekf2.replay.withholding import pretend_mag_fused
 
 MAG_LPF_ALPHA = 0.1
 MIN_SAMPLES_TO_START = 3
@@ -64,19 +64,19 @@ def control_mag_fusion(ekf, params):
         stop_mag_fusion(ekf, params)
         return
 
-    if ekf.mag_data_ready:
+    if ekf.sensors.mag.data_ready:
         _filter_sample(ekf, params)
         wmm_updated = check_world_magnetic_model(ekf)
         _control_with_sample(ekf, params, wmm_updated)
-    elif not is_newer_than_latest(ekf, ekf.mag_newest_time_us, 2 * MAG_MAX_INTERVAL):
+    elif not is_newer_than_latest(ekf, ekf.sensors.mag.newest_time_us, 2 * MAG_MAX_INTERVAL):
         stop_mag_fusion(ekf, params)
 
 
 @kernel
 def _filter_sample(ekf, params):
     """Low-pass the field; start anew at the first sample and when sensor or calibration changed."""
-    sample, mag = ekf.mag_sample.mag, ekf.mag
-    if not ekf.mag_sample.reset and mag.counter > 0:
+    sample, mag = ekf.sensors.mag.sample.mag, ekf.mag
+    if not ekf.sensors.mag.sample.reset and mag.counter > 0:
         for axis in range(3):
             mag.lpf[axis] += MAG_LPF_ALPHA * (sample[axis] - mag.lpf[axis])
         mag.counter += 1
@@ -96,7 +96,7 @@ def _filter_sample(ekf, params):
 @kernel
 def _control_with_sample(ekf, params, wmm_updated):
     """Judge the sample, choose the mode, then fuse, reset, start or stop."""
-    sample, aid = ekf.mag_sample.mag, ekf.aid.mag
+    sample, aid = ekf.sensors.mag.sample.mag, ekf.aid.mag
     _synthesise_z(ekf, params, sample)
     ekf.fs.bad_mag_x = False
     ekf.fs.bad_mag_y = False
@@ -104,8 +104,7 @@ def _control_with_sample(ekf, params, wmm_updated):
 
     R_mag = max(params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE, R_MAG_MIN)
     _update_mag_status(ekf, params, sample, R_mag)
-    if ekf.withheld.mag:
-        pretend_mag_fused(ekf)
+    if not is_fusion_due(ekf.sensors.mag):
         return
 
     continuing = _continuing_conditions_passing(ekf, params, sample)
@@ -156,7 +155,7 @@ def _update_mag_status(ekf, params, sample, R_mag):
         compute_mag_h(ekf, axis, H)
         variance = compute_innovation_variance(ekf, H, R_mag)
         set_axis(ekf.aid.mag, axis, sample[axis], R_mag, predict_mag(ekf, axis) - sample[axis], variance)
-    update_aid_source_status(ekf, ekf.aid.mag, 3, ekf.mag_sample.time_us, max(params.EKF2_MAG_GATE, 1.0))
+    update_aid_source_status(ekf, ekf.aid.mag, 3, ekf.sensors.mag.sample.time_us, max(params.EKF2_MAG_GATE, 1.0))
 
 
 @kernel
@@ -180,7 +179,7 @@ def _may_start(ekf):
         ekf.mag.counter > MIN_SAMPLES_TO_START
         and ekf.cs.yaw_align == ekf.cs_prev.yaw_align
         and ekf.state_reset.quat_counter == ekf.state_reset_prev.quat_counter
-        and is_newer_than_latest(ekf, ekf.mag_newest_time_us, MAG_MAX_INTERVAL)
+        and is_newer_than_latest(ekf, ekf.sensors.mag.newest_time_us, MAG_MAX_INTERVAL)
     )
 
 

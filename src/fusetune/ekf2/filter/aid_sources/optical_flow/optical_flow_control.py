@@ -46,7 +46,7 @@ TERRAIN_VARIANCE_AFTER_RESET = 100.0
 @kernel
 def _complete_gyro_rate(ekf, params):
     """Fill in the gyro rates that the sensor lacks from the IMU, or replace them all if so configured."""
-    imu, flow, rate = ekf.imu_delayed, ekf.flow, ekf.flow_sample.gyro_rate
+    imu, flow, rate = ekf.imu_delayed, ekf.flow, ekf.sensors.flow.sample.gyro_rate
     internal = int(params.EKF2_OF_GYR_SRC) == GYRO_SOURCE_INTERNAL
     xy_missing = not math.isfinite(rate[0]) or not math.isfinite(rate[1])
     for i in range(3):
@@ -59,7 +59,7 @@ def _complete_gyro_rate(ekf, params):
 @kernel
 def _update_gyro_bias(ekf):
     """Follow the difference between the sensor's gyro and the IMU slowly, whatever its spikes."""
-    flow, rate = ekf.flow, ekf.flow_sample.gyro_rate
+    flow, rate = ekf.flow, ekf.sensors.flow.sample.gyro_rate
     for i in range(3):
         difference = min(max(rate[i] - flow.ref_body_rate[i], -GYRO_BIAS_STEP_LIMIT), GYRO_BIAS_STEP_LIMIT)
         flow.gyro_bias[i] = (1.0 - GYRO_BIAS_FORGETTING) * flow.gyro_bias[i] + GYRO_BIAS_FORGETTING * difference
@@ -68,7 +68,7 @@ def _update_gyro_bias(ekf):
 @kernel
 def _update_optical_flow(ekf, params):
     """Judge the sample, and keep the velocity that it amounts to."""
-    sample, flow, aid = ekf.flow_sample, ekf.flow, ekf.aid.optical_flow
+    sample, flow, aid = ekf.sensors.flow.sample, ekf.flow, ekf.aid.optical_flow
     gx = sample.gyro_rate[0] - flow.gyro_bias[0]
     gy = sample.gyro_rate[1] - flow.gyro_bias[1]
     gz = sample.gyro_rate[2] - flow.gyro_bias[2]
@@ -102,7 +102,7 @@ def _filter_flow_velocity(ekf, params):
 @kernel
 def _is_magnitude_good(ekf):
     """Whether flow stays below what the sensor can follow, raw and compensated."""
-    raw, compensated = ekf.flow_sample.flow_rate, ekf.flow.rate_compensated
+    raw, compensated = ekf.sensors.flow.sample.flow_rate, ekf.flow.rate_compensated
     limit = ekf.flow.max_rate * ekf.flow.max_rate
     return (
         math.isfinite(raw[0])
@@ -115,18 +115,18 @@ def _is_magnitude_good(ekf):
 @kernel
 def _is_quality_good(ekf, params):
     minimum = params.EKF2_OF_QMIN if ekf.cs.in_air else params.EKF2_OF_QMIN_GND
-    return ekf.flow_sample.quality >= minimum
+    return ekf.sensors.flow.sample.quality >= minimum
 
 
 @kernel
 def control_optical_flow_fusion(ekf, params):
     """Start, continue, reset or stop optical flow."""
-    if not ekf.flow_buffer_exists or int(params.EKF2_OF_CTRL) != 1:
+    if not ekf.sensors.flow.exists or int(params.EKF2_OF_CTRL) != 1:
         stop_flow_fusion(ekf)
         return
-    if ekf.flow_data_ready:
+    if ekf.sensors.flow.data_ready:
         _use_flow_sample(ekf, params)
-    elif ekf.cs.opt_flow and is_timed_out(ekf, ekf.flow_sample.time_us, RESET_TIMEOUT_MAX):
+    elif ekf.cs.opt_flow and is_timed_out(ekf, ekf.sensors.flow.sample.time_us, RESET_TIMEOUT_MAX):
         stop_flow_fusion(ekf)
 
 
@@ -218,7 +218,7 @@ def reset_flow_fusion(ekf, params):
     """Set the horizontal velocity to that of flow."""
     ekf.events.reset_vel_to_flow = True
     distance = predict_flow_range(ekf, params)
-    variance = distance * distance * calc_opt_flow_meas_var(params, ekf.flow_sample.quality)
+    variance = distance * distance * calc_opt_flow_meas_var(params, ekf.sensors.flow.sample.quality)
     forward, right, R = ekf.flow.vel_body_lpf[0], ekf.flow.vel_body_lpf[1], ekf.R_to_earth
     north = R[0, 0] * forward + R[0, 1] * right
     east = R[1, 0] * forward + R[1, 1] * right

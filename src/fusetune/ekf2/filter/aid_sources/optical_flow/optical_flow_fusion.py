@@ -102,7 +102,7 @@ def calc_opt_flow_meas_var(params, quality):
 @kernel
 def _repredict_second_axis(ekf, params):
     """Account for what the first axis changed; the Jacobian of the second stays as first linearised."""
-    aid, flow, gyro = ekf.aid.optical_flow, ekf.flow, ekf.flow_sample.gyro_rate
+    aid, flow, gyro = ekf.aid.optical_flow, ekf.flow, ekf.sensors.flow.sample.gyro_rate
     aid.innovation_variance[1] = compute_innovation_variance(ekf, flow.H[1], aid.observation_variance[1])
     _, rate = predict_flow(
         ekf, params, gyro[0] - flow.gyro_bias[0], gyro[1] - flow.gyro_bias[1], gyro[2] - flow.gyro_bias[2]

@@ -42,10 +42,10 @@ START_TEST_RATIO = 0.01
 @kernel
 def control_range_hagl_fusion(ekf, params):
     """Process the range sample that reached the fusion time horizon, if any, and watch over the sensor."""
-    if not ekf.range_buffer_exists:
+    if not ekf.sensors.range.exists:
         return
     _check_sensor(ekf, params)
-    if ekf.range_data_ready:
+    if ekf.sensors.range.data_ready:
         update_range_hagl(ekf, params)
         _control_with_sample(ekf, params)
     elif (ekf.cs.rng_hgt or ekf.cs.rng_terrain) and not _has_recent_sample(ekf):
@@ -55,16 +55,16 @@ def control_range_hagl_fusion(ekf, params):
 
 @kernel
 def _has_recent_sample(ekf):
-    return is_newer_than_latest(ekf, ekf.range_newest_time_us, 2 * RNG_MAX_INTERVAL)
+    return is_newer_than_latest(ekf, ekf.sensors.range.newest_time_us, 2 * RNG_MAX_INTERVAL)
 
 
 @kernel
 def _check_sensor(ekf, params):
     """Run the sensor's checks; a healthy sample is moved to the IMU and tested against the vertical velocity."""
     rng, R = ekf.range, ekf.R_to_earth
-    rng.is_sample_ready = ekf.range_data_ready
-    if ekf.range_data_ready:
-        rng.sample = ekf.range_sample
+    rng.is_sample_ready = ekf.sensors.range.data_ready
+    if ekf.sensors.range.data_ready:
+        rng.sample = ekf.sensors.range.sample
     update_cos_tilt(rng, R, params.EKF2_RNG_PITCH)
     run_range_sensor_checks(rng, ekf.time_delayed_us, params.EKF2_RNG_QLTY_T, params.EKF2_RNG_FOG)
 
