@@ -14,7 +14,8 @@ from tests.ekf2.filter.height_and_field_records import (
 )
 
 from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_RANGE
-from fusetune.ekf2.filter.prediction import GRAVITY, predict_covariance, predict_state, update_average_interval
+from fusetune.ekf2.filter.prediction import predict_covariance, predict_state, update_average_interval
+from fusetune.ekf2.numerics.constants import ONE_G
 
 DT = 0.01
 THETA, VEL, POS, B_GYRO, B_ACCEL = (slice(i, i + 3) for i in (0, 3, 6, 9, 12))
@@ -26,7 +27,7 @@ def propagate(q, vel, pos, gyro_bias, accel_bias, gyro, accel, dt):
     half = np.linalg.norm(increment) / 2
     dq = np.concatenate([[np.cos(half)], np.sinc(half / np.pi) * increment / 2])
     force = rotation_matrix(q) @ (accel - accel_bias)
-    return hamilton_product(q, dq), vel + (force + [0, 0, GRAVITY]) * dt, pos + vel * dt
+    return hamilton_product(q, dq), vel + (force + [0, 0, ONE_G]) * dt, pos + vel * dt
 
 
 def attitude_error(q, reference):
@@ -74,7 +75,7 @@ def random_case(seed):
     ekf["P"][...] = root @ root.T + 1e-4 * np.eye(24)
     imu = ekf["imu_delayed"]
     imu["delta_ang"][:] = rng.normal(0, 1, 3) * DT
-    imu["delta_vel"][:] = (rng.normal(0, 3, 3) - [0, 0, GRAVITY]) * DT
+    imu["delta_vel"][:] = (rng.normal(0, 3, 3) - [0, 0, ONE_G]) * DT
     imu["delta_ang_dt"] = imu["delta_vel_dt"] = DT
     ekf["height_sensor_ref"] = HEIGHT_REF_BARO
     return ekf
@@ -157,8 +158,8 @@ def test_free_fall_follows_the_closed_form():
     params = make_parameters()
     for _ in range(100):
         predict_state(ekf, params)
-    assert ekf["vel"][2] == pytest.approx(GRAVITY * 1.0, rel=1e-12)
-    assert -ekf["gpos_alt"] == pytest.approx(GRAVITY / 2, rel=1e-5)  # the altitude is kept in single precision
+    assert ekf["vel"][2] == pytest.approx(ONE_G * 1.0, rel=1e-12)
+    assert -ekf["gpos_alt"] == pytest.approx(ONE_G / 2, rel=1e-5)  # the altitude is kept in single precision
 
 
 def test_rotation_about_one_axis_integrates_to_the_angle():
@@ -166,7 +167,7 @@ def test_rotation_about_one_axis_integrates_to_the_angle():
     imu = ekf["imu_delayed"]
     imu["delta_ang"][2] = 0.02
     imu["delta_ang_dt"] = imu["delta_vel_dt"] = DT
-    imu["delta_vel"][2] = -GRAVITY * DT
+    imu["delta_vel"][2] = -ONE_G * DT
     for _ in range(50):
         predict_state(ekf, make_parameters())
     np.testing.assert_allclose(ekf["q"], [np.cos(0.5), 0, 0, np.sin(0.5)], atol=1e-12)
@@ -184,7 +185,7 @@ def test_earth_rate_and_coriolis_once_the_latitude_is_known():
     ekf["vel"][:] = [speed, 0, 0]
     imu = ekf["imu_delayed"]
     imu["delta_ang_dt"] = imu["delta_vel_dt"] = DT
-    imu["delta_vel"][2] = -GRAVITY * DT
+    imu["delta_vel"][2] = -ONE_G * DT
     imu["delta_ang"][:] = np.array([np.cos(latitude), 0, -np.sin(latitude)]) * spin * DT
     predict_state(ekf, make_parameters())
     np.testing.assert_allclose(ekf["q"], [1, 0, 0, 0], atol=1e-15)

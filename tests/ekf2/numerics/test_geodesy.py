@@ -91,12 +91,3 @@ def test_earth_rate_turns_about_the_polar_axis():
     np.testing.assert_allclose(at_pole, (0.0, 0.0, -7.292115e-5), atol=1e-18)
     # one turn per sidereal day of 86164.1 s
     assert np.linalg.norm(geodesy.earth_rate_ned(0.6)) == pytest.approx(2.0 * math.pi / 86164.1, rel=1e-6)
-
-
-@settings(deadline=None)
-@given(latitudes, st.floats(-30.0, 30.0), st.floats(-30.0, 30.0))
-def test_transport_rate_follows_from_the_rates_of_latitude_and_longitude(lat, vel_n, vel_e):
-    alt = 300.0
-    lat_b, lon_b = geodesy.add_to_lat_lon(lat, 0.0, alt, vel_n, vel_e)
-    expected = (lon_b * math.cos(lat), -(lat_b - lat), -lon_b * math.sin(lat))
-    np.testing.assert_allclose(geodesy.transport_rate(lat, alt, vel_n, vel_e), expected, atol=1e-12)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.ground_truth import Truth, read_truth, sample_times
 from fusetune.analyze.metrics.attitude import rotation_matrices
-from fusetune.ekf2.numerics.geodesy import RADIUS_OF_EARTH
+from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
 from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.px4.layouts import sensor_layouts
 

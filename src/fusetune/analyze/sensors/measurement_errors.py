@@ -16,7 +16,7 @@ from fusetune.analyze.replaying.filter_states import FilterStates
 from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
 from fusetune.analyze.scoring.measurement_alignment import match, measurement_time
 from fusetune.analyze.sources import AID_SOURCES
-from fusetune.ekf2.numerics.geodesy import RADIUS_OF_EARTH
+from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]

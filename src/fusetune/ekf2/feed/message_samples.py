@@ -29,6 +29,7 @@ from fusetune.ekf2.feed.sensor_samples import (
     RANGE_SAMPLE,
 )
 from fusetune.px4.flight import TopicTable, row_count, stacked
+from fusetune.px4.layouts.sensor_layouts import STANDARD_AIR_DENSITY_KG_M3
 from fusetune.px4.sample_times import measurement_time
 
 MICROSECOND_S = np.float32(1e-6)
@@ -117,7 +118,7 @@ def baro_samples(table: TopicTable) -> tuple[np.ndarray, np.ndarray]:
     samples["reset"] = changed_since_previous(column(table, "baro_device_id", 0.0), 0.0) | changed_since_previous(
         column(table, "calibration_count", 0.0), 0.0
     )
-    return samples, column(table, "rho", 1.225)
+    return samples, column(table, "rho", STANDARD_AIR_DENSITY_KG_M3)
 
 
 def gnss_refusals(table: TopicTable, release: Release | None = None) -> list[Refusal]:

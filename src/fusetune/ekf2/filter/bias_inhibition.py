@@ -4,13 +4,15 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_ACCEL_BIAS, IMU_CTRL_GYRO_BIAS
+from fusetune.ekf2.filter.common.imu_rates import body_rate, specific_force
 
 COSINE_OF_15_DEGREES = 0.966
 
 
 @kernel
-def _decaying_maximum(previous, x, y, z, dt, time_constant):
+def _decaying_maximum(previous, vector, dt, time_constant):
     """Envelope of a vector's length: rises at once, decays with the time constant (s)."""
+    x, y, z = vector
     decay = 1.0 - min(max(dt / time_constant, 0.0), 1.0)
     return max(math.sqrt(x * x + y * y + z * z), decay * previous)
 
@@ -23,22 +25,10 @@ def update_imu_bias_inhibit(ekf, params):
     vertical acceleration is bad; without any aiding, only along axes that gravity makes observable.
     """
     imu = ekf.imu_delayed
-    ekf.ang_rate_magnitude_filt = _decaying_maximum(
-        ekf.ang_rate_magnitude_filt,
-        imu.delta_ang[0] / imu.delta_ang_dt - ekf.gyro_bias[0],
-        imu.delta_ang[1] / imu.delta_ang_dt - ekf.gyro_bias[1],
-        imu.delta_ang[2] / imu.delta_ang_dt - ekf.gyro_bias[2],
-        imu.delta_ang_dt,
-        params.EKF2_ABL_TAU,
-    )
-    ekf.accel_magnitude_filt = _decaying_maximum(
-        ekf.accel_magnitude_filt,
-        imu.delta_vel[0] / imu.delta_vel_dt - ekf.accel_bias[0],
-        imu.delta_vel[1] / imu.delta_vel_dt - ekf.accel_bias[1],
-        imu.delta_vel[2] / imu.delta_vel_dt - ekf.accel_bias[2],
-        imu.delta_vel_dt,
-        params.EKF2_ABL_TAU,
-    )
+    tau = params.EKF2_ABL_TAU
+    rate, force = body_rate(ekf), specific_force(ekf)
+    ekf.ang_rate_magnitude_filt = _decaying_maximum(ekf.ang_rate_magnitude_filt, rate, imu.delta_ang_dt, tau)
+    ekf.accel_magnitude_filt = _decaying_maximum(ekf.accel_magnitude_filt, force, imu.delta_vel_dt, tau)
     manoeuvring = (
         ekf.ang_rate_magnitude_filt > params.EKF2_ABL_GYRLIM or ekf.accel_magnitude_filt > params.EKF2_ABL_ACCLIM
     )

@@ -137,10 +137,10 @@ def initialise_covariance(ekf, params):
 @kernel
 def tilt_variance(ekf):
     """Sum of the variances (rad²) of the attitude error about north and east."""
-    return ekf.P[0, 0] + ekf.P[1, 1]
+    return ekf.P[ATTITUDE, ATTITUDE] + ekf.P[ATTITUDE + 1, ATTITUDE + 1]
 
 
 @kernel
 def yaw_variance(ekf):
     """Variance (rad²) of the attitude error about down."""
-    return ekf.P[2, 2]
+    return ekf.P[ATTITUDE + 2, ATTITUDE + 2]

@@ -37,9 +37,10 @@ from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.imu_down_sampler import DOWN_SAMPLER_MEMORY
 from fusetune.ekf2.filter.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
-from fusetune.ekf2.filter.prediction import GRAVITY, predict_covariance, predict_state, update_average_interval
+from fusetune.ekf2.filter.prediction import predict_covariance, predict_state, update_average_interval
 from fusetune.ekf2.filter.wind import WIND_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
+from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL, ONE_G
 from fusetune.ekf2.numerics.rotations import quat_aligning_with_up, quat_to_dcm
 
 EKF = np.dtype(
@@ -72,10 +73,9 @@ EKF = np.dtype(
 )
 """The record `ekf`."""
 
-SEA_LEVEL_AIR_DENSITY = 1.225
 LEVELLING_LPF_ALPHA = 0.1
-LEVELLING_MIN_SPECIFIC_FORCE = 0.8 * GRAVITY
-LEVELLING_MAX_SPECIFIC_FORCE = 1.2 * GRAVITY
+LEVELLING_MIN_SPECIFIC_FORCE = 0.8 * ONE_G
+LEVELLING_MAX_SPECIFIC_FORCE = 1.2 * ONE_G
 LEVELLING_MAX_RATE = math.radians(15.0)
 MIN_IMU_INTERVAL_S = 1e-4
 
@@ -96,7 +96,7 @@ def initialise_estimator(ekf, params):
     ekf.horizontal_deadreckon_time_exceeded = True
     ekf.vertical_position_deadreckon_time_exceeded = True
     ekf.vertical_velocity_deadreckon_time_exceeded = True
-    ekf.air_density = SEA_LEVEL_AIR_DENSITY
+    ekf.air_density = AIR_DENSITY_SEA_LEVEL
     initialise_local_origin(ekf.origin)
     initialise_height_bias_estimator(ekf.baro_b_est)
     initialise_height_bias_estimator(ekf.gps_hgt_b_est)

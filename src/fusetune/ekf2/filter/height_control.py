@@ -15,10 +15,10 @@ from fusetune.ekf2.filter.common.core_memory import (
     HEIGHT_REF_UNKNOWN,
 )
 from fusetune.ekf2.filter.common.timing import is_recent
+from fusetune.ekf2.numerics.constants import FLT_EPSILON
 
 VERT_INNOV_TEST_LIM = 3.0
 VERT_INNOV_TEST_MIN = 1.0
-INNOVATION_VARIANCE_MIN = 1.1920929e-07
 BADACC_PROBATION = 3_000_000
 
 FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
@@ -107,7 +107,7 @@ def _count_clipping(ekf):
 @kernel
 def _normalised(is_active, innovation, innovation_variance):
     """Innovation over its standard deviation; 0 for a source that is not in use."""
-    if not is_active or innovation_variance < INNOVATION_VARIANCE_MIN:
+    if not is_active or innovation_variance < FLT_EPSILON:
         return 0.0
     return innovation / math.sqrt(innovation_variance)
 

@@ -146,7 +146,8 @@ def _limited(value, limit):
 @kernel
 def fuse(ekf, params, K, innovation):
     """Correct the state by -K·innovation, each part within its limits."""
-    rotate_by_earth_increment(ekf.q, -K[0] * innovation, -K[1] * innovation, -K[2] * innovation)
+    north, east, down = K[ATTITUDE], K[ATTITUDE + 1], K[ATTITUDE + 2]
+    rotate_by_earth_increment(ekf.q, -north * innovation, -east * innovation, -down * innovation)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
     for i in range(3):
         ekf.vel[i] = _limited(ekf.vel[i] - K[VELOCITY + i] * innovation, VELOCITY_LIMIT)

@@ -15,16 +15,18 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.buffers import RING_CAPACITY
+from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon, lat_lon_difference
+from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
 from fusetune.ekf2.numerics.rotations import (
     quat_multiply,
     quat_multiply_inverse,
     quat_normalise,
     quat_to_dcm,
     rotate_by_body_increment,
+    rotate_to_earth,
 )
 
-GRAVITY_M_S2 = 9.80665
 MIN_DT_S, MAX_DT_S = 1e-4, 0.03
 MAX_TIME_CONSTANT_S = 10.0
 FAR_RESET_M = 1e5
@@ -112,7 +114,7 @@ def _integrate_velocity(output, imu):
         for j in range(3):
             delta += R[axis, j] * (imu.delta_vel[j] - output.accel_bias[j] * dt)
         if axis == 2:
-            delta += GRAVITY_M_S2 * dt
+            delta += ONE_G * dt
         newest.pos[axis] += (newest.vel[axis] + 0.5 * delta) * dt
         newest.vel[axis] += delta
 
@@ -121,11 +123,9 @@ def _integrate_velocity(output, imu):
 def _velocity_of_imu_offset(output, params, delta_angle, dt):
     """Velocity of the IMU relative to the body's origin, NED: R (ω × r)."""
     wx, wy, wz = delta_angle[0] / dt, delta_angle[1] / dt, delta_angle[2] / dt
-    rx, ry, rz = params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z
-    body = (wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx)
-    for axis in range(3):
-        row = output.R_to_earth[axis]
-        output.vel_imu_rel_body[axis] = row[0] * body[0] + row[1] * body[1] + row[2] * body[2]
+    x, y, z = velocity_of_offset(wx, wy, wz, params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z)
+    vel = output.vel_imu_rel_body
+    vel[0], vel[1], vel[2] = rotate_to_earth(output.R_to_earth, x, y, z)
 
 
 @kernel

@@ -17,20 +17,33 @@ from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, refresh_ellipsoid
 from fusetune.ekf2.filter.common.state import (
     ACCEL_BIAS,
+    ATTITUDE,
     ERROR_STATE_SIZE,
     GYRO_BIAS,
     MAG_BODY,
     MAG_EARTH,
+    POSITION,
     TERRAIN,
     VELOCITY,
     WIND,
 )
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
 from fusetune.ekf2.filter.measurement_update import constrain_state_variances
-from fusetune.ekf2.numerics.rotations import quat_to_dcm, rotate_by_body_increment
+from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.ekf2.numerics.geodesy import earth_rate_ned
+from fusetune.ekf2.numerics.rotations import (
+    component_in_body,
+    quat_to_dcm,
+    rotate_by_body_increment,
+    rotate_to_earth,
+)
 
-GRAVITY = 9.80665
-EARTH_SPIN_RATE = 7.2921150e-5
+THETA, VEL, POS, GB, AB = ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS
+"""Where the parts of the error state sit, by their signs in the equations."""
+
+DYNAMIC_STATES = POSITION + 3
+"""Attitude, velocity and position come first; all that follows has no dynamics."""
+
 EARTH_RATE_LATITUDE_STEP = math.radians(1.0)
 
 BAD_ACCEL_NOISE = 4.9
@@ -77,11 +90,21 @@ def predict_covariance(ekf, params):
 
 
 @kernel
-def _propagate(ekf, dt):
-    """P ← F P Fᵀ; only attitude, velocity and position (the first nine states) have dynamics.
+def _minus_row_of_cross_product_matrix(u, row):
+    """A row of -[u]×."""
+    if row == 0:
+        return -0.0, u[2], -u[1]
+    if row == 1:
+        return -u[2], -0.0, u[0]
+    return u[1], -u[0], -0.0
 
-    `FP` holds the first nine rows of F P. The columns from nine on of those rows are final already; the first nine
-    still need Fᵀ from the right.
+
+@kernel
+def _propagate(ekf, dt):
+    """P ← F P Fᵀ; only attitude, velocity and position have dynamics.
+
+    `FP` holds their rows of F P, of which the columns of the other states are final already; their own still need Fᵀ
+    from the right.
     """
     P = ekf.P
     R = ekf.R_to_earth
@@ -90,49 +113,41 @@ def _propagate(ekf, dt):
     bx = (imu.delta_vel[0] / imu.delta_vel_dt - ekf.accel_bias[0]) * dt
     by = (imu.delta_vel[1] / imu.delta_vel_dt - ekf.accel_bias[1]) * dt
     bz = (imu.delta_vel[2] / imu.delta_vel_dt - ekf.accel_bias[2]) * dt
-    ux = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
-    uy = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
-    uz = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
+    u = rotate_to_earth(R, bx, by, bz)
 
     for i in range(3):
         r0, r1, r2 = R[i, 0] * dt, R[i, 1] * dt, R[i, 2] * dt
-        m0 = uz if i == 1 else (-uy if i == 2 else 0.0)
-        m1 = -uz if i == 0 else (ux if i == 2 else 0.0)
-        m2 = uy if i == 0 else (-ux if i == 1 else 0.0)
-        m0, m1, m2 = -m0, -m1, -m2
+        m0, m1, m2 = _minus_row_of_cross_product_matrix(u, i)
         for j in range(ERROR_STATE_SIZE):
-            A[i, j] = P[i, j] - (r0 * P[9, j] + r1 * P[10, j] + r2 * P[11, j])
-            A[3 + i, j] = (
-                P[3 + i, j]
-                + (m0 * P[0, j] + m1 * P[1, j] + m2 * P[2, j])
-                - (r0 * P[12, j] + r1 * P[13, j] + r2 * P[14, j])
+            A[THETA + i, j] = P[THETA + i, j] - (r0 * P[GB, j] + r1 * P[GB + 1, j] + r2 * P[GB + 2, j])
+            A[VEL + i, j] = (
+                P[VEL + i, j]
+                + (m0 * P[THETA, j] + m1 * P[THETA + 1, j] + m2 * P[THETA + 2, j])
+                - (r0 * P[AB, j] + r1 * P[AB + 1, j] + r2 * P[AB + 2, j])
             )
-            A[6 + i, j] = P[6 + i, j] + dt * P[3 + i, j]
+            A[POS + i, j] = P[POS + i, j] + dt * P[VEL + i, j]
 
-    for i in range(9):
-        for j in range(9, ERROR_STATE_SIZE):
+    for i in range(DYNAMIC_STATES):
+        for j in range(DYNAMIC_STATES, ERROR_STATE_SIZE):
             P[i, j] = A[i, j]
             P[j, i] = A[i, j]
 
     for j in range(3):
         r0, r1, r2 = R[j, 0] * dt, R[j, 1] * dt, R[j, 2] * dt
-        m0 = uz if j == 1 else (-uy if j == 2 else 0.0)
-        m1 = -uz if j == 0 else (ux if j == 2 else 0.0)
-        m2 = uy if j == 0 else (-ux if j == 1 else 0.0)
-        m0, m1, m2 = -m0, -m1, -m2
-        for i in range(j + 1):
-            P[i, j] = A[i, j] - (r0 * A[i, 9] + r1 * A[i, 10] + r2 * A[i, 11])
-            P[j, i] = P[i, j]
-        for i in range(3 + j + 1):
-            P[i, 3 + j] = (
-                A[i, 3 + j]
-                + (m0 * A[i, 0] + m1 * A[i, 1] + m2 * A[i, 2])
-                - (r0 * A[i, 12] + r1 * A[i, 13] + r2 * A[i, 14])
+        m0, m1, m2 = _minus_row_of_cross_product_matrix(u, j)
+        for i in range(THETA + j + 1):
+            P[i, THETA + j] = A[i, THETA + j] - (r0 * A[i, GB] + r1 * A[i, GB + 1] + r2 * A[i, GB + 2])
+            P[THETA + j, i] = P[i, THETA + j]
+        for i in range(VEL + j + 1):
+            P[i, VEL + j] = (
+                A[i, VEL + j]
+                + (m0 * A[i, THETA] + m1 * A[i, THETA + 1] + m2 * A[i, THETA + 2])
+                - (r0 * A[i, AB] + r1 * A[i, AB + 1] + r2 * A[i, AB + 2])
             )
-            P[3 + j, i] = P[i, 3 + j]
-        for i in range(6 + j + 1):
-            P[i, 6 + j] = A[i, 6 + j] + dt * A[i, 3 + j]
-            P[6 + j, i] = P[i, 6 + j]
+            P[VEL + j, i] = P[i, VEL + j]
+        for i in range(POS + j + 1):
+            P[i, POS + j] = A[i, POS + j] + dt * A[i, VEL + j]
+            P[POS + j, i] = P[i, POS + j]
 
 
 @kernel
@@ -142,7 +157,7 @@ def _add_imu_noise(ekf, dt, gyro_variance, ax, ay, az):
     R = ekf.R_to_earth
     dt2 = dt * dt
     for i in range(3):
-        P[i, i] += gyro_variance * dt2
+        P[THETA + i, THETA + i] += gyro_variance * dt2
         for j in range(i, 3):
             noise = dt2 * (R[i, 0] * R[j, 0] * ax + R[i, 1] * R[j, 1] * ay + R[i, 2] * R[j, 2] * az)
             P[VELOCITY + i, VELOCITY + j] += noise
@@ -206,9 +221,8 @@ def _update_earth_rate(ekf):
     """Earth rotation in NED (rad/s), looked up once per degree of latitude; zero until a latitude is known."""
     if abs(ekf.gpos_lat - ekf.earth_rate_lat_ref) > EARTH_RATE_LATITUDE_STEP:
         ekf.earth_rate_lat_ref = ekf.gpos_lat
-        ekf.earth_rate_ned[0] = EARTH_SPIN_RATE * math.cos(ekf.gpos_lat)
-        ekf.earth_rate_ned[1] = 0.0
-        ekf.earth_rate_ned[2] = -EARTH_SPIN_RATE * math.sin(ekf.gpos_lat)
+        rate = ekf.earth_rate_ned
+        rate[0], rate[1], rate[2] = earth_rate_ned(ekf.gpos_lat)
 
 
 @kernel
@@ -217,11 +231,11 @@ def predict_state(ekf, params):
     _update_earth_rate(ekf)
     imu = ekf.imu_delayed
     R = ekf.R_to_earth
-    ekf_rate = ekf.earth_rate_ned
+    earth_rate = ekf.earth_rate_ned
     dt = imu.delta_ang_dt
     rotation = ekf.scratch.quat_before
     for i in range(3):
-        earth = R[0, i] * ekf_rate[0] + R[1, i] * ekf_rate[1] + R[2, i] * ekf_rate[2]
+        earth = component_in_body(R, i, earth_rate[0], earth_rate[1], earth_rate[2])
         rotation[i] = imu.delta_ang[i] - ekf.gyro_bias[i] * dt - earth * dt
     rotate_by_body_increment(ekf.q, rotation[0], rotation[1], rotation[2])
     quat_to_dcm(ekf.q, R)
@@ -237,9 +251,7 @@ def _integrate_velocity(ekf, params):
     bx = imu.delta_vel[0] - ekf.accel_bias[0] * dt
     by = imu.delta_vel[1] - ekf.accel_bias[1] * dt
     bz = imu.delta_vel[2] - ekf.accel_bias[2] * dt
-    dvn = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
-    dve = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
-    dvd = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
+    dvn, dve, dvd = rotate_to_earth(R, bx, by, bz)
 
     vn, ve, vd = ekf.vel[0], ekf.vel[1], ekf.vel[2]
     rate = ekf.earth_rate_ned
@@ -251,7 +263,7 @@ def _integrate_velocity(ekf, params):
     wd = 2.0 * rate[2] - ve * ekf.ellipsoid_tan_lat / transverse
     vn_new = vn + dvn - (we * vd - wd * ve) * dt
     ve_new = ve + dve - (wd * vn - wn * vd) * dt
-    vd_new = vd + dvd + (GRAVITY - (wn * ve - we * vn)) * dt
+    vd_new = vd + dvd + (ONE_G - (wn * ve - we * vn)) * dt
 
     add_to_global_position(ekf, 0.5 * (vn + vn_new) * dt, 0.5 * (ve + ve_new) * dt, 0.5 * (vd + vd_new) * dt)
     limit = params.EKF2_VEL_LIM

@@ -10,9 +10,23 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY, reset_covariance_block
+from fusetune.ekf2.numerics.rotations import rotate_to_body
 
 WIND_MEMORY = np.dtype([("external_init", "?")], align=True)
 """Sub-record `ekf.wind`: whether the wind was given from outside and no source has used it yet."""
+
+
+@kernel
+def air_velocity(ekf):
+    """Velocity (m/s, NED) of the vehicle through the air."""
+    return ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
+
+
+@kernel
+def air_velocity_body(ekf):
+    """Velocity (m/s, FRD) of the vehicle through the air."""
+    x, y, z = air_velocity(ekf)
+    return rotate_to_body(ekf.R_to_earth, x, y, z)
 
 
 @kernel
@@ -44,13 +58,6 @@ def reset_wind_to_external_observation(ekf, speed, direction, speed_accuracy, di
     ekf.events.reset_wind_to_ext_obs = True
     ekf.wind.external_init = True
     reset_wind_to(ekf, speed * c, speed * s, c * c * along + s * s * across, s * s * along + c * c * across)
-
-
-@kernel
-def reset_wind_to_zero(ekf):
-    """Assume calm, with the initial uncertainty."""
-    ekf.wind_vel[0], ekf.wind_vel[1] = 0.0, 0.0
-    reset_covariance_block(ekf, WIND, 2, INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY)
 
 
 @kernel

@@ -6,20 +6,12 @@ Latitudes and longitudes are radians, altitudes and distances metres, north, eas
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.numerics.constants import EARTH_SPIN_RATE, RADIUS_OF_EARTH
 from fusetune.ekf2.numerics.rotations import wrap_pi
 
 WGS84_EQUATORIAL_RADIUS = 6378137.0
 WGS84_ECCENTRICITY = 0.0818191908425
 WGS84_ECCENTRICITY2 = WGS84_ECCENTRICITY * WGS84_ECCENTRICITY
-
-RADIUS_OF_EARTH = 6371000.0
-"""Radius (m) of the sphere on which the local frame is a map projection."""
-
-EARTH_SPIN_RATE = 7.2921150e-5
-"""Rotation rate of the Earth (rad/s)."""
-
-ONE_G = 9.80665
-"""Standard gravity (m/s²), which PX4 uses everywhere."""
 
 
 @kernel
@@ -91,14 +83,3 @@ def reproject(lat_ref, lon_ref, north, east):
 def earth_rate_ned(lat):
     """Rotation rate of the Earth (rad/s, NED) at a latitude."""
     return EARTH_SPIN_RATE * math.cos(lat), 0.0, -EARTH_SPIN_RATE * math.sin(lat)
-
-
-@kernel
-def transport_rate(lat, alt, vel_n, vel_e):
-    """Rotation rate (rad/s, NED) of the local level frame, caused by moving over the ellipsoid; Groves, eq. 5.44."""
-    meridian, transverse = radii_of_curvature(lat)
-    return (
-        vel_e / (transverse + alt),
-        -vel_n / (meridian + alt),
-        -vel_e * math.tan(lat) / (transverse + alt),
-    )

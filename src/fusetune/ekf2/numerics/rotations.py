@@ -70,6 +70,48 @@ def dcm_to_quat(R, q):
 
 
 @kernel
+def rotate_to_earth(R, x, y, z):
+    """Body vector in NED, by the rotation matrix `R`."""
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@kernel
+def rotate_to_body(R, north, east, down):
+    """NED vector in the body frame, by the rotation matrix `R`."""
+    return (
+        R[0, 0] * north + R[1, 0] * east + R[2, 0] * down,
+        R[0, 1] * north + R[1, 1] * east + R[2, 1] * down,
+        R[0, 2] * north + R[1, 2] * east + R[2, 2] * down,
+    )
+
+
+@kernel
+def component_in_earth(R, axis, x, y, z):
+    """Component `axis` in NED of a body vector."""
+    return R[axis, 0] * x + R[axis, 1] * y + R[axis, 2] * z
+
+
+@kernel
+def component_in_body(R, axis, north, east, down):
+    """Component `axis` in the body frame of a NED vector."""
+    return R[0, axis] * north + R[1, axis] * east + R[2, axis] * down
+
+
+@kernel
+def variance_in_earth(R, axis, variance):
+    """Variance of component `axis` in NED of a body vector with independent components."""
+    return (
+        R[axis, 0] * R[axis, 0] * variance[0]
+        + R[axis, 1] * R[axis, 1] * variance[1]
+        + R[axis, 2] * R[axis, 2] * variance[2]
+    )
+
+
+@kernel
 def quat_multiply(a, b, out):
     """Write the Hamilton product a ⊗ b into `out`, which may be `a` or `b` itself."""
     w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]

@@ -20,6 +20,7 @@ from fusetune.ekf2.filter.common.conditions import (
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES, FAULT_STATUS_NAMES, REJECTION_NAMES
 from fusetune.ekf2.filter.common.local_origin import origin_altitude, project_to_local
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon
+from fusetune.ekf2.numerics.rotations import rotate_to_earth
 
 INNOVATION_ROW = np.dtype(
     [
@@ -224,11 +225,9 @@ def _record_states(ekf, row, timestamp):
 def _record_local_position(ekf, params, row, timestamp):
     """Position and velocity of the body's origin: the predictor's, which are the IMU's, less its lever arm."""
     output = ekf.output
-    R = output.R_to_earth
-    arm = (params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z)
-    offset_n = R[0, 0] * arm[0] + R[0, 1] * arm[1] + R[0, 2] * arm[2]
-    offset_e = R[1, 0] * arm[0] + R[1, 1] * arm[1] + R[1, 2] * arm[2]
-    offset_d = R[2, 0] * arm[0] + R[2, 1] * arm[1] + R[2, 2] * arm[2]
+    offset_n, offset_e, offset_d = rotate_to_earth(
+        output.R_to_earth, params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z
+    )
     newest = output.newest
     lat, lon = add_to_lat_lon(
         output.ref_lat, output.ref_lon, output.ref_alt, newest.pos[0] - offset_n, newest.pos[1] - offset_e

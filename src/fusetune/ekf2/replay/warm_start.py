@@ -18,7 +18,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import earth_fiel
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES
 from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MAG_BODY, MAG_EARTH, TERRAIN, WIND
-from fusetune.ekf2.filter.prediction import GRAVITY
+from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import reproject
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
 from fusetune.px4.layouts.logged_state import LoggedState
@@ -135,7 +135,7 @@ def _carried_on(state: LoggedState, imu: np.ndarray, until: int) -> tuple[np.nda
         turn = share * (sample["delta_ang"] - state.gyro_bias * sample["delta_ang_dt"])
         q = _turned(q, turn)
         change = rotation_matrix(q) @ (share * (sample["delta_vel"] - state.accel_bias * sample["delta_vel_dt"]))
-        change[2] += GRAVITY * dt
+        change[2] += ONE_G * dt
         position += (velocity + 0.5 * change) * dt
         velocity += change
     return q, velocity, position

@@ -7,13 +7,13 @@ import numpy as np
 from fusetune.ekf2.compiled.compilation import compile_in_one_piece
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.replay.replay import replay
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
 
 IMU_SAMPLES = 4
 IMU_INTERVAL_US = 4000
-GRAVITY_M_S2 = 9.80665
 
 
 def compile_kernels() -> None:
@@ -29,7 +29,7 @@ def _imu_at_rest() -> TopicTable:
     samples = np.arange(1, IMU_SAMPLES + 1)
     columns = {f"gyro_rad[{axis}]": np.zeros(IMU_SAMPLES, np.float32) for axis in range(3)}
     columns |= {f"accelerometer_m_s2[{axis}]": np.zeros(IMU_SAMPLES, np.float32) for axis in range(3)}
-    columns["accelerometer_m_s2[2]"] -= np.float32(GRAVITY_M_S2)
+    columns["accelerometer_m_s2[2]"] -= np.float32(ONE_G)
     interval = np.full(IMU_SAMPLES, IMU_INTERVAL_US, np.uint32)
     return {
         "timestamp": samples * IMU_INTERVAL_US,

@@ -1,15 +1,11 @@
 """What is aiding the filter now, and whether its estimates can be relied on: questions every aid source asks."""
 
-import math
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.timing import BAD_ACC_RESET_DELAY, HGT_FUSION_TIMEOUT_MAX, is_timed_out
 
 IMU_CTRL_GYRO_BIAS = 1
 IMU_CTRL_ACCEL_BIAS = 2
 IMU_CTRL_GRAVITY_VECTOR = 4
-
-MAG_FLIGHT_ALIGNMENT_SETTLING_US = 1_000_000
 
 
 @kernel
@@ -56,18 +52,6 @@ def is_other_source_of_horizontal_aiding_than(ekf, aiding_flag):
 def is_only_active_source_of_horizontal_aiding(ekf, aiding_flag):
     """Whether the source with this flag alone bounds the horizontal drift."""
     return aiding_flag and not is_other_source_of_horizontal_aiding_than(ekf, aiding_flag)
-
-
-@kernel
-def is_other_source_of_horizontal_position_aiding_than(ekf, aiding_flag):
-    """Whether a source other than the one with this flag gives horizontal position."""
-    return _others(get_number_of_active_horizontal_position_aiding_sources(ekf), aiding_flag)
-
-
-@kernel
-def is_only_active_source_of_horizontal_position_aiding(ekf, aiding_flag):
-    """Whether the source with this flag alone gives horizontal position."""
-    return aiding_flag and not is_other_source_of_horizontal_position_aiding_than(ekf, aiding_flag)
 
 
 @kernel
@@ -137,32 +121,11 @@ def is_local_vertical_velocity_valid(ekf):
 
 
 @kernel
-def is_global_horizontal_position_valid(ekf):
-    """Whether latitude and longitude are known."""
-    return ekf.origin.valid and is_local_horizontal_position_valid(ekf)
-
-
-@kernel
-def is_global_vertical_position_valid(ekf):
-    """Whether the altitude above mean sea level is known."""
-    return math.isfinite(ekf.origin.alt) and is_local_vertical_position_valid(ekf)
-
-
-@kernel
 def is_height_reset_required(ekf):
     """Whether height fusion has failed too long, or vertical acceleration has been bad without a break."""
     return is_timed_out(ekf, ekf.time_good_vert_accel, BAD_ACC_RESET_DELAY) or is_timed_out(
         ekf, ekf.time_last_hgt_fuse, HGT_FUSION_TIMEOUT_MAX
     )
-
-
-@kernel
-def is_yaw_final_align_complete(ekf):
-    """Whether the yaw is aligned, with a magnetometer in use only one second after its in-flight alignment."""
-    if ekf.cs.mag_3d or ekf.cs.mag_hdg:
-        settled = ekf.time_delayed_us - ekf.mag.flight_alignment_start_time > MAG_FLIGHT_ALIGNMENT_SETTLING_US
-        return ekf.cs.yaw_align and ekf.cs.mag_aligned_in_flight and settled
-    return ekf.cs.yaw_align
 
 
 @kernel
@@ -183,12 +146,6 @@ def get_terrain_vpos(ekf):
     if ekf.terrain_valid:
         return ekf.terrain
     return ekf.last_on_ground_pos_d
-
-
-@kernel
-def get_terrain_variance(ekf):
-    """Variance (m²) of the terrain height."""
-    return ekf.P[23, 23]
 
 
 @kernel

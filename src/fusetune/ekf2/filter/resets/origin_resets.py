@@ -74,15 +74,6 @@ def initialise_altitude_to(ekf, params, altitude, vpos_var):
 
 
 @kernel
-def reset_global_position_to(ekf, params, lat, lon, altitude, hpos_var, vpos_var):
-    """Set the whole position, the altitude only if it is plausible."""
-    if not reset_lat_lon_to(ekf, params, lat, lon, hpos_var):
-        return False
-    initialise_altitude_to(ekf, params, altitude, vpos_var)
-    return True
-
-
-@kernel
 def set_lat_lon_origin(ekf, params, lat, lon, hpos_var):
     """Move the origin; a position known in the local frame alone becomes a global one."""
     if not is_lat_lon_plausible(lat, lon):

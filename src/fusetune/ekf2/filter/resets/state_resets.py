@@ -12,6 +12,7 @@ from fusetune.ekf2.filter.common.local_origin import project_to_local, reproject
 from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, VELOCITY
 from fusetune.ekf2.filter.covariance import reset_covariance_block, uncorrelate_block
 from fusetune.ekf2.filter.output_predictor import apply_position_reset, apply_quaternion_reset, apply_velocity_reset
+from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import (
     dcm_to_quat,
     quat_multiply,
@@ -24,7 +25,6 @@ from fusetune.ekf2.numerics.rotations import (
 MIN_RESET_VARIANCE = 0.01**2
 HORIZONTAL_VELOCITY_VARIANCE_AFTER_ZEROING = 25.0
 VERTICAL_VELOCITY_VARIANCE_AFTER_ZEROING = 10.0
-SINGLE_PRECISION_EPSILON = 1.1920929e-07
 
 
 @kernel
@@ -205,7 +205,7 @@ def reset_height_to_last_known(ekf, params):
 @kernel
 def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
-    if math.isfinite(yaw_var) and yaw_var > SINGLE_PRECISION_EPSILON:
+    if math.isfinite(yaw_var) and yaw_var > FLT_EPSILON:
         reset_covariance_block(ekf, ATTITUDE + 2, 1, yaw_var)
     before, error = ekf.scratch.quat_before, ekf.scratch.quat_error
     for i in range(4):

@@ -9,7 +9,7 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import N_MODELS
-from fusetune.ekf2.numerics.geodesy import ONE_G
+from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.rotations import (
     dcm_to_quat,
     quat_aligning_with_up,

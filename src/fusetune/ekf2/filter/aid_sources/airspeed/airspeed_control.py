@@ -16,6 +16,7 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_resets import (
 from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.common.timing import is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
+from fusetune.ekf2.filter.yaw_estimator.gsf_memory import set_true_airspeed
 
 WIND_TIMEOUT_US = 10_000_000
 DATA_STOPPED_US = 1_000_000
@@ -46,9 +47,9 @@ def _assume_yaw_estimator_airspeed(ekf, params):
     """While no airspeed is fused, the yaw estimator of a fixed wing compensates turns by an assumed one."""
     if ekf.cs.fixed_wing:
         if not ekf.cs.in_air or ekf.cs.vehicle_at_rest:
-            ekf.gsf.true_airspeed = 0.0
+            set_true_airspeed(ekf.gsf, 0.0)
         elif not ekf.cs.fuse_aspd:
-            ekf.gsf.true_airspeed = params.EKF2_GSF_TAS
+            set_true_airspeed(ekf.gsf, params.EKF2_GSF_TAS)
 
 
 @kernel
@@ -70,7 +71,7 @@ def _use_airspeed_sample(ekf, params):
             return
         if is_significant:
             fuse_airspeed(ekf, params)
-        ekf.gsf.true_airspeed = sample.true_airspeed
+        set_true_airspeed(ekf.gsf, sample.true_airspeed)
         if is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US):
             stop_airspeed_fusion(ekf)
     elif starting_conditions_passing:
@@ -95,4 +96,4 @@ def stop_airspeed_fusion(ekf):
     """Leave airspeed; the yaw estimator goes without."""
     if ekf.cs.fuse_aspd:
         ekf.cs.fuse_aspd = False
-        ekf.gsf.true_airspeed = np.nan
+        set_true_airspeed(ekf.gsf, np.nan)

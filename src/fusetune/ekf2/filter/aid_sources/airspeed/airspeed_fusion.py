@@ -6,8 +6,6 @@ states move. Mirrors PX4 v1.16 `EKF/aid_sources/airspeed/airspeed_fusion.cpp`.
 
 import math
 
-import numpy as np
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_resets import airspeed_variance, reset_wind_using_airspeed
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
@@ -15,15 +13,14 @@ from fusetune.ekf2.filter.common.state import VELOCITY, WIND
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
-from fusetune.ekf2.filter.wind import keep_only_wind_gains
-
-FLT_EPSILON = float(np.finfo(np.float32).eps)
+from fusetune.ekf2.filter.wind import air_velocity, keep_only_wind_gains
+from fusetune.ekf2.numerics.constants import FLT_EPSILON
 
 
 @kernel
 def predict_airspeed(ekf):
     """Speed (m/s) of the vehicle through the air."""
-    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
+    x, y, z = air_velocity(ekf)
     return math.sqrt(x * x + y * y + z * z + FLT_EPSILON)
 
 

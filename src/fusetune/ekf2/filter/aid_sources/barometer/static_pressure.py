@@ -6,8 +6,10 @@ backward, right and left. As height it is that over ρ g, so the air density dro
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import is_local_horizontal_position_valid
-
-STANDARD_GRAVITY = 9.80665
+from fusetune.ekf2.filter.common.imu_rates import body_rate
+from fusetune.ekf2.filter.wind import air_velocity_body
+from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
 
 
 @kernel
@@ -21,7 +23,7 @@ def static_pressure_height_correction(params, airspeed_x, airspeed_y, airspeed_z
         + coef_y * min(airspeed_y * airspeed_y, limit)
         + params.EKF2_PCOEF_Z * min(airspeed_z * airspeed_z, limit)
     )
-    return 0.5 * weighted / STANDARD_GRAVITY
+    return 0.5 * weighted / ONE_G
 
 
 @kernel
@@ -30,17 +32,8 @@ def compensate_baro_for_dynamic_pressure(ekf, params, height):
     if not (ekf.cs.wind and is_local_horizontal_position_valid(ekf)):
         return height
 
-    imu, R = ekf.imu_delayed, ekf.R_to_earth
-    wx = imu.delta_ang[0] / imu.delta_ang_dt - ekf.gyro_bias[0]
-    wy = imu.delta_ang[1] / imu.delta_ang_dt - ekf.gyro_bias[1]
-    wz = imu.delta_ang[2] / imu.delta_ang_dt - ekf.gyro_bias[2]
-    px, py, pz = params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z
-    north = ekf.vel[0] - ekf.wind_vel[0]
-    east = ekf.vel[1] - ekf.wind_vel[1]
-    down = ekf.vel[2]
-    return height + static_pressure_height_correction(
-        params,
-        R[0, 0] * north + R[1, 0] * east + R[2, 0] * down - (wy * pz - wz * py),
-        R[0, 1] * north + R[1, 1] * east + R[2, 1] * down - (wz * px - wx * pz),
-        R[0, 2] * north + R[1, 2] * east + R[2, 2] * down - (wx * py - wy * px),
-    )
+    x, y, z = air_velocity_body(ekf)
+    wx, wy, wz = body_rate(ekf)
+    # the velocity is the IMU's, less that of the IMU around the body's origin it is the body's
+    ox, oy, oz = velocity_of_offset(wx, wy, wz, params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z)
+    return height + static_pressure_height_correction(params, x - ox, y - oy, z - oz)

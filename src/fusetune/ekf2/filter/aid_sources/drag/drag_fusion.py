@@ -10,20 +10,18 @@ fused; the measurement follows the accelerometer bias. The status counts as fuse
 
 import math
 
-import numpy as np
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.covariance import reset_wind_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body
+from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL, FLT_EPSILON
 
-AIR_DENSITY_SEA_LEVEL = 1.225
 MIN_AIR_DENSITY = 0.1
 MIN_OBSERVATION_VARIANCE = 0.5
 DRAG_GATE = 5.0
-FLT_EPSILON = float(np.finfo(np.float32).eps)
 
 
 @kernel
@@ -31,17 +29,6 @@ def momentum_drag_coefficient(ekf, params):
     """Momentum drag (1/s) at the present air density."""
     rho = max(ekf.air_density, MIN_AIR_DENSITY)
     return max(params.EKF2_MCOEF * math.sqrt(rho / AIR_DENSITY_SEA_LEVEL), 0.0)
-
-
-@kernel
-def _air_velocity_body(ekf):
-    R = ekf.R_to_earth
-    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
-    return (
-        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
-        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
-        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
-    )
 
 
 @kernel
@@ -62,7 +49,7 @@ def inverse_ballistic_coefficients(params, bx, by):
 @kernel
 def predict_drag(ekf, axis, rho, inverse_bcoef, mcoef):
     """Specific force (m/s²) along body axis 0 or 1."""
-    b = _air_velocity_body(ekf)
+    b = air_velocity_body(ekf)
     speed = math.sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2])
     return -0.5 * inverse_bcoef * rho * b[axis] * speed - mcoef * b[axis]
 
@@ -71,8 +58,8 @@ def predict_drag(ekf, axis, rho, inverse_bcoef, mcoef):
 def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
     """Write the derivative of `predict_drag`, at a given coefficient, into `H` (24,)."""
     R = ekf.R_to_earth
-    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
-    b = _air_velocity_body(ekf)
+    x, y, z = air_velocity(ekf)
+    b = air_velocity_body(ekf)
     speed = math.sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2] + FLT_EPSILON)
     bluff = -0.5 * rho * inverse_bcoef
     # by the air velocity: along the axis itself, and along the air through the speed; the latter turns with the air,
@@ -114,7 +101,7 @@ def _fuse_drag(ekf, params):
     R_acc = max(params.EKF2_DRAG_NOISE, MIN_OBSERVATION_VARIANCE)
     rho = max(ekf.air_density, MIN_AIR_DENSITY)
     mcoef = momentum_drag_coefficient(ekf, params)
-    b = _air_velocity_body(ekf)
+    b = air_velocity_body(ekf)
     inverse_bcoef = inverse_ballistic_coefficients(params, b[0], b[1])
     predicted = (
         predict_drag(ekf, 0, rho, inverse_bcoef[0], mcoef),

@@ -9,13 +9,13 @@ from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_s
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.numerics.rotations import component_in_body
 
 
 @kernel
 def predict_body_velocity(ekf, axis):
     """Velocity (m/s) along one body axis."""
-    R, v = ekf.R_to_earth, ekf.vel
-    return R[0, axis] * v[0] + R[1, axis] * v[1] + R[2, axis] * v[2]
+    return component_in_body(ekf.R_to_earth, axis, ekf.vel[0], ekf.vel[1], ekf.vel[2])
 
 
 @kernel

@@ -12,8 +12,6 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
     EV_CTRL_VEL,
     EV_CTRL_VPOS,
     MIN_NOISE,
-    rotate,
-    rotate_variance,
     sensor_offset_body,
     sensor_velocity_body,
 )
@@ -34,6 +32,7 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_vertical_velocity_to,
     reset_vertical_velocity_to_zero,
 )
+from fusetune.ekf2.numerics.rotations import component_in_earth, variance_in_earth
 
 BIAS_NOISE_SPECTRAL_DENSITY = 0.13
 
@@ -47,13 +46,15 @@ def _measured_height(ekf, params):
         # not working entirely in the vision frame
         refresh_ev_rotation(ekf)
         R = ekf.ev.R_ev_to_ekf
-        position = rotate(R, 2, sample.pos[0], sample.pos[1], sample.pos[2])
-        variance = max(rotate_variance(R, 2, sample.position_var), sample.orientation_var[0], sample.orientation_var[1])
+        position = component_in_earth(R, 2, sample.pos[0], sample.pos[1], sample.pos[2])
+        variance = max(
+            variance_in_earth(R, 2, sample.position_var), sample.orientation_var[0], sample.orientation_var[1]
+        )
     variance = max(variance, params.EKF2_EVP_NOISE * params.EKF2_EVP_NOISE, MIN_NOISE * MIN_NOISE)
     if ekf.cs.gps_hgt:
         variance = max(variance, params.EKF2_GPS_P_NOISE * params.EKF2_GPS_P_NOISE)
     px, py, pz = sensor_offset_body(params)
-    return position - rotate(ekf.R_to_earth, 2, px, py, pz), variance
+    return position - component_in_earth(ekf.R_to_earth, 2, px, py, pz), variance
 
 
 @kernel
@@ -142,10 +143,10 @@ def _reset_vertical_velocity(ekf, params):
     ox, oy, oz = sensor_velocity_body(ekf, params)
     min_variance = params.EKF2_EVV_NOISE * params.EKF2_EVV_NOISE
     if sample.vel_frame == EV_FRAME_BODY_FRD:
-        velocity = rotate(R, 2, vel[0] - ox, vel[1] - oy, vel[2] - oz)
-        variance = rotate_variance(R, 2, sample.velocity_var)
+        velocity = component_in_earth(R, 2, vel[0] - ox, vel[1] - oy, vel[2] - oz)
+        variance = variance_in_earth(R, 2, sample.velocity_var)
     else:
-        velocity = vel[2] - rotate(R, 2, ox, oy, oz)
+        velocity = vel[2] - component_in_earth(R, 2, ox, oy, oz)
         variance = sample.velocity_var[2]
     reset_vertical_velocity_to(ekf, params, velocity, max(variance, min_variance))
 

@@ -4,6 +4,8 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sensor_samples import EV_SAMPLE
+from fusetune.ekf2.filter.common.imu_rates import body_rate
+from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu, velocity_of_offset
 
 EV_MEMORY = np.dtype(
     [
@@ -59,35 +61,12 @@ def is_yaw_alignment_changed(ekf):
 @kernel
 def sensor_offset_body(params):
     """Position (m, FRD) of the vision sensor relative to the IMU."""
-    return (
-        params.EKF2_EV_POS_X - params.EKF2_IMU_POS_X,
-        params.EKF2_EV_POS_Y - params.EKF2_IMU_POS_Y,
-        params.EKF2_EV_POS_Z - params.EKF2_IMU_POS_Z,
-    )
+    return position_relative_to_imu(params, params.EKF2_EV_POS_X, params.EKF2_EV_POS_Y, params.EKF2_EV_POS_Z)
 
 
 @kernel
 def sensor_velocity_body(ekf, params):
     """Velocity (m/s, FRD) of the vision sensor relative to the IMU, from the vehicle's rotation."""
-    imu = ekf.imu_delayed
-    wx = imu.delta_ang[0] / imu.delta_ang_dt - ekf.gyro_bias[0]
-    wy = imu.delta_ang[1] / imu.delta_ang_dt - ekf.gyro_bias[1]
-    wz = imu.delta_ang[2] / imu.delta_ang_dt - ekf.gyro_bias[2]
+    wx, wy, wz = body_rate(ekf)
     px, py, pz = sensor_offset_body(params)
-    return wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px
-
-
-@kernel
-def rotate(R, axis, x, y, z):
-    """Component `axis` of R (x, y, z)."""
-    return R[axis, 0] * x + R[axis, 1] * y + R[axis, 2] * z
-
-
-@kernel
-def rotate_variance(R, axis, variance):
-    """Variance of component `axis` of a vector with independent components, after rotation by `R`."""
-    return (
-        R[axis, 0] * R[axis, 0] * variance[0]
-        + R[axis, 1] * R[axis, 1] * variance[1]
-        + R[axis, 2] * R[axis, 2] * variance[2]
-    )
+    return velocity_of_offset(wx, wy, wz, px, py, pz)

@@ -18,8 +18,6 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
     MIN_NOISE,
     RESETS_AVAILABLE_AT_START,
     is_yaw_alignment_changed,
-    rotate,
-    rotate_variance,
     sensor_offset_body,
 )
 from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import (
@@ -36,6 +34,7 @@ from fusetune.ekf2.filter.common.state import POSITION
 from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.filter.resets.state_resets import reset_local_horizontal_position_to
+from fusetune.ekf2.numerics.rotations import component_in_earth, variance_in_earth
 
 BIAS_NOISE_SPECTRAL_DENSITY = 0.13
 
@@ -54,10 +53,10 @@ def _position_in_ekf_frame(ekf, params, axis):
         variance = sample.position_var[axis]
     elif sample.pos_frame == EV_FRAME_FRD:
         R = ekf.ev.R_ev_to_ekf
-        position = rotate(R, axis, sample.pos[0], sample.pos[1], sample.pos[2])
+        position = component_in_earth(R, axis, sample.pos[0], sample.pos[1], sample.pos[2])
         # the uncertain attitude of vision counts as position noise
         variance = max(
-            rotate_variance(R, axis, sample.position_var),
+            variance_in_earth(R, axis, sample.position_var),
             sample.orientation_var[0],
             sample.orientation_var[1],
             sample.orientation_var[2],
@@ -65,7 +64,7 @@ def _position_in_ekf_frame(ekf, params, axis):
     if ekf.cs.gnss_pos:
         variance = max(variance, params.EKF2_GPS_P_NOISE * params.EKF2_GPS_P_NOISE)
     variance = max(variance, params.EKF2_EVP_NOISE * params.EKF2_EVP_NOISE, MIN_NOISE * MIN_NOISE)
-    return position - rotate(ekf.R_to_earth, axis, px, py, pz), variance
+    return position - component_in_earth(ekf.R_to_earth, axis, px, py, pz), variance
 
 
 @kernel

@@ -18,8 +18,6 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
     MIN_NOISE,
     RESETS_AVAILABLE_AT_START,
     is_yaw_alignment_changed,
-    rotate,
-    rotate_variance,
     sensor_velocity_body,
 )
 from fusetune.ekf2.filter.common.aid_source_status import (
@@ -36,6 +34,7 @@ from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.resets.state_resets import reset_velocity_to, reset_vertical_velocity_to
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
+from fusetune.ekf2.numerics.rotations import component_in_earth, variance_in_earth
 
 NO_SAMPLE_TIME = 0
 BODY_RESET_VARIANCE_FACTOR = 5.0
@@ -61,12 +60,12 @@ def _prepare_measurement(ekf, params):
         ev.vel_measurement[i] = sample.vel[i]
         ev.vel_measurement_var[i] = sample.velocity_var[i]
         if turn:
-            ev.vel_measurement[i] = rotate(ev.R_ev_to_ekf, i, sample.vel[0], sample.vel[1], sample.vel[2])
-            ev.vel_measurement_var[i] = rotate_variance(ev.R_ev_to_ekf, i, sample.velocity_var)
+            ev.vel_measurement[i] = component_in_earth(ev.R_ev_to_ekf, i, sample.vel[0], sample.vel[1], sample.vel[2])
+            ev.vel_measurement_var[i] = variance_in_earth(ev.R_ev_to_ekf, i, sample.velocity_var)
         if sample.vel_frame == EV_FRAME_BODY_FRD:
             ev.vel_measurement[i] -= offset_body[i]
         else:
-            ev.vel_measurement[i] -= rotate(R, i, ox, oy, oz)
+            ev.vel_measurement[i] -= component_in_earth(R, i, ox, oy, oz)
         if sample.vel_frame == EV_FRAME_NED and not ekf.cs.yaw_align:
             ev.vel_measurement[i] = np.nan
         ev.vel_measurement_var[i] = max(ev.vel_measurement_var[i], min_variance)
@@ -115,8 +114,8 @@ def _reset_velocity_to_ev(ekf, params):
         velocity, variance = ekf.scratch.PH[:3], ekf.scratch.PH_reduce[:3]
         m = ev.vel_measurement
         for i in range(3):
-            velocity[i] = rotate(R, i, m[0], m[1], m[2])
-            variance[i] = BODY_RESET_VARIANCE_FACTOR * rotate_variance(R, i, ev.vel_measurement_var)
+            velocity[i] = component_in_earth(R, i, m[0], m[1], m[2])
+            variance[i] = BODY_RESET_VARIANCE_FACTOR * variance_in_earth(R, i, ev.vel_measurement_var)
         reset_velocity_to(ekf, params, velocity, variance)
     else:
         reset_velocity_to(ekf, params, ev.vel_measurement, ev.vel_measurement_var)

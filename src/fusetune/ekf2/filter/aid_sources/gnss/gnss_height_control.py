@@ -4,7 +4,7 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
-from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
+from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VPOS
 from fusetune.ekf2.filter.bias_estimator.bias_estimator import (
     reset_bias,
@@ -29,6 +29,7 @@ from fusetune.ekf2.filter.common.timing import (
 from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.filter.resets.origin_resets import initialise_altitude_to
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to
+from fusetune.ekf2.numerics.rotations import component_in_earth
 
 TYPICAL_VACC_PER_HACC = 1.5
 HEIGHT_BIAS_NOISE_DENSITY = 0.13
@@ -53,8 +54,7 @@ def _use_gnss_height(ekf, params, sample):
     if not is_only_active_source_of_vertical_position_aiding(ekf, ekf.cs.gps_hgt):
         noise = min(noise, params.EKF2_NOAID_NOISE)
     x, y, z = antenna_offset_body(params)
-    _, _, offset_d = rotate_to_earth(ekf.R_to_earth, x, y, z)
-    measurement = sample.alt + offset_d
+    measurement = sample.alt + component_in_earth(ekf.R_to_earth, 2, x, y, z)
     variance = noise * noise
     valid = math.isfinite(measurement) and math.isfinite(variance)
 

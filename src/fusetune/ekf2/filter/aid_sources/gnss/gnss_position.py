@@ -3,7 +3,7 @@
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
+from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -15,6 +15,7 @@ from fusetune.ekf2.filter.common.state import POSITION
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.filter.resets.origin_resets import reset_lat_lon_to
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon, lat_lon_difference
+from fusetune.ekf2.numerics.rotations import rotate_to_earth
 
 MIN_NOISE = 0.01
 

@@ -3,7 +3,7 @@
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
+from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -11,10 +11,13 @@ from fusetune.ekf2.filter.common.aid_source_status import (
     update_aid_source_status,
 )
 from fusetune.ekf2.filter.common.conditions import is_height_reset_required, is_horizontal_aiding_active
+from fusetune.ekf2.filter.common.imu_rates import body_rate
 from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.resets.state_resets import reset_velocity_to, reset_vertical_velocity_to
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
+from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
+from fusetune.ekf2.numerics.rotations import rotate_to_earth
 
 MIN_NOISE = 0.01
 VERTICAL_NOISE_RATIO = 1.5
@@ -47,11 +50,9 @@ def _velocity_of_antenna_offset(ekf, params):
     x, y, z = antenna_offset_body(params)
     if x == 0.0 and y == 0.0 and z == 0.0:
         return 0.0, 0.0, 0.0
-    imu = ekf.imu_delayed
-    p = imu.delta_ang[0] / imu.delta_ang_dt - ekf.gyro_bias[0]
-    q = imu.delta_ang[1] / imu.delta_ang_dt - ekf.gyro_bias[1]
-    r = imu.delta_ang[2] / imu.delta_ang_dt - ekf.gyro_bias[2]
-    return rotate_to_earth(ekf.R_to_earth, q * z - r * y, r * x - p * z, p * y - q * x)
+    wx, wy, wz = body_rate(ekf)
+    vx, vy, vz = velocity_of_offset(wx, wy, wz, x, y, z)
+    return rotate_to_earth(ekf.R_to_earth, vx, vy, vz)
 
 
 @kernel

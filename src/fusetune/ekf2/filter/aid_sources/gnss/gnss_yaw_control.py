@@ -9,7 +9,6 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import rotate_to_earth
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -27,7 +26,7 @@ from fusetune.ekf2.filter.common.timing import (
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
-from fusetune.ekf2.numerics.rotations import wrap_pi
+from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
 
 HEADING_NOISE = 0.1
 """Least standard deviation (rad) of the observed heading."""

@@ -14,16 +14,17 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GRAVITY_VECTOR, is_horizontal_aiding_active
+from fusetune.ekf2.filter.common.imu_rates import specific_force
 from fusetune.ekf2.filter.common.state import ATTITUDE
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_kalman_gain
+from fusetune.ekf2.numerics.constants import ONE_G
 
 GRAVITY_MEMORY = np.dtype([("jacobian", "f8", (3, 2))], align=True)
 """Sub-record `ekf.gravity`: of each body axis, the derivative by the attitude errors about north and east."""
 
-CONSTANTS_ONE_G = 9.80665
-ACCEL_LIMIT_LOW = 0.9 * CONSTANTS_ONE_G
-ACCEL_LIMIT_HIGH = 1.1 * CONSTANTS_ONE_G
+ACCEL_LIMIT_LOW = 0.9 * ONE_G
+ACCEL_LIMIT_HIGH = 1.1 * ONE_G
 GRAVITY_GATE = 0.25
 MIN_NOISE = 0.01
 
@@ -39,17 +40,15 @@ def compute_gravity_jacobian(ekf, jacobian):
 @kernel
 def _innovation_variance(ekf, jacobian, axis, R):
     north, east = jacobian[axis, 0], jacobian[axis, 1]
-    P = ekf.P
-    return P[0, 0] * north * north + 2.0 * P[0, 1] * north * east + P[1, 1] * east * east + R
+    P, n, e = ekf.P, ATTITUDE, ATTITUDE + 1
+    return P[n, n] * north * north + 2.0 * P[n, e] * north * east + P[e, e] * east * east + R
 
 
 @kernel
 def _update_gravity(ekf, params):
     """Judge the specific force at the fusion time horizon as an observation of the vertical."""
     imu, aid, jacobian = ekf.imu_delayed, ekf.aid.gravity, ekf.gravity.jacobian
-    x = imu.delta_vel[0] / imu.delta_vel_dt - ekf.accel_bias[0]
-    y = imu.delta_vel[1] / imu.delta_vel_dt - ekf.accel_bias[1]
-    z = imu.delta_vel[2] / imu.delta_vel_dt - ekf.accel_bias[2]
+    x, y, z = specific_force(ekf)
     norm = math.sqrt(x * x + y * y + z * z)
     variance = max(params.EKF2_GRAV_NOISE * params.EKF2_GRAV_NOISE, MIN_NOISE * MIN_NOISE)
     measurement = (x / norm, y / norm, z / norm)

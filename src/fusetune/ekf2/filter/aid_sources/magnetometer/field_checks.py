@@ -6,7 +6,7 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import CHECK_FORCE_WMM, CHECK_INCLINATION, CHECK_STRENGTH
-from fusetune.ekf2.numerics.rotations import wrap_pi
+from fusetune.ekf2.numerics.rotations import component_in_earth, wrap_pi
 
 AVERAGE_STRENGTH = 0.45
 AVERAGE_STRENGTH_TOLERANCE = 0.40
@@ -50,8 +50,7 @@ def check_mag_field(ekf, params, mag_sample):
             ekf.cs.mag_field_disturbed = True
             is_failing = True
 
-    R = ekf.R_to_earth
-    down = R[2, 0] * mag_sample[0] + R[2, 1] * mag_sample[1] + R[2, 2] * mag_sample[2]
+    down = component_in_earth(ekf.R_to_earth, 2, mag_sample[0], mag_sample[1], mag_sample[2])
     mag.inclination = math.asin(min(max(down / max(mag.strength, NORM_FLOOR), -1.0), 1.0))
     if (checks & CHECK_INCLINATION) != 0:
         if np.isfinite(mag.wmm_inclination):

@@ -6,24 +6,22 @@ field h = Rᵀ m_I + m_B with H_θ = Rᵀ[m_I]×, H_mI = Rᵀ, H_mB = I; declina
 
 import math
 
-import numpy as np
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov, reset_quat_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, compute_kalman_gain
-from fusetune.ekf2.numerics.rotations import wrap_pi
+from fusetune.ekf2.numerics.constants import FLT_EPSILON
+from fusetune.ekf2.numerics.rotations import component_in_body, wrap_pi
 
 R_MAG_MIN = 0.01**2
-FLT_EPSILON = float(np.finfo(np.float32).eps)
 
 
 @kernel
 def predict_mag(ekf, axis):
     """Predicted field (Gauss) along one body axis."""
     R, field = ekf.R_to_earth, ekf.mag_I
-    return R[0, axis] * field[0] + R[1, axis] * field[1] + R[2, axis] * field[2] + ekf.mag_B[axis]
+    return component_in_body(R, axis, field[0], field[1], field[2]) + ekf.mag_B[axis]
 
 
 @kernel

@@ -11,7 +11,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import get_mag_de
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.state import MAG_BODY
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
-from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
+from fusetune.ekf2.numerics.rotations import euler_yaw, rotate_to_earth, wrap_pi
 
 HEADING_LPF_ALPHA = 0.1
 YAW_VARIANCE_MIN = 0.01**2
@@ -33,8 +33,8 @@ def field_azimuth(ekf, params, mag):
     if is_mag_bias_good(ekf, params):
         bx, by, bz = ekf.mag_B[0], ekf.mag_B[1], ekf.mag_B[2]
     x, y, z = mag[0] - bx, mag[1] - by, mag[2] - bz
-    R = ekf.R_to_earth
-    return math.atan2(R[1, 0] * x + R[1, 1] * y + R[1, 2] * z, R[0, 0] * x + R[0, 1] * y + R[0, 2] * z)
+    north, east, _ = rotate_to_earth(ekf.R_to_earth, x, y, z)
+    return math.atan2(east, north)
 
 
 @kernel

@@ -7,6 +7,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import reset_mag_
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known
 from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
+from fusetune.ekf2.numerics.rotations import component_in_body, rotate_to_earth
 
 EARTH_FIELD_MIN_CHANGE = 0.01
 MAG_ANOMALIES_MAX_HAGL = 1.5
@@ -41,8 +42,7 @@ def reset_mag_states_to_wmm(ekf, params, mag, reset_heading):
         if moved:
             R = ekf.R_to_earth
             for axis in range(3):
-                predicted = R[0, axis] * field[0] + R[1, axis] * field[1] + R[2, axis] * field[2]
-                ekf.mag_B[axis] = mag[axis] - predicted
+                ekf.mag_B[axis] = mag[axis] - component_in_body(R, axis, field[0], field[1], field[2])
             reset_mag_bias_cov(ekf, params)
     else:
         reset_mag_body_to_zero(ekf, params)
@@ -56,14 +56,8 @@ def reset_mag_states_to_measurement(ekf, params, mag, reset_heading):
     reset_mag_body_to_zero(ekf, params)
     if reset_heading:
         reset_mag_heading(ekf, params, mag)
-    R = ekf.R_to_earth
-    move_earth_field_to(
-        ekf,
-        params,
-        R[0, 0] * mag[0] + R[0, 1] * mag[1] + R[0, 2] * mag[2],
-        R[1, 0] * mag[0] + R[1, 1] * mag[1] + R[1, 2] * mag[2],
-        R[2, 0] * mag[0] + R[2, 1] * mag[1] + R[2, 2] * mag[2],
-    )
+    north, east, down = rotate_to_earth(ekf.R_to_earth, mag[0], mag[1], mag[2])
+    move_earth_field_to(ekf, params, north, east, down)
 
 
 @kernel

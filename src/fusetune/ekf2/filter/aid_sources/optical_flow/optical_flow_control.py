@@ -27,6 +27,7 @@ from fusetune.ekf2.filter.common.conditions import (
 )
 from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.global_position import single_precision
+from fusetune.ekf2.filter.common.imu_rates import body_rate
 from fusetune.ekf2.filter.common.state import TERRAIN
 from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, RESET_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.covariance import reset_covariance_block
@@ -46,11 +47,11 @@ TERRAIN_VARIANCE_AFTER_RESET = 100.0
 @kernel
 def _complete_gyro_rate(ekf, params):
     """Fill in the gyro rates that the sensor lacks from the IMU, or replace them all if so configured."""
-    imu, flow, rate = ekf.imu_delayed, ekf.flow, ekf.sensors.flow.sample.gyro_rate
+    flow, rate = ekf.flow, ekf.sensors.flow.sample.gyro_rate
     internal = int(params.EKF2_OF_GYR_SRC) == GYRO_SOURCE_INTERNAL
     xy_missing = not math.isfinite(rate[0]) or not math.isfinite(rate[1])
-    for i in range(3):
-        flow.ref_body_rate[i] = -(imu.delta_ang[i] / imu.delta_ang_dt - ekf.gyro_bias[i])
+    x, y, z = body_rate(ekf)
+    flow.ref_body_rate[0], flow.ref_body_rate[1], flow.ref_body_rate[2] = -x, -y, -z
     for i in range(3):
         if internal or xy_missing or not math.isfinite(rate[i]):
             rate[i] = flow.ref_body_rate[i]

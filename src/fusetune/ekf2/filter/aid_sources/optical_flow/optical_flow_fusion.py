@@ -16,6 +16,8 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, TERRAIN, VELOC
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu, velocity_of_offset
+from fusetune.ekf2.numerics.rotations import component_in_earth, rotate_to_body
 
 MIN_HAGL = 1e-2
 HAGL_EPSILON = 1e-3
@@ -26,20 +28,14 @@ BEST_QUALITY = 255.0
 @kernel
 def flow_sensor_offset_body(params):
     """Position (m, FRD) of the flow sensor relative to the IMU."""
-    return (
-        params.EKF2_OF_POS_X - params.EKF2_IMU_POS_X,
-        params.EKF2_OF_POS_Y - params.EKF2_IMU_POS_Y,
-        params.EKF2_OF_POS_Z - params.EKF2_IMU_POS_Z,
-    )
+    return position_relative_to_imu(params, params.EKF2_OF_POS_X, params.EKF2_OF_POS_Y, params.EKF2_OF_POS_Z)
 
 
 @kernel
 def predict_flow_hagl(ekf, params):
     """Height (m) of the flow sensor above the terrain estimate, never less than 1 cm."""
     px, py, pz = flow_sensor_offset_body(params)
-    R = ekf.R_to_earth
-    offset_down = R[2, 0] * px + R[2, 1] * py + R[2, 2] * pz
-    return max(abs(get_hagl(ekf) - offset_down), MIN_HAGL)
+    return max(abs(get_hagl(ekf) - component_in_earth(ekf.R_to_earth, 2, px, py, pz)), MIN_HAGL)
 
 
 @kernel
@@ -52,13 +48,10 @@ def predict_flow_range(ekf, params):
 def predict_flow(ekf, params, gyro_x, gyro_y, gyro_z):
     """Predicted rates (rad/s) about body X and Y, for a flow gyro reading (rad/s, minus the body rate)."""
     px, py, pz = flow_sensor_offset_body(params)
-    rx = gyro_z * py - gyro_y * pz
-    ry = gyro_x * pz - gyro_z * px
-    R, v = ekf.R_to_earth, ekf.vel
-    forward = R[0, 0] * v[0] + R[1, 0] * v[1] + R[2, 0] * v[2] + rx
-    right = R[0, 1] * v[0] + R[1, 1] * v[1] + R[2, 1] * v[2] + ry
-    scale = R[2, 2] / predict_flow_hagl(ekf, params)
-    return right * scale, -forward * scale
+    offset_x, offset_y, _ = velocity_of_offset(-gyro_x, -gyro_y, -gyro_z, px, py, pz)
+    forward, right, _ = rotate_to_body(ekf.R_to_earth, ekf.vel[0], ekf.vel[1], ekf.vel[2])
+    scale = ekf.R_to_earth[2, 2] / predict_flow_hagl(ekf, params)
+    return (right + offset_y) * scale, -(forward + offset_x) * scale
 
 
 @kernel

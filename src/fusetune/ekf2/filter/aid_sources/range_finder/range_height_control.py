@@ -32,6 +32,8 @@ from fusetune.ekf2.filter.common.timing import (
     is_timed_out,
 )
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_vertical_velocity_to_zero
+from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu
+from fusetune.ekf2.numerics.rotations import component_in_earth
 
 RNG_CTRL_CONDITIONAL, RNG_CTRL_ENABLED = 1, 2
 RANGE_VARIANCE_MIN = 0.001
@@ -69,12 +71,8 @@ def _check_sensor(ekf, params):
     run_range_sensor_checks(rng, ekf.time_delayed_us, params.EKF2_RNG_QLTY_T, params.EKF2_RNG_FOG)
 
     if is_data_healthy(rng):
-        offset_down = (
-            R[2, 0] * (params.EKF2_RNG_POS_X - params.EKF2_IMU_POS_X)
-            + R[2, 1] * (params.EKF2_RNG_POS_Y - params.EKF2_IMU_POS_Y)
-            + R[2, 2] * (params.EKF2_RNG_POS_Z - params.EKF2_IMU_POS_Z)
-        )
-        rng.sample.range += offset_down / rng.cos_tilt
+        x, y, z = position_relative_to_imu(params, params.EKF2_RNG_POS_X, params.EKF2_RNG_POS_Y, params.EKF2_RNG_POS_Z)
+        rng.sample.range += component_in_earth(R, 2, x, y, z) / rng.cos_tilt
         if ekf.cs.in_air:
             _check_consistency(ekf, params)
     elif not ekf.cs.in_air and rng.is_regularly_sending_data and rng.is_sample_ready:

@@ -8,8 +8,6 @@ Mirrors PX4 v1.16 `EKF/aid_sources/sideslip/sideslip_fusion.cpp`.
 
 import math
 
-import numpy as np
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
@@ -17,44 +15,41 @@ from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_wind_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
-from fusetune.ekf2.filter.wind import keep_only_wind_gains
+from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, keep_only_wind_gains
+from fusetune.ekf2.numerics.constants import FLT_EPSILON
 
 FUSION_INTERVAL_US = 150_000
 FORWARD_SPEED_EPSILON = 1e-3
 MIN_NOISE = 0.01
-FLT_EPSILON = float(np.finfo(np.float32).eps)
 
 
 @kernel
-def _air_velocity_body(ekf, axis):
-    R = ekf.R_to_earth
-    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
-    return R[0, axis] * x + R[1, axis] * y + R[2, axis] * z
+def _air_velocity_in_plane(ekf):
+    """Forward and sideways velocity (m/s) through the air.
 
-
-@kernel
-def _forward_air_speed(ekf):
-    """Kept from zero the way SymForce does it for `atan2`: x + (sign x + ½) ε."""
-    forward = _air_velocity_body(ekf, 0)
+    Forward is kept from zero the way SymForce does it for `atan2`: x + (sign x + ½) ε.
+    """
+    forward, sideways, _ = air_velocity_body(ekf)
     if forward > 0.0:
-        return forward + 1.5 * FORWARD_SPEED_EPSILON
+        return forward + 1.5 * FORWARD_SPEED_EPSILON, sideways
     if forward < 0.0:
-        return forward - 0.5 * FORWARD_SPEED_EPSILON
-    return 0.5 * FORWARD_SPEED_EPSILON
+        return forward - 0.5 * FORWARD_SPEED_EPSILON, sideways
+    return 0.5 * FORWARD_SPEED_EPSILON, sideways
 
 
 @kernel
 def predict_sideslip(ekf):
     """Sideslip angle (rad)."""
-    return math.atan2(_air_velocity_body(ekf, 1), _forward_air_speed(ekf))
+    forward, sideways = _air_velocity_in_plane(ekf)
+    return math.atan2(sideways, forward)
 
 
 @kernel
 def compute_sideslip_jacobian(ekf, H):
     """Write the derivative of the sideslip angle into `H` (24,)."""
     R = ekf.R_to_earth
-    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
-    forward, sideways = _forward_air_speed(ekf), _air_velocity_body(ekf, 1)
+    x, y, z = air_velocity(ekf)
+    forward, sideways = _air_velocity_in_plane(ekf)
     inverse = 1.0 / (forward * forward + sideways * sideways)
     # the derivative of atan2(a, b) is (b da - a db) / (a² + b²): one earth vector takes both body axes
     ex = (forward * R[0, 1] - sideways * R[0, 0]) * inverse

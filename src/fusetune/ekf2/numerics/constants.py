@@ -1,0 +1,20 @@
+"""Physical constants as PX4 v1.16 has them (`lib/geo/geo.h`, `lib/atmosphere/atmosphere.h`), and its resolution."""
+
+import numpy as np
+
+from fusetune.px4.layouts.sensor_layouts import STANDARD_AIR_DENSITY_KG_M3
+
+ONE_G = 9.80665
+"""Standard gravity (m/s²), which PX4 uses everywhere."""
+
+AIR_DENSITY_SEA_LEVEL = STANDARD_AIR_DENSITY_KG_M3
+"""Air density (kg/m³) at 15 °C."""
+
+RADIUS_OF_EARTH = 6371000.0
+"""Radius (m) of the sphere on which the local frame is a map projection."""
+
+EARTH_SPIN_RATE = 7.2921150e-5
+"""Rotation rate of the Earth (rad/s)."""
+
+FLT_EPSILON = float(np.finfo(np.float32).eps)
+"""Resolution of single precision at 1, by which PX4's generated equations keep divisors off zero."""
