@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fusetune.ekf2.filter.common.parameters import parameter_record
@@ -32,6 +34,24 @@ def at_time(ekf: np.void, time_s: float) -> None:
     """Move the fusion time horizon; the newest IMU sample is 0.2 s ahead of it."""
     ekf["time_delayed_us"] = round(time_s * 1e6)
     ekf["time_latest_us"] = round(time_s * 1e6) + 200_000
+
+
+def put_sample(ekf: np.void, sensor: str, age_us: int, **values: Any) -> None:
+    """Let a sample be due, measured so long before the fusion time horizon, and the newest one just in."""
+    record = ekf["sensors"][sensor]
+    record["sample"]["time_us"] = ekf["time_delayed_us"] - age_us
+    for name, value in values.items():
+        record["sample"][name] = value
+    record["data_ready"] = True
+    record["newest_time_us"] = ekf["time_latest_us"]
+
+
+def is_running_after(ekf: np.void, params: np.void, silence_s: float, sensor: str, control: Any, flag: str) -> bool:
+    """Whether a source still counts as fused so long after its sensor's newest sample."""
+    ekf["sensors"][sensor]["data_ready"] = False
+    ekf["time_latest_us"] = ekf["sensors"][sensor]["newest_time_us"] + round(silence_s * 1e6)
+    control(ekf, params)
+    return bool(ekf["cs"][flag])
 
 
 def set_attitude(ekf: np.void, roll: float, pitch: float, yaw: float) -> None:

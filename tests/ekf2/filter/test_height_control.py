@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.ekf2.filter.height_and_field_records import at_time, make_estimator, make_parameters
 
-from fusetune.ekf2.filter.common.core_memory import (
+from fusetune.ekf2.filter.common.height_reference import (
     HEIGHT_REF_BARO,
     HEIGHT_REF_EV,
     HEIGHT_REF_GNSS,

@@ -11,7 +11,7 @@ from fusetune.ekf2.feed.message_samples import imu_samples
 from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE
 from fusetune.ekf2.feed.sensors import SENSORS
 from fusetune.ekf2.filter.common.parameters import complete, parameter_record
-from fusetune.ekf2.filter.imu_down_sampler import (
+from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import (
     DOWN_SAMPLER_MEMORY,
     accumulate_imu,
     initialise_down_sampler,

@@ -13,7 +13,7 @@ from tests.ekf2.filter.height_and_field_records import (
     set_quaternion,
 )
 
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_RANGE
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state, update_average_interval
 from fusetune.ekf2.numerics.constants import ONE_G
 

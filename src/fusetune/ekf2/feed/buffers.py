@@ -4,14 +4,15 @@ The estimator runs a fixed time behind the newest IMU sample. A sample of an aid
 horizon has passed its time stamp; of several that are due, the newest wins and the older ones are dropped. The replay
 has all samples in arrays already, so a ring holds only time stamps and positions in those arrays.
 
-Mirrors PX4's `RingBuffer` and the `set…Data` functions of its estimator interface (v1.16), including two traits that
-change results: a ring that was emptied forgets the time of its newest sample, and samples that arrive faster than
+Mirrors PX4 v1.16 `EKF/RingBuffer.h` and the `set…Data` functions of `EKF/estimator_interface.cpp`, including two traits
+that change results: a ring that was emptied forgets the time of its newest sample, and samples that arrive faster than
 the horizon moves through the ring are refused.
 """
 
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE
 
 RING_CAPACITY = 256
@@ -21,11 +22,8 @@ MAX_SAMPLE_AGE_US = 100_000
 
 RING = np.dtype(
     [
-        ("time_us", "i8", (RING_CAPACITY,)),
-        ("slot", "i8", (RING_CAPACITY,)),
-        ("head", "i8"),
-        ("tail", "i8"),
-        ("size", "i8"),
+        *fields("i8", "time_us", "slot", shape=(RING_CAPACITY,)),
+        *fields("i8", "head", "tail", "size"),
         ("first_write", "?"),
     ],
     align=True,
@@ -34,9 +32,7 @@ RING = np.dtype(
 IMU_RING = np.dtype(
     [
         ("sample", IMU_SAMPLE, (RING_CAPACITY,)),
-        ("head", "i8"),
-        ("tail", "i8"),
-        ("size", "i8"),
+        *fields("i8", "head", "tail", "size"),
         ("first_write", "?"),
     ],
     align=True,
@@ -45,9 +41,7 @@ IMU_RING = np.dtype(
 BUFFERS_MEMORY = np.dtype(
     [
         ("imu", IMU_RING),
-        ("imu_length", "i8"),
-        ("observation_length", "i8"),
-        ("min_observation_interval_us", "i8"),
+        *fields("i8", "imu_length", "observation_length", "min_observation_interval_us"),
         ("initialised", "?"),
     ],
     align=True,

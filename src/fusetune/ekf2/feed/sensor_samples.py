@@ -7,13 +7,13 @@ are rad, heights m upwards, magnetic field Gauss.
 
 import numpy as np
 
+from fusetune.ekf2.feed.record_fields import fields
+
 IMU_SAMPLE = np.dtype(
     [
         ("time_us", "i8"),
-        ("delta_ang", "f8", (3,)),
-        ("delta_vel", "f8", (3,)),
-        ("delta_ang_dt", "f8"),
-        ("delta_vel_dt", "f8"),
+        *fields("f8", "delta_ang", "delta_vel", shape=(3,)),
+        *fields("f8", "delta_ang_dt", "delta_vel_dt"),
         ("delta_vel_clipping", "i8", (3,)),
     ],
     align=True,
@@ -22,19 +22,11 @@ IMU_SAMPLE = np.dtype(
 GNSS_SAMPLE = np.dtype(
     [
         ("time_us", "i8"),
-        ("lat_deg", "f8"),
-        ("lon_deg", "f8"),
-        ("alt", "f8"),
+        *fields("f8", "lat_deg", "lon_deg", "alt"),
         ("vel", "f8", (3,)),
-        ("hacc", "f8"),
-        ("vacc", "f8"),
-        ("sacc", "f8"),
-        ("fix_type", "i8"),
-        ("nsats", "i8"),
-        ("pdop", "f8"),
-        ("yaw", "f8"),
-        ("yaw_acc", "f8"),
-        ("yaw_offset", "f8"),
+        *fields("f8", "hacc", "vacc", "sacc"),
+        *fields("i8", "fix_type", "nsats"),
+        *fields("f8", "pdop", "yaw", "yaw_acc", "yaw_offset"),
         ("spoofed", "?"),
     ],
     align=True,
@@ -53,16 +45,10 @@ FLOW_SAMPLE = np.dtype(
 EV_SAMPLE = np.dtype(
     [
         ("time_us", "i8"),
-        ("pos", "f8", (3,)),
+        *fields("f8", "pos", "vel", shape=(3,)),
         ("quat", "f8", (4,)),
-        ("vel", "f8", (3,)),
-        ("position_var", "f8", (3,)),
-        ("velocity_var", "f8", (3,)),
-        ("orientation_var", "f8", (3,)),
-        ("pos_frame", "i8"),
-        ("vel_frame", "i8"),
-        ("reset_counter", "i8"),
-        ("quality", "i8"),
+        *fields("f8", "position_var", "velocity_var", "orientation_var", shape=(3,)),
+        *fields("i8", "pos_frame", "vel_frame", "reset_counter", "quality"),
     ],
     align=True,
 )
@@ -79,11 +65,7 @@ AUXVEL_SAMPLE = np.dtype([("time_us", "i8"), ("vel", "f8", (2,)), ("vel_var", "f
 SYSTEM_FLAGS_SAMPLE = np.dtype(
     [
         ("time_us", "i8"),
-        ("at_rest", "?"),
-        ("in_air", "?"),
-        ("is_fixed_wing", "?"),
-        ("gnd_effect", "?"),
-        ("constant_pos", "?"),
+        *fields("?", "at_rest", "in_air", "is_fixed_wing", "gnd_effect", "constant_pos"),
     ],
     align=True,
 )

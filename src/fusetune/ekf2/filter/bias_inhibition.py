@@ -1,4 +1,7 @@
-"""Which IMU bias states may be learnt in this update."""
+"""Which IMU bias states may be learnt in this update.
+
+Mirrors `updateIMUBiasInhibit` of PX4 v1.16 `EKF/ekf_helper.cpp`.
+"""
 
 import math
 

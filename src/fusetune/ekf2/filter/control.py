@@ -1,4 +1,4 @@
-"""One pass over all aid sources, in the order of PX4 v1.16's `controlFusionModes`."""
+"""One pass over all aid sources, in the order of `controlFusionModes` of PX4 v1.16 `EKF/control.cpp`."""
 
 import math
 
@@ -8,17 +8,17 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_control import control_a
 from fusetune.ekf2.filter.aid_sources.auxvel.auxvel_fusion import control_aux_vel_fusion
 from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import control_drag_fusion
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_control import control_external_vision_fusion
-from fusetune.ekf2.filter.aid_sources.fake_height import control_fake_hgt_fusion
-from fusetune.ekf2.filter.aid_sources.fake_position import control_fake_pos_fusion
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_control import control_gnss_fusion
+from fusetune.ekf2.filter.aid_sources.fake_height_control import control_fake_hgt_fusion
+from fusetune.ekf2.filter.aid_sources.fake_pos_control import control_fake_pos_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gps_control import control_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
 from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_control import control_optical_flow_fusion
 from fusetune.ekf2.filter.aid_sources.sideslip.sideslip_fusion import control_beta_fusion
-from fusetune.ekf2.filter.aid_sources.zero_gyro import control_zero_gyro_update
-from fusetune.ekf2.filter.aid_sources.zero_innovation_heading import control_zero_innovation_heading_update
-from fusetune.ekf2.filter.aid_sources.zero_velocity import control_zero_velocity_update
+from fusetune.ekf2.filter.aid_sources.zero_gyro_update import control_zero_gyro_update
+from fusetune.ekf2.filter.aid_sources.zero_innovation_heading_update import control_zero_innovation_heading_update
+from fusetune.ekf2.filter.aid_sources.zero_velocity_update import control_zero_velocity_update
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GYRO_BIAS, set_gnd_effect, set_in_air_status
 from fusetune.ekf2.filter.common.dead_reckoning import update_dead_reckoning_status
 from fusetune.ekf2.filter.covariance import tilt_variance

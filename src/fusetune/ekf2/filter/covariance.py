@@ -1,18 +1,11 @@
-"""Covariance: initial values, block resets, and the limits that PX4 v1.16 keeps its variances in."""
+"""Covariance: initial values and block resets.
+
+Mirrors PX4 v1.16 `EKF/covariance.cpp`, whose prediction and limits stand in `prediction.py` and
+`measurement_update.py`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.common.state import (
-    ACCEL_BIAS,
-    ATTITUDE,
-    ERROR_STATE_SIZE,
-    GYRO_BIAS,
-    MAG_BODY,
-    MAG_EARTH,
-    POSITION,
-    TERRAIN,
-    VELOCITY,
-    WIND,
-)
+from fusetune.ekf2.filter.common import state
 
 INITIAL_WIND_UNCERTAINTY = 1.0
 
@@ -23,7 +16,7 @@ def uncorrelate_block(ekf, index, dof):
     P = ekf.P
     for i in range(index, index + dof):
         variance = P[i, i]
-        for j in range(ERROR_STATE_SIZE):
+        for j in range(state.ERROR_STATE_SIZE):
             P[i, j] = 0.0
             P[j, i] = 0.0
         P[i, i] = variance
@@ -51,25 +44,25 @@ def reset_quat_cov(ekf, params, yaw_noise):
     """Attitude variances at alignment: tilt from `EKF2_ANGERR_INIT`, yaw from `yaw_noise` (rad, one sigma)."""
     tilt_sigma = max(params.EKF2_ANGERR_INIT, 0.01)
     tilt_variance = tilt_sigma * tilt_sigma
-    uncorrelate_set_variance_vector(ekf, ATTITUDE, tilt_variance, tilt_variance, yaw_noise * yaw_noise)
+    uncorrelate_set_variance_vector(ekf, state.ATTITUDE, tilt_variance, tilt_variance, yaw_noise * yaw_noise)
 
 
 @kernel
 def reset_gyro_bias_cov(ekf, params):
     """Gyro bias variances as at switch-on."""
-    reset_covariance_block(ekf, GYRO_BIAS, 3, params.EKF2_GBIAS_INIT**2)
+    reset_covariance_block(ekf, state.GYRO_BIAS, 3, params.EKF2_GBIAS_INIT**2)
 
 
 @kernel
 def reset_gyro_bias_z_cov(ekf, params):
     """Variance of the gyro z bias as at switch-on, so that it converges anew."""
-    reset_covariance_block(ekf, GYRO_BIAS + 2, 1, params.EKF2_GBIAS_INIT**2)
+    reset_covariance_block(ekf, state.GYRO_BIAS + 2, 1, params.EKF2_GBIAS_INIT**2)
 
 
 @kernel
 def reset_accel_bias_cov(ekf, params):
     """Accelerometer bias variances as at switch-on."""
-    reset_covariance_block(ekf, ACCEL_BIAS, 3, params.EKF2_ABIAS_INIT**2)
+    reset_covariance_block(ekf, state.ACCEL_BIAS, 3, params.EKF2_ABIAS_INIT**2)
 
 
 @kernel
@@ -91,19 +84,19 @@ def reset_accel_bias(ekf, params):
 @kernel
 def reset_mag_earth_cov(ekf, params):
     """Earth field variances at the start of magnetometer fusion."""
-    reset_covariance_block(ekf, MAG_EARTH, 3, params.EKF2_MAG_NOISE**2)
+    reset_covariance_block(ekf, state.MAG_EARTH, 3, params.EKF2_MAG_NOISE**2)
 
 
 @kernel
 def reset_mag_bias_cov(ekf, params):
     """Body field variances at the start of magnetometer fusion."""
-    reset_covariance_block(ekf, MAG_BODY, 3, params.EKF2_MAG_NOISE**2)
+    reset_covariance_block(ekf, state.MAG_BODY, 3, params.EKF2_MAG_NOISE**2)
 
 
 @kernel
 def reset_wind_cov(ekf):
     """Wind variances before anything is known of the wind."""
-    reset_covariance_block(ekf, WIND, 2, INITIAL_WIND_UNCERTAINTY**2)
+    reset_covariance_block(ekf, state.WIND, 2, INITIAL_WIND_UNCERTAINTY**2)
 
 
 @kernel
@@ -113,34 +106,34 @@ def initialise_covariance(ekf, params):
     The yaw starts without uncertainty: zero-velocity and fake-position fusion level finer that way.
     """
     P = ekf.P
-    for i in range(ERROR_STATE_SIZE):
-        for j in range(ERROR_STATE_SIZE):
+    for i in range(state.ERROR_STATE_SIZE):
+        for j in range(state.ERROR_STATE_SIZE):
             P[i, j] = 0.0
     reset_quat_cov(ekf, params, 0.0)
     vel_var = max(params.EKF2_GPS_V_NOISE, 0.01) ** 2
-    uncorrelate_set_variance_vector(ekf, VELOCITY, vel_var, vel_var, 1.5**2 * vel_var)
+    uncorrelate_set_variance_vector(ekf, state.VELOCITY, vel_var, vel_var, 1.5**2 * vel_var)
     xy_var = max(params.EKF2_GPS_P_NOISE, 0.01) ** 2
     z_var = max(params.EKF2_BARO_NOISE, 0.01) ** 2
     if ekf.cs.gps_hgt:
         z_var = max(1.5 * params.EKF2_GPS_P_NOISE, 0.01) ** 2
     if ekf.cs.rng_hgt:
         z_var = max(params.EKF2_RNG_NOISE, 0.01) ** 2
-    uncorrelate_set_variance_vector(ekf, POSITION, xy_var, xy_var, z_var)
+    uncorrelate_set_variance_vector(ekf, state.POSITION, xy_var, xy_var, z_var)
     reset_gyro_bias_cov(ekf, params)
     reset_accel_bias_cov(ekf, params)
     reset_mag_earth_cov(ekf, params)
     reset_mag_bias_cov(ekf, params)
     reset_wind_cov(ekf)
-    reset_covariance_block(ekf, TERRAIN, 1, params.EKF2_MIN_RNG**2)
+    reset_covariance_block(ekf, state.TERRAIN, 1, params.EKF2_MIN_RNG**2)
 
 
 @kernel
 def tilt_variance(ekf):
     """Sum of the variances (rad²) of the attitude error about north and east."""
-    return ekf.P[ATTITUDE, ATTITUDE] + ekf.P[ATTITUDE + 1, ATTITUDE + 1]
+    return ekf.P[state.ATTITUDE, state.ATTITUDE] + ekf.P[state.ATTITUDE + 1, state.ATTITUDE + 1]
 
 
 @kernel
 def yaw_variance(ekf):
     """Variance (rad²) of the attitude error about down."""
-    return ekf.P[ATTITUDE + 2, ATTITUDE + 2]
+    return ekf.P[state.ATTITUDE + 2, state.ATTITUDE + 2]

@@ -3,6 +3,8 @@
 Per IMU sample, `update` first levels the filter if it has not started yet, then, when a new down-sampled sample moved
 the fusion time horizon, predicts covariance and state over the oldest buffered interval, lets every aid source act,
 and corrects the output predictor.
+
+Mirrors PX4 v1.16 `EKF/ekf.cpp`, whose `predictState` stands in `prediction.py`.
 """
 
 import math
@@ -21,7 +23,7 @@ from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMO
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_MEMORY, initialise_mag_memory
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
-from fusetune.ekf2.filter.aid_sources.zero_gyro import ZERO_GYRO_MEMORY
+from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
     HEIGHT_BIAS_ESTIMATOR,
     initialise_height_bias_estimator,
@@ -31,12 +33,13 @@ from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import (
     initialise_position_bias_estimator,
 )
 from fusetune.ekf2.filter.bias_inhibition import update_imu_bias_inhibit
-from fusetune.ekf2.filter.common.core_memory import CORE_FIELDS, HEIGHT_REF_UNKNOWN, POSITION_REF_GNSS
+from fusetune.ekf2.filter.common.core_memory import CORE_FIELDS, POSITION_REF_GNSS
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.filter.common.local_origin import LOCAL_ORIGIN, initialise_local_origin
 from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
-from fusetune.ekf2.filter.imu_down_sampler import DOWN_SAMPLER_MEMORY
-from fusetune.ekf2.filter.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
+from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
+from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state, update_average_interval
 from fusetune.ekf2.filter.wind import WIND_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory

@@ -1,4 +1,7 @@
-"""Fusion of all height sources, choice of the height reference, and health of the vertical acceleration."""
+"""Fusion of all height sources, choice of the height reference, and health of the vertical acceleration.
+
+Mirrors PX4 v1.16 `EKF/height_control.cpp`.
+"""
 
 import math
 
@@ -7,7 +10,7 @@ from fusetune.ekf2.filter.aid_sources.barometer.baro_height_control import contr
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import update_ground_effect
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import control_gnss_height_fusion
 from fusetune.ekf2.filter.aid_sources.range_finder.range_height_control import control_range_hagl_fusion
-from fusetune.ekf2.filter.common.core_memory import (
+from fusetune.ekf2.filter.common.height_reference import (
     HEIGHT_REF_BARO,
     HEIGHT_REF_EV,
     HEIGHT_REF_GNSS,

@@ -6,22 +6,14 @@ may have been set to zero, the Joseph form (I - K H) P (I - K H)ᵀ + K R Kᵀ m
     P - K (P Hᵀ)ᵀ - (P Hᵀ) Kᵀ + K (H P Hᵀ + R) Kᵀ
 
 which is evaluated here in one pass that keeps P exactly symmetric.
+
+Mirrors `measurementUpdate`, `fuseDirectStateMeasurement` and `fuse` of PX4 v1.16 `EKF/ekf_helper.cpp`, and the limits
+of `EKF/covariance.cpp`; in double precision.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, single_precision
-from fusetune.ekf2.filter.common.state import (
-    ACCEL_BIAS,
-    ATTITUDE,
-    ERROR_STATE_SIZE,
-    GYRO_BIAS,
-    MAG_BODY,
-    MAG_EARTH,
-    POSITION,
-    TERRAIN,
-    VELOCITY,
-    WIND,
-)
 from fusetune.ekf2.filter.observation_gain import dot, multiply_covariance
 from fusetune.ekf2.numerics.rotations import quat_to_dcm, rotate_by_earth_increment
 
@@ -43,24 +35,24 @@ def clear_inhibited_state_kalman_gains(ekf, params, K):
     """Zero the gains of the states that are not being estimated now."""
     for i in range(3):
         if ekf.gyro_bias_inhibit[i]:
-            K[GYRO_BIAS + i] = 0.0
+            K[state.GYRO_BIAS + i] = 0.0
         if ekf.accel_bias_inhibit[i]:
-            K[ACCEL_BIAS + i] = 0.0
+            K[state.ACCEL_BIAS + i] = 0.0
     if not ekf.cs.mag:
-        for i in range(MAG_EARTH, MAG_BODY + 3):
+        for i in range(state.MAG_EARTH, state.MAG_BODY + 3):
             K[i] = 0.0
     if not ekf.cs.wind:
-        K[WIND] = 0.0
-        K[WIND + 1] = 0.0
+        K[state.WIND] = 0.0
+        K[state.WIND + 1] = 0.0
 
 
 @kernel
 def joseph_update(P, K, PH, S):
     """P ← P - K PHᵀ - PH Kᵀ + S K Kᵀ, with PH = P Hᵀ and S = H P Hᵀ + R."""
-    for i in range(ERROR_STATE_SIZE):
+    for i in range(state.ERROR_STATE_SIZE):
         k_i = K[i]
         ph_i = PH[i]
-        for j in range(ERROR_STATE_SIZE):
+        for j in range(state.ERROR_STATE_SIZE):
             P[i, j] -= (k_i * PH[j] + ph_i * K[j]) - (k_i * K[j]) * S
 
 
@@ -75,7 +67,7 @@ def reduce_variance(ekf, params, state_index):
     PH = ekf.scratch.PH_reduce
     R = 10.0 * P[state_index, state_index]
     S = P[state_index, state_index] + R
-    for i in range(ERROR_STATE_SIZE):
+    for i in range(state.ERROR_STATE_SIZE):
         PH[i] = P[state_index, i]
         K[i] = PH[i] / S
     clear_inhibited_state_kalman_gains(ekf, params, K)
@@ -110,21 +102,21 @@ def _limit_variance_ratio(ekf, index, dof, low, high):
 @kernel
 def _first_excessive_variance(ekf):
     """Raise all too small variances up to the first state whose variance is too large; return it, or -1."""
-    i = _limit_variances(ekf, ATTITUDE, 3, 1e-9, 1.0)
+    i = _limit_variances(ekf, state.ATTITUDE, 3, 1e-9, 1.0)
     if i < 0:
-        i = _limit_variances(ekf, VELOCITY, 6, 1e-6, 1e6)
+        i = _limit_variances(ekf, state.VELOCITY, 6, 1e-6, 1e6)
     if i < 0:
-        i = _limit_variance_ratio(ekf, GYRO_BIAS, 3, BIAS_VARIANCE_MIN, 1.0)
+        i = _limit_variance_ratio(ekf, state.GYRO_BIAS, 3, BIAS_VARIANCE_MIN, 1.0)
     if i < 0:
-        i = _limit_variance_ratio(ekf, ACCEL_BIAS, 3, BIAS_VARIANCE_MIN, 1.0)
+        i = _limit_variance_ratio(ekf, state.ACCEL_BIAS, 3, BIAS_VARIANCE_MIN, 1.0)
     if i < 0 and ekf.cs.mag:
-        i = _limit_variance_ratio(ekf, MAG_EARTH, 3, MAG_VARIANCE_MIN, 1.0)
+        i = _limit_variance_ratio(ekf, state.MAG_EARTH, 3, MAG_VARIANCE_MIN, 1.0)
         if i < 0:
-            i = _limit_variance_ratio(ekf, MAG_BODY, 3, MAG_VARIANCE_MIN, 1.0)
+            i = _limit_variance_ratio(ekf, state.MAG_BODY, 3, MAG_VARIANCE_MIN, 1.0)
     if i < 0 and ekf.cs.wind:
-        i = _limit_variance_ratio(ekf, WIND, 2, 1e-6, 1e6)
+        i = _limit_variance_ratio(ekf, state.WIND, 2, 1e-6, 1e6)
     if i < 0:
-        i = _limit_variance_ratio(ekf, TERRAIN, 1, 0.0, 1e4)
+        i = _limit_variance_ratio(ekf, state.TERRAIN, 1, 0.0, 1e4)
     return i
 
 
@@ -146,22 +138,24 @@ def _limited(value, limit):
 @kernel
 def fuse(ekf, params, K, innovation):
     """Correct the state by -K·innovation, each part within its limits."""
-    north, east, down = K[ATTITUDE], K[ATTITUDE + 1], K[ATTITUDE + 2]
+    north, east, down = K[state.ATTITUDE], K[state.ATTITUDE + 1], K[state.ATTITUDE + 2]
     rotate_by_earth_increment(ekf.q, -north * innovation, -east * innovation, -down * innovation)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
     for i in range(3):
-        ekf.vel[i] = _limited(ekf.vel[i] - K[VELOCITY + i] * innovation, VELOCITY_LIMIT)
-        ekf.gyro_bias[i] = _limited(ekf.gyro_bias[i] - K[GYRO_BIAS + i] * innovation, params.EKF2_GYR_B_LIM)
-        ekf.accel_bias[i] = _limited(ekf.accel_bias[i] - K[ACCEL_BIAS + i] * innovation, params.EKF2_ABL_LIM)
-    add_to_global_position(ekf, -K[POSITION] * innovation, -K[POSITION + 1] * innovation, -K[POSITION + 2] * innovation)
+        ekf.vel[i] = _limited(ekf.vel[i] - K[state.VELOCITY + i] * innovation, VELOCITY_LIMIT)
+        ekf.gyro_bias[i] = _limited(ekf.gyro_bias[i] - K[state.GYRO_BIAS + i] * innovation, params.EKF2_GYR_B_LIM)
+        ekf.accel_bias[i] = _limited(ekf.accel_bias[i] - K[state.ACCEL_BIAS + i] * innovation, params.EKF2_ABL_LIM)
+    add_to_global_position(
+        ekf, -K[state.POSITION] * innovation, -K[state.POSITION + 1] * innovation, -K[state.POSITION + 2] * innovation
+    )
     if ekf.cs.mag:
         for i in range(3):
-            ekf.mag_I[i] = _limited(ekf.mag_I[i] - K[MAG_EARTH + i] * innovation, MAG_EARTH_LIMIT)
-            ekf.mag_B[i] = _limited(ekf.mag_B[i] - K[MAG_BODY + i] * innovation, MAG_BIAS_LIMIT)
+            ekf.mag_I[i] = _limited(ekf.mag_I[i] - K[state.MAG_EARTH + i] * innovation, MAG_EARTH_LIMIT)
+            ekf.mag_B[i] = _limited(ekf.mag_B[i] - K[state.MAG_BODY + i] * innovation, MAG_BIAS_LIMIT)
     if ekf.cs.wind:
         for i in range(2):
-            ekf.wind_vel[i] = _limited(ekf.wind_vel[i] - K[WIND + i] * innovation, WIND_LIMIT)
-    ekf.terrain = single_precision(_limited(ekf.terrain - K[TERRAIN] * innovation, TERRAIN_LIMIT))
+            ekf.wind_vel[i] = _limited(ekf.wind_vel[i] - K[state.WIND + i] * innovation, WIND_LIMIT)
+    ekf.terrain = single_precision(_limited(ekf.terrain - K[state.TERRAIN] * innovation, TERRAIN_LIMIT))
 
 
 @kernel
@@ -198,7 +192,7 @@ def fuse_direct_state(ekf, params, innovation, innovation_var, R, state_index):
     K = ekf.scratch.K
     PH = ekf.scratch.PH
     inverse = 1.0 / innovation_var
-    for i in range(ERROR_STATE_SIZE):
+    for i in range(state.ERROR_STATE_SIZE):
         PH[i] = P[state_index, i]
         K[i] = PH[i] * inverse
     clear_inhibited_state_kalman_gains(ekf, params, K)

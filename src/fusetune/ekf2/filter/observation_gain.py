@@ -1,4 +1,7 @@
-"""Innovation variance and Kalman gain of a scalar observation, from its Jacobian by the error state."""
+"""Innovation variance and Kalman gain of a scalar observation, from its Jacobian by the error state.
+
+PX4 has these products in its generated equations; here one kernel serves every observation.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE

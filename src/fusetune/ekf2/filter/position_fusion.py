@@ -1,4 +1,7 @@
-"""Fusion of position observations: horizontal (NE, m) and vertical (down, m)."""
+"""Fusion of position observations: horizontal (NE, m) and vertical (down, m).
+
+Mirrors PX4 v1.16 `EKF/position_fusion.cpp`, whose resets stand in `resets/`.
+"""
 
 import math
 

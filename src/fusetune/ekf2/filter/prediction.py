@@ -6,6 +6,9 @@ Error state dynamics, with the attitude error δθ in the NED frame, R = R(q) an
 
 The process noise is the gyro noise on δθ and the accelerometer noise, rotated to NED, on δv (Solà 2017, section 7,
 with the error on the global side).
+
+Mirrors `predictCovariance` of PX4 v1.16 `EKF/covariance.cpp` and `predictState` of `EKF/ekf.cpp`; the products are
+written out and not generated.
 """
 
 import math
@@ -13,20 +16,9 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_RANGE
+from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, refresh_ellipsoid
-from fusetune.ekf2.filter.common.state import (
-    ACCEL_BIAS,
-    ATTITUDE,
-    ERROR_STATE_SIZE,
-    GYRO_BIAS,
-    MAG_BODY,
-    MAG_EARTH,
-    POSITION,
-    TERRAIN,
-    VELOCITY,
-    WIND,
-)
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
 from fusetune.ekf2.filter.measurement_update import constrain_state_variances
 from fusetune.ekf2.numerics.constants import ONE_G
@@ -38,10 +30,10 @@ from fusetune.ekf2.numerics.rotations import (
     rotate_to_earth,
 )
 
-THETA, VEL, POS, GB, AB = ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS
+THETA, VEL, POS, GB, AB = state.ATTITUDE, state.VELOCITY, state.POSITION, state.GYRO_BIAS, state.ACCEL_BIAS
 """Where the parts of the error state sit, by their signs in the equations."""
 
-DYNAMIC_STATES = POSITION + 3
+DYNAMIC_STATES = state.POSITION + 3
 """Attitude, velocity and position come first; all that follows has no dynamics."""
 
 EARTH_RATE_LATITUDE_STEP = math.radians(1.0)
@@ -118,7 +110,7 @@ def _propagate(ekf, dt):
     for i in range(3):
         r0, r1, r2 = R[i, 0] * dt, R[i, 1] * dt, R[i, 2] * dt
         m0, m1, m2 = _minus_row_of_cross_product_matrix(u, i)
-        for j in range(ERROR_STATE_SIZE):
+        for j in range(state.ERROR_STATE_SIZE):
             A[THETA + i, j] = P[THETA + i, j] - (r0 * P[GB, j] + r1 * P[GB + 1, j] + r2 * P[GB + 2, j])
             A[VEL + i, j] = (
                 P[VEL + i, j]
@@ -128,7 +120,7 @@ def _propagate(ekf, dt):
             A[POS + i, j] = P[POS + i, j] + dt * P[VEL + i, j]
 
     for i in range(DYNAMIC_STATES):
-        for j in range(DYNAMIC_STATES, ERROR_STATE_SIZE):
+        for j in range(DYNAMIC_STATES, state.ERROR_STATE_SIZE):
             P[i, j] = A[i, j]
             P[j, i] = A[i, j]
 
@@ -160,9 +152,9 @@ def _add_imu_noise(ekf, dt, gyro_variance, ax, ay, az):
         P[THETA + i, THETA + i] += gyro_variance * dt2
         for j in range(i, 3):
             noise = dt2 * (R[i, 0] * R[j, 0] * ax + R[i, 1] * R[j, 1] * ay + R[i, 2] * R[j, 2] * az)
-            P[VELOCITY + i, VELOCITY + j] += noise
+            P[state.VELOCITY + i, state.VELOCITY + j] += noise
             if j > i:
-                P[VELOCITY + j, VELOCITY + i] = P[VELOCITY + i, VELOCITY + j]
+                P[state.VELOCITY + j, state.VELOCITY + i] = P[state.VELOCITY + i, state.VELOCITY + j]
 
 
 @kernel
@@ -177,10 +169,10 @@ def _add_bias_noise(ekf, params, dt, gyro_variance, ax, ay, az):
     gyro_noise = (dt * _unit_range(params.EKF2_GYR_B_NOISE)) ** 2
     accel_noise = (dt * _unit_range(params.EKF2_ACC_B_NOISE)) ** 2
     for i in range(3):
-        _add_below(ekf.P, GYRO_BIAS + i, gyro_variance, gyro_noise)
-    _add_below(ekf.P, ACCEL_BIAS, ax, accel_noise)
-    _add_below(ekf.P, ACCEL_BIAS + 1, ay, accel_noise)
-    _add_below(ekf.P, ACCEL_BIAS + 2, az, accel_noise)
+        _add_below(ekf.P, state.GYRO_BIAS + i, gyro_variance, gyro_noise)
+    _add_below(ekf.P, state.ACCEL_BIAS, ax, accel_noise)
+    _add_below(ekf.P, state.ACCEL_BIAS + 1, ay, accel_noise)
+    _add_below(ekf.P, state.ACCEL_BIAS + 2, az, accel_noise)
 
 
 @kernel
@@ -189,8 +181,8 @@ def _add_field_noise(ekf, params, dt):
     earth_noise = (dt * _unit_range(params.EKF2_MAG_E_NOISE)) ** 2
     body_noise = (dt * _unit_range(params.EKF2_MAG_B_NOISE)) ** 2
     for i in range(3):
-        _add_below(ekf.P, MAG_EARTH + i, limit, earth_noise)
-        _add_below(ekf.P, MAG_BODY + i, limit, body_noise)
+        _add_below(ekf.P, state.MAG_EARTH + i, limit, earth_noise)
+        _add_below(ekf.P, state.MAG_BODY + i, limit, body_noise)
 
 
 @kernel
@@ -202,7 +194,7 @@ def _add_wind_noise(ekf, params, dt):
     density = _unit_range(params.EKF2_WIND_NSD) * (1.0 + WIND_NOISE_HEIGHT_RATE_SCALER * abs(ekf.height_rate_lpf))
     noise = density * density * dt
     for i in range(2):
-        _add_below(ekf.P, WIND + i, INITIAL_WIND_UNCERTAINTY**2, noise)
+        _add_below(ekf.P, state.WIND + i, INITIAL_WIND_UNCERTAINTY**2, noise)
 
 
 @kernel
@@ -213,7 +205,9 @@ def _add_terrain_noise(ekf, params):
     interval = ekf.imu_delayed.delta_vel_dt
     gradient = interval * params.EKF2_TERR_GRAD
     speed_squared = ekf.vel[0] ** 2 + ekf.vel[1] ** 2
-    ekf.P[TERRAIN, TERRAIN] += (interval * params.EKF2_TERR_NOISE) ** 2 + gradient * gradient * speed_squared
+    ekf.P[state.TERRAIN, state.TERRAIN] += (
+        interval * params.EKF2_TERR_NOISE
+    ) ** 2 + gradient * gradient * speed_squared
 
 
 @kernel

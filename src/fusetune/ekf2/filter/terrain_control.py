@@ -1,10 +1,13 @@
-"""The terrain state where no sensor observes it, and when its estimate can be relied on."""
+"""The terrain state where no sensor observes it, and when its estimate can be relied on.
+
+Mirrors PX4 v1.16 `EKF/terrain_control.cpp`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.range_finder.range_hagl_fusion import compute_hagl_variance
+from fusetune.ekf2.filter.aid_sources.range_finder.range_height_fusion import compute_hagl_variance
 from fusetune.ekf2.filter.common.conditions import get_hagl
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.global_position import single_precision
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.state import TERRAIN
 from fusetune.ekf2.filter.common.timing import HGT_FUSION_TIMEOUT_MAX, is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import reset_covariance_block

@@ -1,4 +1,7 @@
-"""Fusion of NED velocity observations, axis by axis."""
+"""Fusion of NED velocity observations, axis by axis.
+
+Mirrors PX4 v1.16 `EKF/velocity_fusion.cpp`, whose resets stand in `resets/`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import VELOCITY

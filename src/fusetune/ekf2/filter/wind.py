@@ -10,6 +10,8 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY, reset_covariance_block
+from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.observation_gain import compute_kalman_gain
 from fusetune.ekf2.numerics.rotations import rotate_to_body
 
 WIND_MEMORY = np.dtype([("external_init", "?")], align=True)
@@ -58,6 +60,18 @@ def reset_wind_to_external_observation(ekf, speed, direction, speed_accuracy, di
     ekf.events.reset_wind_to_ext_obs = True
     ekf.wind.external_init = True
     reset_wind_to(ekf, speed * c, speed * s, c * c * along + s * s * across, s * s * along + c * c * across)
+
+
+@kernel
+def fuse_into_wind(ekf, params, aid, H, update_wind_only):
+    """Fuse a judged observation of the air's velocity: into the wind alone, or into every state."""
+    K = ekf.scratch.K
+    compute_kalman_gain(ekf, H, aid.innovation_variance[0], K)
+    if update_wind_only:
+        keep_only_wind_gains(K)
+    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
+    aid.fused = True
+    aid.time_last_fuse = ekf.time_delayed_us
 
 
 @kernel

@@ -2,6 +2,8 @@
 
 With the attitude error in the NED frame, a heading error is the attitude error about down: H has a one there and
 zeros elsewhere. Antenna heading passes its own H.
+
+Mirrors PX4 v1.16 `EKF/yaw_fusion.cpp`, whose resets stand in `resets/`.
 """
 
 import math

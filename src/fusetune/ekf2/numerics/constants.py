@@ -18,3 +18,6 @@ EARTH_SPIN_RATE = 7.2921150e-5
 
 FLT_EPSILON = float(np.finfo(np.float32).eps)
 """Resolution of single precision at 1, by which PX4's generated equations keep divisors off zero."""
+
+FLT_EPSILON_IN_EIGHT_DIGITS = 1.1920929e-07
+"""The same as the C header prints it; antenna heading and yaw estimator are calculated with that, to the last bit."""

@@ -72,20 +72,16 @@ def dcm_to_quat(R, q):
 @kernel
 def rotate_to_earth(R, x, y, z):
     """Body vector in NED, by the rotation matrix `R`."""
-    return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
-    )
+    return component_in_earth(R, 0, x, y, z), component_in_earth(R, 1, x, y, z), component_in_earth(R, 2, x, y, z)
 
 
 @kernel
 def rotate_to_body(R, north, east, down):
     """NED vector in the body frame, by the rotation matrix `R`."""
     return (
-        R[0, 0] * north + R[1, 0] * east + R[2, 0] * down,
-        R[0, 1] * north + R[1, 1] * east + R[2, 1] * down,
-        R[0, 2] * north + R[1, 2] * east + R[2, 2] * down,
+        component_in_body(R, 0, north, east, down),
+        component_in_body(R, 1, north, east, down),
+        component_in_body(R, 2, north, east, down),
     )
 
 

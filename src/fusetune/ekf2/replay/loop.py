@@ -14,8 +14,12 @@ from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_dr
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import save_declination
 from fusetune.ekf2.filter.covariance import reset_accel_bias, reset_gyro_bias
 from fusetune.ekf2.filter.estimator import initialise_estimator, update
-from fusetune.ekf2.filter.imu_down_sampler import accumulate_imu, initialise_down_sampler, reset_down_sampler
-from fusetune.ekf2.filter.output_predictor import initialise_output_predictor, predict_output
+from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import (
+    accumulate_imu,
+    initialise_down_sampler,
+    reset_down_sampler,
+)
+from fusetune.ekf2.filter.output_predictor.output_predictor import initialise_output_predictor, predict_output
 from fusetune.ekf2.replay.commands import handle_command
 from fusetune.ekf2.replay.recording import record_update
 from fusetune.ekf2.replay.withholding import pretend_fused

@@ -6,7 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from tests.ekf2.filter.height_and_field_records import at_time, make_estimator, make_parameters, set_attitude
+from tests.ekf2.filter.height_and_field_records import (
+    at_time,
+    is_running_after,
+    make_estimator,
+    make_parameters,
+    put_sample,
+    set_attitude,
+)
 
 from fusetune.ekf2.filter.aid_sources.barometer.baro_height_control import control_baro_height_fusion
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import apply_ground_effect_deadzone, update_ground_effect
@@ -14,7 +21,7 @@ from fusetune.ekf2.filter.aid_sources.barometer.static_pressure import (
     compensate_baro_for_dynamic_pressure,
     static_pressure_height_correction,
 )
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
 
 BARO, GNSS = 0, 1
 G = 9.80665
@@ -25,11 +32,7 @@ def _feed(ekf: np.void, params: np.void, height: float, samples: int = 1, reset:
     for _ in range(samples):
         at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.05)
         ekf["time_good_vert_accel"] = ekf["time_delayed_us"]
-        ekf["sensors"]["baro"]["sample"]["time_us"] = ekf["time_delayed_us"] - 4_000
-        ekf["sensors"]["baro"]["sample"]["hgt"] = height
-        ekf["sensors"]["baro"]["sample"]["reset"] = reset
-        ekf["sensors"]["baro"]["data_ready"] = True
-        ekf["sensors"]["baro"]["newest_time_us"] = ekf["time_latest_us"]
+        put_sample(ekf, "baro", 4_000, hgt=height, reset=reset)
         control_baro_height_fusion(ekf, params)
 
 
@@ -199,10 +202,6 @@ def test_lasting_rejection_of_the_reference_resets_the_height():
 
 def test_stops_without_data():
     ekf, params = _started(BARO)
-    ekf["sensors"]["baro"]["data_ready"] = False
-    last = ekf["sensors"]["baro"]["newest_time_us"]
-    for seconds, running in ((0.39, True), (0.41, False)):
-        ekf["time_latest_us"] = last + round(seconds * 1e6)
-        control_baro_height_fusion(ekf, params)
-        assert ekf["cs"]["baro_hgt"] == running
+    assert is_running_after(ekf, params, 0.39, "baro", control_baro_height_fusion, "baro_hgt")
+    assert not is_running_after(ekf, params, 0.41, "baro", control_baro_height_fusion, "baro_hgt")
     assert ekf["height_sensor_ref"] == HEIGHT_REF_UNKNOWN

@@ -10,7 +10,7 @@ from tests.ekf2.filter.aiding_estimator import START_US, hovering, parameters, s
 
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_NED
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_control import control_external_vision_fusion
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_EV
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_EV
 
 HPOS, VPOS, VEL, YAW = 1, 2, 4, 8
 SAMPLE_INTERVAL_US = 40_000

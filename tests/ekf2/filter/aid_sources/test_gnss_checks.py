@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_checks import check_gnss_sample, run_gnss_checks
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, initialise_gnss_memory
+from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import check_gnss_sample, run_gnss_checks
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS, INFORMATION_EVENTS
 
 EKF = np.dtype(

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.ekf2.filter.height_and_field_records import at_time, make_estimator, make_parameters, set_attitude
+from tests.ekf2.filter.height_and_field_records import (
+    at_time,
+    is_running_after,
+    make_estimator,
+    make_parameters,
+    put_sample,
+    set_attitude,
+)
 
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import fuse_mag
@@ -33,11 +40,7 @@ def _feed(ekf: np.void, params: np.void, body_field: np.ndarray, samples: int = 
         at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.02)
         ekf["cs_prev"] = ekf["cs"].copy()
         ekf["state_reset_prev"]["quat_counter"] = ekf["state_reset"]["quat_counter"]
-        ekf["sensors"]["mag"]["sample"]["time_us"] = ekf["time_delayed_us"] - 5_000
-        ekf["sensors"]["mag"]["sample"]["mag"][:] = body_field
-        ekf["sensors"]["mag"]["sample"]["reset"] = reset
-        ekf["sensors"]["mag"]["data_ready"] = True
-        ekf["sensors"]["mag"]["newest_time_us"] = ekf["time_latest_us"]
+        put_sample(ekf, "mag", 5_000, mag=body_field, reset=reset)
         control_mag_fusion(ekf, params)
 
 
@@ -122,12 +125,8 @@ def test_type_none_stops():
 def test_stops_after_a_second_without_data():
     ekf, params = _levelled(), make_parameters(EKF2_MAG_CHECK=0)
     _feed(ekf, params, FIELD, samples=5)
-    ekf["sensors"]["mag"]["data_ready"] = False
-    last = ekf["sensors"]["mag"]["newest_time_us"]
-    for seconds, running in ((0.9, True), (1.1, False)):
-        ekf["time_latest_us"] = last + round(seconds * 1e6)
-        control_mag_fusion(ekf, params)
-        assert ekf["cs"]["mag"] == running
+    assert is_running_after(ekf, params, 0.9, "mag", control_mag_fusion, "mag")
+    assert not is_running_after(ekf, params, 1.1, "mag", control_mag_fusion, "mag")
 
 
 def test_climbing_clear_of_the_ground_realigns_once():

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.ekf2.filter.height_and_field_records import at_time, make_estimator, make_parameters
+from tests.ekf2.filter.height_and_field_records import (
+    at_time,
+    is_running_after,
+    make_estimator,
+    make_parameters,
+    put_sample,
+)
 
-from fusetune.ekf2.filter.aid_sources.range_finder.range_hagl_fusion import (
+from fusetune.ekf2.filter.aid_sources.range_finder.range_height_control import control_range_hagl_fusion
+from fusetune.ekf2.filter.aid_sources.range_finder.range_height_fusion import (
     compute_hagl_h,
     compute_hagl_variance,
     fuse_hagl_rng,
@@ -14,8 +21,7 @@ from fusetune.ekf2.filter.aid_sources.range_finder.range_hagl_fusion import (
     reset_terrain_to_rng,
     update_range_hagl,
 )
-from fusetune.ekf2.filter.aid_sources.range_finder.range_height_control import control_range_hagl_fusion
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_GNSS, HEIGHT_REF_RANGE
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_GNSS, HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.terrain_control import control_terrain_fake_fusion, init_terrain, update_terrain_validity
 
 HEIGHT, TERRAIN = 8, 23
@@ -43,11 +49,7 @@ def _feed(ekf: np.void, params: np.void, distance: float, samples: int = 1, qual
     for _ in range(samples):
         at_time(ekf, ekf["time_delayed_us"] * 1e-6 + 0.05)
         ekf["time_good_vert_accel"] = ekf["time_last_hgt_fuse"] = ekf["time_delayed_us"]
-        ekf["sensors"]["range"]["sample"]["time_us"] = ekf["time_delayed_us"] - 3_000
-        ekf["sensors"]["range"]["sample"]["range"] = distance
-        ekf["sensors"]["range"]["sample"]["quality"] = quality
-        ekf["sensors"]["range"]["data_ready"] = True
-        ekf["sensors"]["range"]["newest_time_us"] = ekf["time_latest_us"]
+        put_sample(ekf, "range", 3_000, range=distance, quality=quality)
         control_range_hagl_fusion(ekf, params)
 
 
@@ -262,12 +264,8 @@ def test_disabled_range_finder_is_only_observed():
 def test_stops_without_data():
     ekf, params = _flying(), make_parameters(EKF2_RNG_CTRL=CONDITIONAL)
     _feed(ekf, params, 2.0, samples=3)
-    ekf["sensors"]["range"]["data_ready"] = False
-    last = ekf["sensors"]["range"]["newest_time_us"]
-    for seconds, running in ((0.39, True), (0.41, False)):
-        ekf["time_latest_us"] = last + round(seconds * 1e6)
-        control_range_hagl_fusion(ekf, params)
-        assert ekf["cs"]["rng_terrain"] == running
+    assert is_running_after(ekf, params, 0.39, "range", control_range_hagl_fusion, "rng_terrain")
+    assert not is_running_after(ekf, params, 0.41, "range", control_range_hagl_fusion, "rng_terrain")
 
 
 def test_lever_arm_moves_the_distance_to_the_imu():

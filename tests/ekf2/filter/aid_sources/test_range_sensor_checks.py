@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from tests.ekf2.filter.height_and_field_records import make_estimator, rotation_matrix
 
-from fusetune.ekf2.filter.aid_sources.range_finder.range_consistency_check import update_range_consistency
+from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import update_range_consistency
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import dist_bottom, is_data_healthy, update_cos_tilt
-from fusetune.ekf2.filter.aid_sources.range_finder.range_sensor_checks import run_range_sensor_checks
+from fusetune.ekf2.filter.aid_sources.range_finder.sensor_range_finder import run_range_sensor_checks
 
 QUALITY_HYSTERESIS_S = 1.0
 PERIOD_US = 50_000

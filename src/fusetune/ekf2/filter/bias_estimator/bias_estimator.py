@@ -3,6 +3,8 @@
 State model x[k+1] = x[k] + v, observation y[k] = x[k] + w. An innovation beyond 3 σ is not fused. When the filtered
 signed test ratio grows large, or innovations keep one sign for more than 10 s worth of observations, the process noise
 is raised a thousandfold until the offset is gone.
+
+Mirrors PX4 v1.16 `EKF/bias_estimator/bias_estimator.cpp`.
 """
 
 import math
@@ -25,6 +27,7 @@ BIAS_ESTIMATOR_FIELDS = [
     ("process_psd", "f8"),
     ("bias_var_max", "f8"),
     ("test_ratio_lpf", "f8"),
+    # PX4 gives this filter a gain only when the update interval differs from 10 ms by more than 1 ms
     ("test_ratio_lpf_alpha", "f8"),
     ("time_since_negative_innovation", "f8"),
     ("time_since_positive_innovation", "f8"),
@@ -41,19 +44,11 @@ BIAS_ESTIMATOR = np.dtype(BIAS_ESTIMATOR_FIELDS, align=True)
 
 @kernel
 def initialise_bias_estimator(estimator, bias_var):
-    """State before the first observation."""
-    estimator.bias = 0.0
+    """Give a record of zeros its state before the first observation."""
     estimator.bias_var = bias_var
     estimator.dt = 0.01
     estimator.process_psd = 1.25e-6
     estimator.bias_var_max = 2.0
-    estimator.test_ratio_lpf = 0.0
-    # PX4 gives the filter a gain only when the update interval differs from 10 ms by more than 1 ms
-    estimator.test_ratio_lpf_alpha = 0.0
-    estimator.time_since_negative_innovation = 0.0
-    estimator.time_since_positive_innovation = 0.0
-    estimator.innovation = 0.0
-    estimator.innovation_variance = 0.0
     estimator.innovation_test_ratio = np.inf
 
 

@@ -1,4 +1,7 @@
-"""North and east bias of a position source against the position reference."""
+"""North and east bias of a position source against the position reference.
+
+Mirrors PX4 v1.16 `EKF/bias_estimator/position_bias_estimator.hpp`.
+"""
 
 import numpy as np
 
@@ -23,7 +26,6 @@ def initialise_position_bias_estimator(estimator):
     """State at start: no bias, standard variance of 0.1 m², source not fused."""
     initialise_bias_estimator(estimator.north, 0.1)
     initialise_bias_estimator(estimator.east, 0.1)
-    estimator.fusion_active = False
 
 
 @kernel

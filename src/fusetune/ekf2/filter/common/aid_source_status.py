@@ -1,24 +1,22 @@
-"""What the estimator knows of one aid source: last observation, innovation, its variance, test ratio, verdict."""
+"""What the estimator knows of one aid source: last observation, innovation, its variance, test ratio, verdict.
+
+Mirrors `updateAidSourceStatus` of PX4 v1.16 `EKF/ekf_helper.cpp`.
+"""
 
 import math
 
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
 
 AID_SOURCE = np.dtype(
     [
-        ("timestamp_sample", "i8"),
-        ("time_last_fuse", "i8"),
-        ("observation", "f8", (3,)),
-        ("observation_variance", "f8", (3,)),
-        ("innovation", "f8", (3,)),
-        ("innovation_filtered", "f8", (3,)),
-        ("innovation_variance", "f8", (3,)),
-        ("test_ratio", "f8", (3,)),
-        ("test_ratio_filtered", "f8", (3,)),
-        ("innovation_rejected", "?"),
-        ("fused", "?"),
+        *fields("i8", "timestamp_sample", "time_last_fuse"),
+        *fields("f8", "observation", "observation_variance", shape=(3,)),
+        *fields("f8", "innovation", "innovation_filtered", "innovation_variance", shape=(3,)),
+        *fields("f8", "test_ratio", "test_ratio_filtered", shape=(3,)),
+        *fields("?", "innovation_rejected", "fused"),
     ],
     align=True,
 )

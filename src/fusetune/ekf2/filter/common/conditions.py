@@ -1,4 +1,7 @@
-"""What is aiding the filter now, and whether its estimates can be relied on: questions every aid source asks."""
+"""What is aiding the filter now, and whether its estimates can be relied on: questions every aid source asks.
+
+Mirrors the questions of PX4 v1.16 `EKF/estimator_interface.cpp` and `EKF/ekf_helper.cpp`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.timing import BAD_ACC_RESET_DELAY, HGT_FUSION_TIMEOUT_MAX, is_timed_out

@@ -1,4 +1,7 @@
-"""For how long the filter has navigated without aiding, and so whether position and velocity are still valid."""
+"""For how long the filter has navigated without aiding, and so whether position and velocity are still valid.
+
+Mirrors `updateDeadReckoningStatus` of PX4 v1.16 `EKF/ekf_helper.cpp`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import (

@@ -4,6 +4,8 @@ The radii of the ellipsoid are looked up again only after the latitude has moved
 step by less than 1 part in 10⁷. PX4 keeps the altitude and the terrain height in single precision, so that steps of
 less than half its resolution (30 µm at 500 m) vanish; the same rounding is applied here, since it is part of what PX4
 publishes.
+
+Mirrors `LatLonAlt` of PX4 v1.16 `lib/lat_lon_alt/lat_lon_alt.cpp`.
 """
 
 import math

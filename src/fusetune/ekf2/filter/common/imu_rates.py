@@ -6,20 +6,15 @@ from fusetune.ekf2.compiled.kernel import kernel
 @kernel
 def body_rate(ekf):
     """Rotation rate (rad/s, FRD)."""
-    imu = ekf.imu_delayed
-    return (
-        imu.delta_ang[0] / imu.delta_ang_dt - ekf.gyro_bias[0],
-        imu.delta_ang[1] / imu.delta_ang_dt - ekf.gyro_bias[1],
-        imu.delta_ang[2] / imu.delta_ang_dt - ekf.gyro_bias[2],
-    )
+    return _corrected(ekf.imu_delayed.delta_ang, ekf.imu_delayed.delta_ang_dt, ekf.gyro_bias)
 
 
 @kernel
 def specific_force(ekf):
     """Specific force (m/s², FRD)."""
-    imu = ekf.imu_delayed
-    return (
-        imu.delta_vel[0] / imu.delta_vel_dt - ekf.accel_bias[0],
-        imu.delta_vel[1] / imu.delta_vel_dt - ekf.accel_bias[1],
-        imu.delta_vel[2] / imu.delta_vel_dt - ekf.accel_bias[2],
-    )
+    return _corrected(ekf.imu_delayed.delta_vel, ekf.imu_delayed.delta_vel_dt, ekf.accel_bias)
+
+
+@kernel
+def _corrected(delta, dt, bias):
+    return delta[0] / dt - bias[0], delta[1] / dt - bias[1], delta[2] / dt - bias[2]

@@ -8,16 +8,14 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.numerics.geodesy import project, reproject
 
 LOCAL_ORIGIN = np.dtype(
     [
-        ("lat_lon_valid", "?"),
-        ("valid", "?"),
+        *fields("?", "lat_lon_valid", "valid"),
         ("timestamp", "i8"),
-        ("lat_rad", "f8"),
-        ("lon_rad", "f8"),
-        ("alt", "f8"),
+        *fields("f8", "lat_rad", "lon_rad", "alt"),
     ],
     align=True,
 )
@@ -31,12 +29,7 @@ LOWEST_ALTITUDE, HIGHEST_ALTITUDE = -12_000.0, 100_000.0
 
 @kernel
 def initialise_local_origin(origin):
-    """No origin known."""
-    origin.lat_lon_valid = False
-    origin.valid = False
-    origin.timestamp = 0
-    origin.lat_rad = 0.0
-    origin.lon_rad = 0.0
+    """What is not zero at start: no altitude is known."""
     origin.alt = np.nan
 
 

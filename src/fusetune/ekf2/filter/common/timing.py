@@ -28,6 +28,6 @@ def is_recent(ekf, timestamp, acceptance_interval):
 
 
 @kernel
-def is_newer_than_latest(ekf, timestamp, interval):
-    """Whether a buffered sample's time stamp is within `interval` of the newest IMU sample."""
+def is_newest_sample_recent(ekf, timestamp, interval):
+    """Whether a sample was last buffered (µs, 0 = never) within `interval` of the newest IMU sample."""
     return timestamp != 0 and timestamp + interval > ekf.time_latest_us

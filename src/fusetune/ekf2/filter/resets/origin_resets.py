@@ -2,6 +2,8 @@
 
 Latitudes and longitudes are radians, altitudes metres; a variance of NaN leaves the covariance as it is. The
 functions return False, and do nothing, when the place is not on the globe.
+
+Mirrors the origin's part of PX4 v1.16 `EKF/ekf_helper.cpp`.
 """
 
 import math
@@ -18,7 +20,7 @@ from fusetune.ekf2.filter.common.local_origin import (
 )
 from fusetune.ekf2.filter.common.state import POSITION
 from fusetune.ekf2.filter.covariance import reset_covariance_block
-from fusetune.ekf2.filter.output_predictor import apply_position_reset
+from fusetune.ekf2.filter.output_predictor.output_predictor import apply_position_reset
 from fusetune.ekf2.filter.resets.state_resets import (
     MIN_RESET_VARIANCE,
     reset_altitude_to,

@@ -2,6 +2,8 @@
 
 Each reset sets the state, uncorrelates it at the given variance (a variance of NaN leaves the covariance alone),
 moves the output predictor along, and records the change. Resets within one update add up.
+
+Mirrors the resets of PX4 v1.16 `EKF/position_fusion.cpp`, `EKF/velocity_fusion.cpp` and `EKF/yaw_fusion.cpp`.
 """
 
 import math
@@ -11,7 +13,11 @@ from fusetune.ekf2.filter.common.global_position import single_precision
 from fusetune.ekf2.filter.common.local_origin import project_to_local, reproject_to_global
 from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, VELOCITY
 from fusetune.ekf2.filter.covariance import reset_covariance_block, uncorrelate_block
-from fusetune.ekf2.filter.output_predictor import apply_position_reset, apply_quaternion_reset, apply_velocity_reset
+from fusetune.ekf2.filter.output_predictor.output_predictor import (
+    apply_position_reset,
+    apply_quaternion_reset,
+    apply_velocity_reset,
+)
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import (
     dcm_to_quat,
@@ -46,6 +52,12 @@ def _next(counter):
 
 
 @kernel
+def _added_up(change, delta, counter, counter_before):
+    """Sum of a state's changes since the counter was `counter_before`, at the start of this update."""
+    return (0.0 if counter == counter_before else change) + delta
+
+
+@kernel
 def _reset_variance(ekf, index, variance):
     if math.isfinite(variance):
         reset_covariance_block(ekf, index, 1, max(MIN_RESET_VARIANCE, variance))
@@ -62,11 +74,9 @@ def reset_horizontal_velocity_to(ekf, params, vn, ve, var_n, var_e):
     uncorrelate_block(ekf, POSITION + 1, 1)
     apply_velocity_reset(ekf, delta_n, delta_e, 0.0)
     reset = ekf.state_reset
-    if reset.vel_ne_counter == ekf.state_reset_prev.vel_ne_counter:
-        reset.vel_ne_change[0] = 0.0
-        reset.vel_ne_change[1] = 0.0
-    reset.vel_ne_change[0] += delta_n
-    reset.vel_ne_change[1] += delta_e
+    before = ekf.state_reset_prev.vel_ne_counter
+    reset.vel_ne_change[0] = _added_up(reset.vel_ne_change[0], delta_n, reset.vel_ne_counter, before)
+    reset.vel_ne_change[1] = _added_up(reset.vel_ne_change[1], delta_e, reset.vel_ne_counter, before)
     reset.vel_ne_counter = _next(reset.vel_ne_counter)
     ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
 
@@ -80,9 +90,8 @@ def reset_vertical_velocity_to(ekf, params, vd, var):
     uncorrelate_block(ekf, POSITION + 2, 1)
     apply_velocity_reset(ekf, 0.0, 0.0, delta)
     reset = ekf.state_reset
-    if reset.vel_d_counter == ekf.state_reset_prev.vel_d_counter:
-        reset.vel_d_change = 0.0
-    reset.vel_d_change += delta
+    before = ekf.state_reset_prev.vel_d_counter
+    reset.vel_d_change = _added_up(reset.vel_d_change, delta, reset.vel_d_counter, before)
     reset.vel_d_counter = _next(reset.vel_d_counter)
     ekf.time_last_ver_vel_fuse = ekf.time_delayed_us
 
@@ -112,11 +121,9 @@ def reset_vertical_velocity_to_zero(ekf, params):
 def update_horizontal_position_reset_status(ekf, delta_n, delta_e):
     """Record a jump (m) of the local horizontal position."""
     reset = ekf.state_reset
-    if reset.pos_ne_counter == ekf.state_reset_prev.pos_ne_counter:
-        reset.pos_ne_change[0] = 0.0
-        reset.pos_ne_change[1] = 0.0
-    reset.pos_ne_change[0] += delta_n
-    reset.pos_ne_change[1] += delta_e
+    before = ekf.state_reset_prev.pos_ne_counter
+    reset.pos_ne_change[0] = _added_up(reset.pos_ne_change[0], delta_n, reset.pos_ne_counter, before)
+    reset.pos_ne_change[1] = _added_up(reset.pos_ne_change[1], delta_e, reset.pos_ne_counter, before)
     reset.pos_ne_counter = _next(reset.pos_ne_counter)
 
 
@@ -124,9 +131,8 @@ def update_horizontal_position_reset_status(ekf, delta_n, delta_e):
 def update_vertical_position_reset_status(ekf, delta_d):
     """Record a jump (m, down) of the height."""
     reset = ekf.state_reset
-    if reset.pos_d_counter == ekf.state_reset_prev.pos_d_counter:
-        reset.pos_d_change = 0.0
-    reset.pos_d_change += delta_d
+    before = ekf.state_reset_prev.pos_d_counter
+    reset.pos_d_change = _added_up(reset.pos_d_change, delta_d, reset.pos_d_counter, before)
     reset.pos_d_counter = _next(reset.pos_d_counter)
 
 
@@ -134,9 +140,8 @@ def update_vertical_position_reset_status(ekf, delta_d):
 def update_terrain_reset_status(ekf, delta_d):
     """Record a jump (m, down) of the terrain height."""
     reset = ekf.state_reset
-    if reset.hagl_counter == ekf.state_reset_prev.hagl_counter:
-        reset.hagl_change = 0.0
-    reset.hagl_change += delta_d
+    before = ekf.state_reset_prev.hagl_counter
+    reset.hagl_change = _added_up(reset.hagl_change, delta_d, reset.hagl_counter, before)
     reset.hagl_counter = _next(reset.hagl_counter)
 
 

@@ -3,6 +3,8 @@
 Method of Mahony, Hamel, Pflimlin, Nonlinear Complementary Filters on the Special Orthogonal Group, IEEE TAC 53 (2008),
 with the gain faded out away from 1 g and, with a known airspeed, the centripetal acceleration of a coordinated turn
 taken off.
+
+Mirrors the attitude part of PX4 v1.16 `EKF/yaw_estimator/EKFGSF_yaw.cpp`.
 """
 
 import math

@@ -1,4 +1,7 @@
-"""The bank as a whole: prediction, velocity fusion, weights of the models and the composite yaw."""
+"""The bank as a whole: prediction, velocity fusion, weights of the models and the composite yaw.
+
+Mirrors PX4 v1.16 `EKF/yaw_estimator/EKFGSF_yaw.cpp`, of which the other two files hold the parts.
+"""
 
 import math
 

@@ -37,20 +37,9 @@ unless known; `yaw_variance` (rad²) is infinite until velocity fusion has start
 
 @kernel
 def initialise_gsf_memory(gsf):
-    """State before the first IMU sample."""
-    gsf.tilt_aligned = False
+    """What is not zero at start: all attitudes are level, no airspeed and no yaw is known."""
     gsf.true_airspeed = np.nan
-    gsf.accel_lpf[:] = 0.0
-    gsf.q[:] = 0.0
     gsf.q[:, 0] = 1.0
-    gsf.gyro_bias[:] = 0.0
-    gsf.x[:] = 0.0
-    gsf.P[:] = 0.0
-    gsf.innovation[:] = 0.0
-    gsf.nis[:] = 0.0
-    gsf.S_det_inverse[:] = 0.0
-    gsf.weight[:] = 0.0
-    gsf.yaw = 0.0
     reset_gsf(gsf)
 
 

@@ -1,9 +1,13 @@
-"""Three-state Kalman filter of one model: velocity north, velocity east, yaw, observed through horizontal velocity."""
+"""Three-state Kalman filter of one model: velocity north, velocity east, yaw, observed through horizontal velocity.
+
+Mirrors the small filters of PX4 v1.16 `EKF/yaw_estimator/EKFGSF_yaw.cpp`.
+"""
 
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import N_MODELS
+from fusetune.ekf2.numerics.constants import FLT_EPSILON_IN_EIGHT_DIGITS
 from fusetune.ekf2.numerics.rotations import euler_yaw, quat_to_dcm, rotate_by_earth_increment, wrap_pi
 
 GYRO_NOISE = 0.1
@@ -11,7 +15,6 @@ ACCEL_NOISE = 2.0
 MIN_VARIANCE = 1e-6
 MIN_VELOCITY_ACCURACY = 0.01
 NIS_LIMIT = 25.0
-SINGLE_PRECISION_EPSILON = 1.1920929e-07
 
 
 @kernel
@@ -92,7 +95,7 @@ def update_model(gsf, model, vel_n, vel_e, vel_accuracy):
     s00, s11 = p00 + R, p11 + R
     det = s00 * s11 - p01 * p01
     # PX4's generated equations keep the determinant off zero by the resolution of single precision
-    det_inverse = 1.0 / (det + (SINGLE_PRECISION_EPSILON if det >= 0.0 else -SINGLE_PRECISION_EPSILON))
+    det_inverse = 1.0 / (det + (FLT_EPSILON_IN_EIGHT_DIGITS if det >= 0.0 else -FLT_EPSILON_IN_EIGHT_DIGITS))
     i00, i01, i11 = s11 * det_inverse, -p01 * det_inverse, s00 * det_inverse
     gsf.S_det_inverse[model] = det_inverse
 

@@ -11,9 +11,8 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_resets import airspeed_v
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.state import VELOCITY, WIND
 from fusetune.ekf2.filter.covariance import initialise_covariance
-from fusetune.ekf2.filter.measurement_update import measurement_update
-from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
-from fusetune.ekf2.filter.wind import air_velocity, keep_only_wind_gains
+from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
+from fusetune.ekf2.filter.wind import air_velocity, fuse_into_wind
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 
 
@@ -50,7 +49,7 @@ def update_airspeed(ekf, params):
 @kernel
 def fuse_airspeed(ekf, params):
     """Fuse the judged airspeed unless it was rejected."""
-    aid, H, K = ekf.aid.airspeed, ekf.airspeed.H, ekf.scratch.K
+    aid = ekf.aid.airspeed
     if aid.innovation_rejected:
         return
     update_wind_only = not ekf.cs.wind_dead_reckoning
@@ -59,12 +58,7 @@ def fuse_airspeed(ekf, params):
         _recover_from_bad_covariance(ekf, params, update_wind_only)
         return
     ekf.fs.bad_airspeed = False
-    compute_kalman_gain(ekf, H, variance, K)
-    if update_wind_only:
-        keep_only_wind_gains(K)
-    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
-    aid.fused = True
-    aid.time_last_fuse = ekf.time_delayed_us
+    fuse_into_wind(ekf, params, aid, ekf.airspeed.H, update_wind_only)
     if not update_wind_only:
         ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
 

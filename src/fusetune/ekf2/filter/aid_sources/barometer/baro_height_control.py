@@ -1,4 +1,7 @@
-"""Fusion of barometric height: bias, start, reset as the height reference, fault."""
+"""Fusion of barometric height: bias, start, reset as the height reference, fault.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/barometer/baro_height_control.cpp`.
+"""
 
 import math
 
@@ -6,21 +9,20 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import apply_ground_effect_deadzone
 from fusetune.ekf2.filter.aid_sources.barometer.static_pressure import compensate_baro_for_dynamic_pressure
-from fusetune.ekf2.filter.bias_estimator.bias_estimator import (
-    reset_bias,
-    set_bias,
-    set_max_state_noise,
-    set_process_noise_spectral_density,
+from fusetune.ekf2.filter.bias_estimator.bias_estimator import reset_bias, set_bias
+from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
+    predict_height_bias,
+    start_height_source,
+    stop_height_source,
+    update_height_bias,
 )
-from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import fuse_height_bias, predict_height_bias
 from fusetune.ekf2.filter.common.aid_source_status import reset_aid_source_status_zero_innovation
 from fusetune.ekf2.filter.common.conditions import is_height_reset_required, is_vertical_velocity_aiding_active
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_BARO, HEIGHT_REF_UNKNOWN
-from fusetune.ekf2.filter.common.state import POSITION
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO
 from fusetune.ekf2.filter.common.timing import (
     BARO_MAX_INTERVAL,
     HGT_FUSION_TIMEOUT_MAX,
-    is_newer_than_latest,
+    is_newest_sample_recent,
     is_recent,
     is_timed_out,
 )
@@ -29,7 +31,6 @@ from fusetune.ekf2.filter.resets.origin_resets import initialise_altitude_to
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_vertical_velocity_to_zero
 
 BARO_LPF_ALPHA = 0.1
-BARO_BIAS_NSD = 0.13
 
 
 @kernel
@@ -47,9 +48,10 @@ def control_baro_height_fusion(ekf, params):
         if not is_fusion_due(ekf.sensors.baro):
             return
         if valid:
-            _update_bias(ekf, measurement, variance)
+            observed_bias = measurement - ekf.gpos_alt
+            update_height_bias(ekf, ekf.baro_b_est, HEIGHT_REF_BARO, observed_bias, variance)
         _control_with_sample(ekf, params, measurement, variance, valid)
-    elif ekf.cs.baro_hgt and not is_newer_than_latest(ekf, ekf.sensors.baro.newest_time_us, 2 * BARO_MAX_INTERVAL):
+    elif ekf.cs.baro_hgt and not is_newest_sample_recent(ekf, ekf.sensors.baro.newest_time_us, 2 * BARO_MAX_INTERVAL):
         stop_baro_hgt_fusion(ekf)
 
 
@@ -85,16 +87,6 @@ def _update_baro_status(ekf, params, measurement, variance):
 
 
 @kernel
-def _update_bias(ekf, measurement, variance):
-    """Update the bias with the state that gave the innovation, before the filter fuses it."""
-    bias = ekf.baro_b_est
-    set_max_state_noise(bias, math.sqrt(variance))
-    set_process_noise_spectral_density(bias, BARO_BIAS_NSD)
-    height_variance = ekf.P[POSITION + 2, POSITION + 2]
-    fuse_height_bias(ekf, bias, HEIGHT_REF_BARO, measurement - ekf.gpos_alt, variance + height_variance)
-
-
-@kernel
 def _control_with_sample(ekf, params, measurement, variance, valid):
     continuing = (
         int(params.EKF2_BARO_CTRL) == 1
@@ -107,7 +99,7 @@ def _control_with_sample(ekf, params, measurement, variance, valid):
             _fuse_or_recover(ekf, params, variance)
         else:
             stop_baro_hgt_fusion(ekf)
-    elif continuing and is_newer_than_latest(ekf, ekf.sensors.baro.newest_time_us, 2 * BARO_MAX_INTERVAL):
+    elif continuing and is_newest_sample_recent(ekf, ekf.sensors.baro.newest_time_us, 2 * BARO_MAX_INTERVAL):
         _start(ekf, params, measurement, variance)
 
 
@@ -144,8 +136,7 @@ def _start(ekf, params, measurement, variance):
         reset_aid_source_status_zero_innovation(ekf, ekf.aid.baro_hgt, 1)
     else:
         set_bias(ekf.baro_b_est, ekf.baro.lpf - ekf.gpos_alt)
-    ekf.aid.baro_hgt.time_last_fuse = ekf.time_delayed_us
-    ekf.baro_b_est.fusion_active = True
+    start_height_source(ekf, ekf.baro_b_est, ekf.aid.baro_hgt)
     ekf.cs.baro_hgt = True
 
 
@@ -153,7 +144,5 @@ def _start(ekf, params, measurement, variance):
 def stop_baro_hgt_fusion(ekf):
     """Stop fusing barometric height; another source becomes the reference if this was it."""
     if ekf.cs.baro_hgt:
-        if ekf.height_sensor_ref == HEIGHT_REF_BARO:
-            ekf.height_sensor_ref = HEIGHT_REF_UNKNOWN
-        ekf.baro_b_est.fusion_active = False
+        stop_height_source(ekf, ekf.baro_b_est, HEIGHT_REF_BARO)
         ekf.cs.baro_hgt = False

@@ -1,4 +1,8 @@
-"""Rotor wash near the ground raises the static pressure, so the barometer reads low there."""
+"""Rotor wash near the ground raises the static pressure, so the barometer reads low there.
+
+Mirrors `updateGroundEffect` of PX4 v1.16 `EKF/ekf_helper.cpp`, and the dead zone of
+`EKF/aid_sources/barometer/baro_height_control.cpp`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import get_hagl, is_terrain_estimate_valid

@@ -2,6 +2,8 @@
 
 The error pressure is a body-fixed fraction of the dynamic pressure, ½ ρ Σ Kᵢ vᵢ², with different fractions forward and
 backward, right and left. As height it is that over ρ g, so the air density drops out.
+
+Mirrors `compensateBaroForDynamicPressure` of PX4 v1.16 `EKF/aid_sources/barometer/baro_height_control.cpp`.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel

@@ -1,4 +1,7 @@
-"""Filtered rotation from the frame of external vision to NED."""
+"""Filtered rotation from the frame of external vision to NED.
+
+Mirrors `updateEvAttitudeErrorFilter` of PX4 v1.16 `EKF/aid_sources/external_vision/ev_control.cpp`.
+"""
 
 import math
 

@@ -10,19 +10,20 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_height_control import (
     control_ev_height_fusion,
     stop_ev_hgt_fusion,
 )
-from fusetune.ekf2.filter.aid_sources.external_vision.ev_position_control import (
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_pos_control import (
     control_ev_pos_fusion,
     stop_ev_pos_fusion,
 )
-from fusetune.ekf2.filter.aid_sources.external_vision.ev_velocity_control import (
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_vel_control import (
     control_ev_vel_fusion,
     stop_ev_vel_fusion,
 )
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_yaw_control import control_ev_yaw_fusion, stop_ev_yaw_fusion
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import predict_height_bias
 from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import predict_position_bias
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_EV, POSITION_REF_EV
-from fusetune.ekf2.filter.common.timing import EV_MAX_INTERVAL, is_newer_than_latest, is_timed_out
+from fusetune.ekf2.filter.common.core_memory import POSITION_REF_EV
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_EV
+from fusetune.ekf2.filter.common.timing import EV_MAX_INTERVAL, is_newest_sample_recent, is_timed_out
 
 
 @kernel
@@ -42,7 +43,7 @@ def _are_starting_conditions_passing(ekf, minimum_quality):
     return (
         (minimum_quality <= 0 or quality >= minimum_quality)
         and sample.time_us - ev.prev.time_us < EV_MAX_INTERVAL
-        and is_newer_than_latest(ekf, ekf.sensors.ev.newest_time_us, EV_MAX_INTERVAL)
+        and is_newest_sample_recent(ekf, ekf.sensors.ev.newest_time_us, EV_MAX_INTERVAL)
     )
 
 

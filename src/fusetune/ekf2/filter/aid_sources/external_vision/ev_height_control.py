@@ -15,16 +15,14 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
     sensor_offset_body,
     sensor_velocity_body,
 )
-from fusetune.ekf2.filter.bias_estimator.bias_estimator import (
-    reset_bias,
-    set_bias,
-    set_max_state_noise,
-    set_process_noise_spectral_density,
+from fusetune.ekf2.filter.bias_estimator.bias_estimator import reset_bias, set_bias
+from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
+    start_height_source,
+    stop_height_source,
+    update_height_bias,
 )
-from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import fuse_height_bias
 from fusetune.ekf2.filter.common.conditions import is_height_reset_required
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_EV, HEIGHT_REF_UNKNOWN
-from fusetune.ekf2.filter.common.state import POSITION
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_EV
 from fusetune.ekf2.filter.common.timing import HGT_FUSION_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.filter.resets.state_resets import (
@@ -33,8 +31,6 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_vertical_velocity_to_zero,
 )
 from fusetune.ekf2.numerics.rotations import component_in_earth, variance_in_earth
-
-BIAS_NOISE_SPECTRAL_DENSITY = 0.13
 
 
 @kernel
@@ -64,14 +60,6 @@ def _set_bias_to_difference(ekf, measurement):
 
 
 @kernel
-def _fuse_ev_hgt_bias(ekf, measurement, variance):
-    bias = ekf.ev_hgt_b_est
-    set_max_state_noise(bias, math.sqrt(variance))
-    set_process_noise_spectral_density(bias, BIAS_NOISE_SPECTRAL_DENSITY)
-    fuse_height_bias(ekf, bias, HEIGHT_REF_EV, measurement + ekf.gpos_alt, variance + ekf.P[POSITION + 2, POSITION + 2])
-
-
-@kernel
 def control_ev_height_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the height of external vision for one sample."""
     bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
@@ -86,7 +74,7 @@ def control_ev_height_fusion(ekf, params, common_starting_conditions_passing, ev
         max(params.EKF2_EVP_GATE, 1.0),
     )
     if measurement_valid and quality_sufficient:
-        _fuse_ev_hgt_bias(ekf, measurement, variance)
+        update_height_bias(ekf, bias, HEIGHT_REF_EV, measurement + ekf.gpos_alt, variance)
     continuing_conditions_passing = (int(params.EKF2_EV_CTRL) & EV_CTRL_VPOS) != 0 and measurement_valid
     if ekf.cs.ev_hgt:
         if continuing_conditions_passing:
@@ -159,8 +147,7 @@ def _start_ev_hgt(ekf, params, measurement, variance):
         reset_bias(ekf.ev_hgt_b_est)
     else:
         _set_bias_to_difference(ekf, measurement)
-    ekf.aid.ev_hgt.time_last_fuse = ekf.time_delayed_us
-    ekf.ev_hgt_b_est.fusion_active = True
+    start_height_source(ekf, ekf.ev_hgt_b_est, ekf.aid.ev_hgt)
     ekf.cs.ev_hgt = True
 
 
@@ -168,7 +155,5 @@ def _start_ev_hgt(ekf, params, measurement, variance):
 def stop_ev_hgt_fusion(ekf):
     """Leave external vision as height source, and as height reference."""
     if ekf.cs.ev_hgt:
-        if ekf.height_sensor_ref == HEIGHT_REF_EV:
-            ekf.height_sensor_ref = HEIGHT_REF_UNKNOWN
-        ekf.ev_hgt_b_est.fusion_active = False
+        stop_height_source(ekf, ekf.ev_hgt_b_est, HEIGHT_REF_EV)
         ekf.cs.ev_hgt = False

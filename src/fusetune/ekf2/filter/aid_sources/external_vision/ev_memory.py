@@ -3,6 +3,7 @@
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import EV_SAMPLE
 from fusetune.ekf2.filter.common.imu_rates import body_rate
 from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu, velocity_of_offset
@@ -17,9 +18,7 @@ EV_MEMORY = np.dtype(
         ("vel_measurement", "f8", (3,)),
         ("vel_measurement_var", "f8", (3,)),
         ("body_velocity_jacobian", "f8", (3, 6)),
-        ("nb_pos_reset_available", "i8"),
-        ("nb_vel_reset_available", "i8"),
-        ("nb_yaw_reset_available", "i8"),
+        *fields("i8", "nb_pos_reset_available", "nb_vel_reset_available", "nb_yaw_reset_available"),
     ],
     align=True,
 )
@@ -38,18 +37,8 @@ MIN_NOISE = 0.01
 
 @kernel
 def initialise_ev_memory(ev):
-    """Forget everything; vision and NED frame are taken to agree."""
-    ev.prev.time_us = 0
-    ev.prev.reset_counter = 0
-    ev.prev.quality = 0
-    ev.newest_quality = 0
+    """What is not zero at start: vision and NED frame are taken to agree."""
     ev.q_error_filt[0] = 1.0
-    for i in range(1, 4):
-        ev.q_error_filt[i] = 0.0
-    ev.q_error_initialized = False
-    ev.nb_pos_reset_available = 0
-    ev.nb_vel_reset_available = 0
-    ev.nb_yaw_reset_available = 0
 
 
 @kernel
@@ -59,14 +48,14 @@ def is_yaw_alignment_changed(ekf):
 
 
 @kernel
-def sensor_offset_body(params):
-    """Position (m, FRD) of the vision sensor relative to the IMU."""
-    return position_relative_to_imu(params, params.EKF2_EV_POS_X, params.EKF2_EV_POS_Y, params.EKF2_EV_POS_Z)
-
-
-@kernel
 def sensor_velocity_body(ekf, params):
     """Velocity (m/s, FRD) of the vision sensor relative to the IMU, from the vehicle's rotation."""
     wx, wy, wz = body_rate(ekf)
     px, py, pz = sensor_offset_body(params)
     return velocity_of_offset(wx, wy, wz, px, py, pz)
+
+
+@kernel
+def sensor_offset_body(params):
+    """Position (m, FRD) of the vision sensor relative to the IMU."""
+    return position_relative_to_imu(params, params.EKF2_EV_POS_X, params.EKF2_EV_POS_Y, params.EKF2_EV_POS_Z)

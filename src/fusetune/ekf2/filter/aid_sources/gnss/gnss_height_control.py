@@ -1,4 +1,7 @@
-"""GNSS height: observation, bias against the height reference, and its fusion."""
+"""GNSS height: observation, bias against the height reference, and its fusion.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/gnss/gnss_height_control.cpp`.
+"""
 
 import math
 
@@ -6,24 +9,23 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VPOS
-from fusetune.ekf2.filter.bias_estimator.bias_estimator import (
-    reset_bias,
-    set_bias,
-    set_max_state_noise,
-    set_process_noise_spectral_density,
+from fusetune.ekf2.filter.bias_estimator.bias_estimator import reset_bias, set_bias
+from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
+    predict_height_bias,
+    start_height_source,
+    stop_height_source,
+    update_height_bias,
 )
-from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import fuse_height_bias, predict_height_bias
 from fusetune.ekf2.filter.common.aid_source_status import reset_aid_source_status_zero_innovation
 from fusetune.ekf2.filter.common.conditions import (
     is_height_reset_required,
     is_only_active_source_of_vertical_position_aiding,
 )
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
-from fusetune.ekf2.filter.common.state import POSITION
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_GNSS
 from fusetune.ekf2.filter.common.timing import (
     GNSS_MAX_INTERVAL,
     HGT_FUSION_TIMEOUT_MAX,
-    is_newer_than_latest,
+    is_newest_sample_recent,
     is_timed_out,
 )
 from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
@@ -32,8 +34,6 @@ from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to
 from fusetune.ekf2.numerics.rotations import component_in_earth
 
 TYPICAL_VACC_PER_HACC = 1.5
-HEIGHT_BIAS_NOISE_DENSITY = 0.13
-"""Random walk of the height bias (m/√Hz/s)."""
 
 
 @kernel
@@ -42,7 +42,7 @@ def control_gnss_height_fusion(ekf, params):
     predict_height_bias(ekf, ekf.gps_hgt_b_est, HEIGHT_REF_GNSS, ekf.dt_ekf_avg)
     if ekf.sensors.gnss.data_ready:
         _use_gnss_height(ekf, params, ekf.sensors.gnss.sample)
-    elif ekf.cs.gps_hgt and not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL):
+    elif ekf.cs.gps_hgt and not is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL):
         stop_gps_hgt_fusion(ekf)
 
 
@@ -68,22 +68,13 @@ def _use_gnss_height(ekf, params, sample):
     )
     if not is_fusion_due(ekf.sensors.gnss):
         return
-    # the bias follows once the innovation has been formed with its old value, but before the filter is corrected
     if valid:
-        set_max_state_noise(bias_est, noise)
-        set_process_noise_spectral_density(bias_est, HEIGHT_BIAS_NOISE_DENSITY)
-        fuse_height_bias(
-            ekf,
-            bias_est,
-            HEIGHT_REF_GNSS,
-            measurement - ekf.gpos_alt,
-            variance + ekf.P[POSITION + 2, POSITION + 2],
-        )
+        update_height_bias(ekf, bias_est, HEIGHT_REF_GNSS, measurement - ekf.gpos_alt, variance)
 
     usable = valid and ekf.origin.lat_lon_valid and ekf.gnss.checks_passed
     continuing = usable and int(params.EKF2_GPS_CTRL) & GPS_CTRL_VPOS != 0
     if not ekf.cs.gps_hgt:
-        recent = is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL)
+        recent = is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL)
         _start_gnss_height(ekf, params, measurement, variance, continuing and recent, usable and recent)
     elif continuing:
         _continue_gnss_height(ekf, params, measurement, variance)
@@ -123,8 +114,7 @@ def _start_gnss_height(ekf, params, measurement, variance, may_start, may_initia
             reset_aid_source_status_zero_innovation(ekf, aid, 1)
         else:
             set_bias(bias_est, measurement - ekf.gpos_alt)
-        aid.time_last_fuse = ekf.time_delayed_us
-        bias_est.fusion_active = True
+        start_height_source(ekf, bias_est, aid)
         ekf.cs.gps_hgt = True
     if initialise_origin:
         ekf.events.reset_hgt_to_gps = True
@@ -136,7 +126,5 @@ def _start_gnss_height(ekf, params, measurement, variance, may_start, may_initia
 def stop_gps_hgt_fusion(ekf):
     """Stop fusing GNSS height."""
     if ekf.cs.gps_hgt:
-        if ekf.height_sensor_ref == HEIGHT_REF_GNSS:
-            ekf.height_sensor_ref = HEIGHT_REF_UNKNOWN
-        ekf.gps_hgt_b_est.fusion_active = False
+        stop_height_source(ekf, ekf.gps_hgt_b_est, HEIGHT_REF_GNSS)
         ekf.cs.gps_hgt = False

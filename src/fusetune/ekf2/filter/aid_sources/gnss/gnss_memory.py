@@ -3,6 +3,7 @@
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
 
 GNSS_CHECK_NAMES = (
     "fix",
@@ -24,20 +25,13 @@ GNSS_CHECK_FAILURES = np.dtype([(name, "?") for name in GNSS_CHECK_NAMES])
 GNSS_MEMORY = np.dtype(
     [
         ("fail", GNSS_CHECK_FAILURES),
-        ("checks_passed", "?"),
-        ("intermittent", "?"),
-        ("last_fail_us", "i8"),
-        ("last_pass_us", "i8"),
-        ("prev_time_us", "i8"),
-        ("prev_lat", "f8"),
-        ("prev_lon", "f8"),
-        ("prev_alt", "f8"),
+        *fields("?", "checks_passed", "intermittent"),
+        *fields("i8", "last_fail_us", "last_pass_us", "prev_time_us"),
+        *fields("f8", "prev_lat", "prev_lon", "prev_alt"),
         ("pos_deriv_filt", "f8", (3,)),
         ("vel_ne_filt", "f8", (2,)),
         ("vel_d_filt", "f8"),
-        ("horizontal_position_drift_rate", "f8"),
-        ("vertical_position_drift_rate", "f8"),
-        ("filtered_horizontal_velocity", "f8"),
+        *fields("f8", "horizontal_position_drift_rate", "vertical_position_drift_rate", "filtered_horizontal_velocity"),
     ],
     align=True,
 )
@@ -52,30 +46,25 @@ GPS_CTRL_HPOS, GPS_CTRL_VPOS, GPS_CTRL_VEL, GPS_CTRL_YAW = 1, 2, 4, 8
 
 @kernel
 def initialise_gnss_memory(gnss):
-    """State before the first sample."""
-    fail = gnss.fail
-    fail.fix = False
-    fail.nsats = False
-    fail.pdop = False
-    fail.hacc = False
-    fail.vacc = False
-    fail.sacc = False
-    fail.hdrift = False
-    fail.vdrift = False
-    fail.hspeed = False
-    fail.vspeed = False
-    fail.spoofed = False
-    gnss.checks_passed = False
+    """What is not zero at start: no sample has come, and no drift is known."""
     gnss.intermittent = True
-    gnss.last_fail_us = 0
-    gnss.last_pass_us = 0
-    gnss.prev_time_us = 0
-    gnss.prev_lat = 0.0
-    gnss.prev_lon = 0.0
     gnss.prev_alt = np.nan
+    forget_drift(gnss)
+
+
+@kernel
+def forget_drift(gnss):
+    """Start the filters of the drift at rest anew."""
+    gnss.vel_ne_filt[:] = 0.0
+    gnss.vel_d_filt = 0.0
+    gnss.pos_deriv_filt[:] = 0.0
     gnss.horizontal_position_drift_rate = np.nan
     gnss.vertical_position_drift_rate = np.nan
     gnss.filtered_horizontal_velocity = np.nan
-    gnss.pos_deriv_filt[:] = 0.0
-    gnss.vel_ne_filt[:] = 0.0
-    gnss.vel_d_filt = 0.0
+
+
+@kernel
+def forget_checks(gnss):
+    """Let the quality checks start anew."""
+    gnss.last_fail_us = 0
+    gnss.last_pass_us = 0

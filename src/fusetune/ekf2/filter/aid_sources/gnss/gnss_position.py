@@ -1,10 +1,13 @@
-"""GNSS horizontal position: observation at the IMU, and its fusion."""
+"""GNSS horizontal position: observation at the IMU, and its fusion.
+
+Mirrors the position part of PX4 v1.16 `EKF/aid_sources/gnss/gps_control.cpp`.
+"""
 
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, forget_checks
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -44,17 +47,14 @@ def update_gnss_position(ekf, params, sample):
 @kernel
 def control_gnss_pos_fusion(ekf, params, force_reset):
     """Start, continue or stop fusing GNSS position with the sample just judged; the first good one sets the origin."""
-    aid = ekf.aid.gnss_pos
     enabled = int(params.EKF2_GPS_CTRL) & GPS_CTRL_HPOS != 0
     continuing = enabled and ekf.cs.tilt_align and ekf.cs.yaw_align
-    if ekf.cs.gnss_pos:
-        if not continuing:
-            stop_gnss_pos_fusion(ekf)
-            return
-        if force_reset:
-            reset_horizontal_position_to_gnss(ekf, params)
-        else:
-            fuse_horizontal_position(ekf, params, aid)
+    if ekf.cs.gnss_pos and not continuing:
+        stop_gnss_pos_fusion(ekf)
+    elif ekf.cs.gnss_pos and force_reset:
+        reset_horizontal_position_to_gnss(ekf, params)
+    elif ekf.cs.gnss_pos:
+        fuse_horizontal_position(ekf, params, ekf.aid.gnss_pos)
     elif continuing and ekf.gnss.checks_passed:
         ekf.events.starting_gps_fusion = True
         reset_horizontal_position_to_gnss(ekf, params)
@@ -84,5 +84,4 @@ def stop_gnss_pos_fusion(ekf):
     if ekf.cs.gnss_pos:
         ekf.cs.gnss_pos = False
         if not ekf.cs.gnss_vel:
-            ekf.gnss.last_fail_us = 0
-            ekf.gnss.last_pass_us = 0
+            forget_checks(ekf.gnss)

@@ -1,10 +1,13 @@
-"""GNSS velocity: observation at the IMU, and its fusion."""
+"""GNSS velocity: observation at the IMU, and its fusion.
+
+Mirrors the velocity part of PX4 v1.16 `EKF/aid_sources/gnss/gps_control.cpp`.
+"""
 
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL, forget_checks
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -104,5 +107,4 @@ def stop_gnss_vel_fusion(ekf):
     if ekf.cs.gnss_vel:
         ekf.cs.gnss_vel = False
         if not ekf.cs.gnss_pos:
-            ekf.gnss.last_fail_us = 0
-            ekf.gnss.last_pass_us = 0
+            forget_checks(ekf.gnss)

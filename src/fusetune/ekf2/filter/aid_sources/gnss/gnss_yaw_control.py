@@ -2,6 +2,8 @@
 
 With a the unit vector of the antenna baseline in the body frame, turned by the offset ψ₀ from the nose, and
 v = R a in NED, the observed yaw is atan2(v_e, v_n). An attitude error δθ (NED, from the left) moves v by δθ × v.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/gnss/gnss_yaw_control.cpp`; the Jacobian is written out and not generated.
 """
 
 import math
@@ -20,12 +22,13 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
 from fusetune.ekf2.filter.common.timing import (
     GNSS_YAW_MAX_INTERVAL,
     RESET_TIMEOUT_MAX,
-    is_newer_than_latest,
+    is_newest_sample_recent,
     is_timed_out,
 )
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.numerics.constants import FLT_EPSILON_IN_EIGHT_DIGITS
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
 
 HEADING_NOISE = 0.1
@@ -34,7 +37,6 @@ HEADING_NOISE = 0.1
 STEEP_BASELINE = math.cos(math.radians(30.0))
 WRONG_GYRO_BIAS_TEST_RATIO = 0.2
 GYRO_BIAS_RESET_INTERVAL = 1_000_000
-SINGLE_PRECISION_EPSILON = 1.1920929e-07
 
 
 @kernel
@@ -42,7 +44,7 @@ def predict_gnss_yaw(R, yaw_offset, H):
     """Predicted antenna yaw (rad); its derivative by the attitude error goes into `H[0:3]`, the rest is zeroed."""
     v_n, v_e, v_d = rotate_to_earth(R, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
     # PX4's generated equations keep the arctangent off its singularity by the resolution of single precision
-    v_n += SINGLE_PRECISION_EPSILON if v_n >= 0.0 else -SINGLE_PRECISION_EPSILON
+    v_n += FLT_EPSILON_IN_EIGHT_DIGITS if v_n >= 0.0 else -FLT_EPSILON_IN_EIGHT_DIGITS
     squared = v_n * v_n + v_e * v_e
     H[:] = 0.0
     H[ATTITUDE] = -v_n * v_d / squared
@@ -68,7 +70,7 @@ def control_gnss_yaw_fusion(ekf, params, sample):
         stop_gnss_yaw_fusion(ekf)
         return
     if not np.isfinite(sample.yaw):
-        if ekf.cs.gnss_yaw and not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_yaw_time_us, RESET_TIMEOUT_MAX):
+        if ekf.cs.gnss_yaw and not is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_yaw_time_us, RESET_TIMEOUT_MAX):
             stop_gnss_yaw_fusion(ekf)
         return
 
@@ -84,7 +86,7 @@ def control_gnss_yaw_fusion(ekf, params, sample):
         continuing
         and ekf.gnss.checks_passed
         and not ekf.gnss.intermittent
-        and is_newer_than_latest(ekf, ekf.sensors.gnss.newest_yaw_time_us, 2 * GNSS_YAW_MAX_INTERVAL)
+        and is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_yaw_time_us, 2 * GNSS_YAW_MAX_INTERVAL)
     ):
         _start_gnss_yaw(ekf, params, sample)
 

@@ -1,4 +1,7 @@
-"""Use of the yaw estimator: aligning the yaw, noticing that it is wrong in flight, and putting it right."""
+"""Use of the yaw estimator: aligning the yaw, noticing that it is wrong in flight, and putting it right.
+
+Mirrors the yaw part of PX4 v1.16 `EKF/aid_sources/gnss/gps_control.cpp`.
+"""
 
 import math
 

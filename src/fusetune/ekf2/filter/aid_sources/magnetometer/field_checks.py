@@ -1,4 +1,7 @@
-"""Is the measured field the Earth's? Strength and inclination against the world magnetic model."""
+"""Is the measured field the Earth's? Strength and inclination against the world magnetic model.
+
+Mirrors `checkMagField` of PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`.
+"""
 
 import math
 

@@ -2,6 +2,9 @@
 
 `cs.mag`: the field states are estimated. `cs.mag_hdg`: yaw too (EKF2_MAG_TYPE heading, or automatic until the field
 was aligned in flight). `cs.mag_3d`: every state. `cs.mag_dec`: declination too, as nothing else fixes north.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`, of which `field_checks.py`, `mag_heading.py`,
+`mag_resets.py` and `world_field.py` hold the parts.
 """
 
 import math
@@ -23,6 +26,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     MAG_TYPE_HEADING,
     MAG_TYPE_INIT,
     MAG_TYPE_NONE,
+    clear_mag_faults,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import (
     check_hagl_yaw_reset_req,
@@ -43,7 +47,12 @@ from fusetune.ekf2.filter.common.aid_source_status import (
 )
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
-from fusetune.ekf2.filter.common.timing import MAG_MAX_INTERVAL, RESET_TIMEOUT_MAX, is_newer_than_latest, is_timed_out
+from fusetune.ekf2.filter.common.timing import (
+    MAG_MAX_INTERVAL,
+    RESET_TIMEOUT_MAX,
+    is_newest_sample_recent,
+    is_timed_out,
+)
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance
 
@@ -68,7 +77,7 @@ def control_mag_fusion(ekf, params):
         _filter_sample(ekf, params)
         wmm_updated = check_world_magnetic_model(ekf)
         _control_with_sample(ekf, params, wmm_updated)
-    elif not is_newer_than_latest(ekf, ekf.sensors.mag.newest_time_us, 2 * MAG_MAX_INTERVAL):
+    elif not is_newest_sample_recent(ekf, ekf.sensors.mag.newest_time_us, 2 * MAG_MAX_INTERVAL):
         stop_mag_fusion(ekf, params)
 
 
@@ -98,9 +107,7 @@ def _control_with_sample(ekf, params, wmm_updated):
     """Judge the sample, choose the mode, then fuse, reset, start or stop."""
     sample, aid = ekf.sensors.mag.sample.mag, ekf.aid.mag
     _synthesise_z(ekf, params, sample)
-    ekf.fs.bad_mag_x = False
-    ekf.fs.bad_mag_y = False
-    ekf.fs.bad_mag_z = False
+    clear_mag_faults(ekf)
 
     R_mag = max(params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE, R_MAG_MIN)
     _update_mag_status(ekf, params, sample, R_mag)
@@ -179,7 +186,7 @@ def _may_start(ekf):
         ekf.mag.counter > MIN_SAMPLES_TO_START
         and ekf.cs.yaw_align == ekf.cs_prev.yaw_align
         and ekf.state_reset.quat_counter == ekf.state_reset_prev.quat_counter
-        and is_newer_than_latest(ekf, ekf.sensors.mag.newest_time_us, MAG_MAX_INTERVAL)
+        and is_newest_sample_recent(ekf, ekf.sensors.mag.newest_time_us, MAG_MAX_INTERVAL)
     )
 
 

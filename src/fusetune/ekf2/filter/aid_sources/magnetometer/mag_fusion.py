@@ -2,11 +2,14 @@
 
 Measurement models (error state in the NED tangent frame, R = R(q)):
 field h = Rᵀ m_I + m_B with H_θ = Rᵀ[m_I]×, H_mI = Rᵀ, H_mB = I; declination h = atan2(m_I,y, m_I,x).
+
+Mirrors PX4 v1.16 `EKF/aid_sources/magnetometer/mag_fusion.cpp`; the Jacobians are written out and not generated.
 """
 
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov, reset_quat_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
@@ -90,9 +93,7 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
             K[ATTITUDE + 1] = 0.0
         measurement_update(ekf, params, K, H, aid.observation_variance[axis], aid.innovation[axis])
 
-    ekf.fs.bad_mag_x = False
-    ekf.fs.bad_mag_y = False
-    ekf.fs.bad_mag_z = False
+    clear_mag_faults(ekf)
     aid.fused = True
     aid.time_last_fuse = ekf.time_delayed_us
     if update_all_states:

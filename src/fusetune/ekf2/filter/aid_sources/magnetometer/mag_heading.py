@@ -2,6 +2,8 @@
 
 The field's azimuth in the tilt-compensated frame is yaw-independent: with R = Rz(yaw) R_tilt, the measured heading is
 `declination - azimuth(R_tilt m)` and the heading innovation is simply `azimuth(R m) - declination`.
+
+Mirrors the heading part of PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`.
 """
 
 import math

@@ -40,18 +40,15 @@ CHECK_STRENGTH, CHECK_INCLINATION, CHECK_FORCE_WMM = 1, 2, 4
 
 @kernel
 def initialise_mag_memory(mag):
-    """Forget everything; the world magnetic model is unknown (NaN) until the origin is known."""
-    mag.lpf[:] = 0.0
-    mag.counter = 0
-    mag.heading_innovation_lpf = 0.0
-    mag.strength = 0.0
-    mag.inclination = 0.0
-    mag.time_last_check_failing = 0
-    mag.flt_mag_align_start_time = 0
+    """What is not zero at start: the world magnetic model is unknown until the origin is known."""
     mag.wmm_declination = np.nan
     mag.wmm_inclination = np.nan
     mag.wmm_strength = np.nan
-    mag.wmm_earth_field[:] = 0.0
-    mag.wmm_time_last_checked = 0
-    mag.declination_saved = False
-    mag.jacobians[:, :] = 0.0
+
+
+@kernel
+def clear_mag_faults(ekf):
+    """No axis of the magnetometer is at fault."""
+    ekf.fs.bad_mag_x = False
+    ekf.fs.bad_mag_y = False
+    ekf.fs.bad_mag_z = False

@@ -1,9 +1,13 @@
-"""Resets of the earth and body field states, and the end of magnetometer fusion."""
+"""Resets of the earth and body field states, and the end of magnetometer fusion.
+
+Mirrors the resets of PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`.
+"""
 
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import reset_mag_heading
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known
 from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
@@ -96,7 +100,5 @@ def stop_mag_fusion(ekf, params):
     ekf.cs.mag_3d = False
     ekf.cs.mag_hdg = False
     ekf.cs.mag_aligned_in_flight = False
-    ekf.fs.bad_mag_x = False
-    ekf.fs.bad_mag_y = False
-    ekf.fs.bad_mag_z = False
+    clear_mag_faults(ekf)
     ekf.fs.bad_mag_decl = False

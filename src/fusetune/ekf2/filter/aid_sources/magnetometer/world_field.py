@@ -1,4 +1,7 @@
-"""The world magnetic model at the vehicle: when it is looked up, and what it is used for."""
+"""The world magnetic model at the vehicle: when it is looked up, and what it is used for.
+
+Mirrors the declination and the look-up of the model of PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`.
+"""
 
 import math
 

@@ -13,6 +13,7 @@ from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_fusion import (
     fuse_opt_flow,
     predict_flow,
     predict_flow_range,
+    set_flow_rejection,
 )
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -25,8 +26,8 @@ from fusetune.ekf2.filter.common.conditions import (
     is_only_active_source_of_horizontal_aiding,
     is_terrain_estimate_valid,
 )
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.global_position import single_precision
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.imu_rates import body_rate
 from fusetune.ekf2.filter.common.state import TERRAIN
 from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, RESET_TIMEOUT_MAX, is_timed_out
@@ -210,8 +211,7 @@ def _start_flow(ekf, params):
 @kernel
 def _settle_flow_status(ekf):
     reset_aid_source_status_zero_innovation(ekf, ekf.aid.optical_flow, 2)
-    ekf.reject.optflow_x = False
-    ekf.reject.optflow_y = False
+    set_flow_rejection(ekf, False, False)
 
 
 @kernel
@@ -244,8 +244,7 @@ def stop_flow_fusion(ekf):
     if ekf.cs.opt_flow:
         ekf.cs.opt_flow = False
         ekf.cs.opt_flow_terrain = False
+        set_flow_rejection(ekf, False, False)
         ekf.fs.bad_optflow_x = False
         ekf.fs.bad_optflow_y = False
-        ekf.reject.optflow_x = False
-        ekf.reject.optflow_y = False
         ekf.flow.counter = 0

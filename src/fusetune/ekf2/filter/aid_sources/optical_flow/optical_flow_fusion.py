@@ -106,6 +106,13 @@ def _repredict_second_axis(ekf, params):
 
 
 @kernel
+def set_flow_rejection(ekf, x, y):
+    """Note which axes were rejected."""
+    ekf.reject.optflow_x = x
+    ekf.reject.optflow_y = y
+
+
+@kernel
 def fuse_opt_flow(ekf, params, update_terrain):
     """Fuse the judged flow, X before Y; return whether it was fused.
 
@@ -114,8 +121,7 @@ def fuse_opt_flow(ekf, params, update_terrain):
     """
     aid, H, K = ekf.aid.optical_flow, ekf.flow.H, ekf.scratch.K
     if aid.innovation_rejected:
-        ekf.reject.optflow_x = True
-        ekf.reject.optflow_y = True
+        set_flow_rejection(ekf, True, True)
         return False
     for axis in range(2):
         if axis == 1:
@@ -131,8 +137,7 @@ def fuse_opt_flow(ekf, params, update_terrain):
         measurement_update(ekf, params, K, H[axis], aid.observation_variance[axis], aid.innovation[axis])
     ekf.fs.bad_optflow_x = False
     ekf.fs.bad_optflow_y = False
-    ekf.reject.optflow_x = aid.test_ratio[0] > 1.0
-    ekf.reject.optflow_y = aid.test_ratio[1] > 1.0
+    set_flow_rejection(ekf, aid.test_ratio[0] > 1.0, aid.test_ratio[1] > 1.0)
     aid.time_last_fuse = ekf.time_delayed_us
     aid.fused = True
     ekf.time_last_hor_vel_fuse = ekf.time_delayed_us

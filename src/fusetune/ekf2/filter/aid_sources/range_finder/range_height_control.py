@@ -2,19 +2,21 @@
 
 `cs.rng_terrain`: the distance corrects the terrain state. `cs.rng_hgt`: it corrects the height, always (EKF2_RNG_CTRL
 2) or only low and slow (1). With the range finder as height reference, the ground itself becomes the datum.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/range_finder/range_height_control.cpp`.
 """
 
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.range_finder.range_consistency_check import update_range_consistency
-from fusetune.ekf2.filter.aid_sources.range_finder.range_hagl_fusion import (
+from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import update_range_consistency
+from fusetune.ekf2.filter.aid_sources.range_finder.range_height_fusion import (
     fuse_hagl_rng,
     reset_terrain_to_rng,
     update_range_hagl,
 )
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import dist_bottom, is_data_healthy, update_cos_tilt
-from fusetune.ekf2.filter.aid_sources.range_finder.range_sensor_checks import run_range_sensor_checks
+from fusetune.ekf2.filter.aid_sources.range_finder.sensor_range_finder import run_range_sensor_checks
 from fusetune.ekf2.filter.common.aid_source_status import reset_aid_source_status_zero_innovation
 from fusetune.ekf2.filter.common.conditions import (
     get_hagl,
@@ -23,12 +25,12 @@ from fusetune.ekf2.filter.common.conditions import (
     is_terrain_estimate_valid,
     is_vertical_velocity_aiding_active,
 )
-from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_RANGE, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE, give_up_height_reference
 from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.common.timing import (
     HGT_FUSION_TIMEOUT_MAX,
     RNG_MAX_INTERVAL,
-    is_newer_than_latest,
+    is_newest_sample_recent,
     is_timed_out,
 )
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_vertical_velocity_to_zero
@@ -57,7 +59,7 @@ def control_range_hagl_fusion(ekf, params):
 
 @kernel
 def _has_recent_sample(ekf):
-    return is_newer_than_latest(ekf, ekf.sensors.range.newest_time_us, 2 * RNG_MAX_INTERVAL)
+    return is_newest_sample_recent(ekf, ekf.sensors.range.newest_time_us, 2 * RNG_MAX_INTERVAL)
 
 
 @kernel
@@ -208,8 +210,7 @@ def is_conditional_range_aid_suitable(ekf, params):
 def stop_rng_hgt_fusion(ekf):
     """Stop correcting the height; another source becomes the reference if this was it."""
     if ekf.cs.rng_hgt:
-        if ekf.height_sensor_ref == HEIGHT_REF_RANGE:
-            ekf.height_sensor_ref = HEIGHT_REF_UNKNOWN
+        give_up_height_reference(ekf, HEIGHT_REF_RANGE)
         ekf.cs.rng_hgt = False
 
 

@@ -49,34 +49,8 @@ RANGE_MEMORY = np.dtype(
 
 @kernel
 def initialise_range_memory(rng):
-    """Forget everything; a range finder is taken to be consistent until it proves otherwise."""
-    rng.sample.time_us = 0
-    rng.sample.range = 0.0
-    rng.sample.quality = 0
-    rng.sensor_min_distance = 0.0
-    rng.sensor_max_distance = 0.0
+    """What is not zero at start: the beam points down, and the sensor is consistent until it proves otherwise."""
     rng.cos_tilt = 1.0
-    rng.is_sample_ready = False
-    rng.is_sample_valid = False
-    rng.is_regularly_sending_data = False
-    rng.time_last_valid = 0
-    rng.time_bad_quality = 0
-    rng.dt_data_lpf = 0.0
-    rng.is_stuck = False
-    rng.stuck_min = 0.0
-    rng.stuck_max = 0.0
-    rng.is_blocked = False
-    rng.recent_distances[:] = 0.0
-    rng.next_recent = 0
-    rng.median_distance = 0.0
-    rng.kin_time_last_update = 0
-    rng.kin_dist_bottom_prev = 0.0
-    rng.kin_innovation = 0.0
-    rng.kin_innovation_variance = 0.0
-    rng.kin_test_ratio = 0.0
-    rng.kin_signed_test_ratio_lpf = 0.0
-    rng.kin_time_last_inconsistent = 0
-    rng.kin_time_last_horizontal_motion = 0
     rng.is_kinematically_consistent = True
 
 

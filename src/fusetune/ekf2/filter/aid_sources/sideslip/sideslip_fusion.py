@@ -13,9 +13,8 @@ from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_s
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_wind_cov
-from fusetune.ekf2.filter.measurement_update import measurement_update
-from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
-from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, keep_only_wind_gains
+from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
+from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, fuse_into_wind
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 
 FUSION_INTERVAL_US = 150_000
@@ -97,7 +96,7 @@ def _update_sideslip(ekf, params):
 
 @kernel
 def _fuse_sideslip(ekf, params):
-    aid, H, K = ekf.aid.sideslip, ekf.scratch.H, ekf.scratch.K
+    aid = ekf.aid.sideslip
     if aid.innovation_rejected:
         return False
     update_wind_only = not ekf.cs.wind_dead_reckoning
@@ -111,10 +110,5 @@ def _fuse_sideslip(ekf, params):
             ekf.wind_vel[0], ekf.wind_vel[1] = 0.0, 0.0
         return False
     ekf.fs.bad_sideslip = False
-    compute_kalman_gain(ekf, H, variance, K)
-    if update_wind_only:
-        keep_only_wind_gains(K)
-    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
-    aid.fused = True
-    aid.time_last_fuse = ekf.time_delayed_us
+    fuse_into_wind(ekf, params, aid, ekf.scratch.H, update_wind_only)
     return True

@@ -1,4 +1,7 @@
-"""Zero velocity while the vehicle is at rest: levels the attitude and holds the velocity."""
+"""Zero velocity while the vehicle is at rest: levels the attitude and holds the velocity.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/ZeroVelocityUpdate.cpp`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import is_vertical_velocity_aiding_active

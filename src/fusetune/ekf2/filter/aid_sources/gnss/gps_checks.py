@@ -1,10 +1,12 @@
-"""Is a GNSS fix good enough? Thresholds of EKF2_REQ_…, chosen by EKF2_GPS_CHECK, and drift while at rest."""
+"""Is a GNSS fix good enough? Thresholds of EKF2_REQ_…, chosen by EKF2_GPS_CHECK, and drift while at rest.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/gnss/gps_checks.cpp`.
+"""
 
 import math
 
-import numpy as np
-
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import forget_drift
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.numerics.geodesy import project
 
@@ -91,7 +93,7 @@ def _check_drift(ekf, params, sample):
         gnss.fail.vdrift = False
         gnss.fail.hspeed = False
         gnss.fail.vspeed = False
-    _reset_drift_filters(gnss)
+    forget_drift(gnss)
 
 
 @kernel
@@ -122,16 +124,6 @@ def _filter_drift(gnss, params, sample):
     gnss.fail.vdrift = gnss.vertical_position_drift_rate > vdrift
     gnss.fail.hspeed = gnss.filtered_horizontal_velocity > hdrift
     gnss.fail.vspeed = abs(gnss.vel_d_filt) > vdrift
-
-
-@kernel
-def _reset_drift_filters(gnss):
-    gnss.vel_ne_filt[:] = 0.0
-    gnss.vel_d_filt = 0.0
-    gnss.pos_deriv_filt[:] = 0.0
-    gnss.horizontal_position_drift_rate = np.nan
-    gnss.vertical_position_drift_rate = np.nan
-    gnss.filtered_horizontal_velocity = np.nan
 
 
 @kernel

@@ -1,4 +1,7 @@
-"""Keep the yaw variance bounded while nothing observes the heading."""
+"""Keep the yaw variance bounded while nothing observes the heading.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/zero_innovation_heading_update.cpp`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE

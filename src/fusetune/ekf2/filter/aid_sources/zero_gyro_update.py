@@ -1,4 +1,7 @@
-"""The gyro at rest measures its own bias."""
+"""The gyro at rest measures its own bias.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/ZeroGyroUpdate.cpp`.
+"""
 
 import numpy as np
 

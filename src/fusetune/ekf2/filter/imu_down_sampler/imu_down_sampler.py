@@ -3,7 +3,9 @@
 Rotation is accumulated as a quaternion and velocity is carried along in the rotating body frame, so that coning and
 sculling survive the lower rate. The number of samples per interval follows from the mean gyro interval. All times
 are single precision as in PX4: they decide when a sample is complete and, through the mean interval, the time
-stamps of aiding samples to the microsecond. Mirrors `imu_down_sampler.cpp` of PX4 v1.16.
+stamps of aiding samples to the microsecond.
+
+Mirrors PX4 v1.16 `EKF/imu_down_sampler/imu_down_sampler.cpp`.
 """
 
 import numpy as np

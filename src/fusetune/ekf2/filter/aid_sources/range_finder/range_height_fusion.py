@@ -1,4 +1,8 @@
-"""Fusion of height above ground: h = terrain - p_z (both down), so H is -1 at the height and +1 at the terrain."""
+"""Fusion of height above ground: h = terrain - p_z (both down), so H is -1 at the height and +1 at the terrain.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/range_finder/range_height_fusion.cpp`, and `updateRangeHagl` and
+`resetTerrainToRng` of `range_height_control.cpp`.
+"""
 
 import math
 

@@ -1,4 +1,7 @@
-"""Can the range finder's sample be used: regular, of good quality, not tilted too far, in range, not stuck, no fog."""
+"""Can the range finder's sample be used: regular, of good quality, not tilted too far, in range, not stuck, no fog.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/range_finder/sensor_range_finder.cpp`.
+"""
 
 import math
 

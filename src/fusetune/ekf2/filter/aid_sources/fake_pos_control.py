@@ -2,6 +2,8 @@
 
 `cs.valid_fake_pos`: the vehicle is at rest or said to be fixed, so the position is right. `cs.fake_pos`: it only
 keeps the filter from diverging, while the tilt is uncertain and dead reckoning has lasted too long.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/fake_pos_control.cpp`.
 """
 
 import math

@@ -3,6 +3,8 @@
 The difference quotient of the distance is compared with the velocity; the signed test ratio, low-passed over 2 s, makes
 a lasting disagreement show even where every single one is small. Over uneven ground the distance changes without
 vertical motion, so nothing is concluded while the vehicle moves horizontally.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/range_finder/range_finder_consistency_check.cpp`.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel

@@ -4,7 +4,7 @@ The filter lives at the fusion time horizon, some 0.2 s ago. The predictor integ
 and is steered so that, looked back at the horizon, it agrees with the filter: attitude through a correction of the
 delta angles, velocity and position through a correction of the whole stored history (EKF2_TAU_VEL, EKF2_TAU_POS).
 It feeds what the vehicle publishes (`vehicle_attitude`, `vehicle_local_position`) and never the filter.
-Behaviour of `output_predictor.cpp` in PX4 v1.16.
+Mirrors PX4 v1.16 `EKF/output_predictor/output_predictor.cpp`.
 
 Positions are metres north, east and down of a global reference, which is moved when the filter resets its position.
 A correction moves every stored velocity and position alike, so it is kept once, as an offset: the history holds
@@ -15,6 +15,7 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.buffers import RING_CAPACITY
+from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon, lat_lon_difference
 from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
@@ -37,28 +38,17 @@ OUTPUT_SAMPLE = np.dtype([("q", "f8", (4,)), ("vel", "f8", (3,)), ("pos", "f8", 
 OUTPUT_MEMORY = np.dtype(
     [
         ("history", OUTPUT_SAMPLE, (RING_CAPACITY,)),
-        ("newest", OUTPUT_SAMPLE),
-        ("vel_offset", "f8", (3,)),
-        ("pos_offset", "f8", (3,)),
-        ("head", "i8"),
-        ("tail", "i8"),
-        ("size", "i8"),
+        *fields("i8", "head", "tail", "size"),
         ("first_write", "?"),
-        ("ref_lat", "f8"),
-        ("ref_lon", "f8"),
-        ("ref_alt", "f8"),
+        ("newest", OUTPUT_SAMPLE),
+        *fields("f8", "vel_offset", "pos_offset", shape=(3,)),
+        *fields("f8", "ref_lat", "ref_lon", "ref_alt"),
         ("R_to_earth", "f8", (3, 3)),
-        ("gyro_bias", "f8", (3,)),
-        ("accel_bias", "f8", (3,)),
-        ("delta_angle_corr", "f8", (3,)),
-        ("vel_err_integ", "f8", (3,)),
-        ("pos_err_integ", "f8", (3,)),
+        *fields("f8", "gyro_bias", "accel_bias", "delta_angle_corr", "vel_err_integ", "pos_err_integ", shape=(3,)),
         ("vel_imu_rel_body", "f8", (3,)),
         ("q_work", "f8", (4,)),
-        ("dt_update_avg", "f8"),
-        ("dt_correct_avg", "f8"),
-        ("time_last_update_us", "i8"),
-        ("time_last_correct_us", "i8"),
+        *fields("f8", "dt_update_avg", "dt_correct_avg"),
+        *fields("i8", "time_last_update_us", "time_last_correct_us"),
     ],
     align=True,
 )

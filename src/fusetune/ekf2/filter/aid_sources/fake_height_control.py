@@ -1,4 +1,7 @@
-"""Hold the height where it was last known while nothing aids height or vertical velocity."""
+"""Hold the height where it was last known while nothing aids height or vertical velocity.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/fake_height_control.cpp`.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import is_vertical_aiding_active

@@ -1,10 +1,13 @@
-"""What GNSS does at each update: checks, yaw estimator, heading, velocity and position, in the order of PX4 v1.16."""
+"""What GNSS does at each update: checks, yaw estimator, heading, velocity and position, in the order of PX4 v1.16.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/gnss/gps_control.cpp`, of which `gnss_velocity.py`, `gnss_position.py` and
+`yaw_emergency.py` hold the parts.
+"""
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_checks import check_gnss_sample
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import stop_gps_hgt_fusion
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, forget_checks
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_position import (
     control_gnss_pos_fusion,
     stop_gnss_pos_fusion,
@@ -16,6 +19,7 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_velocity import (
     update_gnss_velocity,
 )
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion, stop_gnss_yaw_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import check_gnss_sample
 from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import (
     control_gnss_yaw_estimator,
     is_yaw_failure,
@@ -24,7 +28,7 @@ from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import (
 from fusetune.ekf2.filter.common.timing import (
     GNSS_MAX_INTERVAL,
     RESET_TIMEOUT_MAX,
-    is_newer_than_latest,
+    is_newest_sample_recent,
     is_recent,
     is_timed_out,
 )
@@ -46,7 +50,7 @@ def control_gnss_fusion(ekf, params):
         return
 
     _run_yaw_estimator(ekf)
-    ekf.gnss.intermittent = not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL)
+    ekf.gnss.intermittent = not is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL)
 
     if ekf.sensors.gnss.data_ready:
         if not check_gnss_sample(ekf, params, ekf.sensors.gnss.sample):
@@ -55,7 +59,7 @@ def control_gnss_fusion(ekf, params):
                 stop_gnss_fusion(ekf)
         update_gnss_position(ekf, params, ekf.sensors.gnss.sample)
         update_gnss_velocity(ekf, params, ekf.sensors.gnss.sample)
-    elif _uses_gnss(ekf) and not is_newer_than_latest(ekf, ekf.sensors.gnss.newest_time_us, RESET_TIMEOUT_MAX):
+    elif _uses_gnss(ekf) and not is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_time_us, RESET_TIMEOUT_MAX):
         stop_gnss_fusion(ekf)
 
     if is_fusion_due(ekf.sensors.gnss):
@@ -125,8 +129,7 @@ def should_reset_gnss_fusion(ekf, params):
 def stop_gnss_fusion(ekf):
     """Stop everything that GNSS gives."""
     if _uses_gnss(ekf):
-        ekf.gnss.last_fail_us = 0
-        ekf.gnss.last_pass_us = 0
+        forget_checks(ekf.gnss)
     stop_gnss_vel_fusion(ekf)
     stop_gnss_pos_fusion(ekf)
     stop_gps_hgt_fusion(ekf)
