@@ -4,21 +4,14 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.reconstruction import ReconstructionSettings, measured_rows, reconstruct
-from fusetune.analyze.reconstruction.attitude import (
-    attitude_history,
-    conjugate,
-    from_rotation_vector,
-    multiply,
-    rotation_vector,
-    steady_history,
-    to_body,
-)
+from fusetune.analyze.reconstruction.attitude import attitude_history, steady_history, to_body
 from fusetune.analyze.reconstruction.between_samples import sensor_rate_hz
 from fusetune.analyze.reconstruction.magnetometer import _spline_is_nearer, interpolate_magnetometer
 from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare, write_replay
 from fusetune.analyze.replaying.set_files import read_set
 from fusetune.analyze.trust.fidelity import load_innovations
 from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.numerics.quaternions import conjugate, from_rotation_vector, multiply, rotation_vector
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, select_rows
 

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.ground_truth import Truth, read_truth, sample_times
-from fusetune.analyze.metrics.attitude import rotation_matrices
 from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
+from fusetune.ekf2.numerics.quaternions import rotation_matrix
 from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.px4.layouts import sensor_layouts
 
@@ -123,7 +123,7 @@ def odometry_reference(table: TopicTable, kind: str) -> Truth | None:
     if not np.isfinite(velocity).all() or (in_body.any() and not has_attitude):
         velocity = np.zeros((0, 3))
     elif in_body.any():
-        velocity = np.where(in_body[:, None], np.einsum("nij,nj->ni", rotation_matrices(q), velocity), velocity)
+        velocity = np.where(in_body[:, None], np.einsum("nij,nj->ni", rotation_matrix(q), velocity), velocity)
     return Truth(
         time=time,
         position=position,

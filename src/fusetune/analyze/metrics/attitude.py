@@ -3,6 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.ekf2.numerics.quaternions import conjugate, multiply, rotation_vector
+
 Array = npt.NDArray[np.float64]
 
 
@@ -36,41 +38,6 @@ def wrap(angle: Array) -> Array:
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
-def rotation_matrices(q: Array) -> Array:
-    """(N, 3, 3) matrices that turn body into NED vectors."""
-    w, x, y, z = q.T
-    return np.moveaxis(
-        np.array(
-            [
-                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-                [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-            ]
-        ),
-        -1,
-        0,
-    )
-
-
-def product(a: Array, b: Array) -> Array:
-    """Hamilton product of (N, 4) quaternions: the rotation b, then a."""
-    aw, ax, ay, az = a.T
-    bw, bx, by, bz = b.T
-    return np.column_stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ]
-    )
-
-
 def error_in_ned(quaternion: Array, true_quaternion: Array) -> Array:
     """Rotation vectors (N, 3), rad, in NED that turn the true attitude into the estimated one."""
-    error = product(quaternion, true_quaternion * np.array([1.0, -1.0, -1.0, -1.0]))
-    error = np.where(error[:, :1] < 0.0, -error, error)
-    sine = np.linalg.norm(error[:, 1:], axis=1)
-    angle = 2.0 * np.arctan2(sine, error[:, 0])
-    scale = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-12)
-    return error[:, 1:] * scale[:, None]
+    return rotation_vector(multiply(quaternion, conjugate(true_quaternion)))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
+from fusetune.ekf2.numerics.quaternions import conjugate, from_rotation_vector, multiply, normalised, rotation_vector
 from fusetune.px4.flight import TopicTable, row_count, stacked
 
 MAX_INTERVAL_US = 1_000_000
@@ -176,47 +177,6 @@ def blocks(rows: int) -> Iterator[slice]:
     """Some rows after the other: quaternions take several times their own memory while they are multiplied."""
     for first in range(0, rows, ROWS_AT_ONCE):
         yield slice(first, min(first + ROWS_AT_ONCE, rows))
-
-
-def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Quaternion products (N, 4)."""
-    pw, px, py, pz = np.moveaxis(p, -1, 0)
-    qw, qx, qy, qz = np.moveaxis(q, -1, 0)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
-    )
-
-
-def conjugate(q: np.ndarray) -> np.ndarray:
-    """Inverses of unit quaternions (N, 4)."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
-
-
-def normalised(q: np.ndarray) -> np.ndarray:
-    """Unit quaternions (N, 4)."""
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
-
-
-def from_rotation_vector(vector: np.ndarray) -> np.ndarray:
-    """Quaternions (N, 4) of rotation vectors (N, 3), rad."""
-    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
-    # sin(a/2)/a, which tends to 1/2
-    scale = np.where(angle < 1e-8, 0.5, np.sin(0.5 * angle) / np.where(angle < 1e-8, 1.0, angle))
-    return np.concatenate([np.cos(0.5 * angle), scale * vector], axis=-1)
-
-
-def rotation_vector(q: np.ndarray) -> np.ndarray:
-    """Rotation vectors (N, 3), rad, of unit quaternions (N, 4), the shorter way round."""
-    q = np.where(q[..., :1] < 0.0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, q[..., :1])
-    return q[..., 1:] * np.where(sine < 1e-12, 2.0, angle / np.where(sine < 1e-12, 1.0, sine))
 
 
 def to_earth(q: np.ndarray, vector: np.ndarray) -> np.ndarray:

@@ -7,18 +7,12 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.reference_truth import EARTH_RADIUS_M, Truth, read_references, read_truth
 from fusetune.analyze.metrics.attitude import error_in_ned as attitude_error
-from fusetune.analyze.metrics.attitude import (
-    heading,
-    interpolate,
-    interpolate_quaternion,
-    product,
-    rotation_matrices,
-    wrap,
-)
+from fusetune.analyze.metrics.attitude import heading, interpolate, interpolate_quaternion, wrap
 from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures, nees_figures, vector_figures
 from fusetune.analyze.replaying.filter_states import FilterStates
 from fusetune.analyze.replaying.set_files import SetRecord
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.ekf2.numerics.quaternions import multiply, rotation_matrix
 
 __all__ = [
     "EARTH_RADIUS_M",
@@ -90,7 +84,7 @@ def _outputs(record: SetRecord, states: FilterStates, truth: Truth, window: Scor
 def _arm(states: FilterStates, truth: Truth, at: npt.NDArray[np.int64]) -> Array:
     """Lever arm in NED, m, (N, 3): its derivative is the velocity that turning adds."""
     attitude = interpolate_quaternion(states.time, states.quaternion, at)
-    return rotation_matrices(attitude) @ np.array(truth.lever_arm)
+    return rotation_matrix(attitude) @ np.array(truth.lever_arm)
 
 
 def _position_figures(
@@ -171,5 +165,5 @@ def _turned_north(truth: Truth, states: FilterStates, window: ScoringWindow) -> 
         truth,
         position=truth.position @ turn.T,
         velocity=truth.velocity @ turn.T,
-        quaternion=product(np.broadcast_to(half, truth.quaternion.shape), truth.quaternion),
+        quaternion=multiply(np.broadcast_to(half, truth.quaternion.shape), truth.quaternion),
     )

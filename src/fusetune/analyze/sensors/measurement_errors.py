@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.metrics.attitude import rotation_matrices
 from fusetune.analyze.replaying.filter_states import FilterStates
 from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
 from fusetune.analyze.scoring.measurement_alignment import match, measurement_time
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
+from fusetune.ekf2.numerics.quaternions import rotation_matrix
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
@@ -144,7 +144,7 @@ def _height_sign(predicted: Array, down: Array) -> float:
 
 def _mag_errors(states: FilterStates, time: npt.NDArray[np.int64], observation: Array) -> Array:
     update = np.minimum(np.searchsorted(states.time, time), states.time.size - 1)
-    to_body = np.swapaxes(rotation_matrices(states.quaternion[update]), 1, 2)
+    to_body = np.swapaxes(rotation_matrix(states.quaternion[update]), 1, 2)
     usable = np.isfinite(observation).all(axis=1)
     design = np.concatenate([to_body, np.broadcast_to(np.eye(3), to_body.shape)], axis=2)
     rows = design[usable].reshape(-1, 6)

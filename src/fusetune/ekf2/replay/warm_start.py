@@ -20,6 +20,7 @@ from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MAG_BODY, MAG_EARTH, TERRAIN, WIND
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import reproject
+from fusetune.ekf2.numerics.quaternions import conjugate, rotation_matrix
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
 from fusetune.px4.layouts.logged_state import LoggedState
 
@@ -149,21 +150,9 @@ def _turned(q: np.ndarray, turn: np.ndarray) -> np.ndarray:
 
 
 def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Product (4,) of two quaternions (w, x, y, z)."""
+    """Product (4,) of two quaternions (w, x, y, z), by vectors; the last bits of `multiply` differ."""
     vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
     return np.array([p[0] * q[0] - p[1:] @ q[1:], *vector])
-
-
-def rotation_matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation (3, 3) from body to NED of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _set_variances(e: np.void, params: np.void, state: LoggedState) -> None:
@@ -285,8 +274,7 @@ def _align_output(e: np.void) -> None:
     """Turn and move the output predictor's history so that it agrees with the filter at the horizon."""
     output = e["output"]
     oldest = output["history"][int(output["tail"])]
-    inverse = oldest["q"] * np.array([1.0, -1.0, -1.0, -1.0])
-    turn = quaternion_product(e["q"], inverse)
+    turn = quaternion_product(e["q"], conjugate(oldest["q"]))
     matrix = rotation_matrix(turn / np.linalg.norm(turn))
     start = oldest["vel"].copy()
     for i in range(int(output["size"])):
