@@ -44,7 +44,7 @@ $(READY): $(LOCKS) pyproject.toml
 
 # Writes the lock files anew, keeping their versions where they still fit; `make lock UPGRADE=--upgrade` takes the newest.
 lock:
-	$(LOCK) $(UPGRADE) --extra dev --output-file requirements.lock
+	$(LOCK) $(UPGRADE) --extra test --extra dev --output-file requirements.lock
 	$(LOCK) $(UPGRADE) --extra slurm --constraint requirements.lock --output-file requirements-slurm.lock
 
 # Removes what the pipeline has made; logs in flights/ and the environment stay.

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import subprocess
 import sys
+import tomllib
+from collections.abc import Iterator
+from importlib.metadata import packages_distributions
 from pathlib import Path
+
+from packaging.requirements import Requirement
 
 IMPORT_ALL = """
 import importlib, pkgutil, sys
@@ -38,3 +45,30 @@ def test_every_module_can_be_imported_where_there_is_no_posix(project_root: Path
     assert int(before) == int(after) > 100
     assert (locks, fcntl) == ("msvcrt", "None")
     assert others_may_write == "False"
+
+
+def imported_by(file: Path) -> Iterator[str]:
+    """Outermost names of what a file imports; rules are not quite Python, so they are read line by line."""
+    text = file.read_text(encoding="utf-8")
+    if file.suffix != ".py":
+        yield from re.findall(r"^\s*(?:from|import)\s+(\w+)", text, re.MULTILINE)
+        return
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module.partition(".")[0]
+
+
+def test_pipeline_and_benchmarks_need_no_more_than_a_plain_installation(project_root: Path) -> None:
+    project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    plain = {Requirement(text).name.lower() for text in project["dependencies"]}
+    files = [project_root / "Snakefile", *(project_root / "workflow").rglob("*.smk")]
+    files += [file for folder in ("src", "workflow", "benchmarks") for file in (project_root / folder).rglob("*.py")]
+    scripts = {file.stem for file in (project_root / "workflow" / "scripts").glob("*.py")}
+    ours = {"fusetune", "benchmarks", *scripts, *sys.stdlib_module_names}
+    found = {name: file for file in files for name in imported_by(file) if name not in ours}
+    assert {"numba", "snakemake"} <= set(found)
+    of = packages_distributions()
+    missing = {name: file for name, file in found.items() if not plain & {d.lower() for d in of.get(name, [name])}}
+    assert missing == {}
