@@ -18,8 +18,8 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from fusetune.analyze.fidelity import ReplayFidelity, compare_folders, order_agreement
-from fusetune.analyze.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.trust.fidelity import ReplayFidelity, compare_folders, order_agreement
 
 HEADER = (
     "| flight | sets | RMS diff., median | worst | worst axis | variance | decisions equal | flags equal | resets | "
