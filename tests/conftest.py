@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from benchmarks.reference_flights import GOLDEN_LOGS, GOLDEN_REFERENCE, log_of, reference_folders
 
 from fusetune.kernel_cache import use_kernel_cache
 
@@ -74,6 +75,21 @@ def survey_flight(project_root: Path) -> Flight:
     mission = load_mission(project_root / "config/missions/survey.yaml")
     vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
     return canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
+
+
+@pytest.fixture(scope="session")
+def golden_logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the golden flights' logs, unpacked; not to be changed."""
+    folder = tmp_path_factory.mktemp("golden_logs")
+    for reference in reference_folders(GOLDEN_REFERENCE):
+        log_of(reference.name, GOLDEN_LOGS, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def golden_reference() -> Path:
+    """Folder of what PX4's own estimator computed on the golden flights."""
+    return GOLDEN_REFERENCE
 
 
 @pytest.fixture(scope="session")
