@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 
 from fusetune.px4.flight import Flight, ParameterHistory, TopicTable
-from fusetune.px4.release_layouts import canonical
+from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.sensor_limits import impossible_samples
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.ulog.writer import write_ulog
 from fusetune.save import Verdict, load_flight, save_log, write_flights_table
 
 MOST_SECONDS = 10.0

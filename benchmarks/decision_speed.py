@@ -9,9 +9,9 @@ import time
 
 import numpy as np
 
-from fusetune.apply.bootstrap import bootstrap_scores
 from fusetune.apply.evidence import AIDED, UNAIDED, AimEvidence, FlightEvidence
-from fusetune.apply.sign_flips import family_p_values
+from fusetune.apply.statistics.bootstrap import bootstrap_scores
+from fusetune.apply.statistics.sign_flips import family_p_values
 
 FLIGHTS, SETS, DRAWS = 10, 50, 2000
 BLOCKS = 12

@@ -22,15 +22,15 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from fusetune.ekf2.compilation import ensure_compiled
-from fusetune.ekf2.core_memory import CORE_MEMORY
-from fusetune.ekf2.inputs import build_inputs
-from fusetune.ekf2.measurement_update import measurement_update
-from fusetune.ekf2.parameters import complete, parameter_record
-from fusetune.ekf2.prediction import predict_covariance, predict_state
-from fusetune.ekf2.replay import replay
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import read_ulog
+from fusetune.ekf2.compiled.compilation import ensure_compiled
+from fusetune.ekf2.feed.inputs import build_inputs
+from fusetune.ekf2.filter.common.core_memory import CORE_MEMORY
+from fusetune.ekf2.filter.common.parameters import complete, parameter_record
+from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
+from fusetune.ekf2.replay.replay import replay
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.ulog.reader import read_ulog
 
 REPEATS = 9
 LOOPS = 20_000
@@ -122,9 +122,10 @@ def main() -> None:
 def process_seconds(log: Path) -> float:
     """Wall seconds of a whole process that reads one log and replays it."""
     code = (
-        "import sys; from pathlib import Path; from fusetune.px4.ulog_reader import read_ulog;"
-        "from fusetune.px4.release_layouts import canonical; from fusetune.ekf2.inputs import build_inputs;"
-        "from fusetune.ekf2.parameters import complete; from fusetune.ekf2.replay import replay;"
+        "import sys; from pathlib import Path; from fusetune.px4.ulog.reader import read_ulog;"
+        "from fusetune.px4.layouts.release_layouts import canonical;"
+        "from fusetune.ekf2.feed.inputs import build_inputs;"
+        "from fusetune.ekf2.filter.common.parameters import complete; from fusetune.ekf2.replay.replay import replay;"
         "f = read_ulog(Path(sys.argv[1])); i = build_inputs(canonical(f));"
         "replay(i, complete(f.parameters.initial, {}, f.release))"
     )

@@ -28,10 +28,10 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fusetune.checksum_file import check_checksum, checksum_file
-from fusetune.documents import read_document
 from fusetune.errors import RUN_AGAIN, UserError
-from fusetune.parquet import read_table
+from fusetune.storage.checksum_file import check_checksum, checksum_file
+from fusetune.storage.documents import read_document
+from fusetune.storage.parquet import read_table
 
 TOLD, SAME, SILENT = "told", "same values", "SILENT"
 

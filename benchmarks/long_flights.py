@@ -24,7 +24,7 @@ from typing import Any
 from benchmarks.save_speed import ROOT, peak_bytes, simulated
 
 from fusetune.design.study import load_study
-from fusetune.job_environment import JOB_ENVIRONMENT
+from fusetune.running.job_environment import JOB_ENVIRONMENT
 from fusetune.save.flight_folder import read_metadata
 
 # All else is imported where it is needed: what a job does not load must not count as its memory.
@@ -43,8 +43,8 @@ def main() -> None:
         return
     from benchmarks.thinned_logs import Thinning, thinned
 
-    from fusetune.px4.release_layouts import canonical
-    from fusetune.px4.ulog_writer import write_ulog
+    from fusetune.px4.layouts.release_layouts import canonical
+    from fusetune.px4.ulog.writer import write_ulog
     from fusetune.save.flight_folder import load_flight
 
     steps = ", ".join(step.replace("_", " ") for step in ANALYSIS_STEPS)
@@ -100,7 +100,7 @@ def _measured(job: str, log: Path) -> dict[str, Any]:
     elif job == "analyse":
         work = _analysis(saved, analysis, steps)
     else:
-        from fusetune.report.flight_figures import plot_flight
+        from fusetune.report.figures.flight_figures import plot_flight
 
         sets = [pset.name for pset in load_study(STUDY).sets]
         work = lambda: plot_flight(saved, analysis, sets, log.with_suffix(".png"))  # noqa: E731
@@ -112,7 +112,7 @@ def _measured(job: str, log: Path) -> dict[str, Any]:
 def _analysis(saved: Path, analysis: Path, steps: dict[str, int]) -> Callable[[], object]:
     """The analysis of all sets; its steps enter their peak memory."""
     from fusetune.analyze import analyze_flight as room
-    from fusetune.analyze.replay_settings import IN_USE
+    from fusetune.analyze.replaying.replay_settings import IN_USE
 
     def noting(name: str, step: Callable[..., Any]) -> Callable[..., Any]:
         def noted(*arguments: Any, **options: Any) -> Any:

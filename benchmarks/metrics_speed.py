@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fusetune.analyze import score_flight as scoring
+from fusetune.analyze.scoring import score_flight as scoring
 
 REPEATS = 5
 

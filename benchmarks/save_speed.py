@@ -75,7 +75,7 @@ def measure(log: Path, scratch: Path) -> dict[str, float]:
     import numpy as np
 
     from fusetune.px4.flight import Flight
-    from fusetune.px4.ulog_writer import write_ulog
+    from fusetune.px4.ulog.writer import write_ulog
     from fusetune.save import save_log
 
     # What is saved stays until the end of all: file systems are slow to make files where others were just removed.
@@ -110,10 +110,10 @@ def peak_bytes() -> int:
 def simulated(log: Path, minutes: float, with_estimator: bool) -> tuple[Path, float]:
     """Write a simulated flight of about this length, laps of the survey mission; the time that took."""
     from fusetune.design.mission import load_mission
-    from fusetune.execute.flight_plan import plan_flight
     from fusetune.execute.simulation import fly
     from fusetune.execute.vehicle import load_vehicle
-    from fusetune.px4.ulog_writer import write_ulog
+    from fusetune.execute.world.flight_plan import plan_flight
+    from fusetune.px4.ulog.writer import write_ulog
 
     vehicle = load_vehicle(ROOT / "config/vehicles/quadrotor.yaml")
     mission = load_mission(ROOT / "config/missions/survey.yaml")

@@ -23,24 +23,24 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import kendalltau
 
-from fusetune.analyze.as_flown_figures import replayed_innovations
-from fusetune.analyze.fidelity import NLL_CAP, NLL_SOURCES
-from fusetune.analyze.flight_phases import airborne_intervals
+from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import ReconstructionSettings
-from fusetune.analyze.replay_flight import PreparedFlight, prepare
-from fusetune.analyze.set_input import WRITTEN_BACK, read_set_files
-from fusetune.analyze.settings import ScoringSettings
-from fusetune.analyze.start_choice import StartSettings
-from fusetune.analyze.trust_grade import grade_flight
+from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.replaying.set_input import WRITTEN_BACK, read_set_files
+from fusetune.analyze.replaying.start_choice import StartSettings
+from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.trust.as_flown_figures import replayed_innovations
+from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES
+from fusetune.analyze.trust.trust_grade import grade_flight
 from fusetune.design.mission import load_mission
-from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
-from fusetune.ekf2.parameters import complete
-from fusetune.ekf2.replay import ReplayResult
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import read_ulog
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.ulog.reader import read_ulog
 
 PROJECT = Path(__file__).resolve().parents[1]
 FULL_RATE = (

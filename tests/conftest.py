@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from benchmarks.reference_flights import GOLDEN_LOGS, GOLDEN_REFERENCE, log_of, reference_folders
 
-from fusetune.kernel_cache import use_kernel_cache
+from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 
 if TYPE_CHECKING:
     from fusetune.px4.flight import Flight
@@ -70,7 +70,7 @@ def survey_flight(project_root: Path) -> Flight:
     from fusetune.design.mission import load_mission
     from fusetune.execute.simulation import fly
     from fusetune.execute.vehicle import load_vehicle
-    from fusetune.px4.release_layouts import canonical
+    from fusetune.px4.layouts.release_layouts import canonical
 
     mission = load_mission(project_root / "config/missions/survey.yaml")
     vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")

@@ -17,7 +17,7 @@ import pytest
 
 from fusetune.cli import main
 from fusetune.px4.flight import Flight, ParameterHistory
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.ulog.writer import write_ulog
 
 Captured = pytest.CaptureFixture[str]
 

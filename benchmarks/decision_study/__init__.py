@@ -1,6 +1,6 @@
 """Does the decision choose what the truth would have chosen? `python -m benchmarks.decision_study --help`."""
 
-from fusetune.kernel_cache import use_kernel_cache
+from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 
 # Numba reads where its cache is when it is imported.
 use_kernel_cache()

@@ -12,16 +12,16 @@ from typing import Any
 
 import yaml
 
-from fusetune.analyze.replay_flight import replay_saved_flight
-from fusetune.analyze.replay_settings import ReplaySettings
-from fusetune.analyze.score_flight import score_saved_flight
-from fusetune.analyze.withheld_gaps import WithholdingSettings
+from fusetune.analyze.replaying.replay_flight import replay_saved_flight
+from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings
+from fusetune.analyze.scoring.score_flight import score_saved_flight
 from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study
-from fusetune.digest import source_digest
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import Vehicle, load_vehicle
 from fusetune.save import save_log
+from fusetune.storage.digest import source_digest
 
 HERE = Path(__file__).parent
 PRESENT = "present"

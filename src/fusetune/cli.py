@@ -23,8 +23,8 @@ from fusetune import __version__
 from fusetune.errors import UserError
 
 if TYPE_CHECKING:
-    from fusetune.analyze.fidelity import ReplayFidelity
-    from fusetune.save.verdict import Check
+    from fusetune.analyze.trust.fidelity import ReplayFidelity
+    from fusetune.save.checks.check import Check
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
@@ -128,7 +128,7 @@ def _seed(text: str) -> int:
 def _simulate(options: argparse.Namespace) -> int:
     from fusetune.design.mission import load_mission
     from fusetune.execute import simulate
-    from fusetune.execute.faults import load_faults
+    from fusetune.execute.sensors.faults import load_faults
     from fusetune.execute.vehicle import load_vehicle
 
     flight = simulate(
@@ -218,9 +218,9 @@ def _add_replay(commands: Commands) -> None:
 
 def _replay(options: argparse.Namespace) -> int:
     from fusetune.analyze.reconstruction import ReconstructionSettings
-    from fusetune.analyze.replay_flight import replay_log
-    from fusetune.analyze.replay_settings import ReplaySettings
-    from fusetune.analyze.start_choice import StartSettings
+    from fusetune.analyze.replaying.replay_flight import replay_log
+    from fusetune.analyze.replaying.replay_settings import ReplaySettings
+    from fusetune.analyze.replaying.start_choice import StartSettings
 
     reconstruction = ReconstructionSettings() if options.reconstruct else None
     settings = ReplaySettings(reconstruction=reconstruction, start=StartSettings(mode=options.start))
@@ -236,7 +236,7 @@ def _add_fidelity(commands: Commands) -> None:
 
 
 def _fidelity(options: argparse.Namespace) -> int:
-    from fusetune.analyze.fidelity import compare_folders, order_agreement
+    from fusetune.analyze.trust.fidelity import compare_folders, order_agreement
 
     results = compare_folders(options.reference, options.replay)
     for result in results:

@@ -7,11 +7,11 @@ import numpy as np
 import pyarrow as pa
 from tests.analyze.made_gaps import UNITS, gap_starts, write_gaps
 
-from fusetune.documents import write_document
-from fusetune.ekf2 import state
-from fusetune.parquet import write_table
+from fusetune.ekf2.filter.common import state
 from fusetune.px4.flight import Flight, ParameterHistory
 from fusetune.save.flight_folder import write_flight
+from fusetune.storage.documents import write_document
+from fusetune.storage.parquet import write_table
 
 START_US = 10_000_000
 TAKE_OFF_S = 10.0

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from fusetune.parquet import write_table
+from fusetune.storage.parquet import write_table
 
 GAP_S = 9.0
 HORIZONS_S = (3.0, 6.0, 9.0)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pyarrow as pa
 from tests.analyze.made_flight import MadeSet, make_flight
 
-from fusetune.analyze.score_flight import score_saved_flight
-from fusetune.parquet import write_table
+from fusetune.analyze.scoring.score_flight import score_saved_flight
+from fusetune.storage.parquet import write_table
 
 
 def make_study(

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from tests.apply.test_leave_one_out import flight
+from tests.apply.statistics.test_leave_one_out import flight
 
 from fusetune.apply.choice import choose, parameter_distance
 from fusetune.apply.ranking import AimComparison, RankedSet, is_proved

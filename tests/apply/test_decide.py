@@ -12,10 +12,10 @@ from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
-from fusetune.documents import read_document, write_document
 from fusetune.errors import UserError
-from fusetune.parquet import write_table
-from fusetune.px4.params_file import read_params
+from fusetune.px4.parameters.params_file import read_params
+from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.parquet import write_table
 
 OUTPUTS = (
     "ranking.parquet",

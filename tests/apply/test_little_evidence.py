@@ -14,18 +14,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 from tests.analyze.made_flight import MadeSet
+from tests.apply.statistics.test_bootstrap import evidence
 from tests.apply.study import make_study
-from tests.apply.test_bootstrap import evidence
 from tests.apply.test_ranking import analyzed
 
-from fusetune.analyze.metrics_schema import METRICS_SCHEMA
-from fusetune.apply.bootstrap import FEWEST_REDRAWN, expanded_interval, holm, p_value, units_redrawn
+from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.choice import choose
 from fusetune.apply.decide import decide
 from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight, FlightEvidence, _Sums, flight_evidence
-from fusetune.apply.leave_one_out import leave_one_out
 from fusetune.apply.ranking import ELIGIBLE, RankedSet, is_proved, rank
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.statistics.bootstrap import FEWEST_REDRAWN, expanded_interval, holm, p_value, units_redrawn
+from fusetune.apply.statistics.leave_one_out import leave_one_out
 from fusetune.apply.wording import paragraph
 
 DRAWS = DecisionSettings(draws=400)

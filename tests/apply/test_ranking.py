@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.apply.test_leave_one_out import flight
+from tests.apply.statistics.test_leave_one_out import flight
 
-from fusetune.analyze.metrics_schema import METRICS_SCHEMA
+from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.ranking import is_proved, rank
 from fusetune.apply.settings import DecisionSettings

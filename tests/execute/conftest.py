@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from fusetune.design.mission import Home, Landing, Mission, Takeoff, Waypoint
-from fusetune.execute.flight_plan import FlightPlan, plan_flight
-from fusetune.execute.truth import Truth, simulate_truth
 from fusetune.execute.vehicle import InertialSensor, Vehicle, Vibration, load_vehicle
+from fusetune.execute.world.flight_plan import FlightPlan, plan_flight
+from fusetune.execute.world.truth import Truth, simulate_truth
 
 SEED = 7
 

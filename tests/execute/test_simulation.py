@@ -13,13 +13,13 @@ from pyulog import ULog
 
 from fusetune.design.mission import Mission
 from fusetune.errors import UserError
-from fusetune.execute.faults import DefaultProfile, Fault, LoggerDropout, parse_faults
 from fusetune.execute.logger import NO_SAMPLE
+from fusetune.execute.sensors.faults import DefaultProfile, Fault, LoggerDropout, parse_faults
 from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import Vehicle, load_vehicle
-from fusetune.px4.ekf2_parameters import PARAMETERS, ParameterError
 from fusetune.px4.flight import Flight
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError
+from fusetune.px4.ulog.writer import write_ulog
 
 FLOWN = {"EKF2_ACC_NOISE": 0.7, "EKF2_GPS_CTRL": 7}
 SEED = 11

@@ -7,10 +7,10 @@ from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
-from fusetune.documents import write_document
-from fusetune.report.flight_figures import plot_flight
+from fusetune.report.figures.flight_figures import plot_flight
+from fusetune.report.figures.summary_figures import plot_summary
 from fusetune.report.page import build_report
-from fusetune.report.summary_figures import plot_summary
+from fusetune.storage.documents import write_document
 
 SETS = {
     "present": MadeSet(error=0.13, overrides={"EKF2_ACC_NOISE": 0.35}),

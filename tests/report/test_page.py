@@ -7,8 +7,8 @@ from PIL import Image
 from tests.analyze.made_flight import MadeSet
 from tests.report.made_report import SETS, make_report
 
-from fusetune.report.flight_figures import plot_flight
-from fusetune.report.summary_figures import SUMMARY_FIGURES, plot_summary
+from fusetune.report.figures.flight_figures import plot_flight
+from fusetune.report.figures.summary_figures import SUMMARY_FIGURES, plot_summary
 
 
 def test_the_page_needs_no_network(made: tuple[Path, str]) -> None:

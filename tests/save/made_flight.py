@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.px4.flight import Flight, ParameterHistory
-from fusetune.px4.release_layouts import canonical
-from fusetune.save.verdict import Check, Verdict, VerdictThresholds, judge
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.save.checks.check import Check
+from fusetune.save.thresholds import VerdictThresholds
+from fusetune.save.verdict import Verdict, judge
 
 SLOW_HZ = 20
 TAKE_OFF_ROW, LANDING_ROW = 240, 840

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from fusetune.errors import UserError
 from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory
-from fusetune.px4.ulog_reader import read_ulog
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.ulog.reader import read_ulog
+from fusetune.px4.ulog.writer import write_ulog
 from fusetune.save import VerdictThresholds, load_flight, save_log, write_flights_table
 from fusetune.save.discovery import RefusedEntry
 from fusetune.save.log_facts import recorded_at

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from fusetune.px4.flight import Flight, ParameterHistory, TopicKey, TopicTable
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import read_ulog
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.ulog.reader import read_ulog
+from fusetune.px4.ulog.writer import write_ulog
 from fusetune.save import load_flight, save_log
-from fusetune.save.verdict import Check, Verdict
+from fusetune.save.checks.check import Check
+from fusetune.save.verdict import Verdict
 
 FIRST_US, SECONDS, IMU_HZ, SLOW_HZ = 5_000_000, 12, 200, 20
 TIME = FIRST_US + np.arange(SECONDS * IMU_HZ, dtype=np.int64) * 5_000

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from fusetune.documents import write_document
 from fusetune.errors import UserError
 from fusetune.save import Present, find_present, flight_folder, read_present, write_present
+from fusetune.storage.documents import write_document
 
 VARIED = ("EKF2_GPS_V_NOISE", "EKF2_ACC_NOISE", "EKF2_NOT_IN_THESE_LOGS")
 

@@ -11,10 +11,11 @@ import pytest
 from tests.save.made_flight import check_of, judged, made_flight
 
 from fusetune.px4.flight import Flight
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import read_ulog
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.log_facts import flight_times
-from fusetune.save.verdict import VerdictThresholds, judge
+from fusetune.save.thresholds import VerdictThresholds
+from fusetune.save.verdict import judge
 
 REFUSED = {
     "PX4__sample_log_small": r"too short: 6\.5 s of IMU",

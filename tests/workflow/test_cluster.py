@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from tests.workflow.conftest import CONFIG, ROOT, STUDY, Workspace, make_workspace
 
-from fusetune.cluster_jobs import queued_jobs
+from fusetune.running.cluster_jobs import queued_jobs
 
 DECISION = "results/apply/decision.json"
 PATIENCE_S = 300.0

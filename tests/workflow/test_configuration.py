@@ -59,11 +59,11 @@ def test_every_key_is_described_and_in_the_manual(schema: dict[str, Any], projec
 
 
 def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
-    from fusetune.analyze.settings import ScoringSettings
-    from fusetune.analyze.trust_settings import TrustSettings
-    from fusetune.analyze.withheld_gaps import WithholdingSettings
+    from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings
+    from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+    from fusetune.analyze.trust.trust_settings import TrustSettings
     from fusetune.apply.settings import DecisionSettings
-    from fusetune.px4.reading_limits import ReadingLimits
+    from fusetune.px4.ulog.reading_limits import ReadingLimits
     from fusetune.save import VerdictThresholds
 
     assert ReadingLimits.from_mapping(shipped["reading"]) == ReadingLimits()
@@ -78,7 +78,7 @@ def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
 
 def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: dict[str, Any]) -> None:
     from fusetune.analyze.sources import AID_SOURCES
-    from fusetune.ekf2.withholding import WITHHOLDABLE
+    from fusetune.ekf2.replay.withholding import WITHHOLDABLE
 
     decision = schema["properties"]["decision"]["properties"]
     assert decision["sources"]["propertyNames"]["enum"] == sorted(AID_SOURCES)

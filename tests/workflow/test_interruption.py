@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from tests.workflow.conftest import ROOT, Workspace, make_workspace
 
-from fusetune.run_lock import RUN_VARIABLE
+from fusetune.running.run_lock import RUN_VARIABLE
 
 TABLE = "results/save/flights.csv"
 
@@ -23,7 +23,7 @@ TABLE = "results/save/flights.csv"
 @contextmanager
 def process_in(workspace: Workspace, call: str) -> Iterator[subprocess.Popen[str]]:
     """A process that has called a function of the lock in a folder, and lives on."""
-    code = f"import sys; from fusetune.run_lock import *; {call}; print(flush=True); sys.stdin.readline()"
+    code = f"import sys; from fusetune.running.run_lock import *; {call}; print(flush=True); sys.stdin.readline()"
     process = subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=workspace.folder,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tests.workflow.conftest import STUDY, Workspace
 
-from fusetune.kernel_cache import kernel_cache
+from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
 SUMMARIES = {"list_flights": 1, "decide": 1, "plot_summary": 1, "build_report": 1, "all": 1}
 DECISION = "results/apply/decision.json"

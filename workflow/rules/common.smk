@@ -2,8 +2,8 @@
 import csv
 from dataclasses import astuple
 
-from fusetune.cells import as_it_was
-from fusetune.checksum_file import check_checksum
+from fusetune.storage.cells import as_it_was
+from fusetune.storage.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
 from fusetune.save import read_present
 from fusetune.save.discovery import printable

@@ -58,7 +58,7 @@ def check_demonstration():
     """Check what jobs would read of the demonstration, so that no job has to fail of it."""
     load_vehicle(SETTINGS["demonstration"]["vehicle"])
     if FAULTS:
-        from fusetune.execute.faults import parse_faults
+        from fusetune.execute.sensors.faults import parse_faults
 
         for flight, faults in FAULTS.items():
             parse_faults(faults, f"{CONFIG_FILE}: demonstration.faults.{flight}")

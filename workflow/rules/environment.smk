@@ -35,13 +35,13 @@ sys.path.insert(0, str(PROJECT / "src"))
 prepend_to_path_list("PYTHONPATH", str(PROJECT / "src"))
 from snakemake.exceptions import WorkflowError
 
-from fusetune.cluster_jobs import cancel_queued_jobs
-from fusetune.content import ContentDigests
-from fusetune.digest import source_digest
+from fusetune.running.cluster_jobs import cancel_queued_jobs
+from fusetune.storage.content import ContentDigests
+from fusetune.storage.digest import source_digest
 from fusetune.errors import UserError, demand_room, write_error
-from fusetune.job_environment import use_job_environment
-from fusetune.kernel_cache import use_kernel_cache
-from fusetune.recovery import (
+from fusetune.running.job_environment import use_job_environment
+from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
+from fusetune.running.recovery import (
     belong_together,
     bind_together,
     remove,
@@ -49,7 +49,7 @@ from fusetune.recovery import (
     remove_unfinished,
     unfinished_files,
 )
-from fusetune.run_lock import RUN_VARIABLE, claim_run, holder_of, join_run, new_run, wait_for_jobs
+from fusetune.running.run_lock import RUN_VARIABLE, claim_run, holder_of, join_run, new_run, wait_for_jobs
 
 CONTENT = ContentDigests(STATE / "fusetune_contents.json")
 
@@ -147,46 +147,18 @@ if not workflow.is_main_process:
         told_and_ended(error)
 
 # Changed sources run again what depends on them.
-BASE = (
-    "cells.py",
-    "checksum_file.py",
-    "csv_file.py",
-    "documents.py",
-    "errors.py",
-    "files.py",
-    "number_settings.py",
-    "parquet.py",
-    "px4",
-    "time_limit.py",
-)
-GIVEN_SAMPLES = tuple(
-    f"ekf2/{name}.py"
-    for name in (
-        "arrival_order",
-        "given_samples",
-        "message_samples",
-        "range_selection",
-        "sensor_samples",
-        "taken_samples",
-    )
-)
+BASE = ("errors.py", "number_settings.py", "px4", "settings.py", "storage", "time_limit.py")
 REPLAY_SOURCES = (
     "ekf2",
     "save",
-    "analyze/flight_phases.py",
+    "analyze/flight",
     "analyze/reconstruction",
-    "analyze/replay_files.py",
-    "analyze/replay_flight.py",
-    "analyze/replay_settings.py",
-    "analyze/row_groups.py",
-    "analyze/settings.py",
-    "analyze/start_choice.py",
-    "analyze/withheld_gaps.py",
+    "analyze/replaying",
 )
 DIGEST = {
     "design": source_digest(*BASE, "design"),
     "execute": source_digest(*BASE, "ekf2", "design", "execute"),
-    "save": source_digest(*BASE, *GIVEN_SAMPLES, "save"),
+    "save": source_digest(*BASE, "ekf2/feed", "save"),
     "replay": source_digest(*BASE, *REPLAY_SOURCES),
     "score": source_digest(*BASE, "ekf2", "save", "analyze"),
     "apply": source_digest(*BASE, "apply"),

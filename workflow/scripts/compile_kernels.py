@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import fusetune
-from fusetune.ekf2.warm_up import compile_kernels
-from fusetune.files import atomic_path
+from fusetune.ekf2.replay.warm_up import compile_kernels
+from fusetune.storage.files import atomic_path
 
 from job import logged_job
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 
 from fusetune.errors import UserError, write_error
-from fusetune.run_lock import join_run
+from fusetune.running.run_lock import join_run
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusetune.report.flight_figures import plot_flight
+from fusetune.report.figures.flight_figures import plot_flight
 
 from job import keep_out, logged_job
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusetune.report.summary_figures import plot_summary
+from fusetune.report.figures.summary_figures import plot_summary
 
 from job import logged_job
 

@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING, Any
 
-from fusetune.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
-from fusetune.px4.reading_limits import ReadingLimits
+from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.save import VerdictThresholds, save_log
+from fusetune.storage.checksum_file import check_checksum
 
 from job import keep_out, logged_job
 

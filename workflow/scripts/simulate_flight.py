@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING, Any
 
-from fusetune.checksum_file import write_checksum
 from fusetune.design.mission import load_mission
 from fusetune.execute import simulate
-from fusetune.execute.faults import parse_faults
+from fusetune.execute.sensors.faults import parse_faults
 from fusetune.execute.vehicle import load_vehicle
+from fusetune.storage.checksum_file import write_checksum
 
 from job import keep_out, logged_job
 

@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fusetune.analyze.onboard_fidelity import FIDELITY_TOPICS, graded, write_flight_fidelity
-from fusetune.analyze.replay_flight import REPLAY_TOPICS, replay_flight
-from fusetune.analyze.replay_settings import IN_USE, ReplaySettings
-from fusetune.analyze.score_flight import SCORE_TOPICS, score_flight
-from fusetune.analyze.settings import ScoringSettings
-from fusetune.analyze.trust_grade import TRUST_TOPICS, TrustGrade
-from fusetune.analyze.trust_settings import TrustSettings
-from fusetune.files import AnyPath
+from fusetune.analyze.replaying.replay_flight import REPLAY_TOPICS, replay_flight
+from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
+from fusetune.analyze.scoring.score_flight import SCORE_TOPICS, score_flight
+from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS, graded, write_flight_fidelity
+from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, TrustGrade
+from fusetune.analyze.trust.trust_settings import TrustSettings
 from fusetune.save.flight_folder import load_flight
+from fusetune.storage.files import AnyPath
 
 
 @dataclass(frozen=True)

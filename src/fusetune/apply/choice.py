@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fusetune.apply.evidence import FlightEvidence
-from fusetune.apply.leave_one_out import LeaveOneOut, leave_one_out
 from fusetune.apply.ranking import RankedSet, is_proved
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.statistics.leave_one_out import LeaveOneOut, leave_one_out
 
 
 @dataclass(frozen=True)

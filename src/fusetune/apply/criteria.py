@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusetune.analyze.metrics_schema import METRICS_SCHEMA
+from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
-from fusetune.apply.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
+from fusetune.apply.paper.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
 
 Criteria = dict[str, float]
 

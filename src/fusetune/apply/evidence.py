@@ -14,12 +14,12 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusetune.analyze.likelihood import profile_nll
+from fusetune.analyze.metrics.likelihood import profile_nll
 from fusetune.analyze.sources import AXES
 from fusetune.apply.settings import DecisionSettings
-from fusetune.documents import read_document
-from fusetune.files import AnyPath
-from fusetune.parquet import read_table
+from fusetune.storage.documents import read_document
+from fusetune.storage.files import AnyPath
+from fusetune.storage.parquet import read_table
 
 Array = npt.NDArray[np.float64]
 

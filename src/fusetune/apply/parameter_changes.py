@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from fusetune.files import AnyPath
-from fusetune.px4.ekf2_parameters import PARAMETERS
-from fusetune.px4.params_file import ParamEntry, ParamsHeader, write_params
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.params_file import ParamEntry, ParamsHeader, write_params
+from fusetune.storage.files import AnyPath
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import Any
 import fusetune
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.errors import UserError
-from fusetune.files import AnyPath, sha256_of
-from fusetune.parquet import read_table
+from fusetune.storage.files import AnyPath, sha256_of
+from fusetune.storage.parquet import read_table
 
 _FLIGHT_COLUMNS = ("flight", "status", "reason", "firmware", "checksum", "duration_s", "airborne_s")
 

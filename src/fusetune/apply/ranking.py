@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.apply.bootstrap import (
+from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
+from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.statistics.bootstrap import (
     FEWEST_REDRAWN,
     Redrawn,
     bootstrap_scores,
@@ -20,10 +22,8 @@ from fusetune.apply.bootstrap import (
     standard_error,
     units_redrawn,
 )
-from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
-from fusetune.apply.rounding import EQUAL_WITHIN, without_rounding
-from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.sign_flips import family_p_values
+from fusetune.apply.statistics.rounding import EQUAL_WITHIN, without_rounding
+from fusetune.apply.statistics.sign_flips import family_p_values
 
 Array = npt.NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class RankedSet:
     score : mean over the flights, nat; lower is better
     difference, lower, upper : score less that of the present set, and its interval; below 0 is better
     p_value, p_holm : of the difference against 0, alone and by Holm's correction for all candidates
-    p_family : that the best of the candidates is so much better by luck, see `fusetune.apply.sign_flips`
+    p_family : that the best of the candidates is so much better by luck, see `fusetune.apply.statistics.sign_flips`
     p_best : share of bootstrap draws in which no set that may be flown scores lower; not known with few units, of which
         the draws are so much alike that a set which is best on all of them would be best for sure
     flights, flights_better : flights behind the score, and on how many of them it beats the present set

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fusetune.analyze.settings import setting, settings_from_mapping
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.errors import UserError
-from fusetune.files import AnyPath
+from fusetune.settings import setting, settings_from_mapping
+from fusetune.storage.files import AnyPath
 
 MULTIPLICITY = ("sign_flips", "holm", "none")
 """Ways to allow for the best of many candidates looking better than it is, see `fusetune.apply.choice`."""
@@ -82,7 +82,7 @@ class DecisionSettings:
 def _withheld_sources() -> tuple[str, ...]:
     """Sources that are predicted without their sensor, whole and by axis."""
     # imported where it is needed: it brings the estimator's compiler along, which readers of results have no use for
-    from fusetune.ekf2.withholding import WITHHOLDABLE
+    from fusetune.ekf2.replay.withholding import WITHHOLDABLE
 
     sources = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
     return (*sources, *(f"{source}.{axis}" for source in sources for axis in AXES[: AID_SOURCES[source].axes]))

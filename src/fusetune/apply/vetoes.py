@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.apply.evidence import AnalyzedFlight
-from fusetune.px4.ekf2_parameters import check_value
+from fusetune.px4.parameters.ekf2_parameters import check_value
 
 
 def vetoes(name: str, present: str, flights: Sequence[AnalyzedFlight], metrics: pa.Table) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fusetune.files import DEVICES
+from fusetune.storage.files import DEVICES
 
 
 def name_problem(name: str) -> str | None:

@@ -7,9 +7,8 @@ from pathlib import Path
 
 from fusetune.design.mission import Mission, Waypoint, load_mission
 from fusetune.design.study import ParameterSet, Study, load_study
-from fusetune.files import atomic_path
-from fusetune.px4.ekf2_parameters import PARAMETERS
-from fusetune.px4.params_file import ParamEntry, ParamsHeader, write_params
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.params_file import ParamEntry, ParamsHeader, write_params
 from fusetune.px4.plan_file import (
     Plan,
     PlanItem,
@@ -21,6 +20,7 @@ from fusetune.px4.plan_file import (
     waypoint,
     write_plan,
 )
+from fusetune.storage.files import atomic_path
 
 FLY_OVER_ACCEPTANCE_M = 0.5
 """PX4 turns once it is this near, so a small radius makes it cross the waypoint; 0 leaves the vehicle's own."""
@@ -98,7 +98,7 @@ def write_sets_table(study: Study, path: str | os.PathLike[str]) -> None:
     # Imported here: everything else of this room is also read when the workflow starts, and that must stay quick.
     import pyarrow as pa
 
-    from fusetune.parquet import write_table
+    from fusetune.storage.parquet import write_table
 
     rows = [(one.name, name, float(value)) for one in study.sets for name, value in sorted(one.overrides.items())]
     schema = pa.schema([("set", pa.string()), ("parameter", pa.string()), ("value", pa.float64())])

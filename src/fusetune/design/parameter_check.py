@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fusetune.px4.ekf2_parameters import PARAMETERS, ParameterError, check_value
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_value
 
 
 def parameter_problem(name: str, value: float) -> str | None:

@@ -1,12 +1,12 @@
 """Our own implementation of PX4's EKF2, behaviour of release v1.16, compiled with Numba.
 
-Importing it decides where compiled kernels are kept (see `fusetune.kernel_cache`), unless NUMBA_CACHE_DIR says so.
+Importing it decides where compiled kernels are kept (see `compiled/kernel_cache.py`), unless NUMBA_CACHE_DIR says so.
 """
 
 import os
 import sys
 
-from fusetune.kernel_cache import LOCATOR, use_kernel_cache
+from fusetune.ekf2.compiled.kernel_cache import LOCATOR, use_kernel_cache
 
 if "NUMBA_CACHE_DIR" not in os.environ:
     use_kernel_cache()

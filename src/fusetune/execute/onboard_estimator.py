@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusetune.ekf2 import state as S
-from fusetune.ekf2.aid_source_status import AID_SOURCE_AXES, AID_SOURCE_NAMES
-from fusetune.ekf2.inputs import build_inputs
-from fusetune.ekf2.parameters import complete
-from fusetune.ekf2.recording import FLAG_COLUMNS
-from fusetune.ekf2.replay import ReplayResult, replay
+from fusetune.ekf2.feed.inputs import build_inputs
+from fusetune.ekf2.filter.common import state as S
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_AXES, AID_SOURCE_NAMES
+from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.replay.recording import FLAG_COLUMNS
+from fusetune.ekf2.replay.replay import replay
+from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
-from fusetune.px4.release_layouts import canonical
+from fusetune.px4.layouts.release_layouts import canonical
 
 INNOVATION_FIELDS: dict[str, tuple[str, int] | None] = {
     "gps_hvel[0]": ("gnss_vel", 0),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fusetune.execute.vehicle import Vehicle
-from fusetune.px4.ekf2_parameters import PARAMETERS, check_value
 from fusetune.px4.flight import ParameterHistory, ParameterValue
 from fusetune.px4.logger_settings import DEFAULT_SET_BIT, FROM_BOOT, PROFILE_FOR_REPLAY, WHEN_ARMED
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, check_value
 
 SYSTEM_PARAMETERS: dict[str, ParameterValue] = {
     "MAV_TYPE": 2,

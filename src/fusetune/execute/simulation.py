@@ -8,20 +8,20 @@ from pathlib import Path
 
 from fusetune.design.mission import Mission
 from fusetune.errors import UserError
-from fusetune.execute.barometer import vehicle_air_data
-from fusetune.execute.faults import DefaultProfile, Fault, of_kind
-from fusetune.execute.flight_plan import FlightPlan, plan_flight
-from fusetune.execute.gnss import vehicle_gps_position
-from fusetune.execute.groundtruth import groundtruth_topics
-from fusetune.execute.imu import sensor_combined
 from fusetune.execute.logger import ekf2_timestamps, logged_topics
-from fusetune.execute.magnetometer import vehicle_magnetometer
 from fusetune.execute.parameters import flown_parameters
-from fusetune.execute.truth import Truth, simulate_truth
+from fusetune.execute.sensors.barometer import vehicle_air_data
+from fusetune.execute.sensors.faults import DefaultProfile, Fault, of_kind
+from fusetune.execute.sensors.gnss import vehicle_gps_position
+from fusetune.execute.sensors.imu import sensor_combined
+from fusetune.execute.sensors.magnetometer import vehicle_magnetometer
 from fusetune.execute.vehicle import Vehicle
-from fusetune.execute.vehicle_state import sensor_selection, vehicle_land_detected, vehicle_status
+from fusetune.execute.world.flight_plan import FlightPlan, plan_flight
+from fusetune.execute.world.groundtruth import groundtruth_topics
+from fusetune.execute.world.truth import Truth, simulate_truth
+from fusetune.execute.world.vehicle_state import sensor_selection, vehicle_land_detected, vehicle_status
 from fusetune.px4.flight import Flight, LoggedMessage, ParameterHistory, TopicKey, TopicTable
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.ulog.writer import write_ulog
 
 LONGEST_FLIGHT_S = 4500.0
 RELEASE = (1 << 24) | (16 << 16) | 255

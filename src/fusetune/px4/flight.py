@@ -27,7 +27,7 @@ class ParameterChange(NamedTuple):
 
 
 class ReplacedParameter(NamedTuple):
-    """A parameter with which no vehicle can have flown, see `fusetune.px4.logged_parameters`."""
+    """A parameter with which no vehicle can have flown, see `fusetune.px4.parameters.logged_parameters`."""
 
     name: str
     value: ParameterValue
@@ -107,7 +107,7 @@ class Flight:
     left_out: tuple[LeftOut, ...] = ()
     replaced_parameters: tuple[ReplacedParameter, ...] = ()
     beyond_limits: tuple[str, ...] = ()
-    """Topics that were logged but are beyond what a log may ask for (`fusetune.px4.reading_limits`)."""
+    """Topics that were logged but are beyond what a log may ask for (`fusetune.px4.ulog.reading_limits`)."""
 
     def topic(self, name: str, instance: int = 0) -> TopicTable | None:
         """Columns of one topic instance, or `None` where the log has none."""

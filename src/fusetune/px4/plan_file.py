@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-from fusetune.files import atomic_path
+from fusetune.storage.files import atomic_path
 
 _FIRMWARE_PX4 = 12
 _VEHICLE_QUADROTOR = 2

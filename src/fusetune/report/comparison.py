@@ -8,7 +8,7 @@ import pandas as pd
 from scipy.special import bdtr
 
 from fusetune.apply.evidence import AIDED, AIMS, UNAIDED
-from fusetune.apply.rounding import without_rounding
+from fusetune.apply.statistics.rounding import without_rounding
 from fusetune.report.results import Results
 
 Array = npt.NDArray[np.float64]

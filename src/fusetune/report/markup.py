@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from fusetune.files import AnyPath
+from fusetune.storage.files import AnyPath
 
 _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 

@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from fusetune.files import AnyPath, atomic_path
-from fusetune.report.decision_sections import decision_section, sets_section
-from fusetune.report.evidence_sections import (
+from fusetune.report.results import read_results
+from fusetune.report.sections.decision_sections import decision_section, sets_section
+from fusetune.report.sections.evidence_sections import (
     evidence_section,
     holds_section,
     paper_section,
     weights_section,
     withheld_section,
 )
-from fusetune.report.flight_sections import (
+from fusetune.report.sections.flight_sections import (
     as_flown_section,
     flight_figure_paths,
     flights_section,
@@ -21,8 +21,8 @@ from fusetune.report.flight_sections import (
     single_flights_section,
     truth_section,
 )
-from fusetune.report.results import read_results
-from fusetune.report.trust_section import trust_section
+from fusetune.report.sections.trust_section import trust_section
+from fusetune.storage.files import AnyPath, atomic_path
 
 STYLE_SHEET = Path(__file__).with_name("page.css")
 

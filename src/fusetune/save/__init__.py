@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from fusetune.save.flights_table import write_flights_table
     from fusetune.save.log_folder import save_log
     from fusetune.save.present import Present, find_present, read_present, write_present
-    from fusetune.save.verdict import Verdict, VerdictThresholds, judge
+    from fusetune.save.thresholds import VerdictThresholds
+    from fusetune.save.verdict import Verdict, judge
 
 __all__ = [
     "Present",
@@ -32,7 +33,7 @@ __all__ = [
 _MODULES = {
     "Present": "present",
     "Verdict": "verdict",
-    "VerdictThresholds": "verdict",
+    "VerdictThresholds": "thresholds",
     "find_present": "present",
     "judge": "verdict",
     "load_flight": "flight_folder",

@@ -20,7 +20,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from fusetune.files import DEVICES
+from fusetune.storage.files import DEVICES
 
 _LOG = re.compile(r"\.ulg$", re.IGNORECASE | re.DOTALL)
 _PACKED = re.compile(r"\.ulg\.(gz|xz|bz2|zst|lz4|zip|7z)$", re.IGNORECASE | re.DOTALL)

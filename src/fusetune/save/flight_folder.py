@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from fusetune.documents import read_document, write_document
 from fusetune.errors import FOLDER_AGAIN, UserError
-from fusetune.parquet import read_table, write_table
 from fusetune.px4.flight import (
     Dropout,
     Flight,
@@ -25,6 +23,8 @@ from fusetune.px4.flight import (
     ParameterValue,
     TopicTable,
 )
+from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.parquet import read_table, write_table
 from fusetune.time_limit import Deadline
 
 METADATA_FILE = "metadata.json"

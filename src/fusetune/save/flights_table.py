@@ -9,13 +9,13 @@ from typing import Any
 
 import pyarrow as pa
 
-from fusetune.checksum_file import write_checksum
-from fusetune.csv_file import write_csv
-from fusetune.files import atomic_path
-from fusetune.parquet import write_table
 from fusetune.save.discovery import RefusedEntry
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
 from fusetune.save.log_folder import VERDICT_FILE
+from fusetune.storage.checksum_file import write_checksum
+from fusetune.storage.csv_file import write_csv
+from fusetune.storage.files import atomic_path
+from fusetune.storage.parquet import write_table
 
 SCHEMA = pa.schema(
     [

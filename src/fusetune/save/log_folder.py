@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusetune.documents import write_document
 from fusetune.errors import UserError
-from fusetune.px4.ekf2_parameters import migrate
 from fusetune.px4.flight import Flight
-from fusetune.px4.logged_parameters import checked_history
-from fusetune.px4.reading_limits import ReadingLimits
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import file_checksum, read_ulog, takes_too_long
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.ekf2_parameters import migrate
+from fusetune.px4.parameters.logged_parameters import checked_history
+from fusetune.px4.ulog.reader import file_checksum, read_ulog, takes_too_long
+from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.save.discovery import printable
 from fusetune.save.flight_folder import METADATA_FILE, write_flight
 from fusetune.save.log_facts import log_facts
-from fusetune.save.verdict import Verdict, VerdictThresholds, judge, unreadable
+from fusetune.save.thresholds import VerdictThresholds
+from fusetune.save.verdict import Verdict, judge, unreadable
+from fusetune.storage.documents import write_document
 from fusetune.time_limit import Deadline, TimeLimitError
 
 VERDICT_FILE = "verdict.json"

@@ -7,10 +7,10 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from fusetune.documents import read_document, write_document
 from fusetune.errors import UserError
-from fusetune.files import atomic_path
 from fusetune.save.flight_folder import read_metadata
+from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.files import atomic_path
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fusetune.analyze.reconstruction.attitude import to_body, to_earth
-from fusetune.save.magnetometer_mounting import stillest_mounting
-from fusetune.save.verdict import VerdictThresholds
+from fusetune.save.checks.magnetometer_mounting import stillest_mounting
+from fusetune.save.thresholds import VerdictThresholds
 
 MIN_SAMPLES = 24
 LOG_DRIFT_RANGE = (-5.0, 4.0)

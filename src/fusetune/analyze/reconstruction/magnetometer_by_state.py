@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusetune.ekf2.following import Departure, follow
-from fusetune.ekf2.inputs import build_inputs
+from fusetune.ekf2.feed.inputs import build_inputs
+from fusetune.ekf2.replay.following import Departure, follow
 from fusetune.px4.flight import Flight, TopicTable, stacked
-from fusetune.px4.logged_state import LoggedState
+from fusetune.px4.layouts.logged_state import LoggedState
 
 MAG = "vehicle_magnetometer"
 PASSES = 2

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, MAG, ReconstructedFlight
-from fusetune.ekf2.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.px4.sample_times import measurement_time
 
 SENSORS = {"mag": (MAG, "EKF2_MAG_DELAY"), "baro_hgt": (BARO, "EKF2_BARO_DELAY")}
@@ -24,7 +24,7 @@ def measured_rows(
 
     Parameters
     ----------
-    innovations : rows of a `fusetune.ekf2.replay.ReplayResult`
+    innovations : rows of a `fusetune.ekf2.replay.results.ReplayResult`
     parameters : the complete set of the replay
     interval_us : update interval of the replay
     """

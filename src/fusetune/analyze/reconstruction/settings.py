@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fusetune.analyze.settings import setting, settings_from_mapping
-from fusetune.files import AnyPath
+from fusetune.settings import setting, settings_from_mapping
+from fusetune.storage.files import AnyPath
 
 RAW = {"imu": False, "magnetometer": False, "barometer": False}
 """Every step switched off."""

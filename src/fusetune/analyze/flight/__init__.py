@@ -1,0 +1,1 @@
+"""What a flight itself tells: its phases, and references that its replays are compared with."""

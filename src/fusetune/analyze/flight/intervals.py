@@ -1,0 +1,50 @@
+"""Intervals of time, half-open, µs, and what is cut out of them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+Interval = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A part of the flight that is not scored, µs, and why."""
+
+    start: int
+    stop: int
+    reason: str
+
+
+def subtract(intervals: Sequence[Interval], cuts: Iterable[Cut]) -> tuple[Interval, ...]:
+    """Remove cuts from intervals; all half-open, µs."""
+    remaining = [interval for interval in intervals if interval[1] > interval[0]]
+    for cut in cuts:
+        pieces: list[Interval] = []
+        for start, stop in remaining:
+            if cut.stop <= start or cut.start >= stop:
+                pieces.append((start, stop))
+                continue
+            if start < cut.start:
+                pieces.append((start, cut.start))
+            if cut.stop < stop:
+                pieces.append((cut.stop, stop))
+        remaining = pieces
+    return tuple(sorted(remaining))
+
+
+def duration(intervals: Sequence[Interval]) -> int:
+    """Length of intervals together, µs."""
+    return sum(stop - start for start, stop in intervals)
+
+
+def merged(cuts: list[Cut]) -> tuple[Cut, ...]:
+    """Cuts that touch or overlap as one, with the reasons of all."""
+    found: list[Cut] = []
+    for cut in sorted(cuts, key=lambda cut: (cut.start, cut.stop, cut.reason)):
+        if found and cut.start <= found[-1].stop:
+            last = found[-1]
+            reasons = sorted({*last.reason.split(", "), cut.reason})
+            found[-1] = Cut(last.start, max(last.stop, cut.stop), ", ".join(reasons))
+        else:
+            found.append(cut)
+    return tuple(found)

@@ -1,0 +1,133 @@
+"""Figures of an error whose truth is known: RMSE and its relatives, along and across the track, NEES with bounds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.metrics.attitude import down_in_body, heading, wrap
+from fusetune.analyze.metrics.consistency import effective_bounds, paper_bounds
+from fusetune.analyze.metrics.whiteness import autocorrelation, effective_samples, lag_limit
+
+Array = npt.NDArray[np.float64]
+
+_SLOWEST_TRACK_M_S = 0.5
+"""Below this ground speed there is no direction to split an error along."""
+
+_NEES_STEP_US = 200_000
+"""Errors are thinned to this before their correlation is told: at the rate of the filter it would outlast all lags."""
+
+
+@dataclass(frozen=True)
+class ErrorFigure:
+    """One figure of the true error: quantity, axis, metric and value over n samples."""
+
+    quantity: str
+    axis: str
+    metric: str
+    value: float
+    n: float
+    lower: float = np.nan
+    upper: float = np.nan
+
+
+def norm_figures(quantity: str, axis: str, norm: Array) -> list[ErrorFigure]:
+    """RMSE; average Euclidean, harmonic and geometric error; maximum of error norms (N,).
+
+    References
+    ----------
+    García, Molina, Trincado, table 1; Li and Zhao, "Practical measures for performance evaluation", 2001.
+    """
+    positive = np.maximum(norm, 1e-12)
+    values = {
+        "rmse": np.sqrt(np.mean(np.square(norm))),
+        "average_euclidean_error": np.mean(norm),
+        "harmonic_error": 1.0 / np.mean(1.0 / positive),
+        "geometric_error": np.exp(np.mean(np.log(positive))),
+        "maximum_error": np.max(norm),
+    }
+    return [ErrorFigure(quantity, axis, metric, float(value), norm.size) for metric, value in values.items()]
+
+
+def vector_figures(quantity: str, error: Array, true_velocity: Array) -> list[ErrorFigure]:
+    """Figures of a NED error (N, 3): per axis, horizontal, 3-D, along and across the true track.
+
+    Each axis has its RMSE, mean and maximum; horizontal and 3-D norms have those of `norm_figures`.
+    """
+    components = {"x": error[:, 0], "y": error[:, 1], "z": error[:, 2]}
+    speed = np.hypot(true_velocity[:, 0], true_velocity[:, 1])
+    moving = speed > _SLOWEST_TRACK_M_S
+    if moving.any():
+        direction = true_velocity[moving, :2] / speed[moving, None]
+        components["along_track"] = np.sum(error[moving, :2] * direction, axis=1)
+        components["cross_track"] = error[moving, 1] * direction[:, 0] - error[moving, 0] * direction[:, 1]
+    figures = []
+    for axis, values in components.items():
+        figures += component_figures(quantity, axis, values)
+    figures += norm_figures(quantity, "horizontal", np.hypot(error[:, 0], error[:, 1]))
+    return figures + norm_figures(quantity, "all", np.linalg.norm(error, axis=1))
+
+
+def component_figures(quantity: str, axis: str, error: Array) -> list[ErrorFigure]:
+    """RMSE, mean and largest absolute error of one component (N,)."""
+    values = {
+        "rmse": np.sqrt(np.mean(np.square(error))),
+        "mean_error": np.mean(error),
+        "maximum_error": np.max(np.abs(error)),
+    }
+    return [ErrorFigure(quantity, axis, metric, float(value), error.size) for metric, value in values.items()]
+
+
+def attitude_figures(quaternion: Array, true_quaternion: Array) -> list[ErrorFigure]:
+    """Figures of heading, tilt and total rotation, deg, of unit quaternions (N, 4), (w, x, y, z) body → NED."""
+    off = np.degrees(wrap(heading(quaternion) - heading(true_quaternion)))
+    dot = np.clip(np.abs(np.sum(quaternion * true_quaternion, axis=1)), 0.0, 1.0)
+    down = np.sum(down_in_body(quaternion) * down_in_body(true_quaternion), axis=1)
+    tilt = np.degrees(np.arccos(np.clip(down, -1.0, 1.0)))
+    figures = component_figures("attitude_deg", "heading", off) + component_figures("attitude_deg", "tilt", tilt)
+    return figures + norm_figures("attitude_deg", "all", np.degrees(2.0 * np.arccos(dot)))
+
+
+def nees_figures(
+    quantity: str,
+    axis: str,
+    time: npt.NDArray[np.int64],
+    error: Array,
+    variance: Array,
+    confidence: float,
+    fitted: int = 0,
+) -> list[ErrorFigure]:
+    """Normalised estimation error squared ε = Σ e²/P, its mean with χ² bounds; (N, D) arrays.
+
+    `nees` has the paper's bounds for independent samples, `nees_effective` those for N_eff. Only variances are known,
+    so this is the diagonal form.
+
+    Parameters
+    ----------
+    fitted : number of constants that were fitted to the errors beforehand (an unknown origin); the errors lose as
+        many degrees of freedom
+    """
+    if error.shape[0] < 2 or not np.all(variance > 0.0):
+        return []
+    count, dimension = error.shape
+    normalised = error / np.sqrt(variance)
+    nees = np.atleast_1d(np.mean(np.sum(np.square(normalised), axis=1)) * count / (count - fitted / dimension))
+    step = max(1, round(_NEES_STEP_US / max(float(np.median(np.diff(time))), 1.0)))
+    thinned = normalised[::step].T
+    n = thinned.shape[1]
+    shares = effective_samples(autocorrelation(thinned, lag_limit(n)), n) / n
+    independent = np.atleast_1d(n * np.mean(shares))
+    plain = paper_bounds(nees, count, dimension, confidence)
+    wide = effective_bounds(nees, independent, dimension, confidence)
+    return [
+        ErrorFigure(quantity, axis, "nees", float(nees[0]), count, float(plain.lower[0]), float(plain.upper[0])),
+        ErrorFigure(
+            quantity,
+            axis,
+            "nees_effective",
+            float(nees[0]),
+            float(independent[0]),
+            float(wide.lower[0]),
+            float(wide.upper[0]),
+        ),
+    ]

@@ -1,0 +1,1 @@
+"""Parameter sets replayed on a flight, and the files of a replay."""

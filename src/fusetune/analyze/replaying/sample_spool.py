@@ -1,0 +1,174 @@
+"""Innovation samples by source and axis, kept on the disk and read one source and axis at a time.
+
+The innovations of one set on an hour of flight are some 60 MB, and every figure is made of one source and axis. So a
+table is sorted once, a row group at a time, into a file that has no name and goes with its last user, and what is asked
+for is read from there.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from fusetune.analyze.sources import AID_SOURCES
+from fusetune.storage.files import AnyPath
+
+SourceAxis = tuple[str, int]
+
+_NOT_STORED = ("source", "axis", "measured")
+_AXES = 8
+"""More than any source has."""
+
+
+@dataclass(frozen=True)
+class AxisSamples:
+    """All samples of one axis of one aid source in order of time, arrays of shape (N,).
+
+    `timestamp_sample` is the delayed time at which the estimator used the measurement, µs. `observation` is the
+    measurement as the estimator used it, empty where only innovations are known.
+    """
+
+    timestamp_sample: npt.NDArray[np.int64]
+    observation_variance: npt.NDArray[np.float64]
+    innovation: npt.NDArray[np.float64]
+    innovation_variance: npt.NDArray[np.float64]
+    test_ratio: npt.NDArray[np.float64]
+    rejected: npt.NDArray[np.bool_]
+    fused: npt.NDArray[np.bool_]
+    observation: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    def rows(self, selected: np.ndarray) -> AxisSamples:
+        """The samples that an index or boolean array selects."""
+        parts = {one.name: getattr(self, one.name) for one in fields(self)}
+        return AxisSamples(**{name: values[selected] if values.size else values for name, values in parts.items()})
+
+
+class SampleSpool:
+    """A nameless file that rows are put into and read from."""
+
+    def __init__(self, folder: AnyPath) -> None:
+        self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - lives as long as the samples in it
+
+    def put(self, rows: np.ndarray) -> int:
+        """Append rows; their place."""
+        place = self._file.seek(0, 2)
+        self._file.write(rows.tobytes())
+        return place
+
+    def get(self, places: Iterable[tuple[int, int]], dtype: np.dtype) -> np.ndarray:
+        """Rows from several places, each with its number of rows, one after the other."""
+        places = list(places)
+        rows = np.zeros(sum(count for _, count in places), dtype)
+        content, done = rows.view(np.uint8).data, 0
+        for place, count in places:
+            self._file.seek(place)
+            done += self._file.readinto(content[done : done + count * dtype.itemsize])
+        assert done == len(content), "what was put into the spool can be read from it"
+        return rows
+
+
+class SpooledRows(Sequence[np.ndarray]):
+    """Arrays of rows, each read from the spool when it is asked for."""
+
+    def __init__(self, spool: SampleSpool) -> None:
+        self._spool = spool
+        self._parts: list[tuple[int, int, np.dtype]] = []
+
+    def append(self, rows: np.ndarray) -> None:
+        self._parts.append((self._spool.put(rows), len(rows), rows.dtype))
+
+    @overload
+    def __getitem__(self, number: int) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[np.ndarray]: ...
+    def __getitem__(self, number: int | slice) -> np.ndarray | list[np.ndarray]:
+        if isinstance(number, slice):
+            return [self[one] for one in range(len(self))[number]]
+        place, count, dtype = self._parts[number]
+        return self._spool.get([(place, count)], dtype)
+
+    def __len__(self) -> int:
+        return len(self._parts)
+
+
+class SpooledSamples(Mapping[SourceAxis, AxisSamples]):
+    """Samples of a set on a flight; each look-up reads from the spool."""
+
+    def __init__(self, spool: SampleSpool, gate: Callable[[str], float]) -> None:
+        self._spool, self._gate = spool, gate
+        self._names: dict[str, int] = {}
+        self._places: dict[SourceAxis, list[tuple[int, int]]] = {}
+        self._dtype = np.dtype([])
+
+    def add(self, table: pa.Table) -> None:
+        """Put the rows of a table into the spool, but for those that were not measured, or are of unknown sources."""
+        if "measured" in table.column_names:
+            table = table.filter(table["measured"])
+        if not table.num_rows:
+            return
+        source = table["source"].combine_chunks()
+        if not pa.types.is_dictionary(source.type):
+            source = source.dictionary_encode()
+        names = source.dictionary.to_pylist()
+        for name in names:
+            self._names.setdefault(name, len(self._names))
+        number = np.array([self._names[name] for name in names], np.int64)
+        key = number[source.indices.to_numpy()] * _AXES + table["axis"].to_numpy()
+        order = np.argsort(key, kind="stable")
+        columns = {name: table[name].to_numpy() for name in table.column_names if name not in _NOT_STORED}
+        self._dtype = np.dtype([(name, values.dtype) for name, values in columns.items()])
+        rows = np.zeros(len(order), self._dtype)
+        for name, values in columns.items():
+            rows[name] = values[order]
+        key, place = key[order], self._spool.put(rows)
+        starts = np.flatnonzero(np.r_[True, np.diff(key) != 0])
+        by_number = list(self._names)
+        for start, stop in zip(starts.tolist(), [*starts[1:].tolist(), key.size], strict=True):
+            name, axis = by_number[key[start] // _AXES], int(key[start] % _AXES)
+            if name in AID_SOURCES:
+                part = (place + start * self._dtype.itemsize, stop - start)
+                self._places.setdefault((name, axis), []).append(part)
+
+    def __getitem__(self, key: SourceAxis) -> AxisSamples:
+        rows = self._spool.get(self._places[key], self._dtype)
+        return _axis_samples(rows, self._gate(key[0]))
+
+    def __iter__(self) -> Iterator[SourceAxis]:
+        return iter(sorted(self._places, key=lambda key: (self._names[key[0]], key[1])))
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._places
+
+
+def _axis_samples(rows: np.ndarray, gate: float) -> AxisSamples:
+    present = rows.dtype.names or ()
+
+    def column(name: str, dtype: Any = np.float64) -> npt.NDArray[Any]:
+        return rows[name].astype(dtype)
+
+    innovation, variance = column("innovation"), column("innovation_variance")
+    if "test_ratio" in present:
+        test_ratio = column("test_ratio")
+    else:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            test_ratio = np.square(innovation) / (gate * gate * variance)
+    unknown = np.full(len(rows), np.nan)
+    return AxisSamples(
+        timestamp_sample=column("timestamp_sample", np.int64),
+        observation_variance=column("observation_variance") if "observation_variance" in present else unknown,
+        innovation=innovation,
+        innovation_variance=variance,
+        test_ratio=test_ratio,
+        rejected=column("innovation_rejected", np.bool_),
+        fused=column("fused", np.bool_),
+        observation=column("observation") if "observation" in present else np.zeros(0),
+    )

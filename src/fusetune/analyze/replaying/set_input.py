@@ -1,0 +1,75 @@
+"""Parameter sets that people give as files, one `SET.json` each, beside the study: for single replays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from fusetune.errors import UserError
+from fusetune.px4.parameters.ekf2_parameters import ParameterError, metadata_of, number_of
+from fusetune.px4.parameters.logged_parameters import flown_limits, typed_value
+from fusetune.storage.documents import read_document
+from fusetune.storage.files import AnyPath
+
+WRITTEN_BACK = "EKF2_MAG_DECL"
+"""The estimator writes this one back once it knows its place, so a recorded set holds the value at the end."""
+
+FORM = 'Expected {"params": {NAME: number, …}, "overrides": {NAME: number, …}}'
+
+SetValues = tuple[dict[str, float], dict[str, float]]
+"""EKF2 parameters used, and those that differ from the log."""
+
+
+def existing_folder(folder: AnyPath, remedy: str) -> Path:
+    """A folder that is there; else raises `UserError`, which tells nothing there from something else there."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise UserError(folder, "is no folder" if folder.exists() else "does not exist", remedy)
+    return folder
+
+
+def read_set_files(folder: AnyPath) -> dict[str, SetValues]:
+    """Read every `SET.json` of a folder, in order of name.
+
+    Raises
+    ------
+    UserError
+        There is no such folder, it holds no set, or a file is no set of parameters that the baseline release has.
+    """
+    folder = existing_folder(folder, "Name the folder that holds the parameter sets")
+    files = sorted(folder.glob("*.json"))
+    if not files:
+        raise UserError(folder, "holds no parameter set", "Put one SET.json with a params object per set there")
+    return {file.stem: read_set_file(file) for file in files}
+
+
+def read_set_file(file: AnyPath) -> SetValues:
+    """Read one set; a summary that a replay wrote is one, too.
+
+    Raises
+    ------
+    UserError
+        The file is no set of parameters that the baseline release has.
+    """
+    content = read_document(file, remedy=FORM, sealed=False)
+    params, overrides = (_numbers(file, content.get(part, {})) for part in ("params", "overrides"))
+    params.pop(WRITTEN_BACK, None)
+    return params, overrides
+
+
+def _numbers(file: AnyPath, values: object) -> dict[str, float]:
+    if not isinstance(values, Mapping):
+        raise UserError(file, "is no parameter set: it holds something else than names and numbers", FORM)
+    try:
+        numbers = {name: number_of(metadata_of(name), value) for name, value in values.items()}
+    except (ParameterError, OverflowError) as error:
+        reason, remedy = (error.reason, error.remedy) if isinstance(error, ParameterError) else (str(error), FORM)
+        name = f"{error.name}: " if isinstance(error, ParameterError) else ""
+        raise UserError(file, f"{name}{reason}", remedy) from error
+    for name, number in numbers.items():
+        if typed_value(name, number) is None:
+            low, high = flown_limits(name)
+            raise UserError(
+                file, f"{name} = {number:g} is nothing that can be flown", f"Give a number from {low:g} to {high:g}"
+            )
+    return numbers

@@ -1,0 +1,139 @@
+"""What the filter did beside fusing: resets, faults, sources that timed out, time spent without aid."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.replaying.set_files import SetRecord
+
+AIDING_FLAGS = (
+    "cs_gnss_pos",
+    "cs_gnss_vel",
+    "cs_gps_hgt",
+    "cs_gnss_yaw",
+    "cs_baro_hgt",
+    "cs_rng_hgt",
+    "cs_mag_hdg",
+    "cs_mag_3d",
+    "cs_mag",
+    "cs_ev_pos",
+    "cs_ev_vel",
+    "cs_ev_hgt",
+    "cs_ev_yaw",
+    "cs_opt_flow",
+    "cs_fuse_aspd",
+    "cs_aux_gpos",
+)
+"""Flags of `estimator_status_flags` that say a source is being fused."""
+
+_HEADING_BY_MAGNETOMETER = ("cs_mag_hdg", "cs_mag_3d", "cs_mag")
+
+
+@dataclass(frozen=True)
+class SourceAid:
+    """How an aid source served: samples, share of them fused, and the longest time without one fused, s."""
+
+    samples: int
+    fused_share: float
+    longest_without_s: float
+
+
+@dataclass(frozen=True)
+class FilterEvents:
+    """Counts and times inside the flight after the warm-up.
+
+    Attributes
+    ----------
+    resets : number of resets of each kind
+    timeouts : how often a source that was fused stopped being fused
+    faults : names of the fault flags (`fs_*`) that were ever set
+    fault_flags : largest value of `filter_fault_flags`
+    dead_reckoning_s : time without any horizontal aiding
+    aid : by source that was ever fused
+    """
+
+    resets: dict[str, int]
+    timeouts: dict[str, int]
+    faults: tuple[str, ...]
+    fault_flags: int
+    dead_reckoning_s: float
+    aid: dict[str, SourceAid]
+
+    @property
+    def total_resets(self) -> int:
+        return sum(self.resets.values())
+
+    @property
+    def total_timeouts(self) -> int:
+        return sum(self.timeouts.values())
+
+
+def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEvents:
+    """Count the events of one replay.
+
+    Parameters
+    ----------
+    flight : flight time after the warm-up, µs: before it every filter resets and switches sources
+    """
+    resets = {kind: int(np.count_nonzero(_inside(times, flight))) for kind, times in record.reset_times.items()}
+    time = record.flags.get("timestamp", np.zeros(0)).astype(np.int64)
+    # The magnetometer changes between heading and three axes by itself; only its end is a loss.
+    columns = {flag: record.flags[flag] for flag in AIDING_FLAGS if flag in record.flags}
+    heading = [columns.pop(flag) for flag in _HEADING_BY_MAGNETOMETER if flag in columns]
+    if heading:
+        columns["cs_mag"] = np.logical_or.reduce(heading)
+    timeouts = {}
+    for flag, values in columns.items():
+        stopped = time[1:][values[:-1].astype(bool) & ~values[1:].astype(bool)]
+        timeouts[flag.removeprefix("cs_")] = int(np.count_nonzero(_inside(stopped, flight)))
+    faults = tuple(sorted(name for name, values in record.flags.items() if name.startswith("fs_") and values.any()))
+    return FilterEvents(
+        resets=resets,
+        timeouts=timeouts,
+        faults=faults,
+        fault_flags=int(record.summary.get("filter_fault_flags_max", 0)),
+        dead_reckoning_s=_time_true(time, record.flags.get("cs_inertial_dead_reckoning"), flight),
+        aid=_source_aid(record, flight),
+    )
+
+
+def _source_aid(record: SetRecord, intervals: tuple[Interval, ...]) -> dict[str, SourceAid]:
+    """Axis 0 speaks for its source: PX4 fuses or rejects all axes of a sample but for rare faults."""
+    found = {}
+    for source, axis in record.first_fused:
+        if axis:
+            continue
+        samples = record.samples[source, axis]
+        time = samples.timestamp_sample
+        inside = _inside(time, intervals)
+        if not inside.any():
+            continue
+        longest = 0
+        for start, stop in intervals:
+            fused = time[samples.fused & (time >= start) & (time < stop)]
+            longest = max(longest, int(np.max(np.diff(np.r_[start, fused, stop]))))
+        found[source] = SourceAid(int(inside.sum()), float(np.mean(samples.fused[inside])), longest * 1e-6)
+    return found
+
+
+def _inside(times: npt.NDArray[np.int64], intervals: tuple[Interval, ...]) -> npt.NDArray[np.bool_]:
+    inside = np.zeros(times.shape, dtype=bool)
+    for start, stop in intervals:
+        inside |= (times >= start) & (times < stop)
+    return inside
+
+
+def _time_true(
+    time: npt.NDArray[np.int64], values: npt.NDArray[np.bool_] | None, intervals: tuple[Interval, ...]
+) -> float:
+    if values is None or time.size == 0:
+        return 0.0
+    # The flags are written at each change, so a value holds until the next row.
+    stops = np.r_[time[1:], np.iinfo(np.int64).max]
+    total = 0
+    for start, stop in intervals:
+        overlap = np.minimum(stops, stop) - np.maximum(time, start)
+        total += int(np.sum(np.where(values, np.maximum(overlap, 0), 0)))
+    return total * 1e-6

@@ -1,0 +1,175 @@
+"""Errors of a replay against a reference, on the scored part of the flight."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.flight.reference_truth import EARTH_RADIUS_M, Truth, read_references, read_truth
+from fusetune.analyze.metrics.attitude import error_in_ned as attitude_error
+from fusetune.analyze.metrics.attitude import (
+    heading,
+    interpolate,
+    interpolate_quaternion,
+    product,
+    rotation_matrices,
+    wrap,
+)
+from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures, nees_figures, vector_figures
+from fusetune.analyze.replaying.filter_states import FilterStates
+from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.scoring.scoring_window import ScoringWindow
+
+__all__ = [
+    "EARTH_RADIUS_M",
+    "ErrorFigure",
+    "Truth",
+    "attitude_figures",
+    "interpolate",
+    "interpolate_quaternion",
+    "read_references",
+    "read_truth",
+    "true_errors",
+    "vector_figures",
+]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Outputs:
+    """Published position and velocity of a replay, (N, 3), at the times at which they hold, µs."""
+
+    time: npt.NDArray[np.int64]
+    position: Array
+    velocity: Array
+
+
+def true_errors(
+    record: SetRecord, states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
+) -> list[ErrorFigure]:
+    """All figures of one replay against one reference.
+
+    Parameters
+    ----------
+    states : of the same replay
+    window : only these times count, alike for all sets
+
+    Returns
+    -------
+    Position (m; absolute where both origins are known, and with the mean removed), velocity (m/s), attitude (deg:
+    tilt, heading, total rotation), and NEES of velocity, of the horizontal position with its mean offset removed, and
+    of the attitude. Quantities that the reference does not know are missing.
+    """
+    if truth.own_north:
+        truth = _turned_north(truth, states, window)
+    outputs = _outputs(record, states, truth, window)
+    figures: list[ErrorFigure] = []
+    if outputs.time.size > 1:
+        figures += _position_figures(record, states, outputs, truth, confidence)
+    return figures + _state_figures(states, truth, window, confidence)
+
+
+def _outputs(record: SetRecord, states: FilterStates, truth: Truth, window: ScoringWindow) -> _Outputs:
+    local = record.local_position
+    # The output predictor carries the state from the fusion horizon to `timestamp`; that is when it holds.
+    time = local["timestamp"].astype(np.int64)
+    rows = window.contains(time) & truth.known_at(time)
+    time = time[rows]
+    position, velocity = (
+        np.column_stack([local[name][rows] for name in names]).astype(np.float64)
+        for names in (("x", "y", "z"), ("vx", "vy", "vz"))
+    )
+    if any(truth.lever_arm) and time.size > 1:
+        arm = _arm(states, truth, time)
+        position = position + arm
+        velocity = velocity + np.gradient(arm, time * 1e-6, axis=0)
+    return _Outputs(time, position, velocity)
+
+
+def _arm(states: FilterStates, truth: Truth, at: npt.NDArray[np.int64]) -> Array:
+    """Lever arm in NED, m, (N, 3): its derivative is the velocity that turning adds."""
+    attitude = interpolate_quaternion(states.time, states.quaternion, at)
+    return rotation_matrices(attitude) @ np.array(truth.lever_arm)
+
+
+def _position_figures(
+    record: SetRecord, states: FilterStates, outputs: _Outputs, truth: Truth, confidence: float
+) -> list[ErrorFigure]:
+    time = outputs.time
+    figures: list[ErrorFigure] = []
+    known = truth.velocity if truth.velocity.size else np.gradient(truth.position, truth.time * 1e-6, axis=0)
+    true_velocity = interpolate(truth.time, known, time)
+    if truth.velocity.size:
+        figures += vector_figures("velocity", outputs.velocity - true_velocity, true_velocity)
+    error = outputs.position - interpolate(truth.time, truth.position, time)
+    offset = _origin_offset(record, truth)
+    if offset is not None:
+        figures += vector_figures("position", error + offset, true_velocity)
+    centred = error - error.mean(axis=0)
+    figures += vector_figures("position_mean_removed", centred, true_velocity)
+    # The variance is that of the fusion horizon, some 0.1 s earlier, over which it hardly changes.
+    variance = interpolate(states.time, states.position_variance[:, :2], time)
+    return figures + nees_figures(
+        "position_mean_removed", "horizontal", time, centred[:, :2], variance, confidence, fitted=2
+    )
+
+
+def _origin_offset(record: SetRecord, truth: Truth) -> Array | None:
+    origin = record.summary.get("origin")
+    if not origin or truth.reference is None:
+        return None
+    latitude, longitude, altitude = truth.reference
+    north = np.radians(origin["latitude_deg"] - latitude) * EARTH_RADIUS_M
+    east = np.radians(origin["longitude_deg"] - longitude) * EARTH_RADIUS_M * np.cos(np.radians(latitude))
+    return np.array([north, east, altitude - origin["altitude_m"]])
+
+
+def _state_figures(states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float) -> list[ErrorFigure]:
+    time, figures = states.time, []
+    scored = window.contains(time)
+    rows = scored & truth.known_at(time)
+    if np.count_nonzero(rows) > 1 and truth.velocity.size:
+        velocity = states.velocity[rows]
+        if any(truth.lever_arm):
+            velocity = velocity + np.gradient(_arm(states, truth, time[rows]), time[rows] * 1e-6, axis=0)
+        error = velocity - interpolate(truth.time, truth.velocity, time[rows])
+        figures += nees_figures("velocity", "all", time[rows], error, states.velocity_variance[rows], confidence)
+    rows = scored & truth.known_at(time, attitude=True)
+    if np.count_nonzero(rows) > 1:
+        true_attitude = interpolate_quaternion(truth.attitude_time, truth.quaternion, time[rows])
+        figures += attitude_figures(states.quaternion[rows], true_attitude)
+        error = attitude_error(states.quaternion[rows], true_attitude)
+        variance = states.attitude_variance[rows]
+        figures += nees_figures("attitude", "all", time[rows], error, variance, confidence)
+    return figures
+
+
+def _turned_north(truth: Truth, states: FilterStates, window: ScoringWindow) -> Truth:
+    """The reference turned about the vertical by the mean heading between it and the estimate.
+
+    Where it has no attitude, by the angle that brings its horizontal path nearest to the integrated velocity.
+    """
+    if truth.attitude_time.size:
+        rows = window.contains(states.time) & truth.known_at(states.time, attitude=True)
+        if not rows.any():
+            return truth
+        own = interpolate_quaternion(truth.attitude_time, truth.quaternion, states.time[rows])
+        off = wrap(heading(states.quaternion[rows]) - heading(own))
+        angle = float(np.angle(np.mean(np.exp(1j * off))))
+    else:
+        rows = window.contains(truth.time) & (truth.time >= states.time[0]) & (truth.time <= states.time[-1])
+        if np.count_nonzero(rows) < 3:
+            return truth
+        own_speed = np.gradient(truth.position[:, :2], truth.time * 1e-6, axis=0)[rows] @ np.array([1.0, 1j])
+        speed = interpolate(states.time, states.velocity[:, :2], truth.time[rows]) @ np.array([1.0, 1j])
+        angle = float(np.angle(np.sum(speed * np.conj(own_speed))))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    half = np.array([[np.cos(angle / 2.0), 0.0, 0.0, np.sin(angle / 2.0)]])
+    return replace(
+        truth,
+        position=truth.position @ turn.T,
+        velocity=truth.velocity @ turn.T,
+        quaternion=product(np.broadcast_to(half, truth.quaternion.shape), truth.quaternion),
+    )

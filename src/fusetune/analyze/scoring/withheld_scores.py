@@ -1,0 +1,211 @@
+"""What the sets of one flight predicted in the same gaps without a sensor: errors, drift and likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, winsorised
+from fusetune.analyze.replaying.set_files import SetRecord, read_columns
+from fusetune.analyze.scoring.metrics_table import MetricsTable
+from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.true_errors import Truth, interpolate
+from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+from fusetune.storage.files import AnyPath
+
+Array = npt.NDArray[np.float64]
+
+WITHHELD_SCHEMA = pa.schema(
+    [
+        pa.field("flight", pa.string()),
+        pa.field("set", pa.string()),
+        pa.field("sensor", pa.string()),
+        pa.field("gap", pa.int32()),
+        pa.field("start_us", pa.int64()),
+        pa.field("block", pa.int32()),
+        pa.field("source", pa.string()),
+        pa.field("axis", pa.int32()),
+        pa.field("horizon_s", pa.float64()),
+        pa.field("n", pa.int32()),
+        pa.field("error", pa.float64()),
+        pa.field("error_winsorised", pa.float64()),
+        pa.field("variance", pa.float64()),
+    ]
+)
+"""One row per set, gap, source, axis and horizon. `error` (prediction less measurement, in the unit of the source) and
+`variance` are means over the second before the horizon; the rows of all sets are the same gaps and measurements."""
+
+FEWEST_GAPS = 3
+"""Fewer gaps than this make no figure."""
+
+_STALE_US = 1_000_000
+"""A sensor that the present set has not fused for so long was not there to be withheld."""
+
+
+@dataclass(frozen=True)
+class PairedGaps:
+    """Predictions of one source, axis and horizon in the gaps that all sets share; arrays (S, G), the sets first."""
+
+    sensor: str
+    source: str
+    axis: int
+    horizon_s: float
+    sets: tuple[str, ...]
+    gap: npt.NDArray[np.int64]
+    start: npt.NDArray[np.int64]
+    n: npt.NDArray[np.int64]
+    error: Array
+    variance: Array
+
+
+def paired_gaps(records: Sequence[SetRecord], folder: AnyPath, present: str, window: ScoringWindow) -> list[PairedGaps]:
+    """Predictions in the gaps that lie wholly in the scored part of the flight.
+
+    Parameters
+    ----------
+    records : sets that are scored on this flight, the present one among them
+    folder : holds `<set>.withheld.parquet`
+    present : a gap counts if this set used the sensor when the gap began
+    """
+    folder = Path(folder)
+    names = [record.name for record in records]
+    tables = [_read(folder / f"{name}.withheld.parquet") for name in names]
+    present_record = records[names.index(present)]
+    common = tables[0]["key"]
+    for table in tables[1:]:
+        common = np.intersect1d(common, table["key"])
+    rows = [np.flatnonzero(np.isin(table["key"], common)) for table in tables]
+    base = {name: values[rows[0]] for name, values in tables[0].items()}
+    error = np.stack([table["innovation"][row] for table, row in zip(tables, rows, strict=True)])
+    variance = np.stack([table["innovation_variance"][row] for table, row in zip(tables, rows, strict=True)])
+    usable = (
+        _inside(base["start"], base["stop"], window) & np.isfinite(error).all(axis=0) & (variance > 0.0).all(axis=0)
+    )
+    groups: list[PairedGaps] = []
+    for sensor, sources in WITHHOLDABLE.items():
+        for source in sources:
+            used = usable & (base["sensor"] == sensor) & (base["source"] == source)
+            used &= _in_use(present_record, source, base["start"])
+            for axis in range(AID_SOURCES[source].axes):
+                for horizon in np.unique(base["horizon_s"][used]):
+                    take = np.flatnonzero(used & (base["axis"] == axis) & (base["horizon_s"] == horizon))
+                    if take.size:
+                        groups.append(
+                            PairedGaps(
+                                sensor, source, axis, float(horizon), tuple(names), base["gap"][take],
+                                base["start"][take], base["n"][take], error[:, take], variance[:, take],
+                            )
+                        )  # fmt: skip
+    return groups
+
+
+def _read(path: Path) -> dict[str, npt.NDArray]:
+    """Columns of one set's predictions, in ascending order of a key that names gap, source, axis and horizon."""
+    table = read_columns(path)
+    sources = list(AID_SOURCES)
+    source = np.array([sources.index(name) if name in AID_SOURCES else -1 for name in table["source"]], np.int64)
+    horizon_ds = np.rint(table["horizon_s"] * 10.0).astype(np.int64)
+    key = ((table["start"] * 64 + source) * 4 + table["axis"]) * 1000 + horizon_ds
+    order = np.argsort(key, kind="stable")
+    return {"key": key[order]} | {name: values[order] for name, values in table.items()}
+
+
+def _inside(start: npt.NDArray[np.int64], stop: npt.NDArray[np.int64], window: ScoringWindow) -> npt.NDArray[np.bool_]:
+    """True where a gap lies within one scored interval."""
+    inside = np.zeros(start.shape, bool)
+    for first, last in window.intervals:
+        inside |= (start >= first) & (stop <= last)
+    return inside
+
+
+def _in_use(record: SetRecord, source: str, start: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """True where the record fused a source shortly before a time."""
+    samples = record.samples.get((source, 0))
+    if samples is None or not samples.fused.any():
+        return np.zeros(start.shape, bool)
+    fused = samples.timestamp_sample[samples.fused]
+    last = fused[np.maximum(np.searchsorted(fused, start) - 1, 0)]
+    return (last <= start) & (start - last <= _STALE_US)
+
+
+def withheld_rows(flight: str, groups: Sequence[PairedGaps], edges: npt.NDArray[np.int64]) -> pa.Table:
+    """The predictions as rows of `WITHHELD_SCHEMA`, with the block that each gap begins in."""
+    tables = [_rows_of(flight, group, edges) for group in groups]
+    return pa.concat_tables(tables) if tables else WITHHELD_SCHEMA.empty_table()
+
+
+def _rows_of(flight: str, group: PairedGaps, edges: npt.NDArray[np.int64]) -> pa.Table:
+    sets, gaps = group.error.shape
+    block = np.clip(np.searchsorted(edges, group.start, side="right") - 1, 0, edges.size - 2)
+    clipped = winsorised(group.error, winsor_limit(group.error))
+    count = sets * gaps
+    columns = {
+        "flight": pa.array([flight] * count, pa.string()),
+        "set": pa.array(np.repeat(np.array(group.sets, dtype=object), gaps), pa.string()),
+        "sensor": pa.array([group.sensor] * count, pa.string()),
+        "gap": pa.array(np.tile(group.gap.astype(np.int32), sets)),
+        "start_us": pa.array(np.tile(group.start, sets)),
+        "block": pa.array(np.tile(block.astype(np.int32), sets)),
+        "source": pa.array([group.source] * count, pa.string()),
+        "axis": pa.array(np.full(count, group.axis, np.int32)),
+        "horizon_s": pa.array(np.full(count, group.horizon_s)),
+        "n": pa.array(np.tile(group.n.astype(np.int32), sets)),
+        "error": pa.array(group.error.ravel()),
+        "error_winsorised": pa.array(clipped.ravel()),
+        "variance": pa.array(group.variance.ravel()),
+    }
+    return pa.table(columns, schema=WITHHELD_SCHEMA)
+
+
+def add_withheld_metrics(table: MetricsTable, groups: Sequence[PairedGaps]) -> None:
+    """Append RMS error and NLL per axis and horizon, and the drift at the end of the gaps.
+
+    Metrics are `withheld_rms_<horizon>s` and `withheld_nll_<horizon>s`; `withheld_drift` is the RMS of the error's
+    norm at the last horizon, in the plane for GNSS position and velocity, over all axes for the magnetometer.
+    """
+    last = {}
+    for group in groups:
+        gaps = group.error.shape[1]
+        if gaps < FEWEST_GAPS:
+            continue
+        label, axis = f"{group.horizon_s:g}s", AXES[group.axis]
+        rms = np.sqrt(np.mean(np.square(group.error), axis=1))
+        nll = np.mean(gaussian_nll(group.error, group.variance), axis=1)
+        table.add_each(group.sets, group.source, axis, f"withheld_rms_{label}", rms, gaps)
+        table.add_each(group.sets, group.source, axis, f"withheld_nll_{label}", nll, gaps)
+        if group.horizon_s >= max(other.horizon_s for other in groups if other.sensor == group.sensor):
+            last[group.source, group.axis] = group
+    for source in dict.fromkeys(source for source, _ in last):
+        for name, axes in AID_SOURCES[source].groups:
+            members = [last[source, axis] for axis in axes if (source, axis) in last]
+            if len(members) == len(axes) and all(np.array_equal(one.gap, members[0].gap) for one in members):
+                drift = np.sqrt(np.mean(sum(np.square(one.error) for one in members), axis=1))
+                table.add_each(members[0].sets, source, name, "withheld_drift", drift, members[0].gap.size)
+
+
+def add_true_drift(
+    table: MetricsTable, records: Sequence[SetRecord], folder: AnyPath, truth: Truth, window: ScoringWindow
+) -> None:
+    """Append by how much the true horizontal error of position and velocity grew over the gaps without GNSS (RMS)."""
+    folder = Path(folder)
+    for record in records:
+        gaps = read_columns(folder / f"{record.name}.gaps.parquet")
+        rows = (gaps["sensor"] == "gnss") & _inside(gaps["start"], gaps["stop"], window)
+        if np.count_nonzero(rows) < FEWEST_GAPS:
+            continue
+        for quantity, fields, course in (("position", "x y", truth.position), ("velocity", "vx vy", truth.velocity)):
+            begin, end = (
+                np.column_stack([gaps[f"{name}_{moment}"][rows] for name in fields.split()])
+                - interpolate(truth.time, course, gaps[f"timestamp_{moment}"][rows])[:, :2]
+                for moment in ("begin", "end")
+            )
+            drift = float(np.sqrt(np.mean(np.sum(np.square(end - begin), axis=1))))
+            table.add(
+                record.name, f"truth_withheld_{quantity}", "horizontal", "rmse", drift, int(np.count_nonzero(rows))
+            )

@@ -1,0 +1,1 @@
+"""What the flight tells of the sensors themselves."""

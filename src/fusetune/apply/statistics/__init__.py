@@ -1,0 +1,1 @@
+"""What chance can do: bootstrap, sign flips, leave-one-out."""

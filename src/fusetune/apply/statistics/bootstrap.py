@@ -1,0 +1,220 @@
+"""Paired hierarchical bootstrap: flights are redrawn, and in each drawn flight its blocks, alike for all sets."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import ndtr, stdtr, stdtrit
+
+from fusetune.analyze.metrics.likelihood import profile_nll
+from fusetune.apply.evidence import AIMS, AimEvidence, FlightEvidence
+from fusetune.apply.statistics.rounding import EQUAL_WITHIN
+
+Array = npt.NDArray[np.float64]
+
+
+FEWEST_FLIGHTS = 3
+"""With fewer flights what differs between them says little, and the blocks speak for themselves."""
+
+FEWEST_REDRAWN = 5
+"""With fewer units no draw lies as far out as Student's quantiles: of 4, one in 256 has one unit only, and the tail of
+a 95 % interval is 1.2e-4."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Confidence interval of a mean difference."""
+
+    lower: float
+    upper: float
+
+    @property
+    def excludes_zero(self) -> bool:
+        return self.lower > 0.0 or self.upper < 0.0
+
+
+@dataclass(frozen=True)
+class Redrawn:
+    """Redrawn mean scores, (D, S) each: of the whole score, and of each aim alone where any flight speaks of it."""
+
+    total: Array
+    aims: dict[str, Array]
+
+
+def bootstrap_scores(flights: Sequence[FlightEvidence], sets: Sequence[str], draws: int, seed: int) -> Redrawn:
+    """Redraw the mean score of every set.
+
+    Parameters
+    ----------
+    flights : evidence, F ≥ 1, in a fixed order
+    sets : names, S; each must be scored on every flight
+    draws : D
+    seed : of the generator; the same seed gives the same draws on any number of cores
+
+    Returns
+    -------
+    Mean scores. In one draw all sets see the same flights and blocks, so differences are paired. An aim's mean is
+    over the drawn flights that have it, and NaN where none has.
+    """
+    generator = np.random.Generator(np.random.PCG64(seed))
+    count = len(flights)
+    drawn = generator.integers(0, count, size=(draws, count))
+    total = np.zeros((draws, len(sets)))
+    aims = {name: (np.zeros_like(total), np.zeros((draws, 1))) for name in AIMS}
+    for index, flight in enumerate(flights):
+        draw_of_slot = np.nonzero(drawn == index)[0]
+        columns = np.array([flight.sets.index(name) for name in sets])
+        for aim in flight.aims:
+            scores = _redrawn_aim(aim, columns, draw_of_slot.size, generator)
+            np.add.at(total, draw_of_slot, aim.weight * scores)
+            np.add.at(aims[aim.name][0], draw_of_slot, scores)
+            np.add.at(aims[aim.name][1], draw_of_slot, 1.0)
+    with np.errstate(invalid="ignore"):
+        means = {name: scores / number for name, (scores, number) in aims.items() if number.any()}
+    return Redrawn(total / count, means)
+
+
+def _redrawn_aim(aim: AimEvidence, columns: npt.NDArray[np.int64], slots: int, generator: np.random.Generator) -> Array:
+    """(slots, S) scores of one aim of a flight whose blocks are drawn anew for each slot."""
+    blocks, axes = aim.n.shape
+    picks = generator.integers(0, blocks, size=(slots, blocks))
+    cells = (np.arange(slots)[:, None] * blocks + picks).ravel()
+    weights = np.bincount(cells, minlength=slots * blocks).reshape(slots, blocks).astype(np.float64)
+    n = np.zeros((slots, 1, axes))
+    nis = np.zeros((slots, columns.size, axes))
+    log_variance = np.zeros_like(nis)
+    # Summed block by block, not by a matrix product: its order of summation could change with the number of cores.
+    for block in range(blocks):
+        weight = weights[:, block, None, None]
+        n += weight * aim.n[block]
+        nis += weight * aim.sum_nis[columns, block]
+        if aim.sum_log_variance.any():
+            log_variance += weight * aim.sum_log_variance[columns, block]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scores = profile_nll(nis / n, log_variance / n)
+    # A draw may hold none of the blocks in which a column has samples: then the column says what it says on the whole.
+    scores = np.where(n > 0.0, scores, aim.column_scores[columns])
+    return np.asarray((scores * aim.column_weights).sum(axis=-1))
+
+
+def spread_of_flights(draws: Array, differences: Array) -> Array:
+    """Bring the spread of redrawn means to that of redrawing flights alone.
+
+    What differs from flight to flight already holds the noise within flights. Redrawing the blocks as well counts that
+    noise twice, which makes intervals up to √2 too wide. From three flights on the draws are drawn together around
+    their mean, by the factor between the two standard deviations; their shape stays.
+
+    Parameters
+    ----------
+    draws : (D,) redrawn mean differences; NaN where a draw had no flight with evidence
+    differences : (F,) differences on the flights
+
+    References
+    ----------
+    Davison and Hinkley, "Bootstrap Methods and their Application", 1997, section 3.8.
+    """
+    draws = draws[np.isfinite(draws)]
+    spread = float(np.std(draws))
+    flights = float(np.std(differences)) / np.sqrt(differences.size)
+    if differences.size < FEWEST_FLIGHTS or spread <= flights:
+        return draws
+    centre = draws.mean()
+    return np.asarray(centre + (draws - centre) * (flights / spread))
+
+
+def units_redrawn(flights: Sequence[FlightEvidence], aim: str | None = None) -> int:
+    """How many things were redrawn whose differences show the spread: flights, or of a single flight its blocks.
+
+    A flight whose blocks alone must show it has as many as the kind of prediction that has fewest.
+
+    Parameters
+    ----------
+    aim : of this kind of prediction alone, on the flights that have it
+    """
+    having = [one for one in flights if aim is None or one.aim(aim) is not None]
+    if len(having) != 1:
+        return len(having)
+    parts = [part for part in having[0].aims if aim is None or part.name == aim]
+    return min(int(np.count_nonzero(part.n.any(axis=1))) for part in parts)
+
+
+def standard_error(draws: Array, units: int) -> float | None:
+    """Standard error of a mean difference from its redrawn means (D,); None where nothing shows its spread.
+
+    The spread of redrawn means is that of the population, too small by √((n − 1)/n) for n units.
+    """
+    draws = draws[np.isfinite(draws)]
+    if units < 2 or not draws.size:
+        return None
+    spread = float(np.std(draws))
+    return spread * math.sqrt(units / (units - 1.0)) if spread > EQUAL_WITHIN else None
+
+
+def expanded_interval(draws: Array, units: int, confidence: float) -> Interval | None:
+    """Interval of a mean difference, widened for the small number of units; None where nothing shows its spread.
+
+    The plain percentile interval is as narrow as if the spread of a few flights were known. Its tails are moved
+    to Φ(−√(n/(n−1)) t), with t the quantile of Student's distribution with n − 1 degrees of freedom. With fewer than
+    `FEWEST_REDRAWN` units, no draw lies there, and the interval is Student's own around the mean of the draws.
+
+    Parameters
+    ----------
+    draws : (D,) redrawn mean differences; those that are not finite are left out
+    units : n, from `units_redrawn`
+
+    References
+    ----------
+    Hesterberg, "What Teachers Should Know About the Bootstrap", The American Statistician 69(4), 2015.
+    """
+    error = standard_error(draws, units)
+    if error is None:
+        return None
+    draws = draws[np.isfinite(draws)]
+    tail = 0.5 * (1.0 - confidence)
+    quantile = float(stdtrit(units - 1, tail))
+    if units < FEWEST_REDRAWN:
+        centre = float(draws.mean())
+        return Interval(centre + quantile * error, centre - quantile * error)
+    tail = float(ndtr(np.sqrt(units / (units - 1.0)) * quantile))
+    lower, upper = np.quantile(draws, [tail, 1.0 - tail])
+    return Interval(float(lower), float(upper))
+
+
+def interval_over_flights(draws: Array, differences: Array, units: int, confidence: float) -> Interval | None:
+    """Interval of a mean difference from its redrawn means (D,) and the differences on the flights (F,)."""
+    return expanded_interval(spread_of_flights(draws, differences), units, confidence)
+
+
+def p_value(difference: float, draws: Array, units: int) -> float | None:
+    """Two-sided p-value of a mean difference against 0: Student's t with the bootstrap's standard error.
+
+    1 where there is no difference beyond rounding, None where nothing shows how far it spreads.
+    """
+    if abs(difference) <= EQUAL_WITHIN:
+        return 1.0
+    error = standard_error(draws, units)
+    if error is None or not np.isfinite(difference):
+        return None
+    return float(min(2.0 * stdtr(units - 1, -abs(difference) / error), 1.0))
+
+
+def holm(p_values: Sequence[float | None]) -> list[float | None]:
+    """Holm's adjusted p-values in the order of the arguments: they hold for all candidates together.
+
+    One that is not known stays so; it counts as a candidate like the others.
+    """
+    known = [1.0 if one is None else one for one in p_values]
+    adjusted: list[float | None] = [None] * len(known)
+    largest = 0.0
+    for rank, index in enumerate(np.argsort(known, kind="stable")):
+        largest = max(largest, min(1.0, (len(known) - rank) * known[index]))
+        adjusted[index] = None if p_values[index] is None else float(largest)
+    return adjusted
+
+
+def probability_best(scores: Array) -> Array:
+    """Share of draws in which each set has the lowest score, (D, S) → (S,); equal sets share a draw."""
+    best = scores <= scores.min(axis=1, keepdims=True) + EQUAL_WITHIN
+    return (best / best.sum(axis=1, keepdims=True)).mean(axis=0)

@@ -1,0 +1,164 @@
+"""Compile the estimator in one piece, in a process of its own, and keep it in the kernel cache.
+
+Numba optimises and translates every function by itself, each time together with everything it calls: the estimator's
+few hundred nested functions would pass through the optimiser some thirty times. Here the inner functions are only
+joined, and the optimiser sees the whole once, at the entry. The inner functions cannot be called from Python in a
+process that compiled this way, so it is a child that does it; everybody else loads the result.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba.core import codegen, compiler, config, types
+
+from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
+from fusetune.ekf2.compiled.kernel_locator import KernelLocator
+from fusetune.errors import UserError
+from fusetune.storage.files import atomic_path
+
+LOCK_NAME = "compile.lock"
+RECORD_NAME = "compiled.json"
+ENTRY_SOURCE = Path(__file__).parents[1] / "replay" / "loop.py"
+COMPILES = "fusetune.ekf2.replay.warm_up"
+"""The module that, when it is run, calls the entry once and so compiles all."""
+CHILD_MARK = "FUSETUNE_COMPILING"
+
+
+@cache
+def ensure_compiled() -> None:
+    """Make sure the kernel cache holds the estimator for this processor; one process compiles and others wait.
+
+    Kernels that have lost or changed a byte, or that others could have written, are made again. Does nothing where
+    Numba is switched off. If the child fails, the caller compiles the usual, slower way.
+
+    Raises
+    ------
+    UserError
+        The cache belongs to another user, or it lacks the kernels and cannot be written.
+    """
+    if _setting("DISABLE_JIT") or CHILD_MARK in os.environ:
+        return
+    caches, folder = Path(_setting("CACHE_DIR")), kernel_folder()
+    if _may_be_loaded(folder):
+        return
+    try:
+        caches.mkdir(parents=True, exist_ok=True)
+        lock = (caches / LOCK_NAME).open("w")
+    except OSError as error:
+        reason = f"does not hold the estimator for this processor, and cannot be written ({error.strerror})"
+        raise UserError(caches, reason, "Start the pipeline where it can, or make room") from error
+    with lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not _may_be_loaded(folder):
+            keep_others_out(folder)
+            for file in folder.iterdir():
+                file.unlink()  # Numba would stumble over a damaged one
+            print("Compiling the estimator for this processor ...", file=sys.stderr)
+            environment = os.environ | {"NUMBA_CACHE_DIR": str(caches), "NUMBA_CACHE_LOCATOR_CLASSES": LOCATOR}
+            subprocess.run([sys.executable, "-m", COMPILES], env=environment, umask=0o022, check=False)
+
+
+def _setting(name: str) -> Any:
+    """A setting of Numba, which makes them up as module attributes when it is imported."""
+    return getattr(config, name)
+
+
+def kernel_folder() -> Path:
+    """Where in the cache the kernels of this processor are."""
+    return Path(_setting("CACHE_DIR")) / KernelLocator.get_suitable_cache_subpath(str(ENTRY_SOURCE))
+
+
+def _kernel_files(folder: Path) -> dict[str, str]:
+    """Digest of each of Numba's files in a folder."""
+    files = sorted(file for file in folder.glob("*") if file.suffix in (".nbi", ".nbc"))
+    return {file.name: hashlib.blake2b(file.read_bytes()).hexdigest() for file in files}
+
+
+def _may_be_loaded(folder: Path) -> bool:
+    """Whether a folder holds the kernels as they were compiled, byte for byte, and others cannot have written them."""
+    if others_may_write_kernels(folder):
+        return False
+    try:
+        recorded = json.loads((folder / RECORD_NAME).read_text(encoding="utf-8"))
+        return bool(recorded) and recorded == _kernel_files(folder)
+    except (OSError, ValueError):
+        return False
+
+
+@contextmanager
+def joined_without_optimising() -> Iterator[None]:
+    """Join functions as they are compiled; only what is compiled last, the entry, is optimised and translated."""
+    library, native = codegen.JITCodeLibrary, codegen.JITCPUCodegen
+    finalize, pointer, set_env = library.finalize, library.get_pointer_to_function, native.set_env
+    compile_function = compiler.CompilerBase.compile_extra
+    depth = 0
+
+    def count_depth(self, function):  # type: ignore[no-untyped-def]
+        nonlocal depth
+        depth += 1
+        try:
+            return compile_function(self, function)
+        finally:
+            depth -= 1
+
+    def join(self):  # type: ignore[no-untyped-def]
+        if depth <= 1:
+            return finalize(self)
+        self._raise_if_finalized()
+        for linked in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(linked._reload_init)
+            self._final_module.link_in(linked._get_module_for_linking(), preserve=True)
+        self._finalize_dynamic_globals()
+        self._finalized = True
+        self._only_joined = True
+        return None
+
+    def pointer_if_translated(self, name):  # type: ignore[no-untyped-def]
+        self._ensure_finalized()
+        return 0 if getattr(self, "_only_joined", False) else pointer(self, name)
+
+    def set_env_if_translated(self, name, env):  # type: ignore[no-untyped-def]
+        if self._engine.is_symbol_defined(name):
+            set_env(self, name, env)
+
+    patches: tuple[tuple[type, str, Any], ...] = (
+        (library, "finalize", join),
+        (library, "get_pointer_to_function", pointer_if_translated),
+        (native, "set_env", set_env_if_translated),
+        (compiler.CompilerBase, "compile_extra", count_depth),
+        (types.Record, "__repr__", _short_repr),
+    )
+    originals = [getattr(owner, name) for owner, name, _ in patches]
+    try:
+        for owner, name, replacement in patches:
+            setattr(owner, name, replacement)
+        yield
+    finally:
+        for (owner, name, _), original in zip(patches, originals, strict=True):
+            setattr(owner, name, original)
+
+
+def _short_repr(record: types.Record) -> str:
+    """Numba spells out all fields of a record in each of its progress events, a fifth of the time it takes."""
+    return f"Record({len(record.fields)} fields, {record.size} bytes)"
+
+
+def compile_in_one_piece(call_entry: Callable[[], None]) -> None:
+    """Compile by a first call of the entry, and record what is now in the cache; the work of the child process."""
+    os.environ[CHILD_MARK] = "1"
+    with joined_without_optimising():
+        call_entry()
+    folder = kernel_folder()
+    with atomic_path(folder / RECORD_NAME) as temporary:
+        temporary.write_text(json.dumps(_kernel_files(folder), indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,232 @@
+"""Everything the estimator takes from one flight, in the order in which it arrives.
+
+Built once per flight, since no parameter of the estimator enters: parameter sets share it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fusetune.ekf2.feed import message_samples as convert
+from fusetune.ekf2.feed.arrival_order import RunSchedule, schedule_runs
+from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE, SYSTEM_FLAGS_SAMPLE
+from fusetune.ekf2.feed.taken_samples import AIDING, only_usable
+from fusetune.px4.flight import Flight, ParameterChange, TopicTable, select_rows
+
+ARMING_STATE_ARMED = 2
+VEHICLE_TYPE_FIXED_WING = 2
+LAUNCH_STATE_WAITING = 1
+STATUS_MAX_AGE_US = 3_000_000
+
+COMMAND_SET_GPS_GLOBAL_ORIGIN = 100000
+COMMAND_EXTERNAL_POSITION_ESTIMATE = 43003
+COMMAND_EXTERNAL_WIND_ESTIMATE = 43004
+ESTIMATOR_COMMANDS = (
+    COMMAND_SET_GPS_GLOBAL_ORIGIN,
+    COMMAND_EXTERNAL_POSITION_ESTIMATE,
+    COMMAND_EXTERNAL_WIND_ESTIMATE,
+)
+
+ARRIVAL_TOPICS = ("airspeed", "auxvel", "baro", "ev", "flow", "gnss", "mag", "range", "system_flags", "command")
+
+ARRIVALS = np.dtype(
+    [(name, "i4") for name in ARRIVAL_TOPICS] + [("reset_accel_bias", "?"), ("reset_gyro_bias", "?")], align=True
+)
+"""What arrives with one IMU sample: a position in each sample array, -1 for nothing."""
+
+IMU_ROW = np.dtype(
+    [
+        ("time_us", "i8"),
+        ("delta_ang", "f4", (3,)),
+        ("delta_vel", "f4", (3,)),
+        ("delta_ang_dt", "f4"),
+        ("delta_vel_dt", "f4"),
+        ("delta_vel_clipping", "?", (3,)),
+    ],
+    align=True,
+)
+"""An IMU_SAMPLE at half its size, for a flight has hundreds a second: PX4 gives all its figures single precision."""
+
+IMU_ROWS_AT_ONCE = 1 << 16
+
+COMMAND = np.dtype([("timestamp", "i8"), ("command", "i8"), ("param", "f8", (7,))], align=True)
+
+
+class SampleArrays(NamedTuple):
+    """The arrays that the compiled replay reads, and of a whole flight `imu` as IMU_ROW, see `of_runs`."""
+
+    imu: np.ndarray
+    arrivals: np.ndarray
+    gnss: np.ndarray
+    mag: np.ndarray
+    baro: np.ndarray
+    air_density: np.ndarray
+    range: np.ndarray
+    range_limits: np.ndarray
+    flow: np.ndarray
+    flow_limits: np.ndarray
+    ev: np.ndarray
+    airspeed: np.ndarray
+    auxvel: np.ndarray
+    system_flags: np.ndarray
+    command: np.ndarray
+
+    def of_runs(self, start: int, stop: int) -> SampleArrays:
+        """The same for the estimator's runs from `start` to before `stop` alone, `imu` as IMU_SAMPLE."""
+        return self._replace(imu=imu_samples(self.imu[start:stop]), arrivals=self.arrivals[start:stop])
+
+
+def imu_samples(rows: np.ndarray) -> np.ndarray:
+    """IMU_ROW → IMU_SAMPLE."""
+    samples = np.zeros(len(rows), IMU_SAMPLE)
+    for name in rows.dtype.names or ():
+        samples[name] = rows[name]
+    return samples
+
+
+@dataclass(frozen=True)
+class EstimatorInputs:
+    """Samples of one flight and the order of their arrival."""
+
+    flight: str
+    mode: str
+    """``"timestamps"`` or ``"approx"``, see `fusetune.ekf2.feed.arrival_order`."""
+    arrays: SampleArrays
+    parameter_changes: tuple[tuple[int, ParameterChange], ...]
+    """(run, change): changes that the log records in flight, and the run before which each takes effect."""
+
+
+def build_inputs(flight: Flight) -> EstimatorInputs:
+    """Collect the estimator's inputs from a canonical flight.
+
+    Parameters
+    ----------
+    flight : Flight
+        In the layout of `px4.layouts.release_layouts.canonical`; needs `sensor_combined`, all else is optional.
+
+    Raises
+    ------
+    KeyError
+        The flight has no `sensor_combined`.
+    """
+    runs = schedule_runs(flight)
+    arrivals = np.full(len(runs.timestamp), -1, ARRIVALS)
+    arrivals["reset_accel_bias"], arrivals["reset_gyro_bias"] = _bias_resets(flight, runs)
+    aiding = {name: take(flight, runs) for name, take in AIDING.items()}
+    for name, one in aiding.items():
+        arrivals[name] = one.arrival
+    system_flags = _system_flags(flight, runs, arrivals)
+    command = _commands(flight, runs, arrivals)
+    arrays = SampleArrays(
+        imu=_imu_rows(flight.topics["sensor_combined", 0], runs.imu_rows),
+        arrivals=arrivals,
+        **{name: one.samples for name, one in aiding.items()},
+        air_density=aiding["baro"].beside,
+        range_limits=aiding["range"].beside,
+        flow_limits=aiding["flow"].beside,
+        system_flags=system_flags,
+        command=command,
+    )
+    changes = tuple(
+        (int(np.searchsorted(runs.timestamp, change.timestamp)), change) for change in flight.parameters.changed
+    )
+    return EstimatorInputs(flight.name, runs.mode, arrays, changes)
+
+
+def _imu_rows(table: TopicTable, chosen: np.ndarray) -> np.ndarray:
+    """Chosen rows of `sensor_combined` as IMU_ROW; the wide samples exist of some at a time."""
+    rows = np.zeros(len(chosen), IMU_ROW)
+    for first in range(0, len(chosen), IMU_ROWS_AT_ONCE):
+        part = slice(first, first + IMU_ROWS_AT_ONCE)
+        samples = convert.imu_samples(select_rows(table, chosen[part]))
+        for name in IMU_ROW.names or ():
+            rows[name][part] = samples[name]
+    return rows
+
+
+def _bias_resets(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndarray]:
+    """Runs at which the accelerometer or gyro in use, or its calibration, changes."""
+    imu = flight.topics["sensor_combined", 0]
+    selection = flight.topic("sensor_selection")
+    resets = []
+    for sensor in ("accel", "gyro"):
+        count = convert.column(imu, f"{sensor}_calibration_count", 0.0)[runs.imu_rows]
+        reset = convert.changed_since_previous(count, 0.0)
+        if selection is not None and f"{sensor}_device_id" in selection:
+            newest = runs.newest_message("sensor_selection", selection["timestamp"])
+            device = selection[f"{sensor}_device_id"].astype(np.int64)
+            seen = np.flatnonzero(newest >= 0)
+            reset[seen] |= convert.changed_since_previous(device[newest[seen]], 0.0)
+        resets.append(reset)
+    return resets[0], resets[1]
+
+
+def _carried(flight: Flight, runs: RunSchedule, topic: str) -> tuple[np.ndarray, np.ndarray]:
+    """For each run: row of the newest message so far (-1 before the first), and whether it is new."""
+    table = flight.topic(topic)
+    if table is None or not len(table["timestamp"]):
+        nothing = np.full(len(runs.timestamp), -1)
+        return nothing, nothing >= 0
+    newest = runs.newest_message(topic, table["timestamp"])
+    return np.maximum.accumulate(newest), newest >= 0
+
+
+def _system_flags(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
+    """One sample whenever `vehicle_status` or `vehicle_land_detected` is new; messages over 3 s old are ignored."""
+    status_row, status_new = _carried(flight, runs, "vehicle_status")
+    land_row, land_new = _carried(flight, runs, "vehicle_land_detected")
+    launch_row, _ = _carried(flight, runs, "launch_detection_status")
+    at = np.flatnonzero(status_new | land_new)
+    arrivals["system_flags"][at] = np.arange(len(at))
+    samples = np.zeros(len(at), SYSTEM_FLAGS_SAMPLE)
+    samples["time_us"] = runs.timestamp[at]
+    status = _fresh(flight, "vehicle_status", status_row[at], runs.timestamp[at])
+    if status is not None:
+        rows, table = status
+        samples["in_air"][rows] = table["arming_state"] == ARMING_STATE_ARMED
+        samples["is_fixed_wing"][rows] = convert_vehicle_type(table) == VEHICLE_TYPE_FIXED_WING
+    land = _fresh(flight, "vehicle_land_detected", land_row[at], runs.timestamp[at])
+    if land is not None:
+        rows, table = land
+        samples["at_rest"][rows] = convert.column(table, "at_rest", 0.0) > 0
+        samples["in_air"][rows] = convert.column(table, "landed", 0.0) == 0
+        samples["gnd_effect"][rows] = convert.column(table, "in_ground_effect", 0.0) > 0
+    launch = _fresh(flight, "launch_detection_status", launch_row[at], runs.timestamp[at])
+    if launch is not None:
+        rows, table = launch
+        samples["constant_pos"][rows] = table["launch_detection_state"] == LAUNCH_STATE_WAITING
+    return samples
+
+
+def convert_vehicle_type(table):  # type: ignore[no-untyped-def]
+    """`vehicle_type` of `vehicle_status`; releases before it existed say `is_rotary_wing`."""
+    if "vehicle_type" in table:
+        return table["vehicle_type"]
+    return np.where(convert.column(table, "is_rotary_wing", 1.0) > 0, 1, VEHICLE_TYPE_FIXED_WING)
+
+
+def _fresh(flight: Flight, topic: str, rows: np.ndarray, now: np.ndarray):  # type: ignore[no-untyped-def]
+    """(which samples, the message of each) for messages at most 3 s old; None without the topic."""
+    table = flight.topic(topic)
+    if table is None or not len(table["timestamp"]):
+        return None
+    fresh = (rows >= 0) & (now < table["timestamp"].astype(np.int64)[rows] + STATUS_MAX_AGE_US)
+    return np.flatnonzero(fresh), {name: values[rows[fresh]] for name, values in table.items()}
+
+
+def _commands(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
+    """Commands that move the estimator's origin, position or wind."""
+    table = flight.topic("vehicle_command")
+    if table is None:
+        return np.zeros(0, COMMAND)
+    commands = np.zeros(len(table["timestamp"]), COMMAND)
+    commands["timestamp"] = table["timestamp"]
+    commands["command"] = table["command"]
+    for i in range(7):
+        commands["param"][:, i] = convert.column(table, f"param{i + 1}")
+    relevant = np.isin(commands["command"], ESTIMATOR_COMMANDS)
+    arrivals["command"] = only_usable(runs.newest_message("vehicle_command", table["timestamp"]), relevant)
+    return commands

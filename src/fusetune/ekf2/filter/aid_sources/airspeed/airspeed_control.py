@@ -1,0 +1,98 @@
+"""True airspeed: when it is fused, and which wind or velocity it starts from.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/airspeed/airspeed_fusion.cpp`.
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_fusion import fuse_airspeed, update_airspeed
+from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_resets import (
+    reset_vel_using_airspeed,
+    reset_wind_using_airspeed,
+)
+from fusetune.ekf2.filter.common.state import WIND
+from fusetune.ekf2.filter.common.timing import is_recent, is_timed_out
+from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
+
+WIND_TIMEOUT_US = 10_000_000
+DATA_STOPPED_US = 1_000_000
+
+
+@kernel
+def control_air_data_fusion(ekf, params):
+    """Start, continue or stop airspeed, and give up the wind when nothing has observed it for 10 s."""
+    aid = ekf.aid.airspeed
+    airspeed_timed_out = is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US)
+    sideslip_timed_out = is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, WIND_TIMEOUT_US)
+    if ekf.cs.fake_pos or (airspeed_timed_out and sideslip_timed_out and int(params.EKF2_DRAG_CTRL) == 0):
+        ekf.cs.wind = False
+    if ekf.cs.wind and ekf.wind.external_init:
+        ekf.wind.external_init = False
+
+    _assume_yaw_estimator_airspeed(ekf, params)
+    if params.EKF2_ARSP_THR <= 0.0:
+        stop_airspeed_fusion(ekf)
+    elif ekf.airspeed_data_ready:
+        _use_airspeed_sample(ekf, params)
+    elif ekf.cs.fuse_aspd and not is_recent(ekf, ekf.airspeed_sample.time_us, DATA_STOPPED_US):
+        stop_airspeed_fusion(ekf)
+
+
+@kernel
+def _assume_yaw_estimator_airspeed(ekf, params):
+    """While no airspeed is fused, the yaw estimator of a fixed wing compensates turns by an assumed one."""
+    if ekf.cs.fixed_wing:
+        if not ekf.cs.in_air or ekf.cs.vehicle_at_rest:
+            ekf.gsf.true_airspeed = 0.0
+        elif not ekf.cs.fuse_aspd:
+            ekf.gsf.true_airspeed = params.EKF2_GSF_TAS
+
+
+@kernel
+def _use_airspeed_sample(ekf, params):
+    aid, sample = ekf.aid.airspeed, ekf.airspeed_sample
+    update_airspeed(ekf, params)
+    ekf.reject.airspeed = aid.innovation_rejected
+    continuing_conditions_passing = ekf.cs.in_air and not ekf.cs.fake_pos
+    is_significant = sample.true_airspeed > params.EKF2_ARSP_THR
+    is_consistent = 0.0 < aid.test_ratio[0] < 1.0
+    starting_conditions_passing = (
+        continuing_conditions_passing
+        and is_significant
+        and (is_consistent or not ekf.cs.wind or ekf.cs.inertial_dead_reckoning)
+    )
+    if ekf.cs.fuse_aspd:
+        if not continuing_conditions_passing:
+            stop_airspeed_fusion(ekf)
+            return
+        if is_significant:
+            fuse_airspeed(ekf, params)
+        ekf.gsf.true_airspeed = sample.true_airspeed
+        if is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US):
+            stop_airspeed_fusion(ekf)
+    elif starting_conditions_passing:
+        _start_airspeed(ekf, params, is_consistent)
+
+
+@kernel
+def _start_airspeed(ekf, params, is_consistent):
+    largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
+    wind_unknown = math.hypot(ekf.P[WIND, WIND], ekf.P[WIND + 1, WIND + 1]) > largest
+    if ekf.cs.inertial_dead_reckoning and not is_consistent:
+        reset_vel_using_airspeed(ekf, params)
+    elif not ekf.wind.external_init and (not ekf.cs.wind or wind_unknown):
+        reset_wind_using_airspeed(ekf, params)
+        ekf.aid.airspeed.time_last_fuse = ekf.time_delayed_us
+    ekf.cs.wind = True
+    ekf.cs.fuse_aspd = True
+
+
+@kernel
+def stop_airspeed_fusion(ekf):
+    """Leave airspeed; the yaw estimator goes without."""
+    if ekf.cs.fuse_aspd:
+        ekf.cs.fuse_aspd = False
+        ekf.gsf.true_airspeed = np.nan

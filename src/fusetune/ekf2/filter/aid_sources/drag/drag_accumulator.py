@@ -1,0 +1,45 @@
+"""Mean of the specific force along body X and Y over a few IMU samples, as drag observation.
+
+Mirrors `setDragData` of PX4 v1.16's `estimator_interface.cpp`, which runs for every raw IMU sample.
+"""
+
+from fusetune.ekf2.compiled.kernel import kernel
+
+MIN_SAMPLES_PER_MEAN = 5
+
+
+@kernel
+def _restart(drag):
+    drag.sample_count = 0
+    drag.delta_vel_sum[0] = 0.0
+    drag.delta_vel_sum[1] = 0.0
+    drag.time_sum_us = 0
+    drag.dt_sum = 0.0
+
+
+@kernel
+def accumulate_drag(ekf, params, imu, imu_buffer_length, obs_buffer_length):
+    """Take in one raw IMU sample; return whether `ekf.drag.produced` holds a new mean to be buffered.
+
+    A clipped sample discards what had been summed up. The mean carries the mean time of its samples (µs).
+    """
+    if int(params.EKF2_DRAG_CTRL) <= 0:
+        return False
+    ekf.drag_buffer_exists = True
+    drag = ekf.drag
+    if imu.delta_vel_clipping[0] != 0 or imu.delta_vel_clipping[1] != 0 or imu.delta_vel_clipping[2] != 0:
+        _restart(drag)
+        return False
+    drag.sample_count += 1
+    drag.delta_vel_sum[0] += imu.delta_vel[0]
+    drag.delta_vel_sum[1] += imu.delta_vel[1]
+    drag.time_sum_us += imu.time_us
+    drag.dt_sum += imu.delta_vel_dt
+    buffer_ratio = (imu_buffer_length + obs_buffer_length - 1) // obs_buffer_length
+    if drag.sample_count < max(buffer_ratio, MIN_SAMPLES_PER_MEAN):
+        return False
+    drag.produced.accel_xy[0] = drag.delta_vel_sum[0] / drag.dt_sum
+    drag.produced.accel_xy[1] = drag.delta_vel_sum[1] / drag.dt_sum
+    drag.produced.time_us = drag.time_sum_us // drag.sample_count
+    _restart(drag)
+    return True

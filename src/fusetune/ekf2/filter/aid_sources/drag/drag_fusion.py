@@ -1,0 +1,140 @@
+"""Wind of a multirotor from the drag that it feels along body X and Y.
+
+With b = Rᵀ (v - w) the specific force is h_i = -½ ρ b_i |b| / C_i - m b_i: bluff body drag with the ballistic
+coefficients C (`EKF2_BCOEF_X`, `_Y`, kg/m²) and momentum drag of the propellers (`EKF2_MCOEF`, 1/s, times √(ρ/ρ₀) as
+momentum theory has it for the mass flow of a hover). ∂b/∂θ = Rᵀ [v - w]×, ∂b/∂v = Rᵀ, ∂b/∂w = -Rᵀ.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/drag/drag_fusion.cpp`. Both axes are predicted from the state before the first is
+fused; the measurement follows the accelerometer bias. The status counts as fused at every sample.
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
+from fusetune.ekf2.filter.covariance import reset_wind_cov
+from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+
+AIR_DENSITY_SEA_LEVEL = 1.225
+MIN_AIR_DENSITY = 0.1
+MIN_OBSERVATION_VARIANCE = 0.5
+DRAG_GATE = 5.0
+FLT_EPSILON = float(np.finfo(np.float32).eps)
+
+
+@kernel
+def momentum_drag_coefficient(ekf, params):
+    """Momentum drag (1/s) at the present air density."""
+    rho = max(ekf.air_density, MIN_AIR_DENSITY)
+    return max(params.EKF2_MCOEF * math.sqrt(rho / AIR_DENSITY_SEA_LEVEL), 0.0)
+
+
+@kernel
+def _air_velocity_body(ekf):
+    R = ekf.R_to_earth
+    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
+    return (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )
+
+
+@kernel
+def inverse_ballistic_coefficients(params, bx, by):
+    """1/C (m²/kg) of both axes for air coming along (bx, by); an axis with C ≤ 1 has none.
+
+    Where both are given, drag is an ellipse over the direction of the air, the same for both axes.
+    """
+    inverse_x = 1.0 / params.EKF2_BCOEF_X if params.EKF2_BCOEF_X > 1.0 else 0.0
+    inverse_y = 1.0 / params.EKF2_BCOEF_Y if params.EKF2_BCOEF_Y > 1.0 else 0.0
+    if inverse_x > 0.0 and inverse_y > 0.0:
+        speed = math.sqrt(bx * bx + by * by)
+        inverse_x = math.sqrt((inverse_x * bx / speed) ** 2 + (inverse_y * by / speed) ** 2)
+        inverse_y = inverse_x
+    return inverse_x, inverse_y
+
+
+@kernel
+def predict_drag(ekf, axis, rho, inverse_bcoef, mcoef):
+    """Specific force (m/s²) along body axis 0 or 1."""
+    b = _air_velocity_body(ekf)
+    speed = math.sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2])
+    return -0.5 * inverse_bcoef * rho * b[axis] * speed - mcoef * b[axis]
+
+
+@kernel
+def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
+    """Write the derivative of `predict_drag`, at a given coefficient, into `H` (24,)."""
+    R = ekf.R_to_earth
+    x, y, z = ekf.vel[0] - ekf.wind_vel[0], ekf.vel[1] - ekf.wind_vel[1], ekf.vel[2]
+    b = _air_velocity_body(ekf)
+    speed = math.sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2] + FLT_EPSILON)
+    bluff = -0.5 * rho * inverse_bcoef
+    # by the air velocity: along the axis itself, and along the air through the speed; the latter turns with the air,
+    # so the attitude error acts through the first alone
+    own = bluff * speed - mcoef
+    through_speed = bluff * b[axis] / speed
+    ax, ay, az = own * R[0, axis], own * R[1, axis], own * R[2, axis]
+    clear_jacobian(H)
+    H[ATTITUDE] = ay * z - az * y
+    H[ATTITUDE + 1] = az * x - ax * z
+    H[ATTITUDE + 2] = ax * y - ay * x
+    H[VELOCITY] = ax + through_speed * x
+    H[VELOCITY + 1] = ay + through_speed * y
+    H[VELOCITY + 2] = az + through_speed * z
+    H[WIND] = -H[VELOCITY]
+    H[WIND + 1] = -H[VELOCITY + 1]
+
+
+@kernel
+def control_drag_fusion(ekf, params):
+    """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
+    if int(params.EKF2_DRAG_CTRL) <= 0 or not ekf.drag_buffer_exists:
+        return
+    if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
+        ekf.cs.wind = True
+        if not ekf.wind.external_init:
+            reset_wind_cov(ekf)
+    if ekf.drag_data_ready:
+        _fuse_drag(ekf, params)
+
+
+@kernel
+def _fuse_drag(ekf, params):
+    aid, drag = ekf.aid.drag, ekf.drag
+    using_mcoef = params.EKF2_MCOEF > 0.001
+    using_bcoef = (params.EKF2_BCOEF_X > 1.0, params.EKF2_BCOEF_Y > 1.0)
+    if not using_bcoef[0] and not using_bcoef[1] and not using_mcoef:
+        return
+    R_acc = max(params.EKF2_DRAG_NOISE, MIN_OBSERVATION_VARIANCE)
+    rho = max(ekf.air_density, MIN_AIR_DENSITY)
+    mcoef = momentum_drag_coefficient(ekf, params)
+    b = _air_velocity_body(ekf)
+    inverse_bcoef = inverse_ballistic_coefficients(params, b[0], b[1])
+    predicted = (
+        predict_drag(ekf, 0, rho, inverse_bcoef[0], mcoef),
+        predict_drag(ekf, 1, rho, inverse_bcoef[1], mcoef),
+    )
+    for axis in range(2):
+        compute_drag_jacobian(ekf, axis, rho, inverse_bcoef[axis], mcoef, drag.H[axis])
+    for axis in range(2):
+        measured = ekf.drag_sample.accel_xy[axis] - ekf.accel_bias[axis]
+        innovation = predicted[axis] - measured
+        innovation_variance = compute_innovation_variance(ekf, drag.H[axis], R_acc)
+        set_axis(aid, axis, measured, R_acc, innovation, innovation_variance)
+        if not using_bcoef[axis] and not using_mcoef:
+            continue
+        if innovation_variance < R_acc:
+            return
+        test_ratio = innovation * innovation / (DRAG_GATE * DRAG_GATE * innovation_variance)
+        if ekf.cs.in_air and ekf.cs.wind and not ekf.cs.fake_pos and test_ratio < 1.0:
+            compute_kalman_gain(ekf, drag.H[axis], innovation_variance, ekf.scratch.K)
+            measurement_update(ekf, params, ekf.scratch.K, drag.H[axis], R_acc, innovation)
+    update_aid_source_status(ekf, aid, 2, ekf.drag_sample.time_us, DRAG_GATE)
+    aid.fused = True
+    aid.time_last_fuse = ekf.time_delayed_us

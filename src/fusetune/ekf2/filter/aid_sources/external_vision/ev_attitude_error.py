@@ -1,0 +1,55 @@
+"""Filtered rotation from the frame of external vision to NED."""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.numerics.rotations import (
+    quat_multiply,
+    quat_normalise,
+    quat_to_dcm,
+    quat_to_rotation_vector,
+    rotation_vector_to_quat,
+)
+
+FILTER_INTERVAL_S = 0.01
+FILTER_TIME_CONSTANT_S = 10.0
+FILTER_ALPHA = FILTER_INTERVAL_S / (FILTER_INTERVAL_S + FILTER_TIME_CONSTANT_S)
+"""PX4 sets the gain once, from the nominal update interval."""
+
+
+@kernel
+def update_ev_attitude_error_filter(ekf, ev_reset):
+    """Filter the rotation between the vision attitude and the estimate; restart it when vision was reset."""
+    error = ekf.scratch.quat_error
+    quat = ekf.ev_sample.quat
+    error[0], error[1], error[2], error[3] = quat[0], -quat[1], -quat[2], -quat[3]
+    quat_multiply(ekf.q, error, error)
+    quat_normalise(error)
+    for i in range(4):
+        if not math.isfinite(error[i]):
+            return
+    if not ekf.ev.q_error_initialized or ev_reset:
+        for i in range(4):
+            ekf.ev.q_error_filt[i] = error[i]
+        ekf.ev.q_error_initialized = True
+    else:
+        _step_towards(ekf.ev.q_error_filt, error, ekf.scratch.quat_before)
+
+
+@kernel
+def _step_towards(q, target, work):
+    """Turn `q` by the fraction `FILTER_ALPHA` of the shortest rotation to `target`."""
+    work[0], work[1], work[2], work[3] = q[0], -q[1], -q[2], -q[3]
+    quat_multiply(work, target, work)
+    if work[0] < 0.0:
+        for i in range(4):
+            work[i] = -work[i]
+    x, y, z = quat_to_rotation_vector(work)
+    work[0], work[1], work[2], work[3] = rotation_vector_to_quat(FILTER_ALPHA * x, FILTER_ALPHA * y, FILTER_ALPHA * z)
+    quat_multiply(q, work, q)
+
+
+@kernel
+def refresh_ev_rotation(ekf):
+    """Write the matrix of the filtered rotation into `ekf.ev.R_ev_to_ekf`."""
+    quat_to_dcm(ekf.ev.q_error_filt, ekf.ev.R_ev_to_ekf)

@@ -1,0 +1,75 @@
+"""External vision: one sample offers yaw, velocity, position and height, each with its own state machine.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/external_vision/ev_control.cpp`.
+"""
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_UNKNOWN
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_attitude_error import update_ev_attitude_error_filter
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_height_control import (
+    control_ev_height_fusion,
+    stop_ev_hgt_fusion,
+)
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_position_control import (
+    control_ev_pos_fusion,
+    stop_ev_pos_fusion,
+)
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_velocity_control import (
+    control_ev_vel_fusion,
+    stop_ev_vel_fusion,
+)
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_yaw_control import control_ev_yaw_fusion, stop_ev_yaw_fusion
+from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import predict_height_bias
+from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import predict_position_bias
+from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_EV, POSITION_REF_EV
+from fusetune.ekf2.filter.common.timing import EV_MAX_INTERVAL, is_newer_than_latest, is_timed_out
+
+
+@kernel
+def _assume_missing_frames(sample):
+    """Of a sample without position or velocity PX4 takes the frame to be local FRD or body FRD."""
+    if sample.pos_frame == EV_FRAME_UNKNOWN:
+        sample.pos_frame = EV_FRAME_FRD
+    if sample.vel_frame == EV_FRAME_UNKNOWN:
+        sample.vel_frame = EV_FRAME_BODY_FRD
+
+
+@kernel
+def _are_starting_conditions_passing(ekf, minimum_quality):
+    """Whether samples come regularly, and this, the one before and the newest are good enough."""
+    ev, sample = ekf.ev, ekf.ev_sample
+    quality = min(sample.quality, ev.prev.quality, ev.newest_quality)
+    return (
+        (minimum_quality <= 0 or quality >= minimum_quality)
+        and sample.time_us - ev.prev.time_us < EV_MAX_INTERVAL
+        and is_newer_than_latest(ekf, ev.time_last_buffer_push_us, EV_MAX_INTERVAL)
+    )
+
+
+@kernel
+def control_external_vision_fusion(ekf, params):
+    """Use the external vision sample due now, if there is one; stop when none has come for two intervals."""
+    ev, sample = ekf.ev, ekf.ev_sample
+    predict_position_bias(ekf, ekf.ev_pos_b_est, POSITION_REF_EV, ekf.dt_ekf_avg)
+    predict_height_bias(ekf, ekf.ev_hgt_b_est, HEIGHT_REF_EV, ekf.dt_ekf_avg)
+    if ekf.ev_data_ready:
+        _assume_missing_frames(sample)
+        minimum_quality = int(params.EKF2_EV_QMIN)
+        ev_reset = sample.reset_counter != ev.prev.reset_counter
+        quality_sufficient = minimum_quality <= 0 or sample.quality >= minimum_quality
+        starting = _are_starting_conditions_passing(ekf, minimum_quality)
+        update_ev_attitude_error_filter(ekf, ev_reset)
+        control_ev_yaw_fusion(ekf, params, starting, ev_reset, quality_sufficient)
+        control_ev_vel_fusion(ekf, params, starting, ev_reset, quality_sufficient)
+        control_ev_pos_fusion(ekf, params, starting, ev_reset, quality_sufficient)
+        control_ev_height_fusion(ekf, params, starting, ev_reset, quality_sufficient)
+        if quality_sufficient:
+            ev.prev = sample
+    elif (ekf.cs.ev_pos or ekf.cs.ev_vel or ekf.cs.ev_yaw or ekf.cs.ev_hgt) and is_timed_out(
+        ekf, ev.prev.time_us, 2 * EV_MAX_INTERVAL
+    ):
+        stop_ev_pos_fusion(ekf)
+        stop_ev_vel_fusion(ekf)
+        stop_ev_yaw_fusion(ekf)
+        stop_ev_hgt_fusion(ekf)
+        ev.q_error_initialized = False

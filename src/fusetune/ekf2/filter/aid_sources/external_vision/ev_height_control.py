@@ -1,0 +1,173 @@
+"""Height of external vision, as the height reference or beside another with its bias estimated.
+
+Mirrors PX4 v1.16 `EKF/aid_sources/external_vision/ev_height_control.cpp`. Heights are down positions (m).
+"""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_attitude_error import refresh_ev_rotation
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
+    EV_CTRL_VEL,
+    EV_CTRL_VPOS,
+    MIN_NOISE,
+    rotate,
+    rotate_variance,
+    sensor_offset_body,
+    sensor_velocity_body,
+)
+from fusetune.ekf2.filter.bias_estimator.bias_estimator import (
+    reset_bias,
+    set_bias,
+    set_max_state_noise,
+    set_process_noise_spectral_density,
+)
+from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import fuse_height_bias
+from fusetune.ekf2.filter.common.conditions import is_height_reset_required
+from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_EV, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.filter.common.state import POSITION
+from fusetune.ekf2.filter.common.timing import HGT_FUSION_TIMEOUT_MAX, is_timed_out
+from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
+from fusetune.ekf2.filter.resets.state_resets import (
+    reset_altitude_to,
+    reset_vertical_velocity_to,
+    reset_vertical_velocity_to_zero,
+)
+
+BIAS_NOISE_SPECTRAL_DENSITY = 0.13
+
+
+@kernel
+def _measured_height(ekf, params):
+    """Down position (m) of the IMU by external vision, and its variance."""
+    sample = ekf.ev_sample
+    position, variance = sample.pos[2], sample.position_var[2]
+    if not (ekf.cs.ev_yaw and ekf.cs.ev_pos):
+        # not working entirely in the vision frame
+        refresh_ev_rotation(ekf)
+        R = ekf.ev.R_ev_to_ekf
+        position = rotate(R, 2, sample.pos[0], sample.pos[1], sample.pos[2])
+        variance = max(rotate_variance(R, 2, sample.position_var), sample.orientation_var[0], sample.orientation_var[1])
+    variance = max(variance, params.EKF2_EVP_NOISE * params.EKF2_EVP_NOISE, MIN_NOISE * MIN_NOISE)
+    if ekf.cs.gps_hgt:
+        variance = max(variance, params.EKF2_GPS_P_NOISE * params.EKF2_GPS_P_NOISE)
+    px, py, pz = sensor_offset_body(params)
+    return position - rotate(ekf.R_to_earth, 2, px, py, pz), variance
+
+
+@kernel
+def _set_bias_to_difference(ekf, measurement):
+    """Let the measurement agree with the estimate."""
+    set_bias(ekf.ev_hgt_b_est, measurement + ekf.gpos_alt)
+
+
+@kernel
+def _fuse_ev_hgt_bias(ekf, measurement, variance):
+    bias = ekf.ev_hgt_b_est
+    set_max_state_noise(bias, math.sqrt(variance))
+    set_process_noise_spectral_density(bias, BIAS_NOISE_SPECTRAL_DENSITY)
+    fuse_height_bias(ekf, bias, HEIGHT_REF_EV, measurement + ekf.gpos_alt, variance + ekf.P[POSITION + 2, POSITION + 2])
+
+
+@kernel
+def control_ev_height_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
+    """Start, continue, reset or stop the height of external vision for one sample."""
+    bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
+    measurement, variance = _measured_height(ekf, params)
+    measurement_valid = math.isfinite(measurement) and math.isfinite(variance)
+    update_vertical_position_aid_status(
+        ekf,
+        aid,
+        ekf.ev_sample.time_us,
+        measurement - bias.bias,
+        variance + bias.bias_var,
+        max(params.EKF2_EVP_GATE, 1.0),
+    )
+    if measurement_valid and quality_sufficient:
+        _fuse_ev_hgt_bias(ekf, measurement, variance)
+    continuing_conditions_passing = (int(params.EKF2_EV_CTRL) & EV_CTRL_VPOS) != 0 and measurement_valid
+    if ekf.cs.ev_hgt:
+        if continuing_conditions_passing:
+            _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_sufficient)
+        else:
+            stop_ev_hgt_fusion(ekf)
+    elif common_starting_conditions_passing and continuing_conditions_passing:
+        _start_ev_hgt(ekf, params, measurement, variance)
+
+
+@kernel
+def _reset_height_to_ev(ekf, params, measurement, variance):
+    ekf.events.reset_hgt_to_ev = True
+    reset_altitude_to(ekf, params, -measurement, variance)
+
+
+@kernel
+def _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_sufficient):
+    bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
+    if ev_reset:
+        if not quality_sufficient:
+            stop_ev_hgt_fusion(ekf)
+            return
+        if ekf.height_sensor_ref == HEIGHT_REF_EV:
+            _reset_height_to_ev(ekf, params, measurement, variance)
+            reset_bias(bias)
+        else:
+            _set_bias_to_difference(ekf, measurement)
+        aid.time_last_fuse = ekf.time_delayed_us
+    elif quality_sufficient:
+        fuse_vertical_position(ekf, params, aid)
+    else:
+        aid.innovation_rejected = True
+
+    if is_height_reset_required(ekf) and quality_sufficient:
+        # all height sources are failing
+        _reset_height_to_ev(ekf, params, measurement - bias.bias, variance)
+        _set_bias_to_difference(ekf, measurement)
+        _reset_vertical_velocity(ekf, params)
+        aid.time_last_fuse = ekf.time_delayed_us
+    elif is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX):
+        stop_ev_hgt_fusion(ekf)
+
+
+@kernel
+def _reset_vertical_velocity(ekf, params):
+    """To that of external vision where it is to be used, else to rest."""
+    sample, R = ekf.ev_sample, ekf.R_to_earth
+    vel = sample.vel
+    finite = math.isfinite(vel[0]) and math.isfinite(vel[1]) and math.isfinite(vel[2])
+    if not finite or (int(params.EKF2_EV_CTRL) & EV_CTRL_VEL) == 0:
+        reset_vertical_velocity_to_zero(ekf, params)
+        return
+    ox, oy, oz = sensor_velocity_body(ekf, params)
+    min_variance = params.EKF2_EVV_NOISE * params.EKF2_EVV_NOISE
+    if sample.vel_frame == EV_FRAME_BODY_FRD:
+        velocity = rotate(R, 2, vel[0] - ox, vel[1] - oy, vel[2] - oz)
+        variance = rotate_variance(R, 2, sample.velocity_var)
+    else:
+        velocity = vel[2] - rotate(R, 2, ox, oy, oz)
+        variance = sample.velocity_var[2]
+    reset_vertical_velocity_to(ekf, params, velocity, max(variance, min_variance))
+
+
+@kernel
+def _start_ev_hgt(ekf, params, measurement, variance):
+    if int(params.EKF2_HGT_REF) == HEIGHT_REF_EV:
+        _reset_height_to_ev(ekf, params, measurement, variance)
+        ekf.height_sensor_ref = HEIGHT_REF_EV
+        reset_bias(ekf.ev_hgt_b_est)
+    else:
+        _set_bias_to_difference(ekf, measurement)
+    ekf.aid.ev_hgt.time_last_fuse = ekf.time_delayed_us
+    ekf.ev_hgt_b_est.fusion_active = True
+    ekf.cs.ev_hgt = True
+
+
+@kernel
+def stop_ev_hgt_fusion(ekf):
+    """Leave external vision as height source, and as height reference."""
+    if ekf.cs.ev_hgt:
+        if ekf.height_sensor_ref == HEIGHT_REF_EV:
+            ekf.height_sensor_ref = HEIGHT_REF_UNKNOWN
+        ekf.ev_hgt_b_est.fusion_active = False
+        ekf.cs.ev_hgt = False

@@ -1,0 +1,136 @@
+"""What GNSS does at each update: checks, yaw estimator, heading, velocity and position, in the order of PX4 v1.16."""
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_checks import check_gnss_sample
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import stop_gps_hgt_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_position import (
+    control_gnss_pos_fusion,
+    stop_gnss_pos_fusion,
+    update_gnss_position,
+)
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_velocity import (
+    control_gnss_vel_fusion,
+    stop_gnss_vel_fusion,
+    update_gnss_velocity,
+)
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion, stop_gnss_yaw_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import (
+    control_gnss_yaw_estimator,
+    is_yaw_failure,
+    try_yaw_emergency_reset,
+)
+from fusetune.ekf2.filter.common.timing import (
+    GNSS_MAX_INTERVAL,
+    RESET_TIMEOUT_MAX,
+    is_newer_than_latest,
+    is_recent,
+    is_timed_out,
+)
+from fusetune.ekf2.filter.yaw_estimator.gaussian_sum import predict_gsf
+from fusetune.ekf2.filter.yaw_estimator.gsf_memory import reset_gsf, set_gyro_bias
+from fusetune.ekf2.replay.withholding import pretend_gnss_fused
+
+YAW_EMERGENCY_DELAY = 1_000_000
+"""How long (µs) horizontal velocity must have been rejected before the yaw is blamed."""
+
+
+@kernel
+def control_gnss_fusion(ekf, params):
+    """Run GNSS for one update, with the sample in `ekf.gnss_sample` if `ekf.gnss_data_ready`.
+
+    A sample that fails the checks is not used: `ekf.gnss_data_ready` is cleared, for the height, too.
+    """
+    if not ekf.gnss_buffer_exists or int(params.EKF2_GPS_CTRL) == 0:
+        stop_gnss_fusion(ekf)
+        return
+
+    _run_yaw_estimator(ekf)
+    ekf.gnss.intermittent = not is_newer_than_latest(ekf, ekf.gnss_newest_time_us, 2 * GNSS_MAX_INTERVAL)
+
+    if ekf.gnss_data_ready:
+        if not check_gnss_sample(ekf, params, ekf.gnss_sample):
+            ekf.gnss_data_ready = False
+            if _uses_gnss(ekf) and is_timed_out(ekf, ekf.gnss.last_pass_us, RESET_TIMEOUT_MAX):
+                stop_gnss_fusion(ekf)
+        update_gnss_position(ekf, params, ekf.gnss_sample)
+        update_gnss_velocity(ekf, params, ekf.gnss_sample)
+    elif _uses_gnss(ekf) and not is_newer_than_latest(ekf, ekf.gnss_newest_time_us, RESET_TIMEOUT_MAX):
+        stop_gnss_fusion(ekf)
+
+    if ekf.withheld.gnss:
+        pretend_gnss_fused(ekf)
+    elif ekf.gnss_data_ready:
+        control_gnss_yaw_fusion(ekf, params, ekf.gnss_sample)
+        control_gnss_yaw_estimator(ekf, params)
+        force_reset = _is_reset_due(ekf, params)
+        control_gnss_vel_fusion(ekf, params, force_reset)
+        control_gnss_pos_fusion(ekf, params, force_reset)
+
+
+@kernel
+def _uses_gnss(ekf):
+    return ekf.cs.gnss_vel or ekf.cs.gnss_pos
+
+
+@kernel
+def _run_yaw_estimator(ekf):
+    inhibited = ekf.gyro_bias_inhibit[0] or ekf.gyro_bias_inhibit[1] or ekf.gyro_bias_inhibit[2]
+    if not inhibited:
+        set_gyro_bias(ekf.gsf, ekf.gyro_bias, ekf.cs.vehicle_at_rest)
+    predict_gsf(ekf.gsf, ekf.imu_delayed, ekf.cs.in_air and not ekf.cs.vehicle_at_rest)
+
+
+@kernel
+def _is_reset_due(ekf, params):
+    """Whether velocity and position are to be reset; decided once for both, since resetting one would hide the need.
+
+    A yaw found wrong in flight is put right here, and calls for a reset of both.
+    """
+    if not _uses_gnss(ekf):
+        return False
+    due = should_reset_gnss_fusion(ekf, params)
+    if (
+        ekf.cs.in_air
+        and is_yaw_failure(ekf)
+        and is_timed_out(ekf, ekf.time_last_hor_vel_fuse, YAW_EMERGENCY_DELAY)
+        and ekf.time_last_hor_vel_fuse > ekf.time_last_on_ground
+    ):
+        due = try_yaw_emergency_reset(ekf, params)
+    return due
+
+
+@kernel
+def should_reset_gnss_fusion(ekf, params):
+    """Whether nothing has bounded the horizontal drift for 7 s, or no position has for 14 s."""
+    pos_timed_out = is_timed_out(ekf, ekf.time_last_hor_pos_fuse, RESET_TIMEOUT_MAX)
+    vel_timed_out = is_timed_out(ekf, ekf.time_last_hor_vel_fuse, RESET_TIMEOUT_MAX)
+    aiding_timed_out = pos_timed_out and vel_timed_out
+    if aiding_timed_out and ekf.cs.opt_flow:
+        if is_recent(ekf, ekf.aid.optical_flow.time_last_fuse, RESET_TIMEOUT_MAX):
+            aiding_timed_out = False
+    position_lost = (
+        is_timed_out(ekf, ekf.time_last_hor_pos_fuse, 2 * RESET_TIMEOUT_MAX)
+        and int(params.EKF2_GPS_CTRL) & GPS_CTRL_HPOS != 0
+    )
+    failing_since_take_off = (
+        ekf.cs.in_air
+        and vel_timed_out
+        and pos_timed_out
+        and ekf.time_last_hor_vel_fuse > ekf.time_last_on_ground
+        and ekf.time_last_hor_pos_fuse > ekf.time_last_on_ground
+    )
+    return aiding_timed_out or position_lost or failing_since_take_off
+
+
+@kernel
+def stop_gnss_fusion(ekf):
+    """Stop everything that GNSS gives."""
+    if _uses_gnss(ekf):
+        ekf.gnss.last_fail_us = 0
+        ekf.gnss.last_pass_us = 0
+    stop_gnss_vel_fusion(ekf)
+    stop_gnss_pos_fusion(ekf)
+    stop_gps_hgt_fusion(ekf)
+    stop_gnss_yaw_fusion(ekf)
+    reset_gsf(ekf.gsf)

@@ -1,0 +1,107 @@
+"""GNSS velocity: observation at the IMU, and its fusion."""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body, rotate_to_earth
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL
+from fusetune.ekf2.filter.common.aid_source_status import (
+    reset_aid_source_status_zero_innovation,
+    set_axis,
+    update_aid_source_status,
+)
+from fusetune.ekf2.filter.common.conditions import is_height_reset_required, is_horizontal_aiding_active
+from fusetune.ekf2.filter.common.state import VELOCITY
+from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_timed_out
+from fusetune.ekf2.filter.resets.state_resets import reset_velocity_to, reset_vertical_velocity_to
+from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
+
+MIN_NOISE = 0.01
+VERTICAL_NOISE_RATIO = 1.5
+
+
+@kernel
+def update_gnss_velocity(ekf, params, sample):
+    """Judge a velocity sample, moved from the antenna to the IMU."""
+    aid = ekf.aid.gnss_vel
+    vel_n, vel_e, vel_d = _velocity_of_antenna_offset(ekf, params)
+    variance = max(sample.sacc, params.EKF2_GPS_V_NOISE, MIN_NOISE) ** 2
+    _set_velocity_axis(ekf, aid, 0, sample.vel[0] - vel_n, variance)
+    _set_velocity_axis(ekf, aid, 1, sample.vel[1] - vel_e, variance)
+    _set_velocity_axis(ekf, aid, 2, sample.vel[2] - vel_d, variance * VERTICAL_NOISE_RATIO**2)
+    gate = max(params.EKF2_GPS_V_GATE, 1.0)
+    update_aid_source_status(ekf, aid, 3, sample.time_us, gate)
+
+    # while the vertical acceleration is bad, an accurate velocity is what can still hold the height: limit, not reject
+    only_vertical_rejected = aid.test_ratio[2] > 1.0 and aid.test_ratio[0] < 1.0 and aid.test_ratio[1] < 1.0
+    relied_on = ekf.fs.bad_acc_vertical and not ekf.withheld.gnss
+    if relied_on and only_vertical_rejected and sample.sacc < params.EKF2_REQ_SACC:
+        limit = gate * math.sqrt(aid.innovation_variance[2])
+        aid.innovation[2] = min(max(aid.innovation[2], -limit), limit)
+        aid.innovation_rejected = False
+
+
+@kernel
+def _velocity_of_antenna_offset(ekf, params):
+    """Velocity (m/s, NED) of the antenna relative to the IMU, from the rotation rate."""
+    x, y, z = antenna_offset_body(params)
+    if x == 0.0 and y == 0.0 and z == 0.0:
+        return 0.0, 0.0, 0.0
+    imu = ekf.imu_delayed
+    p = imu.delta_ang[0] / imu.delta_ang_dt - ekf.gyro_bias[0]
+    q = imu.delta_ang[1] / imu.delta_ang_dt - ekf.gyro_bias[1]
+    r = imu.delta_ang[2] / imu.delta_ang_dt - ekf.gyro_bias[2]
+    return rotate_to_earth(ekf.R_to_earth, q * z - r * y, r * x - p * z, p * y - q * x)
+
+
+@kernel
+def _set_velocity_axis(ekf, aid, axis, velocity, variance):
+    index = VELOCITY + axis
+    set_axis(aid, axis, velocity, variance, ekf.vel[axis] - velocity, ekf.P[index, index] + variance)
+
+
+@kernel
+def control_gnss_vel_fusion(ekf, params, force_reset):
+    """Start, continue or stop fusing GNSS velocity with the sample that has just been judged."""
+    aid = ekf.aid.gnss_vel
+    enabled = int(params.EKF2_GPS_CTRL) & GPS_CTRL_VEL != 0
+    continuing = enabled and ekf.cs.tilt_align and ekf.cs.yaw_align
+    if ekf.cs.gnss_vel:
+        if not continuing:
+            stop_gnss_vel_fusion(ekf)
+            return
+        if force_reset:
+            reset_velocity_to_gnss(ekf, params)
+            return
+        fuse_velocity(ekf, params, aid)
+        if is_height_reset_required(ekf):
+            reset_vertical_velocity_to(ekf, params, aid.observation[2], aid.observation_variance[2])
+    elif continuing and ekf.gnss.checks_passed:
+        ekf.events.starting_gps_fusion = True
+        # another source of horizontal aiding makes a reset unnecessary, unless the yaw has only now become known
+        if (
+            not is_horizontal_aiding_active(ekf)
+            or is_timed_out(ekf, ekf.time_last_hor_vel_fuse, RESET_TIMEOUT_MAX)
+            or not ekf.cs_prev.yaw_align
+        ):
+            reset_velocity_to_gnss(ekf, params)
+        ekf.cs.gnss_vel = True
+
+
+@kernel
+def reset_velocity_to_gnss(ekf, params):
+    """Set the velocity to the last GNSS velocity."""
+    ekf.events.reset_vel_to_gps = True
+    aid = ekf.aid.gnss_vel
+    reset_velocity_to(ekf, params, aid.observation, aid.observation_variance)
+    reset_aid_source_status_zero_innovation(ekf, aid, 3)
+
+
+@kernel
+def stop_gnss_vel_fusion(ekf):
+    """Stop fusing velocity; with position stopped, too, the quality checks start anew."""
+    if ekf.cs.gnss_vel:
+        ekf.cs.gnss_vel = False
+        if not ekf.cs.gnss_pos:
+            ekf.gnss.last_fail_us = 0
+            ekf.gnss.last_pass_us = 0

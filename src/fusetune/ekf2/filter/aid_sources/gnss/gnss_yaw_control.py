@@ -1,0 +1,185 @@
+"""Heading from two GNSS antennas: observation equations and fusion.
+
+With a the unit vector of the antenna baseline in the body frame, turned by the offset ψ₀ from the nose, and
+v = R a in NED, the observed yaw is atan2(v_e, v_n). An attitude error δθ (NED, from the left) moves v by δθ × v.
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import rotate_to_earth
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW
+from fusetune.ekf2.filter.common.aid_source_status import (
+    reset_aid_source_status_zero_innovation,
+    set_axis,
+    update_aid_source_status,
+)
+from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
+from fusetune.ekf2.filter.common.timing import (
+    GNSS_YAW_MAX_INTERVAL,
+    RESET_TIMEOUT_MAX,
+    is_newer_than_latest,
+    is_timed_out,
+)
+from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
+from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.numerics.rotations import wrap_pi
+
+HEADING_NOISE = 0.1
+"""Least standard deviation (rad) of the observed heading."""
+
+STEEP_BASELINE = math.cos(math.radians(30.0))
+WRONG_GYRO_BIAS_TEST_RATIO = 0.2
+GYRO_BIAS_RESET_INTERVAL = 1_000_000
+SINGLE_PRECISION_EPSILON = 1.1920929e-07
+
+
+@kernel
+def predict_gnss_yaw(R, yaw_offset, H):
+    """Predicted antenna yaw (rad); its derivative by the attitude error goes into `H[0:3]`, the rest is zeroed."""
+    v_n, v_e, v_d = rotate_to_earth(R, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
+    # PX4's generated equations keep the arctangent off its singularity by the resolution of single precision
+    v_n += SINGLE_PRECISION_EPSILON if v_n >= 0.0 else -SINGLE_PRECISION_EPSILON
+    squared = v_n * v_n + v_e * v_e
+    H[:] = 0.0
+    H[ATTITUDE] = -v_n * v_d / squared
+    H[ATTITUDE + 1] = -v_e * v_d / squared
+    H[ATTITUDE + 2] = 1.0
+    return math.atan2(v_e, v_n)
+
+
+@kernel
+def gnss_yaw_innovation_variance(P, H, R):
+    """H P Hᵀ + R of a row `H` that is nonzero for the attitude only."""
+    variance = R
+    for i in range(3):
+        for j in range(3):
+            variance += H[ATTITUDE + i] * P[ATTITUDE + i, ATTITUDE + j] * H[ATTITUDE + j]
+    return variance
+
+
+@kernel
+def control_gnss_yaw_fusion(ekf, params, sample):
+    """Start, continue or stop fusing the heading of a GNSS sample."""
+    if int(params.EKF2_GPS_CTRL) & GPS_CTRL_YAW == 0 or ekf.cs.gnss_yaw_fault:
+        stop_gnss_yaw_fusion(ekf)
+        return
+    if not np.isfinite(sample.yaw):
+        if ekf.cs.gnss_yaw and not is_newer_than_latest(ekf, ekf.gnss_yaw_newest_time_us, RESET_TIMEOUT_MAX):
+            stop_gnss_yaw_fusion(ekf)
+        return
+
+    update_gnss_yaw(ekf, params, sample)
+    continuing = ekf.cs.tilt_align
+    if ekf.cs.gnss_yaw:
+        if continuing:
+            _continue_gnss_yaw(ekf, params, sample)
+        else:
+            stop_gnss_yaw_fusion(ekf)
+        return
+    if (
+        continuing
+        and ekf.gnss.checks_passed
+        and not ekf.gnss.intermittent
+        and is_newer_than_latest(ekf, ekf.gnss_yaw_newest_time_us, 2 * GNSS_YAW_MAX_INTERVAL)
+    ):
+        _start_gnss_yaw(ekf, params, sample)
+
+
+@kernel
+def _continue_gnss_yaw(ekf, params, sample):
+    fuse_gnss_yaw(ekf, params, sample.yaw_offset)
+    if is_timed_out(ekf, ekf.aid.gnss_yaw.time_last_fuse, RESET_TIMEOUT_MAX):
+        stop_gnss_yaw_fusion(ekf)
+        # before take-off there is time to align anew rather than trust the present heading
+        if not ekf.cs.in_air:
+            ekf.cs.yaw_align = False
+
+
+@kernel
+def _start_gnss_yaw(ekf, params, sample):
+    if not ekf.cs.in_air or not ekf.cs.yaw_align or not is_north_east_aiding_active(ekf):
+        if reset_yaw_to_gnss(ekf, params, sample.yaw, sample.yaw_offset):
+            reset_aid_source_status_zero_innovation(ekf, ekf.aid.gnss_yaw, 1)
+            ekf.cs.gnss_yaw = True
+            ekf.cs.yaw_align = True
+    elif not ekf.aid.gnss_yaw.innovation_rejected:
+        # in flight with a known heading: wait until both agree
+        ekf.cs.gnss_yaw = True
+        fuse_gnss_yaw(ekf, params, sample.yaw_offset)
+
+
+@kernel
+def update_gnss_yaw(ekf, params, sample):
+    """Judge the heading of a sample; the observation is the yaw of the antenna baseline."""
+    aid = ekf.aid.gnss_yaw
+    measured = wrap_pi(sample.yaw + sample.yaw_offset)
+    accuracy = sample.yaw_acc if np.isfinite(sample.yaw_acc) else 0.0
+    variance = max(accuracy, HEADING_NOISE) ** 2
+    H = ekf.scratch.H
+    predicted = predict_gnss_yaw(ekf.R_to_earth, sample.yaw_offset, H)
+    set_axis(
+        aid,
+        0,
+        measured,
+        variance,
+        wrap_pi(predicted - measured),
+        gnss_yaw_innovation_variance(ekf.P, H, variance),
+    )
+    update_aid_source_status(ekf, aid, 1, sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
+
+
+@kernel
+def fuse_gnss_yaw(ekf, params, yaw_offset):
+    """Fuse the heading that has been judged."""
+    aid = ekf.aid.gnss_yaw
+    if aid.innovation_rejected:
+        ekf.reject.yaw = True
+        return
+    offset = yaw_offset if np.isfinite(yaw_offset) else 0.0
+    H, K = ekf.scratch.H, ekf.scratch.K
+    predict_gnss_yaw(ekf.R_to_earth, offset, H)
+    variance = aid.innovation_variance[0]
+    if variance < aid.observation_variance[0]:
+        # the state covariance is no longer positive: start it anew
+        ekf.fs.bad_hdg = True
+        initialise_covariance(ekf, params)
+        stop_gnss_yaw_fusion(ekf)
+        return
+    ekf.reject.yaw = False
+
+    if (
+        abs(aid.test_ratio_filtered[0]) > WRONG_GYRO_BIAS_TEST_RATIO
+        and not ekf.cs.in_air
+        and is_timed_out(ekf, aid.time_last_fuse, GYRO_BIAS_RESET_INTERVAL)
+    ):
+        # innovations that stay on one side tell of a wrong yaw gyro bias: let it be learnt faster
+        reset_gyro_bias_z_cov(ekf, params)
+
+    for i in range(ERROR_STATE_SIZE):
+        K[i] = (ekf.P[i, 0] * H[0] + ekf.P[i, 1] * H[1] + ekf.P[i, 2] * H[2]) / variance
+    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
+    ekf.fs.bad_hdg = False
+    aid.fused = True
+    aid.time_last_fuse = ekf.time_delayed_us
+    ekf.time_last_heading_fuse = ekf.time_delayed_us
+
+
+@kernel
+def reset_yaw_to_gnss(ekf, params, yaw, yaw_offset):
+    """Set the yaw to the receiver's heading, unless the antenna baseline is within 30° of the vertical."""
+    _, _, v_d = rotate_to_earth(ekf.R_to_earth, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
+    if abs(v_d) > STEEP_BASELINE:
+        return False
+    reset_quat_state_yaw(ekf, params, yaw, HEADING_NOISE * HEADING_NOISE)
+    return True
+
+
+@kernel
+def stop_gnss_yaw_fusion(ekf):
+    """Stop fusing the GNSS heading."""
+    ekf.cs.gnss_yaw = False

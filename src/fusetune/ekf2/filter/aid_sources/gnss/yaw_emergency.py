@@ -1,0 +1,74 @@
+"""Use of the yaw estimator: aligning the yaw, noticing that it is wrong in flight, and putting it right."""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, GPS_CTRL_VEL
+from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.filter.yaw_estimator.gaussian_sum import fuse_gsf_velocity
+from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
+
+CONVERGED_YAW_DEVIATION = 0.262
+"""Standard deviation (rad) below which the composite yaw counts as converged."""
+
+YAW_FAILURE = math.radians(25.0)
+
+
+@kernel
+def is_yaw_emergency_estimate_available(ekf):
+    """Whether the yaw estimator has converged."""
+    variance = ekf.gsf.yaw_variance
+    return ekf.gsf.vel_fuse_started and 0.0 < variance < CONVERGED_YAW_DEVIATION * CONVERGED_YAW_DEVIATION
+
+
+@kernel
+def is_yaw_failure(ekf):
+    """Whether the filter's yaw is off the converged yaw estimator's by more than 25°."""
+    if not is_yaw_emergency_estimate_available(ekf):
+        return False
+    return abs(wrap_pi(euler_yaw(ekf.R_to_earth) - ekf.gsf.yaw)) > YAW_FAILURE
+
+
+@kernel
+def reset_yaw_to_ekf_gsf(ekf, params):
+    """Set the yaw to the yaw estimator's, if that has converged and the yaw was not reset in this update already."""
+    if not is_yaw_emergency_estimate_available(ekf):
+        return False
+    if ekf.cs_prev.yaw_align != ekf.cs.yaw_align or ekf.state_reset.quat_counter != ekf.state_reset_prev.quat_counter:
+        return False
+    reset_quat_state_yaw(ekf, params, ekf.gsf.yaw, ekf.gsf.yaw_variance)
+    ekf.cs.yaw_align = True
+    ekf.events.yaw_aligned_to_imu_gps = True
+    return True
+
+
+@kernel
+def try_yaw_emergency_reset(ekf, params):
+    """Put the yaw right in flight; the heading source that led it astray counts as faulty from then on."""
+    if not reset_yaw_to_ekf_gsf(ekf, params):
+        return False
+    if ekf.cs.mag_hdg or ekf.cs.mag_3d:
+        ekf.cs.mag_fault = True
+    if ekf.cs.gnss_yaw:
+        ekf.cs.gnss_yaw_fault = True
+    if ekf.cs.ev_yaw:
+        ekf.cs.ev_yaw_fault = True
+    return True
+
+
+@kernel
+def control_gnss_yaw_estimator(ekf, params):
+    """Give the last GNSS velocity to the yaw estimator, and align the yaw by it where nothing else has."""
+    aid = ekf.aid.gnss_vel
+    variance = aid.observation_variance[0]
+    # v1.16 compares the variance with the limit of the speed accuracy, and passes it on as if it were the accuracy
+    if not 0.0 < variance < params.EKF2_REQ_SACC:
+        return
+    if not (np.isfinite(aid.observation[0]) and np.isfinite(aid.observation[1])):
+        return
+    fuse_gsf_velocity(ekf.gsf, aid.observation[0], aid.observation[1], variance, ekf.cs.in_air)
+    uses_gnss = int(params.EKF2_GPS_CTRL) & (GPS_CTRL_VEL | GPS_CTRL_HPOS) != 0
+    if uses_gnss and not ekf.cs.yaw_align and ekf.cs.tilt_align:
+        reset_yaw_to_ekf_gsf(ekf, params)

@@ -1,0 +1,93 @@
+"""Gravity as an observation of tilt while nothing else bounds the horizontal velocity.
+
+The unit vector of the specific force stands for h = Rᵀ (0, 0, -1). With the attitude error in the NED frame,
+∂h/∂θ = Rᵀ [(0, 0, -1)]×, so axis i depends on the errors about north and east alone, by (-R₁ᵢ, R₀ᵢ).
+
+Mirrors PX4 v1.16 `EKF/aid_sources/gravity/gravity_fusion.cpp`: the aid source is judged and counted as fused at
+every update, even while its flag is off; the axes are fused one after the other, all linearised at the first state.
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GRAVITY_VECTOR, is_horizontal_aiding_active
+from fusetune.ekf2.filter.common.state import ATTITUDE
+from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_kalman_gain
+
+GRAVITY_MEMORY = np.dtype([("jacobian", "f8", (3, 2))], align=True)
+"""Sub-record `ekf.gravity`: of each body axis, the derivative by the attitude errors about north and east."""
+
+CONSTANTS_ONE_G = 9.80665
+ACCEL_LIMIT_LOW = 0.9 * CONSTANTS_ONE_G
+ACCEL_LIMIT_HIGH = 1.1 * CONSTANTS_ONE_G
+GRAVITY_GATE = 0.25
+MIN_NOISE = 0.01
+
+
+@kernel
+def compute_gravity_jacobian(ekf, jacobian):
+    """Write the derivative of each body axis of the up vector by the errors about north and east, shape (3, 2)."""
+    for axis in range(3):
+        jacobian[axis, 0] = -ekf.R_to_earth[1, axis]
+        jacobian[axis, 1] = ekf.R_to_earth[0, axis]
+
+
+@kernel
+def _innovation_variance(ekf, jacobian, axis, R):
+    north, east = jacobian[axis, 0], jacobian[axis, 1]
+    P = ekf.P
+    return P[0, 0] * north * north + 2.0 * P[0, 1] * north * east + P[1, 1] * east * east + R
+
+
+@kernel
+def _update_gravity(ekf, params):
+    """Judge the specific force at the fusion time horizon as an observation of the vertical."""
+    imu, aid, jacobian = ekf.imu_delayed, ekf.aid.gravity, ekf.gravity.jacobian
+    x = imu.delta_vel[0] / imu.delta_vel_dt - ekf.accel_bias[0]
+    y = imu.delta_vel[1] / imu.delta_vel_dt - ekf.accel_bias[1]
+    z = imu.delta_vel[2] / imu.delta_vel_dt - ekf.accel_bias[2]
+    norm = math.sqrt(x * x + y * y + z * z)
+    variance = max(params.EKF2_GRAV_NOISE * params.EKF2_GRAV_NOISE, MIN_NOISE * MIN_NOISE)
+    measurement = (x / norm, y / norm, z / norm)
+    compute_gravity_jacobian(ekf, jacobian)
+    for axis in range(3):
+        innovation = -ekf.R_to_earth[2, axis] - measurement[axis]
+        innovation_variance = _innovation_variance(ekf, jacobian, axis, variance)
+        set_axis(aid, axis, measurement[axis], variance, innovation, innovation_variance)
+    update_aid_source_status(ekf, aid, 3, imu.time_us, GRAVITY_GATE)
+
+
+@kernel
+def _fuse_gravity(ekf, params):
+    aid, jacobian, H, K = ekf.aid.gravity, ekf.gravity.jacobian, ekf.scratch.H, ekf.scratch.K
+    clear_jacobian(H)
+    for axis in range(3):
+        if axis > 0:
+            aid.innovation_variance[axis] = _innovation_variance(ekf, jacobian, axis, aid.observation_variance[axis])
+            aid.innovation[axis] = -ekf.R_to_earth[2, axis] - aid.observation[axis]
+        H[ATTITUDE] = jacobian[axis, 0]
+        H[ATTITUDE + 1] = jacobian[axis, 1]
+        compute_kalman_gain(ekf, H, aid.innovation_variance[axis], K)
+        measurement_update(ekf, params, K, H, aid.observation_variance[axis], aid.innovation[axis])
+
+
+@kernel
+def control_gravity_fusion(ekf, params):
+    """Hold the tilt to the vertical while the vehicle hardly accelerates and no other source aids horizontally."""
+    imu, aid = ekf.imu_delayed, ekf.aid.gravity
+    accel_norm_good = ACCEL_LIMIT_LOW < ekf.accel_magnitude_filt < ACCEL_LIMIT_HIGH
+    ekf.cs.gravity_vector = (
+        (int(params.EKF2_IMU_CTRL) & IMU_CTRL_GRAVITY_VECTOR) != 0
+        and (accel_norm_good or ekf.cs.vehicle_at_rest)
+        and not is_horizontal_aiding_active(ekf)
+    )
+    _update_gravity(ekf, params)
+    clipping = imu.delta_vel_clipping[0] != 0 or imu.delta_vel_clipping[1] != 0 or imu.delta_vel_clipping[2] != 0
+    if ekf.cs.gravity_vector and not aid.innovation_rejected and not clipping:
+        _fuse_gravity(ekf, params)
+    aid.fused = True
+    aid.time_last_fuse = imu.time_us

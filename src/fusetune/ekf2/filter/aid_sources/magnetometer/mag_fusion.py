@@ -1,0 +1,139 @@
+"""Fusion of the three magnetometer axes and of declination.
+
+Measurement models (error state in the NED tangent frame, R = R(q)):
+field h = Rᵀ m_I + m_B with H_θ = Rᵀ[m_I]×, H_mI = Rᵀ, H_mB = I; declination h = atan2(m_I,y, m_I,x).
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH
+from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov, reset_quat_cov
+from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.numerics.rotations import wrap_pi
+
+R_MAG_MIN = 0.01**2
+FLT_EPSILON = float(np.finfo(np.float32).eps)
+
+
+@kernel
+def predict_mag(ekf, axis):
+    """Predicted field (Gauss) along one body axis."""
+    R, field = ekf.R_to_earth, ekf.mag_I
+    return R[0, axis] * field[0] + R[1, axis] * field[1] + R[2, axis] * field[2] + ekf.mag_B[axis]
+
+
+@kernel
+def compute_mag_h(ekf, axis, H):
+    """Write the observation Jacobian of one body axis into H (24,)."""
+    R, field = ekf.R_to_earth, ekf.mag_I
+    rx, ry, rz = R[0, axis], R[1, axis], R[2, axis]
+    H[:] = 0.0
+    H[ATTITUDE] = ry * field[2] - rz * field[1]
+    H[ATTITUDE + 1] = rz * field[0] - rx * field[2]
+    H[ATTITUDE + 2] = rx * field[1] - ry * field[0]
+    H[MAG_EARTH] = rx
+    H[MAG_EARTH + 1] = ry
+    H[MAG_EARTH + 2] = rz
+    H[MAG_BODY + axis] = 1.0
+
+
+@kernel
+def keep_only_mag_gains(K):
+    """Let the update move nothing but the field states."""
+    K[:MAG_EARTH] = 0.0
+    K[MAG_BODY + 3 :] = 0.0
+
+
+@kernel
+def recover_from_bad_mag_covariance(ekf, params, update_all_states):
+    """The innovation variance fell below the noise: start the covariances that made it anew."""
+    if update_all_states:
+        reset_quat_cov(ekf, params, params.EKF2_HEAD_NOISE)
+    reset_mag_earth_cov(ekf, params)
+    reset_mag_bias_cov(ekf, params)
+
+
+@kernel
+def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
+    """Fuse the axes one after the other, all linearised at the first state; return whether all were fused.
+
+    `ekf.aid.mag` holds the first axis's innovation and variance already. Of y and z both are computed anew. Without
+    `update_tilt` roll and pitch stay; without `update_all_states` only the field states move.
+    """
+    aid = ekf.aid.mag
+    if aid.innovation_rejected:
+        return False
+
+    jacobians = ekf.mag.jacobians
+    for axis in range(3):
+        compute_mag_h(ekf, axis, jacobians[axis])
+
+    K = ekf.scratch.K
+    for axis in range(3):
+        if axis == 2 and ekf.cs.synthetic_mag_z:
+            continue
+        H = jacobians[axis]
+        if axis > 0:
+            aid.innovation_variance[axis] = compute_innovation_variance(ekf, H, R_mag)
+            aid.innovation[axis] = predict_mag(ekf, axis) - mag[axis]
+        if aid.innovation_variance[axis] < R_mag:
+            recover_from_bad_mag_covariance(ekf, params, update_all_states)
+            return False
+
+        compute_kalman_gain(ekf, H, aid.innovation_variance[axis], K)
+        if not update_all_states:
+            keep_only_mag_gains(K)
+        elif not update_tilt:
+            K[ATTITUDE] = 0.0
+            K[ATTITUDE + 1] = 0.0
+        measurement_update(ekf, params, K, H, aid.observation_variance[axis], aid.innovation[axis])
+
+    ekf.fs.bad_mag_x = False
+    ekf.fs.bad_mag_y = False
+    ekf.fs.bad_mag_z = False
+    aid.fused = True
+    aid.time_last_fuse = ekf.time_delayed_us
+    if update_all_states:
+        ekf.time_last_heading_fuse = ekf.time_delayed_us
+    return True
+
+
+@kernel
+def compute_declination_h(mag_I, H):
+    """Write the Jacobian of declination into H (24,); return the predicted declination (rad).
+
+    The north component is kept off zero by single-precision epsilon, as PX4's generated equations do.
+    """
+    sign = 1.0 if mag_I[0] > 0.0 else (-1.0 if mag_I[0] < 0.0 else 0.0)
+    north = mag_I[0] + (sign + 0.5) * FLT_EPSILON
+    east = mag_I[1]
+    squared = north * north + east * east
+    H[:] = 0.0
+    H[MAG_EARTH] = -east / squared
+    H[MAG_EARTH + 1] = north / squared
+    return math.atan2(east, north)
+
+
+@kernel
+def fuse_declination(ekf, params, declination, R, update_all_states):
+    """Fuse a declination (rad) of variance R (rad²) into the earth field states; return whether it was fused."""
+    H = ekf.scratch.H
+    predicted = compute_declination_h(ekf.mag_I, H)
+    innovation = wrap_pi(predicted - declination)
+
+    innovation_variance = compute_innovation_variance(ekf, H, R)
+    if innovation_variance < R:
+        ekf.fs.bad_mag_decl = True
+        return False
+
+    K = ekf.scratch.K
+    compute_kalman_gain(ekf, H, innovation_variance, K)
+    if not update_all_states:
+        keep_only_mag_gains(K)
+    measurement_update(ekf, params, K, H, R, innovation)
+    ekf.fs.bad_mag_decl = False
+    return True

@@ -1,0 +1,65 @@
+"""The heading that the magnetometer shows: its agreement with the yaw estimate, and resets of yaw to it.
+
+The field's azimuth in the tilt-compensated frame is yaw-independent: with R = Rz(yaw) R_tilt, the measured heading is
+`declination - azimuth(R_tilt m)` and the heading innovation is simply `azimuth(R m) - declination`.
+"""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import get_mag_declination
+from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.state import MAG_BODY
+from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
+
+HEADING_LPF_ALPHA = 0.1
+YAW_VARIANCE_MIN = 0.01**2
+
+
+@kernel
+def is_mag_bias_good(ekf, params):
+    """Whether every body-field variance is positive and no larger than the measurement noise allows."""
+    P = ekf.P
+    var_x, var_y, var_z = P[MAG_BODY, MAG_BODY], P[MAG_BODY + 1, MAG_BODY + 1], P[MAG_BODY + 2, MAG_BODY + 2]
+    variance_limit = params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE
+    return min(var_x, var_y, var_z) > 0.0 and max(var_x, var_y, var_z) <= variance_limit
+
+
+@kernel
+def field_azimuth(ekf, params, mag):
+    """Azimuth (rad) of the bias-corrected body-frame field `mag` seen in the estimated earth frame."""
+    bx, by, bz = 0.0, 0.0, 0.0
+    if is_mag_bias_good(ekf, params):
+        bx, by, bz = ekf.mag_B[0], ekf.mag_B[1], ekf.mag_B[2]
+    x, y, z = mag[0] - bx, mag[1] - by, mag[2] - bz
+    R = ekf.R_to_earth
+    return math.atan2(R[1, 0] * x + R[1, 1] * y + R[1, 2] * z, R[0, 0] * x + R[0, 1] * y + R[0, 2] * z)
+
+
+@kernel
+def check_mag_heading_consistency(ekf, params, mag):
+    """Low-pass the heading innovation; consistent once it is small while the vehicle accelerates enough to tell."""
+    if ekf.cs.yaw_align:
+        innovation = wrap_pi(field_azimuth(ekf, params, mag) - get_mag_declination(ekf, params))
+        ekf.mag.heading_innovation_lpf += HEADING_LPF_ALPHA * (innovation - ekf.mag.heading_innovation_lpf)
+    else:
+        ekf.mag.heading_innovation_lpf = 0.0
+
+    if abs(ekf.mag.heading_innovation_lpf) < params.EKF2_HEAD_NOISE:
+        acceleration = math.hypot(ekf.accel_horiz_lpf[0], ekf.accel_horiz_lpf[1])
+        if is_north_east_aiding_active(ekf) and acceleration > params.EKF2_MAG_ACCLIM:
+            ekf.cs.mag_heading_consistent = True
+    else:
+        ekf.cs.mag_heading_consistent = False
+
+
+@kernel
+def reset_mag_heading(ekf, params, mag):
+    """Reset yaw to the heading of the body-frame field `mag` (Gauss), keeping roll and pitch."""
+    yaw = euler_yaw(ekf.R_to_earth) - field_azimuth(ekf, params, mag) + get_mag_declination(ekf, params)
+    variance = max(params.EKF2_HEAD_NOISE * params.EKF2_HEAD_NOISE, YAW_VARIANCE_MIN)
+    reset_quat_state_yaw(ekf, params, yaw, variance)
+    ekf.time_last_heading_fuse = ekf.time_delayed_us
+    ekf.mag.heading_innovation_lpf = 0.0
+    ekf.cs.mag_heading_consistent = True

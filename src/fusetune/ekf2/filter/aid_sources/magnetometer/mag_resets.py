@@ -1,0 +1,108 @@
+"""Resets of the earth and body field states, and the end of magnetometer fusion."""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import reset_mag_heading
+from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known
+from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
+from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
+
+EARTH_FIELD_MIN_CHANGE = 0.01
+MAG_ANOMALIES_MAX_HAGL = 1.5
+
+
+@kernel
+def reset_mag_body_to_zero(ekf, params):
+    """Forget the body field."""
+    ekf.mag_B[:] = 0.0
+    reset_mag_bias_cov(ekf, params)
+
+
+@kernel
+def move_earth_field_to(ekf, params, north, east, down):
+    """Set the earth field (Gauss) unless it is within 0.01 Gauss already; return whether it moved."""
+    distance = math.sqrt((ekf.mag_I[0] - north) ** 2 + (ekf.mag_I[1] - east) ** 2 + (ekf.mag_I[2] - down) ** 2)
+    if distance <= EARTH_FIELD_MIN_CHANGE:
+        return False
+    ekf.mag_I[0] = north
+    ekf.mag_I[1] = east
+    ekf.mag_I[2] = down
+    reset_mag_earth_cov(ekf, params)
+    return True
+
+
+@kernel
+def reset_mag_states_to_wmm(ekf, params, mag, reset_heading):
+    """Earth field from the world magnetic model; the body field explains the rest of `mag`, unless yaw is reset too."""
+    field = ekf.mag.wmm_earth_field
+    moved = move_earth_field_to(ekf, params, field[0], field[1], field[2])
+    if not reset_heading and ekf.cs.yaw_align:
+        if moved:
+            R = ekf.R_to_earth
+            for axis in range(3):
+                predicted = R[0, axis] * field[0] + R[1, axis] * field[1] + R[2, axis] * field[2]
+                ekf.mag_B[axis] = mag[axis] - predicted
+            reset_mag_bias_cov(ekf, params)
+    else:
+        reset_mag_body_to_zero(ekf, params)
+    if reset_heading:
+        reset_mag_heading(ekf, params, mag)
+
+
+@kernel
+def reset_mag_states_to_measurement(ekf, params, mag, reset_heading):
+    """Earth field from the measurement turned into NED, body field zero."""
+    reset_mag_body_to_zero(ekf, params)
+    if reset_heading:
+        reset_mag_heading(ekf, params, mag)
+    R = ekf.R_to_earth
+    move_earth_field_to(
+        ekf,
+        params,
+        R[0, 0] * mag[0] + R[0, 1] * mag[1] + R[0, 2] * mag[2],
+        R[1, 0] * mag[0] + R[1, 1] * mag[1] + R[1, 2] * mag[2],
+        R[2, 0] * mag[0] + R[2, 1] * mag[1] + R[2, 2] * mag[2],
+    )
+
+
+@kernel
+def reset_mag_states(ekf, params, mag, reset_heading):
+    """Reset field states (and yaw, if asked) from the filtered measurement `mag` (body frame, Gauss)."""
+    if is_wmm_field_known(ekf):
+        reset_mag_states_to_wmm(ekf, params, mag, reset_heading)
+    else:
+        reset_mag_states_to_measurement(ekf, params, mag, reset_heading)
+    if ekf.cs.in_air:
+        ekf.cs.mag_aligned_in_flight = True
+        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+
+
+@kernel
+def check_hagl_yaw_reset_req(ekf):
+    """Whether the vehicle has just climbed clear (1.5 m) of what disturbs the field near the ground."""
+    if not (ekf.cs.in_air and ekf.cs.yaw_align) or ekf.cs.mag_aligned_in_flight:
+        return False
+    return get_terrain_vpos(ekf) + ekf.gpos_alt > MAG_ANOMALIES_MAX_HAGL
+
+
+@kernel
+def stop_mag_fusion(ekf, params):
+    """Stop using the magnetometer; yaw stays aligned only if horizontal aiding keeps it observable."""
+    if not ekf.cs.mag:
+        return
+    reset_mag_earth_cov(ekf, params)
+    reset_mag_bias_cov(ekf, params)
+    if ekf.cs.yaw_align and (ekf.cs.mag_3d or ekf.cs.mag_hdg) and not is_north_east_aiding_active(ekf):
+        ekf.cs.yaw_align = False
+    if ekf.cs.mag_hdg:
+        ekf.fs.bad_hdg = False
+    ekf.cs.mag = False
+    ekf.cs.mag_dec = False
+    ekf.cs.mag_3d = False
+    ekf.cs.mag_hdg = False
+    ekf.cs.mag_aligned_in_flight = False
+    ekf.fs.bad_mag_x = False
+    ekf.fs.bad_mag_y = False
+    ekf.fs.bad_mag_z = False
+    ekf.fs.bad_mag_decl = False

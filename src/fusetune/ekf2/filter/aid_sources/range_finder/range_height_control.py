@@ -1,0 +1,221 @@
+"""When the range finder aids the terrain, the height, or both, and what is reset to it.
+
+`cs.rng_terrain`: the distance corrects the terrain state. `cs.rng_hgt`: it corrects the height, always (EKF2_RNG_CTRL
+2) or only low and slow (1). With the range finder as height reference, the ground itself becomes the datum.
+"""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.range_finder.range_consistency_check import update_range_consistency
+from fusetune.ekf2.filter.aid_sources.range_finder.range_hagl_fusion import (
+    fuse_hagl_rng,
+    reset_terrain_to_rng,
+    update_range_hagl,
+)
+from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import dist_bottom, is_data_healthy, update_cos_tilt
+from fusetune.ekf2.filter.aid_sources.range_finder.range_sensor_checks import run_range_sensor_checks
+from fusetune.ekf2.filter.common.aid_source_status import reset_aid_source_status_zero_innovation
+from fusetune.ekf2.filter.common.conditions import (
+    get_hagl,
+    is_height_reset_required,
+    is_horizontal_aiding_active,
+    is_terrain_estimate_valid,
+    is_vertical_velocity_aiding_active,
+)
+from fusetune.ekf2.filter.common.core_memory import HEIGHT_REF_RANGE, HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.filter.common.state import VELOCITY
+from fusetune.ekf2.filter.common.timing import (
+    HGT_FUSION_TIMEOUT_MAX,
+    RNG_MAX_INTERVAL,
+    is_newer_than_latest,
+    is_timed_out,
+)
+from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_vertical_velocity_to_zero
+
+RNG_CTRL_CONDITIONAL, RNG_CTRL_ENABLED = 1, 2
+RANGE_VARIANCE_MIN = 0.001
+START_HYSTERESIS = 0.7
+START_TEST_RATIO = 0.01
+
+
+@kernel
+def control_range_hagl_fusion(ekf, params):
+    """Process the range sample that reached the fusion time horizon, if any, and watch over the sensor."""
+    if not ekf.range_buffer_exists:
+        return
+    _check_sensor(ekf, params)
+    if ekf.range_data_ready:
+        update_range_hagl(ekf, params)
+        _control_with_sample(ekf, params)
+    elif (ekf.cs.rng_hgt or ekf.cs.rng_terrain) and not _has_recent_sample(ekf):
+        stop_rng_hgt_fusion(ekf)
+        stop_rng_terr_fusion(ekf)
+
+
+@kernel
+def _has_recent_sample(ekf):
+    return is_newer_than_latest(ekf, ekf.range_newest_time_us, 2 * RNG_MAX_INTERVAL)
+
+
+@kernel
+def _check_sensor(ekf, params):
+    """Run the sensor's checks; a healthy sample is moved to the IMU and tested against the vertical velocity."""
+    rng, R = ekf.range, ekf.R_to_earth
+    rng.is_sample_ready = ekf.range_data_ready
+    if ekf.range_data_ready:
+        rng.sample = ekf.range_sample
+    update_cos_tilt(rng, R, params.EKF2_RNG_PITCH)
+    run_range_sensor_checks(rng, ekf.time_delayed_us, params.EKF2_RNG_QLTY_T, params.EKF2_RNG_FOG)
+
+    if is_data_healthy(rng):
+        offset_down = (
+            R[2, 0] * (params.EKF2_RNG_POS_X - params.EKF2_IMU_POS_X)
+            + R[2, 1] * (params.EKF2_RNG_POS_Y - params.EKF2_IMU_POS_Y)
+            + R[2, 2] * (params.EKF2_RNG_POS_Z - params.EKF2_IMU_POS_Z)
+        )
+        rng.sample.range += offset_down / rng.cos_tilt
+        if ekf.cs.in_air:
+            _check_consistency(ekf, params)
+    elif not ekf.cs.in_air and rng.is_regularly_sending_data and rng.is_sample_ready:
+        # standing on the ground the distance is known, whatever the sensor says
+        rng.sample.range = params.EKF2_MIN_RNG
+        rng.is_sample_valid = True
+    ekf.cs.rng_kin_consistent = rng.is_kinematically_consistent
+
+
+@kernel
+def _check_consistency(ekf, params):
+    speed_squared = ekf.vel[0] * ekf.vel[0] + ekf.vel[1] * ekf.vel[1]
+    speed_variance = ekf.P[VELOCITY, VELOCITY] + ekf.P[VELOCITY + 1, VELOCITY + 1]
+    horizontal_motion = ekf.cs.fixed_wing or speed_squared > max(speed_variance, 0.1)
+    distance = dist_bottom(ekf.range)
+    scaled = params.EKF2_RNG_SFE * distance
+    update_range_consistency(
+        ekf.range,
+        distance,
+        max(params.EKF2_RNG_NOISE * params.EKF2_RNG_NOISE + scaled * scaled, RANGE_VARIANCE_MIN),
+        ekf.vel[2],
+        ekf.P[VELOCITY + 2, VELOCITY + 2],
+        horizontal_motion,
+        ekf.time_delayed_us,
+        params.EKF2_RNG_K_GATE,
+    )
+
+
+@kernel
+def _control_with_sample(ekf, params):
+    """Choose between height and terrain, then fuse, reset, start or stop."""
+    aid, cs, rng = ekf.aid.rng_hgt, ekf.cs, ekf.range
+    ctrl = int(params.EKF2_RNG_CTRL)
+    continuing = (
+        ctrl in (RNG_CTRL_ENABLED, RNG_CTRL_CONDITIONAL)
+        and cs.tilt_align
+        and math.isfinite(aid.observation[0])
+        and math.isfinite(aid.observation_variance[0])
+        and is_data_healthy(rng)
+        and rng.is_kinematically_consistent
+    )
+    starting = continuing and _has_recent_sample(ekf) and rng.is_regularly_sending_data
+
+    aiding = cs.rng_terrain or cs.rng_hgt
+    conditional_aid = aiding and ctrl == RNG_CTRL_CONDITIONAL and is_conditional_range_aid_suitable(ekf, params)
+    full_aid = aiding and ctrl == RNG_CTRL_ENABLED
+    if cs.rng_hgt:
+        if not (conditional_aid or full_aid):
+            stop_rng_hgt_fusion(ekf)
+    elif conditional_aid or full_aid:
+        _start_height_aiding(ekf, params, conditional_aid)
+
+    if cs.rng_hgt or cs.rng_terrain:
+        if continuing:
+            _fuse_or_recover(ekf, params)
+        else:
+            stop_rng_hgt_fusion(ekf)
+            stop_rng_terr_fusion(ekf)
+    elif starting:
+        _start_terrain_aiding(ekf, params)
+
+
+@kernel
+def _start_height_aiding(ekf, params, conditional_aid):
+    """Let the distance correct the height; as unconditional height reference it also becomes the altitude."""
+    aid = ekf.aid.rng_hgt
+    is_reference = int(params.EKF2_HGT_REF) == HEIGHT_REF_RANGE
+    ekf.cs.rng_hgt = True
+    if is_reference:
+        ekf.height_sensor_ref = HEIGHT_REF_RANGE
+        stop_rng_terr_fusion(ekf)
+    if is_reference and not conditional_aid:
+        ekf.events.reset_hgt_to_rng = True
+        reset_altitude_to(ekf, params, aid.observation[0], aid.observation_variance[0])
+        ekf.terrain = 0.0
+        reset_aid_source_status_zero_innovation(ekf, aid, 1)
+    elif not ekf.cs.opt_flow_terrain and aid.innovation_rejected:
+        reset_terrain_to_rng(ekf, params)
+
+
+@kernel
+def _fuse_or_recover(ekf, params):
+    """Fuse; when that fails too long, reset the height (as the reference of last resort) or the terrain."""
+    aid = ekf.aid.rng_hgt
+    fuse_hagl_rng(ekf, params, ekf.cs.rng_hgt, ekf.cs.rng_terrain)
+    is_fusion_failing = is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX)
+
+    if is_height_reset_required(ekf) and ekf.cs.rng_hgt and ekf.height_sensor_ref == HEIGHT_REF_RANGE:
+        ekf.events.reset_hgt_to_rng = True
+        reset_altitude_to(ekf, params, aid.observation[0] - ekf.terrain, math.nan)
+        reset_aid_source_status_zero_innovation(ekf, aid, 1)
+        if not is_vertical_velocity_aiding_active(ekf):
+            reset_vertical_velocity_to_zero(ekf, params)
+    elif is_fusion_failing:
+        if ekf.cs.opt_flow_terrain and is_terrain_estimate_valid(ekf):
+            stop_rng_hgt_fusion(ekf)
+            stop_rng_terr_fusion(ekf)
+        else:
+            reset_terrain_to_rng(ekf, params)
+
+
+@kernel
+def _start_terrain_aiding(ekf, params):
+    """Begin terrain fusion: optical flow's terrain must agree, any other is reset if it does not."""
+    rejected = ekf.aid.rng_hgt.innovation_rejected
+    if ekf.cs.opt_flow_terrain:
+        if not rejected:
+            ekf.cs.rng_terrain = True
+            fuse_hagl_rng(ekf, params, ekf.cs.rng_hgt, ekf.cs.rng_terrain)
+        return
+    if rejected:
+        reset_terrain_to_rng(ekf, params)
+    ekf.cs.rng_terrain = True
+
+
+@kernel
+def is_conditional_range_aid_suitable(ekf, params):
+    """Whether the vehicle is low and slow enough, over ground steady enough, for range to aid the height.
+
+    Starting takes 70 % of EKF2_RNG_A_HMAX and EKF2_RNG_A_VMAX, and a test ratio a hundred times smaller.
+    """
+    scale, test_ratio_max = 1.0, 1.0
+    if not ekf.cs.rng_hgt:
+        scale, test_ratio_max = START_HYSTERESIS, START_TEST_RATIO
+    if get_hagl(ekf) >= scale * params.EKF2_RNG_A_HMAX or ekf.aid.rng_hgt.test_ratio[0] >= test_ratio_max:
+        return False
+    if is_horizontal_aiding_active(ekf):
+        return math.hypot(ekf.vel[0], ekf.vel[1]) <= scale * params.EKF2_RNG_A_VMAX
+    return True
+
+
+@kernel
+def stop_rng_hgt_fusion(ekf):
+    """Stop correcting the height; another source becomes the reference if this was it."""
+    if ekf.cs.rng_hgt:
+        if ekf.height_sensor_ref == HEIGHT_REF_RANGE:
+            ekf.height_sensor_ref = HEIGHT_REF_UNKNOWN
+        ekf.cs.rng_hgt = False
+
+
+@kernel
+def stop_rng_terr_fusion(ekf):
+    """Stop correcting the terrain."""
+    ekf.cs.rng_terrain = False

@@ -1,0 +1,35 @@
+"""Keep the yaw variance bounded while nothing observes the heading."""
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
+from fusetune.ekf2.filter.common.timing import is_timed_out
+from fusetune.ekf2.filter.covariance import initialise_covariance
+from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h
+
+UPDATE_INTERVAL_US = 200_000
+VARIANCE_WHILE_LEVELLING = 0.001
+VARIANCE_AFTERWARDS = 0.25
+
+
+@kernel
+def control_zero_innovation_heading_update(ekf, params):
+    """Fuse a heading innovation of zero every 0.2 s, always while levelling, later only if the variance is large."""
+    yaw_aiding = ekf.cs.mag_hdg or ekf.cs.mag_3d or ekf.cs.ev_yaw or ekf.cs.gnss_yaw
+    if yaw_aiding or not is_timed_out(ekf, ekf.time_last_heading_fuse, UPDATE_INTERVAL_US):
+        return
+    variance = VARIANCE_AFTERWARDS if ekf.cs.tilt_align else VARIANCE_WHILE_LEVELLING
+    H, K = ekf.scratch.H, ekf.scratch.K
+    innovation_variance = compute_yaw_innov_var_and_h(ekf, variance, H)
+    if ekf.cs.tilt_align and innovation_variance - variance <= params.EKF2_HEAD_NOISE**2:
+        return
+    if not innovation_variance >= variance:
+        ekf.fs.bad_hdg = True
+        initialise_covariance(ekf, params)
+        return
+    for i in range(ERROR_STATE_SIZE):
+        K[i] = ekf.P[i, 2] / innovation_variance
+    ekf.fs.bad_hdg = False
+    ekf.reject.yaw = False
+    measurement_update(ekf, params, K, H, variance, 0.0)
+    ekf.time_last_heading_fuse = ekf.time_delayed_us

@@ -1,0 +1,135 @@
+"""What the estimator knows of one aid source: last observation, innovation, its variance, test ratio, verdict."""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+
+AID_SOURCE = np.dtype(
+    [
+        ("timestamp_sample", "i8"),
+        ("time_last_fuse", "i8"),
+        ("observation", "f8", (3,)),
+        ("observation_variance", "f8", (3,)),
+        ("innovation", "f8", (3,)),
+        ("innovation_filtered", "f8", (3,)),
+        ("innovation_variance", "f8", (3,)),
+        ("test_ratio", "f8", (3,)),
+        ("test_ratio_filtered", "f8", (3,)),
+        ("innovation_rejected", "?"),
+        ("fused", "?"),
+    ],
+    align=True,
+)
+
+AID_SOURCE_AXES = {
+    "baro_hgt": 1,
+    "rng_hgt": 1,
+    "fake_hgt": 1,
+    "fake_pos": 2,
+    "gnss_hgt": 1,
+    "gnss_pos": 2,
+    "gnss_vel": 3,
+    "gnss_yaw": 1,
+    "ev_hgt": 1,
+    "ev_pos": 2,
+    "ev_vel": 3,
+    "ev_yaw": 1,
+    "airspeed": 1,
+    "sideslip": 1,
+    "mag": 3,
+    "gravity": 3,
+    "optical_flow": 2,
+    "aux_vel": 2,
+    "aux_global_position": 2,
+    "drag": 2,
+}
+"""Number of axes of every aid source, in the order in which their codes count."""
+
+AID_SOURCE_NAMES = tuple(AID_SOURCE_AXES)
+
+AID_SOURCES = np.dtype([(name, AID_SOURCE) for name in AID_SOURCE_NAMES], align=True)
+"""The estimator's sub-record `ekf.aid`: one status for each source."""
+
+FILTER_TIME_CONSTANT_S = 0.5
+NORMALISED_INNOVATION_LIMIT = 2.0
+TEST_RATIO_LIMIT = NORMALISED_INNOVATION_LIMIT**2
+
+
+@kernel
+def set_axis(aid, axis, observation, observation_variance, innovation, innovation_variance):
+    """Store one axis of a new observation; `update_aid_source_status` judges all of them."""
+    aid.observation[axis] = observation
+    aid.observation_variance[axis] = observation_variance
+    aid.innovation[axis] = innovation
+    aid.innovation_variance[axis] = innovation_variance
+
+
+@kernel
+def update_aid_source_status(ekf, aid, n_axes, time_us, gate):
+    """Judge the axes that `set_axis` stored, and filter their innovations for the published status.
+
+    Parameters
+    ----------
+    aid : AID_SOURCE record with `n_axes` axes set
+    time_us : time of the sample (µs)
+    gate : innovation gate (standard deviations)
+
+    Any axis beyond the gate, or not finite, rejects the whole observation. `fused` is cleared.
+    """
+    rejected = False
+    has_history = aid.timestamp_sample > 0 and time_us > aid.timestamp_sample
+    dt_s = min(max((time_us - aid.timestamp_sample) * 1e-6, 0.001), 1.0)
+    alpha = dt_s / (dt_s + FILTER_TIME_CONSTANT_S)
+    for i in range(n_axes):
+        innovation = aid.innovation[i]
+        variance = aid.innovation_variance[i]
+        test_ratio = innovation * innovation / (gate * gate * variance)
+        if has_history:
+            limit = NORMALISED_INNOVATION_LIMIT * gate * math.sqrt(variance)
+            _filter_axis(aid, i, alpha, innovation, test_ratio, limit)
+        else:
+            aid.test_ratio_filtered[i] = test_ratio
+            aid.innovation_filtered[i] = innovation
+        aid.test_ratio[i] = test_ratio
+        if not test_ratio <= 1.0 or not math.isfinite(innovation) or not math.isfinite(variance):
+            rejected = True
+    aid.timestamp_sample = time_us
+    aid.innovation_rejected = rejected
+    aid.fused = False
+
+
+@kernel
+def _filter_axis(aid, i, alpha, innovation, test_ratio, innovation_limit):
+    """First-order filters of the signed test ratio and of the innovation, bounded while the test fails badly."""
+    signed_ratio = test_ratio
+    if innovation < 0.0:
+        signed_ratio = -test_ratio
+    elif innovation == 0.0:
+        signed_ratio = 0.0
+    if math.isfinite(aid.test_ratio_filtered[i]):
+        aid.test_ratio_filtered[i] += alpha * (signed_ratio - aid.test_ratio_filtered[i])
+    else:
+        aid.test_ratio_filtered[i] = test_ratio
+    if math.isfinite(aid.innovation_filtered[i]):
+        aid.innovation_filtered[i] += alpha * (innovation - aid.innovation_filtered[i])
+    else:
+        aid.innovation_filtered[i] = innovation
+    if test_ratio > TEST_RATIO_LIMIT:
+        aid.test_ratio_filtered[i] = min(max(aid.test_ratio_filtered[i], -TEST_RATIO_LIMIT), TEST_RATIO_LIMIT)
+        aid.innovation_filtered[i] = min(max(aid.innovation_filtered[i], -innovation_limit), innovation_limit)
+
+
+@kernel
+def reset_aid_source_status_zero_innovation(ekf, aid, n_axes):
+    """The state was reset to this source: keep the observation, with an innovation of zero."""
+    aid.time_last_fuse = ekf.time_delayed_us
+    for i in range(n_axes):
+        aid.innovation[i] = 0.0
+        aid.innovation_filtered[i] = 0.0
+        aid.innovation_variance[i] = aid.observation_variance[i]
+        aid.test_ratio[i] = 0.0
+        aid.test_ratio_filtered[i] = 0.0
+    aid.innovation_rejected = False
+    aid.fused = True

@@ -1,0 +1,208 @@
+"""What is aiding the filter now, and whether its estimates can be relied on: questions every aid source asks."""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.timing import BAD_ACC_RESET_DELAY, HGT_FUSION_TIMEOUT_MAX, is_timed_out
+
+IMU_CTRL_GYRO_BIAS = 1
+IMU_CTRL_ACCEL_BIAS = 2
+IMU_CTRL_GRAVITY_VECTOR = 4
+
+MAG_FLIGHT_ALIGNMENT_SETTLING_US = 1_000_000
+
+
+@kernel
+def get_number_of_active_horizontal_position_aiding_sources(ekf):
+    """How many sources give horizontal position."""
+    return int(ekf.cs.gnss_pos) + int(ekf.cs.ev_pos) + int(ekf.cs.aux_gpos)
+
+
+@kernel
+def get_number_of_active_horizontal_velocity_aiding_sources(ekf):
+    """How many sources give horizontal velocity; airspeed and sideslip together count as one."""
+    return int(ekf.cs.gnss_vel) + int(ekf.cs.opt_flow) + int(ekf.cs.ev_vel) + int(ekf.cs.fuse_aspd and ekf.cs.fuse_beta)
+
+
+@kernel
+def get_number_of_active_horizontal_aiding_sources(ekf):
+    """How many sources bound the horizontal drift."""
+    return get_number_of_active_horizontal_position_aiding_sources(
+        ekf
+    ) + get_number_of_active_horizontal_velocity_aiding_sources(ekf)
+
+
+@kernel
+def _others(sources, aiding_flag):
+    """Whether there is a source besides the one whose flag is given."""
+    if aiding_flag:
+        return sources > 1
+    return sources > 0
+
+
+@kernel
+def is_horizontal_aiding_active(ekf):
+    """Whether any source bounds the horizontal drift."""
+    return get_number_of_active_horizontal_aiding_sources(ekf) > 0
+
+
+@kernel
+def is_other_source_of_horizontal_aiding_than(ekf, aiding_flag):
+    """Whether a source other than the one with this flag bounds the horizontal drift."""
+    return _others(get_number_of_active_horizontal_aiding_sources(ekf), aiding_flag)
+
+
+@kernel
+def is_only_active_source_of_horizontal_aiding(ekf, aiding_flag):
+    """Whether the source with this flag alone bounds the horizontal drift."""
+    return aiding_flag and not is_other_source_of_horizontal_aiding_than(ekf, aiding_flag)
+
+
+@kernel
+def is_other_source_of_horizontal_position_aiding_than(ekf, aiding_flag):
+    """Whether a source other than the one with this flag gives horizontal position."""
+    return _others(get_number_of_active_horizontal_position_aiding_sources(ekf), aiding_flag)
+
+
+@kernel
+def is_only_active_source_of_horizontal_position_aiding(ekf, aiding_flag):
+    """Whether the source with this flag alone gives horizontal position."""
+    return aiding_flag and not is_other_source_of_horizontal_position_aiding_than(ekf, aiding_flag)
+
+
+@kernel
+def get_number_of_active_vertical_position_aiding_sources(ekf):
+    """How many height sources are fused."""
+    return int(ekf.cs.gps_hgt) + int(ekf.cs.baro_hgt) + int(ekf.cs.rng_hgt) + int(ekf.cs.ev_hgt)
+
+
+@kernel
+def is_vertical_position_aiding_active(ekf):
+    """Whether any height source is fused."""
+    return get_number_of_active_vertical_position_aiding_sources(ekf) > 0
+
+
+@kernel
+def is_other_source_of_vertical_position_aiding_than(ekf, aiding_flag):
+    """Whether a height source other than the one with this flag is fused."""
+    return _others(get_number_of_active_vertical_position_aiding_sources(ekf), aiding_flag)
+
+
+@kernel
+def is_only_active_source_of_vertical_position_aiding(ekf, aiding_flag):
+    """Whether the height source with this flag is the only one fused."""
+    return aiding_flag and not is_other_source_of_vertical_position_aiding_than(ekf, aiding_flag)
+
+
+@kernel
+def get_number_of_active_vertical_velocity_aiding_sources(ekf):
+    """How many sources give vertical velocity."""
+    return int(ekf.cs.gnss_vel) + int(ekf.cs.ev_vel)
+
+
+@kernel
+def is_vertical_velocity_aiding_active(ekf):
+    """Whether any source gives vertical velocity."""
+    return get_number_of_active_vertical_velocity_aiding_sources(ekf) > 0
+
+
+@kernel
+def is_vertical_aiding_active(ekf):
+    """Whether any source gives height or vertical velocity."""
+    return is_vertical_position_aiding_active(ekf) or is_vertical_velocity_aiding_active(ekf)
+
+
+@kernel
+def is_north_east_aiding_active(ekf):
+    """Whether a source tied to true north is fused, so that heading is observable by manoeuvring."""
+    return ekf.cs.gnss_pos or ekf.cs.gnss_vel or ekf.cs.aux_gpos
+
+
+@kernel
+def is_local_horizontal_position_valid(ekf):
+    """Whether horizontal dead reckoning has not lasted too long."""
+    return not ekf.horizontal_deadreckon_time_exceeded
+
+
+@kernel
+def is_local_vertical_position_valid(ekf):
+    """Whether the height has been aided recently enough."""
+    return not ekf.vertical_position_deadreckon_time_exceeded
+
+
+@kernel
+def is_local_vertical_velocity_valid(ekf):
+    """Whether the vertical velocity has been aided recently enough."""
+    return not ekf.vertical_velocity_deadreckon_time_exceeded
+
+
+@kernel
+def is_global_horizontal_position_valid(ekf):
+    """Whether latitude and longitude are known."""
+    return ekf.origin.valid and is_local_horizontal_position_valid(ekf)
+
+
+@kernel
+def is_global_vertical_position_valid(ekf):
+    """Whether the altitude above mean sea level is known."""
+    return math.isfinite(ekf.origin.alt) and is_local_vertical_position_valid(ekf)
+
+
+@kernel
+def is_height_reset_required(ekf):
+    """Whether height fusion has failed too long, or vertical acceleration has been bad without a break."""
+    return is_timed_out(ekf, ekf.time_good_vert_accel, BAD_ACC_RESET_DELAY) or is_timed_out(
+        ekf, ekf.time_last_hgt_fuse, HGT_FUSION_TIMEOUT_MAX
+    )
+
+
+@kernel
+def is_yaw_final_align_complete(ekf):
+    """Whether the yaw is aligned, with a magnetometer in use only one second after its in-flight alignment."""
+    if ekf.cs.mag_3d or ekf.cs.mag_hdg:
+        settled = ekf.time_delayed_us - ekf.mag.flight_alignment_start_time > MAG_FLIGHT_ALIGNMENT_SETTLING_US
+        return ekf.cs.yaw_align and ekf.cs.mag_aligned_in_flight and settled
+    return ekf.cs.yaw_align
+
+
+@kernel
+def is_terrain_estimate_valid(ekf):
+    """Whether the terrain state can be used."""
+    return ekf.terrain_valid
+
+
+@kernel
+def get_hagl(ekf):
+    """Height (m) above the terrain estimate."""
+    return ekf.terrain + ekf.gpos_alt
+
+
+@kernel
+def get_terrain_vpos(ekf):
+    """Down position (m) of the terrain: estimated, or where the vehicle last stood."""
+    if ekf.terrain_valid:
+        return ekf.terrain
+    return ekf.last_on_ground_pos_d
+
+
+@kernel
+def get_terrain_variance(ekf):
+    """Variance (m²) of the terrain height."""
+    return ekf.P[23, 23]
+
+
+@kernel
+def set_in_air_status(ekf, in_air):
+    """Note whether the vehicle flies, and when it last did or did not."""
+    if in_air:
+        ekf.time_last_in_air = ekf.time_delayed_us
+    else:
+        ekf.time_last_on_ground = ekf.time_delayed_us
+    ekf.cs.in_air = in_air
+
+
+@kernel
+def set_gnd_effect(ekf):
+    """Note that rotor downwash near the ground may be raising the static pressure."""
+    ekf.cs.gnd_effect = True
+    ekf.time_last_gnd_effect_on = ekf.time_delayed_us

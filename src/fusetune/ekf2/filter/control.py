@@ -1,0 +1,114 @@
+"""One pass over all aid sources, in the order of PX4 v1.16's `controlFusionModes`."""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sample_arrival import (
+    pop_airspeed,
+    pop_auxvel,
+    pop_baro,
+    pop_drag,
+    pop_ev,
+    pop_flow,
+    pop_gnss,
+    pop_mag,
+    pop_range,
+    pop_system_flags,
+)
+from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_control import control_air_data_fusion
+from fusetune.ekf2.filter.aid_sources.auxvel.auxvel_fusion import control_aux_vel_fusion
+from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import control_drag_fusion
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_control import control_external_vision_fusion
+from fusetune.ekf2.filter.aid_sources.fake_height import control_fake_hgt_fusion
+from fusetune.ekf2.filter.aid_sources.fake_position import control_fake_pos_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_control import control_gnss_fusion
+from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_control import control_optical_flow_fusion
+from fusetune.ekf2.filter.aid_sources.sideslip.sideslip_fusion import control_beta_fusion
+from fusetune.ekf2.filter.aid_sources.zero_gyro import control_zero_gyro_update
+from fusetune.ekf2.filter.aid_sources.zero_innovation_heading import control_zero_innovation_heading_update
+from fusetune.ekf2.filter.aid_sources.zero_velocity import control_zero_velocity_update
+from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GYRO_BIAS, set_gnd_effect, set_in_air_status
+from fusetune.ekf2.filter.common.dead_reckoning import update_dead_reckoning_status
+from fusetune.ekf2.filter.covariance import tilt_variance
+from fusetune.ekf2.filter.height_control import control_height_fusion
+from fusetune.ekf2.filter.resets.state_resets import remember_reset_counters
+from fusetune.ekf2.filter.terrain_control import control_terrain_fake_fusion, update_terrain_validity
+
+TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
+
+
+@kernel
+def control_fusion_modes(ekf, params, inputs):
+    """Take the samples that are due and let every aid source start, fuse, reset or stop."""
+    ekf.cs_prev = ekf.cs
+    remember_reset_counters(ekf)
+    _pop_due_samples(ekf, params, inputs)
+    _follow_system_flags(ekf)
+    if not ekf.cs.tilt_align:
+        ekf.cs.tilt_align = tilt_variance(ekf) < TILT_ALIGNED_VARIANCE
+
+    control_mag_fusion(ekf, params)
+    control_optical_flow_fusion(ekf, params)
+    control_gnss_fusion(ekf, params)
+    control_air_data_fusion(ekf, params)
+    control_beta_fusion(ekf, params)
+    control_drag_fusion(ekf, params)
+    control_height_fusion(ekf, params)
+    control_gravity_fusion(ekf, params)
+    control_external_vision_fusion(ekf, params)
+    control_aux_vel_fusion(ekf, params)
+    control_terrain_fake_fusion(ekf, params)
+    update_terrain_validity(ekf)
+
+    control_zero_innovation_heading_update(ekf, params)
+    control_zero_velocity_update(ekf, params)
+    if int(params.EKF2_IMU_CTRL) & IMU_CTRL_GYRO_BIAS:
+        control_zero_gyro_update(ekf, params)
+    control_fake_pos_fusion(ekf, params)
+    control_fake_hgt_fusion(ekf, params)
+    update_dead_reckoning_status(ekf, params)
+
+
+@kernel
+def _pop_due_samples(ekf, params, inputs):
+    """Take from every buffer the newest sample that the fusion time horizon has passed.
+
+    What is switched off leaves its samples there; switched on again, it starts with the newest of the last 0.1 s.
+    """
+    ekf.mag_data_ready = False
+    ekf.flow_data_ready = False
+    ekf.gnss_data_ready = False
+    ekf.airspeed_data_ready = False
+    ekf.drag_data_ready = False
+    pop_system_flags(ekf, inputs)
+    if int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE:
+        pop_mag(ekf, inputs)
+    if int(params.EKF2_OF_CTRL) == 1:
+        pop_flow(ekf, inputs)
+    if int(params.EKF2_GPS_CTRL) != 0:
+        pop_gnss(ekf, inputs)
+    if params.EKF2_ARSP_THR > 0.0:
+        pop_airspeed(ekf, inputs)
+    if int(params.EKF2_DRAG_CTRL) > 0:
+        pop_drag(ekf)
+    pop_baro(ekf, inputs)
+    pop_range(ekf, inputs)
+    pop_ev(ekf, inputs)
+    pop_auxvel(ekf, inputs)
+
+
+@kernel
+def _follow_system_flags(ekf):
+    """Apply what the vehicle's status and land detector said at the fusion time horizon."""
+    if not ekf.system_flags_data_ready:
+        return
+    flags = ekf.system_flags_sample
+    ekf.cs.vehicle_at_rest = flags.at_rest
+    set_in_air_status(ekf, flags.in_air)
+    ekf.cs.fixed_wing = flags.is_fixed_wing
+    if flags.gnd_effect:
+        set_gnd_effect(ekf)
+    ekf.cs.constant_pos = flags.constant_pos

@@ -1,0 +1,140 @@
+"""Fusion of all height sources, choice of the height reference, and health of the vertical acceleration."""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.barometer.baro_height_control import control_baro_height_fusion
+from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import update_ground_effect
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import control_gnss_height_fusion
+from fusetune.ekf2.filter.aid_sources.range_finder.range_height_control import control_range_hagl_fusion
+from fusetune.ekf2.filter.common.core_memory import (
+    HEIGHT_REF_BARO,
+    HEIGHT_REF_EV,
+    HEIGHT_REF_GNSS,
+    HEIGHT_REF_RANGE,
+    HEIGHT_REF_UNKNOWN,
+)
+from fusetune.ekf2.filter.common.timing import is_recent
+
+VERT_INNOV_TEST_LIM = 3.0
+VERT_INNOV_TEST_MIN = 1.0
+INNOVATION_VARIANCE_MIN = 1.1920929e-07
+BADACC_PROBATION = 3_000_000
+
+FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
+
+
+@kernel
+def control_height_fusion(ekf, params):
+    """Check the vertical acceleration, fuse every height source, and replace a lost height reference."""
+    check_vertical_acceleration_health(ekf)
+    update_ground_effect(ekf, params)
+    control_baro_height_fusion(ekf, params)
+    control_gnss_height_fusion(ekf, params)
+    control_range_hagl_fusion(ekf, params)
+    check_height_sensor_ref_fallback(ekf, params)
+
+
+@kernel
+def check_height_sensor_ref_fallback(ekf, params):
+    """Where there is no height reference, take the active source that comes first for EKF2_HGT_REF."""
+    if ekf.height_sensor_ref != HEIGHT_REF_UNKNOWN:
+        return
+    wanted = int(params.EKF2_HGT_REF)
+    if wanted == HEIGHT_REF_BARO:
+        order = (HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_EV, HEIGHT_REF_RANGE)
+    elif wanted == HEIGHT_REF_RANGE:
+        order = (HEIGHT_REF_RANGE, HEIGHT_REF_EV, HEIGHT_REF_BARO, HEIGHT_REF_GNSS)
+    elif wanted == HEIGHT_REF_EV:
+        order = (HEIGHT_REF_EV, HEIGHT_REF_RANGE, HEIGHT_REF_BARO, HEIGHT_REF_GNSS)
+    else:
+        order = (HEIGHT_REF_GNSS, HEIGHT_REF_BARO, HEIGHT_REF_EV, HEIGHT_REF_RANGE)
+    for source in order:
+        if _is_height_source_active(ekf, source):
+            ekf.height_sensor_ref = source
+            return
+
+
+@kernel
+def _is_height_source_active(ekf, source):
+    if source == HEIGHT_REF_BARO:
+        return ekf.cs.baro_hgt
+    if source == HEIGHT_REF_GNSS:
+        return ekf.cs.gps_hgt
+    if source == HEIGHT_REF_RANGE:
+        return ekf.cs.rng_hgt
+    return ekf.cs.ev_hgt
+
+
+@kernel
+def check_vertical_acceleration_health(ekf):
+    """Detect accelerations that clipping or vibration bias towards free fall.
+
+    Such a bias shows as vertical innovations that are all positive (prediction below the observation, in NED).
+    `fs.bad_acc_vertical` persists for 3 s after the last detection.
+    """
+    falling = estimate_inertial_nav_falling_likelihood(ekf)
+    is_clipping_frequently = _count_clipping(ekf)
+    bad_vert_accel = falling == FALLING_LIKELY or (is_clipping_frequently and falling == FALLING_POSSIBLE)
+
+    if bad_vert_accel:
+        ekf.time_bad_vert_accel = ekf.time_delayed_us
+    else:
+        ekf.time_good_vert_accel = ekf.time_delayed_us
+    if ekf.fs.bad_acc_vertical:
+        ekf.fs.bad_acc_vertical = is_recent(ekf, ekf.time_bad_vert_accel, BADACC_PROBATION)
+    else:
+        ekf.fs.bad_acc_vertical = bad_vert_accel
+
+
+@kernel
+def _count_clipping(ekf):
+    """Count clipped samples up and clean ones down within a second's worth; return whether it is too frequent."""
+    limit = int(1.0 / ekf.dt_ekf_avg)
+    all_axes_warning = True
+    any_axis_critical = False
+    for axis in range(3):
+        if ekf.imu_delayed.delta_vel_clipping[axis] and ekf.clip_counter[axis] < limit:
+            ekf.clip_counter[axis] += 1
+        elif ekf.clip_counter[axis] > 0:
+            ekf.clip_counter[axis] -= 1
+        all_axes_warning = all_axes_warning and ekf.clip_counter[axis] >= limit // 2
+        any_axis_critical = any_axis_critical or ekf.clip_counter[axis] >= limit
+    ekf.fs.bad_acc_clipping = all_axes_warning or any_axis_critical
+    return ekf.fs.bad_acc_clipping or ekf.clip_counter[2] >= limit // 2
+
+
+@kernel
+def _normalised(is_active, innovation, innovation_variance):
+    """Innovation over its standard deviation; 0 for a source that is not in use."""
+    if not is_active or innovation_variance < INNOVATION_VARIANCE_MIN:
+        return 0.0
+    return innovation / math.sqrt(innovation_variance)
+
+
+@kernel
+def estimate_inertial_nav_falling_likelihood(ekf):
+    """How likely the inertial navigation falls away from the height and vertical velocity observations.
+
+    Possible if one source's normalised innovation exceeds 3, likely if another of a different kind (pressure, GNSS,
+    ground) exceeds 1 as well. Range is measured towards the ground, so its innovation counts with opposite sign.
+    """
+    cs, aid = ekf.cs, ekf.aid
+    knows_gnss = not ekf.withheld.gnss
+    pressure = _normalised(
+        cs.baro_hgt and not ekf.withheld.baro, aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0]
+    )
+    gnss = max(
+        _normalised(cs.gps_hgt and knows_gnss, aid.gnss_hgt.innovation[0], aid.gnss_hgt.innovation_variance[0]),
+        _normalised(cs.gnss_vel and knows_gnss, aid.gnss_vel.innovation[2], aid.gnss_vel.innovation_variance[2]),
+    )
+    ground = max(
+        _normalised(cs.rng_hgt, -aid.rng_hgt.innovation[0], aid.rng_hgt.innovation_variance[0]),
+        _normalised(cs.ev_hgt, aid.ev_hgt.innovation[0], aid.ev_hgt.innovation_variance[0]),
+        _normalised(cs.ev_vel, aid.ev_vel.innovation[2], aid.ev_vel.innovation_variance[2]),
+    )
+    if not max(pressure, gnss, ground) > VERT_INNOV_TEST_LIM:
+        return FALLING_UNLIKELY
+    failed_min = int(pressure > VERT_INNOV_TEST_MIN) + int(gnss > VERT_INNOV_TEST_MIN)
+    failed_min += int(ground > VERT_INNOV_TEST_MIN)
+    return FALLING_LIKELY if failed_min > 1 else FALLING_POSSIBLE

@@ -1,0 +1,1 @@
+"""Resets of states, and of the origin of the local frame."""

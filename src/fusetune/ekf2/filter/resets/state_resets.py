@@ -1,0 +1,236 @@
+"""Resets of velocity, position, height and yaw, with the counters and changes that are published.
+
+Each reset sets the state, uncorrelates it at the given variance (a variance of NaN leaves the covariance alone),
+moves the output predictor along, and records the change. Resets within one update add up.
+"""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.global_position import single_precision
+from fusetune.ekf2.filter.common.local_origin import project_to_local, reproject_to_global
+from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, VELOCITY
+from fusetune.ekf2.filter.covariance import reset_covariance_block, uncorrelate_block
+from fusetune.ekf2.filter.output_predictor import apply_position_reset, apply_quaternion_reset, apply_velocity_reset
+from fusetune.ekf2.numerics.rotations import (
+    dcm_to_quat,
+    quat_multiply,
+    quat_multiply_inverse,
+    quat_normalise,
+    quat_to_dcm,
+    update_yaw_in_rot_mat,
+)
+
+MIN_RESET_VARIANCE = 0.01**2
+HORIZONTAL_VELOCITY_VARIANCE_AFTER_ZEROING = 25.0
+VERTICAL_VELOCITY_VARIANCE_AFTER_ZEROING = 10.0
+SINGLE_PRECISION_EPSILON = 1.1920929e-07
+
+
+@kernel
+def remember_reset_counters(ekf):
+    """Note the counters at the start of an update, so that its resets are told from earlier ones."""
+    now, before = ekf.state_reset, ekf.state_reset_prev
+    before.vel_ne_counter = now.vel_ne_counter
+    before.vel_d_counter = now.vel_d_counter
+    before.pos_ne_counter = now.pos_ne_counter
+    before.pos_d_counter = now.pos_d_counter
+    before.quat_counter = now.quat_counter
+    before.hagl_counter = now.hagl_counter
+
+
+@kernel
+def _next(counter):
+    """Published counters are eight bits wide."""
+    return (counter + 1) % 256
+
+
+@kernel
+def _reset_variance(ekf, index, variance):
+    if math.isfinite(variance):
+        reset_covariance_block(ekf, index, 1, max(MIN_RESET_VARIANCE, variance))
+
+
+@kernel
+def reset_horizontal_velocity_to(ekf, params, vn, ve, var_n, var_e):
+    """Set north and east velocity (m/s) and their variances; horizontal position is uncorrelated."""
+    delta_n, delta_e = vn - ekf.vel[0], ve - ekf.vel[1]
+    ekf.vel[0], ekf.vel[1] = vn, ve
+    _reset_variance(ekf, VELOCITY, var_n)
+    _reset_variance(ekf, VELOCITY + 1, var_e)
+    uncorrelate_block(ekf, POSITION, 1)
+    uncorrelate_block(ekf, POSITION + 1, 1)
+    apply_velocity_reset(ekf, delta_n, delta_e, 0.0)
+    reset = ekf.state_reset
+    if reset.vel_ne_counter == ekf.state_reset_prev.vel_ne_counter:
+        reset.vel_ne_change[0] = 0.0
+        reset.vel_ne_change[1] = 0.0
+    reset.vel_ne_change[0] += delta_n
+    reset.vel_ne_change[1] += delta_e
+    reset.vel_ne_counter = _next(reset.vel_ne_counter)
+    ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+
+
+@kernel
+def reset_vertical_velocity_to(ekf, params, vd, var):
+    """Set down velocity (m/s) and its variance; vertical position is uncorrelated."""
+    delta = vd - ekf.vel[2]
+    ekf.vel[2] = vd
+    _reset_variance(ekf, VELOCITY + 2, var)
+    uncorrelate_block(ekf, POSITION + 2, 1)
+    apply_velocity_reset(ekf, 0.0, 0.0, delta)
+    reset = ekf.state_reset
+    if reset.vel_d_counter == ekf.state_reset_prev.vel_d_counter:
+        reset.vel_d_change = 0.0
+    reset.vel_d_change += delta
+    reset.vel_d_counter = _next(reset.vel_d_counter)
+    ekf.time_last_ver_vel_fuse = ekf.time_delayed_us
+
+
+@kernel
+def reset_velocity_to(ekf, params, vel, var):
+    """Set the velocity (NED, m/s) and its variances, both arrays of three."""
+    reset_horizontal_velocity_to(ekf, params, vel[0], vel[1], var[0], var[1])
+    reset_vertical_velocity_to(ekf, params, vel[2], var[2])
+
+
+@kernel
+def reset_horizontal_velocity_to_zero(ekf, params):
+    """Nothing is known of the horizontal velocity: start from rest."""
+    ekf.events.reset_vel_to_zero = True
+    variance = HORIZONTAL_VELOCITY_VARIANCE_AFTER_ZEROING
+    reset_horizontal_velocity_to(ekf, params, 0.0, 0.0, variance, variance)
+
+
+@kernel
+def reset_vertical_velocity_to_zero(ekf, params):
+    """Nothing is known of the vertical velocity: start from rest, with room to converge."""
+    reset_vertical_velocity_to(ekf, params, 0.0, VERTICAL_VELOCITY_VARIANCE_AFTER_ZEROING)
+
+
+@kernel
+def update_horizontal_position_reset_status(ekf, delta_n, delta_e):
+    """Record a jump (m) of the local horizontal position."""
+    reset = ekf.state_reset
+    if reset.pos_ne_counter == ekf.state_reset_prev.pos_ne_counter:
+        reset.pos_ne_change[0] = 0.0
+        reset.pos_ne_change[1] = 0.0
+    reset.pos_ne_change[0] += delta_n
+    reset.pos_ne_change[1] += delta_e
+    reset.pos_ne_counter = _next(reset.pos_ne_counter)
+
+
+@kernel
+def update_vertical_position_reset_status(ekf, delta_d):
+    """Record a jump (m, down) of the height."""
+    reset = ekf.state_reset
+    if reset.pos_d_counter == ekf.state_reset_prev.pos_d_counter:
+        reset.pos_d_change = 0.0
+    reset.pos_d_change += delta_d
+    reset.pos_d_counter = _next(reset.pos_d_counter)
+
+
+@kernel
+def update_terrain_reset_status(ekf, delta_d):
+    """Record a jump (m, down) of the terrain height."""
+    reset = ekf.state_reset
+    if reset.hagl_counter == ekf.state_reset_prev.hagl_counter:
+        reset.hagl_change = 0.0
+    reset.hagl_change += delta_d
+    reset.hagl_counter = _next(reset.hagl_counter)
+
+
+@kernel
+def shift_external_vision_position_bias(ekf, delta_n, delta_e):
+    """Keep the external vision position where it was relative to the vehicle's new position."""
+    bias = ekf.ev_pos_b_est
+    bias.north.bias -= delta_n
+    bias.east.bias -= delta_e
+
+
+@kernel
+def reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e):
+    """Set latitude and longitude (rad) and the variances (m²) of the horizontal position."""
+    before_n, before_e = project_to_local(ekf, ekf.gpos_lat, ekf.gpos_lon)
+    after_n, after_e = project_to_local(ekf, lat_rad, lon_rad)
+    delta_n, delta_e = after_n - before_n, after_e - before_e
+    update_horizontal_position_reset_status(ekf, delta_n, delta_e)
+    shift_external_vision_position_bias(ekf, delta_n, delta_e)
+    ekf.gpos_lat, ekf.gpos_lon = lat_rad, lon_rad
+    apply_position_reset(ekf, delta_n, delta_e, 0.0)
+    _reset_variance(ekf, POSITION, var_n)
+    _reset_variance(ekf, POSITION + 1, var_e)
+    ekf.time_last_hor_pos_fuse = ekf.time_delayed_us
+
+
+@kernel
+def reset_local_horizontal_position_to(ekf, params, north, east, var_n, var_e):
+    """Set the horizontal position to a place given in the local frame (m)."""
+    lat_rad, lon_rad = reproject_to_global(ekf, north, east)
+    reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e)
+
+
+@kernel
+def reset_horizontal_position_to_last_known(ekf, params):
+    """Return to the last horizontal position that was aided."""
+    ekf.events.reset_pos_to_last_known = True
+    variance = params.EKF2_NOAID_NOISE**2
+    reset_horizontal_position_to(ekf, params, ekf.last_known_lat, ekf.last_known_lon, variance, variance)
+
+
+@kernel
+def reset_altitude_to(ekf, params, altitude, var):
+    """Set the altitude (m) and its variance; height biases and the terrain move along."""
+    altitude = single_precision(altitude)
+    delta_d = -single_precision(altitude - ekf.gpos_alt)
+    ekf.gpos_alt = altitude
+    _reset_variance(ekf, POSITION + 2, var)
+    apply_position_reset(ekf, 0.0, 0.0, delta_d)
+    update_vertical_position_reset_status(ekf, delta_d)
+    ekf.baro_b_est.bias += delta_d
+    ekf.ev_hgt_b_est.bias -= delta_d
+    ekf.gps_hgt_b_est.bias += delta_d
+    update_terrain_reset_status(ekf, delta_d)
+    ekf.terrain = single_precision(ekf.terrain + delta_d)
+    ekf.time_last_hgt_fuse = ekf.time_delayed_us
+
+
+@kernel
+def reset_height_to_last_known(ekf, params):
+    """Return to the last altitude that was aided."""
+    ekf.events.reset_pos_to_last_known = True
+    reset_altitude_to(ekf, params, ekf.last_known_alt, params.EKF2_NOAID_NOISE**2)
+
+
+@kernel
+def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
+    """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
+    if math.isfinite(yaw_var) and yaw_var > SINGLE_PRECISION_EPSILON:
+        reset_covariance_block(ekf, ATTITUDE + 2, 1, yaw_var)
+    before, error = ekf.scratch.quat_before, ekf.scratch.quat_error
+    for i in range(4):
+        before[i] = ekf.q[i]
+    quat_to_dcm(ekf.q, ekf.scratch.R)
+    update_yaw_in_rot_mat(yaw, ekf.scratch.R, ekf.R_to_earth)
+    dcm_to_quat(ekf.R_to_earth, ekf.q)
+    quat_multiply_inverse(ekf.q, before, error)
+    quat_normalise(error)
+    _propagate_quat_reset(ekf, error)
+    ekf.time_last_heading_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _propagate_quat_reset(ekf, error):
+    """Tell the output predictor and the external vision filter of an attitude jump, and record it."""
+    apply_quaternion_reset(ekf, error)
+    if ekf.ev.q_error_initialized:
+        quat_multiply(error, ekf.ev.q_error_filt, ekf.ev.q_error_filt)
+        quat_normalise(ekf.ev.q_error_filt)
+    reset = ekf.state_reset
+    if reset.quat_counter == ekf.state_reset_prev.quat_counter:
+        for i in range(4):
+            reset.quat_change[i] = error[i]
+    else:
+        quat_multiply(error, reset.quat_change, reset.quat_change)
+        quat_normalise(reset.quat_change)
+    reset.quat_counter = _next(reset.quat_counter)

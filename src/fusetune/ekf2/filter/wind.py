@@ -1,0 +1,62 @@
+"""Wind states: what remains of them between aid sources, and their resets.
+
+Mirrors PX4 v1.16 `EKF/wind.cpp`.
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.state import WIND
+from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY, reset_covariance_block
+
+WIND_MEMORY = np.dtype([("external_init", "?")], align=True)
+"""Sub-record `ekf.wind`: whether the wind was given from outside and no source has used it yet."""
+
+
+@kernel
+def reset_wind_to(ekf, north, east, var_north, var_east):
+    """Set the wind (m/s, towards NE) and its variances; a variance that is not finite leaves the covariance alone."""
+    ekf.wind_vel[0], ekf.wind_vel[1] = north, east
+    largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
+    if math.isfinite(var_north):
+        reset_covariance_block(ekf, WIND, 1, min(largest, var_north))
+    if math.isfinite(var_east):
+        reset_covariance_block(ekf, WIND + 1, 1, min(largest, var_east))
+
+
+@kernel
+def reset_wind_to_external_observation(ekf, speed, direction, speed_accuracy, direction_accuracy):
+    """Take the wind that an operator gave, on ground only.
+
+    Parameters
+    ----------
+    speed, speed_accuracy : m/s
+    direction, direction_accuracy : rad; the direction that the wind blows to
+    """
+    if ekf.cs.in_air:
+        return
+    speed = max(speed, 0.0)
+    c, s = math.cos(direction), math.sin(direction)
+    along = speed_accuracy * speed_accuracy
+    across = speed * speed * direction_accuracy * direction_accuracy
+    ekf.events.reset_wind_to_ext_obs = True
+    ekf.wind.external_init = True
+    reset_wind_to(ekf, speed * c, speed * s, c * c * along + s * s * across, s * s * along + c * c * across)
+
+
+@kernel
+def reset_wind_to_zero(ekf):
+    """Assume calm, with the initial uncertainty."""
+    ekf.wind_vel[0], ekf.wind_vel[1] = 0.0, 0.0
+    reset_covariance_block(ekf, WIND, 2, INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY)
+
+
+@kernel
+def keep_only_wind_gains(K):
+    """Let an update move the wind states alone."""
+    for i in range(WIND):
+        K[i] = 0.0
+    for i in range(WIND + 2, K.shape[0]):
+        K[i] = 0.0

@@ -1,0 +1,67 @@
+"""Fusion of a heading observation.
+
+With the attitude error in the NED frame, a heading error is the attitude error about down: H has a one there and
+zeros elsewhere. Antenna heading passes its own H.
+"""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
+from fusetune.ekf2.filter.common.timing import is_timed_out
+from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
+from fusetune.ekf2.filter.measurement_update import measurement_update
+
+LANDED_TIME_BEFORE_FORCED_YAW_US = 5_000_000
+FORCED_YAW_INTERVAL_US = 1_000_000
+
+
+@kernel
+def compute_yaw_innov_var_and_h(ekf, variance, H):
+    """Write H of a heading observation into `H` (24,) and return its innovation variance (rad²)."""
+    for i in range(ERROR_STATE_SIZE):
+        H[i] = 0.0
+    H[ATTITUDE + 2] = 1.0
+    return ekf.P[ATTITUDE + 2, ATTITUDE + 2] + variance
+
+
+@kernel
+def fuse_yaw(ekf, params, aid, H_yaw):
+    """Fuse a judged heading observation; return whether it was fused.
+
+    On ground a rejected heading is fused all the same, limited to the gate, once per second and not within five
+    seconds of landing: it may come from interference or a wrong initial gyro bias.
+    """
+    if not aid.innovation_variance[0] >= aid.observation_variance[0]:
+        ekf.fs.bad_hdg = True
+        initialise_covariance(ekf, params)
+        return False
+    ekf.fs.bad_hdg = False
+
+    K = ekf.scratch.K
+    inverse = 1.0 / aid.innovation_variance[0]
+    for i in range(ERROR_STATE_SIZE):
+        K[i] = (ekf.P[i, 0] * H_yaw[0] + ekf.P[i, 1] * H_yaw[1] + ekf.P[i, 2] * H_yaw[2]) * inverse
+
+    ekf.reject.yaw = aid.innovation_rejected
+    if aid.innovation_rejected:
+        if not _may_force_yaw(ekf, aid):
+            return False
+        limit = max(params.EKF2_HDG_GATE, 1.0) * math.sqrt(aid.innovation_variance[0])
+        aid.innovation[0] = min(max(aid.innovation[0], -limit), limit)
+        reset_gyro_bias_z_cov(ekf, params)
+
+    measurement_update(ekf, params, K, H_yaw, aid.observation_variance[0], aid.innovation[0])
+    ekf.time_last_heading_fuse = ekf.time_delayed_us
+    aid.time_last_fuse = ekf.time_delayed_us
+    aid.fused = True
+    return True
+
+
+@kernel
+def _may_force_yaw(ekf, aid):
+    return (
+        not ekf.cs.in_air
+        and is_timed_out(ekf, ekf.time_last_in_air, LANDED_TIME_BEFORE_FORCED_YAW_US)
+        and is_timed_out(ekf, aid.time_last_fuse, FORCED_YAW_INTERVAL_US)
+    )

@@ -1,0 +1,1 @@
+"""Rotations, geodesy and the earth as kernels; they know nothing of the filter."""

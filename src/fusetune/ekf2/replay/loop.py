@@ -1,0 +1,99 @@
+"""The compiled loop: at every IMU sample what PX4's EKF2 module does in one run.
+
+Take the IMU sample, the newest message of every aiding topic, the system flags; update the filter; publish.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import entry_kernel, kernel
+from fusetune.ekf2.feed.buffers import initialise_buffers, push_drag, push_imu
+from fusetune.ekf2.feed.sample_arrival import (
+    receive_airspeed,
+    receive_auxvel,
+    receive_baro,
+    receive_ev,
+    receive_flow,
+    receive_gnss,
+    receive_mag,
+    receive_range,
+    receive_system_flags,
+)
+from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag
+from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import save_declination
+from fusetune.ekf2.filter.covariance import reset_accel_bias, reset_gyro_bias
+from fusetune.ekf2.filter.estimator import initialise_estimator, update
+from fusetune.ekf2.filter.imu_down_sampler import accumulate_imu, initialise_down_sampler, reset_down_sampler
+from fusetune.ekf2.filter.output_predictor import initialise_output_predictor, predict_output
+from fusetune.ekf2.replay.commands import handle_command
+from fusetune.ekf2.replay.recording import (
+    record_update,
+)
+
+MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
+
+
+@entry_kernel
+def run_estimator(ekf, params, inputs, views, recorder, records, runs):
+    """Process a stretch of a flight; `inputs` are of its runs."""
+    for run in range(runs):
+        arrivals = inputs.arrivals[run]
+        if arrivals.command >= 0:
+            handle_command(ekf, params, inputs.command[arrivals.command])
+        if arrivals.reset_accel_bias:
+            reset_accel_bias(ekf, params)
+        if arrivals.reset_gyro_bias:
+            reset_gyro_bias(ekf, params)
+        receive_imu(ekf, params, inputs.imu[run])
+        receive_aiding(ekf, params, inputs, arrivals)
+        if update(ekf, params, inputs):
+            save_declination(ekf, params)
+            record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
+
+
+@kernel
+def receive_imu(ekf, params, imu):
+    """Feed the output predictor and the down-sampler; move the horizon when an interval is complete."""
+    if not ekf.buffers.initialised:
+        initialise_buffers(ekf, params, imu.time_us)
+        initialise_down_sampler(ekf.down_sampler)
+        initialise_output_predictor(ekf)
+        initialise_estimator(ekf, params)
+    ekf.time_latest_us = imu.time_us
+    predict_output(ekf, params, imu)
+    if accumulate_imu(ekf.down_sampler, imu):
+        ekf.imu_newest = ekf.down_sampler.sample
+        reset_down_sampler(ekf.down_sampler, params)
+        period = np.float32(params.EKF2_PREDICT_US) * np.float32(1e-6)
+        low, high = MIN_DT_FACTOR * period, MAX_DT_FACTOR * period
+        ekf.imu_newest.delta_ang_dt = min(max(np.float32(ekf.imu_newest.delta_ang_dt), low), high)
+        ekf.imu_newest.delta_vel_dt = min(max(np.float32(ekf.imu_newest.delta_vel_dt), low), high)
+        push_imu(ekf, imu.time_us)
+        ekf.imu_updated = True
+    buffers = ekf.buffers
+    if accumulate_drag(ekf, params, imu, buffers.imu_length, buffers.observation_length):
+        push_drag(ekf, ekf.drag.produced)
+
+
+@kernel
+def receive_aiding(ekf, params, inputs, arrivals):
+    """Buffer what arrived with this IMU sample, in the order of PX4's module."""
+    if arrivals.airspeed >= 0:
+        receive_airspeed(ekf, params, inputs, arrivals.airspeed)
+    if arrivals.auxvel >= 0:
+        receive_auxvel(ekf, params, inputs, arrivals.auxvel)
+    if arrivals.baro >= 0:
+        receive_baro(ekf, params, inputs, arrivals.baro)
+    if arrivals.ev >= 0:
+        receive_ev(ekf, params, inputs, arrivals.ev)
+    if arrivals.flow >= 0:
+        receive_flow(ekf, params, inputs, arrivals.flow)
+    if arrivals.gnss >= 0:
+        receive_gnss(ekf, params, inputs, arrivals.gnss)
+    if arrivals.mag >= 0:
+        receive_mag(ekf, params, inputs, arrivals.mag)
+    if arrivals.range >= 0:
+        receive_range(ekf, params, inputs, arrivals.range)
+    if arrivals.system_flags >= 0:
+        receive_system_flags(ekf, inputs, arrivals.system_flags)

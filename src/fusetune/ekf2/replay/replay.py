@@ -1,0 +1,207 @@
+"""Replay one flight through the estimator with one parameter set.
+
+The compiled loop does at every IMU sample what PX4's EKF2 module does in one run: take the IMU sample, the newest
+message of every aiding topic, the system flags; update the filter; publish. It works through the flight in stretches,
+so that what is recorded of one can be written before the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from fusetune.ekf2.compiled.compilation import ensure_compiled
+from fusetune.ekf2.feed.inputs import EstimatorInputs
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.filter.common.parameters import PARAMETER_NAMES, parameter_record
+from fusetune.ekf2.replay.course import Course
+from fusetune.ekf2.replay.handover import handover_runs, without_resets_at
+from fusetune.ekf2.replay.recording import (
+    FLAG_COLUMNS,
+    LOCAL_POSITION_ROW,
+    RecordArrays,
+    joined,
+)
+from fusetune.ekf2.replay.results import Gap, GapResult, ReplayResult, ReplaySummary
+from fusetune.ekf2.replay.warm_start import without_first_resets
+from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+from fusetune.px4.layouts.logged_state import Handover, LoggedState
+
+
+def replay(
+    inputs: EstimatorInputs,
+    parameters: Mapping[str, float],
+    *,
+    overridden: frozenset[str] | None = None,
+    gaps: Sequence[Gap] = (),
+    start: LoggedState | None = None,
+    handovers: Sequence[Handover] = (),
+    keep: Callable[[RecordArrays], RecordArrays] | None = None,
+) -> ReplayResult:
+    """Run the estimator over one flight and keep what it published.
+
+    Parameters
+    ----------
+    keep : callable, optional
+        What is kept of the rows of each stretch of the flight, fewer rows or fewer fields of them; by default all.
+
+    All others are those of `replay_into`.
+
+    Returns
+    -------
+    ReplayResult
+        The same inputs and parameters give the same bytes.
+    """
+    kept: list[RecordArrays] = []
+    summary = replay_into(
+        lambda rows: kept.append(rows if keep is None else keep(rows)),
+        inputs,
+        parameters,
+        overridden=overridden,
+        gaps=gaps,
+        start=start,
+        handovers=handovers,
+    )
+    told = {field.name: getattr(summary, field.name) for field in fields(ReplaySummary)}
+    return ReplayResult(**told, **joined(kept)._asdict())
+
+
+def replay_into(
+    take: Callable[[RecordArrays], None],
+    inputs: EstimatorInputs,
+    parameters: Mapping[str, float],
+    *,
+    overridden: frozenset[str] | None = None,
+    gaps: Sequence[Gap] = (),
+    start: LoggedState | None = None,
+    handovers: Sequence[Handover] = (),
+) -> ReplaySummary:
+    """Run the estimator over one flight and hand on what it publishes, a stretch of the flight at a time.
+
+    Parameters
+    ----------
+    take : callable
+        Is given the rows of each stretch, in order.
+    inputs : EstimatorInputs
+        From `fusetune.ekf2.feed.inputs.build_inputs`.
+    parameters : mapping
+        A complete set, from `fusetune.ekf2.filter.common.parameters.complete`.
+    overridden : frozenset of str, optional
+        Parameters that the set varies: changes that the log records for them in flight are not applied.
+    gaps : sequence of Gap
+        Gaps that the replay is continued into beside its normal course. Each starts from the state that the filter
+        has at that moment and ends without a trace, so gaps may overlap and cost nothing but their own length.
+    start : LoggedState, optional
+        State of the vehicle's own estimator that the filter starts from. Nothing is recorded before. Without it, or
+        where the samples end before that time, the filter starts from nothing, as when the vehicle boots.
+    handovers : sequence of Handover
+        Another estimator instance became primary: the filter takes over what that knew of its sensors.
+    """
+    ranges = [_runs_of(inputs, gap) for gap in gaps]
+    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers)
+    tally = _Tally()
+    found: list[GapResult | None] = [None] * len(gaps)
+    for begin, end in course.stretches(first_run, len(inputs.arrays.imu), [first for first, _ in ranges]):
+        for number, (first, last) in enumerate(ranges):
+            if first == begin:
+                found[number] = _continue_into_gap(course, gaps[number], first, last)
+        rows = course.run(begin, end)
+        tally.add(rows)
+        take(rows)
+    return tally.summary(course, warm_start_us, found)
+
+
+def begin_course(
+    inputs: EstimatorInputs,
+    parameters: Mapping[str, float],
+    overridden: frozenset[str] | None = None,
+    start: LoggedState | None = None,
+    handovers: Sequence[Handover] = (),
+) -> tuple[Course, int, int | None]:
+    """Set the estimator on its way; arguments as for `replay`.
+
+    Returns
+    -------
+    The course, the run to go on with, and the horizon at which `start` was taken over (None: it was not).
+    """
+    ensure_compiled()
+    changes = [
+        (run, change)
+        for run, change in inputs.parameter_changes
+        if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
+    ]
+    if start is not None:
+        inputs = without_first_resets(inputs, start.time_us)
+    inputs = without_resets_at(inputs, handovers)
+    record = parameter_record(parameters)
+    course = Course(inputs, record, changes, handover_runs(inputs, float(record["EKF2_DELAY_MAX"][0]), handovers))
+    first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
+    return course, first_run, warm_start_us
+
+
+def _runs_of(inputs: EstimatorInputs, gap: Gap) -> tuple[int, int]:
+    first, last = np.searchsorted(inputs.arrays.imu["time_us"], (gap.start, gap.stop))
+    return int(first), int(last)
+
+
+def _continue_into_gap(course: Course, gap: Gap, first: int, last: int) -> GapResult | None:
+    """Replay the gap on a copy of the filter; None where the filter has not started, or the flight has no such time."""
+    if not course.ekf["filter_initialised"][0]:
+        return None
+    branch = course.branch()
+    branch.ekf["withheld"][gap.sensor] = True
+    start = int(branch.ekf["time_delayed_us"][0])
+    innovations, _, local_position, _ = joined([branch.run(*stretch) for stretch in branch.stretches(first, last)])
+    if not len(local_position):
+        return None
+    sources = [AID_SOURCE_NAMES.index(name) for name in WITHHOLDABLE[gap.sensor]]
+    return GapResult(
+        gap=gap,
+        start=start,
+        innovations=innovations[np.isin(innovations["source"], sources)],
+        local_position=local_position[[0, -1]],
+    )
+
+
+class _Tally:
+    """What is told of all rows, counted as they come."""
+
+    def __init__(self) -> None:
+        self._horizons: list[np.ndarray] = []
+        self._diverged = False
+        self._faults = 0
+        self._resets = {name: 0 for name in LOCAL_POSITION_ROW.names or () if name.endswith("_reset_counter")}
+
+    def add(self, rows: RecordArrays) -> None:
+        states, position = rows.states, rows.local_position
+        self._horizons.append(states["timestamp_sample"].copy())
+        self._diverged |= not (np.isfinite(states["states"]).all() and np.isfinite(states["covariances"]).all())
+        faults = [i for i, name in enumerate(FLAG_COLUMNS) if name.startswith("fs_")]
+        bits = rows.flags["flags"][:, faults].astype(np.int64) << np.arange(len(faults))
+        self._faults = max(self._faults, int(bits.sum(axis=1).max(initial=0)))
+        if len(position):
+            self._resets = {name: int(position[name][-1]) for name in self._resets}
+
+    def summary(self, course: Course, warm_start_us: int | None, gaps: Sequence[GapResult | None]) -> ReplaySummary:
+        time = np.concatenate([np.zeros(0, np.int64), *self._horizons])
+        return ReplaySummary(
+            mode=course.inputs.mode,
+            imu_samples=len(course.inputs.arrays.imu),
+            updates=int(course.recorder["updates"][0]),
+            update_interval_us=float(np.median(np.diff(time))) if len(time) > 1 else 0.0,
+            origin=_origin(course.ekf["origin"][0]),
+            resets=self._resets,
+            filter_fault_flags_max=self._faults,
+            diverged=self._diverged,
+            gaps=tuple(one for one in gaps if one is not None),
+            warm_start_us=warm_start_us,
+            levelled=bool(course.ekf["filter_initialised"][0]),
+        )
+
+
+def _origin(origin: np.void) -> tuple[float, float, float] | None:
+    if not origin["valid"]:
+        return None
+    return float(np.rad2deg(origin["lat_rad"])), float(np.rad2deg(origin["lon_rad"])), float(origin["alt"])

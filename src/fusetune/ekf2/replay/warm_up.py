@@ -1,0 +1,44 @@
+"""Compile the estimator before many processes need it at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusetune.ekf2.compiled.compilation import compile_in_one_piece
+from fusetune.ekf2.feed.inputs import build_inputs
+from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.replay.replay import replay
+from fusetune.px4.flight import Flight, TopicTable
+from fusetune.px4.layouts.release_layouts import canonical
+
+IMU_SAMPLES = 4
+IMU_INTERVAL_US = 4000
+GRAVITY_M_S2 = 9.80665
+
+
+def compile_kernels() -> None:
+    """Replay a moment at rest, which compiles the estimator or loads it from the cache.
+
+    The types of all inputs are fixed, so what is compiled for this moment serves every flight and parameter set.
+    """
+    flight = Flight("warm_up", topics={("sensor_combined", 0): _imu_at_rest()})
+    replay(build_inputs(canonical(flight)), complete({}, {}, None))
+
+
+def _imu_at_rest() -> TopicTable:
+    samples = np.arange(1, IMU_SAMPLES + 1)
+    columns = {f"gyro_rad[{axis}]": np.zeros(IMU_SAMPLES, np.float32) for axis in range(3)}
+    columns |= {f"accelerometer_m_s2[{axis}]": np.zeros(IMU_SAMPLES, np.float32) for axis in range(3)}
+    columns["accelerometer_m_s2[2]"] -= np.float32(GRAVITY_M_S2)
+    interval = np.full(IMU_SAMPLES, IMU_INTERVAL_US, np.uint32)
+    return {
+        "timestamp": samples * IMU_INTERVAL_US,
+        **columns,
+        "gyro_integral_dt": interval,
+        "accelerometer_integral_dt": interval,
+        "accelerometer_timestamp_relative": np.zeros(IMU_SAMPLES, np.int32),
+    }
+
+
+if __name__ == "__main__":
+    compile_in_one_piece(compile_kernels)

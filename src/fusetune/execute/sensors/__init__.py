@@ -1,0 +1,1 @@
+"""Sensors as models on the truth, with their noise and faults."""

@@ -1,0 +1,54 @@
+"""Barometer (`vehicle_air_data`): pressure altitude that drifts and is fooled by the rotors' wash near the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusetune.execute.sensors.noise import gauss_markov, random_stream
+from fusetune.execute.sensors.sampling import sample_times
+from fusetune.execute.vehicle import Barometer
+from fusetune.execute.world.truth import Truth
+from fusetune.px4.flight import TopicTable
+
+DEVICE_ID = 4028193
+SEA_LEVEL_PRESSURE_PA = 101_325.0
+SEA_LEVEL_TEMPERATURE_K = 288.15
+LAPSE_RATE_K_M = 0.0065
+PRESSURE_EXPONENT = 5.2558797
+GAS_CONSTANT_AIR_J_KG_K = 287.05287
+ZERO_CELSIUS_K = 273.15
+
+
+def vehicle_air_data(truth: Truth, barometer: Barometer, geoid_undulation_m: float, seed: int) -> TopicTable:
+    """Barometer samples in the layout of PX4's topic."""
+    rng = random_stream(seed, "barometer")
+    sampled_us = sample_times(truth, barometer.rate_hz, rng)
+    _, _, height = truth.frame.to_geodetic(truth.at(sampled_us, truth.position))
+    altitude = height - geoid_undulation_m + _errors(truth, barometer, sampled_us, rng)
+    temperature = SEA_LEVEL_TEMPERATURE_K - LAPSE_RATE_K_M * altitude
+    pressure = SEA_LEVEL_PRESSURE_PA * (temperature / SEA_LEVEL_TEMPERATURE_K) ** PRESSURE_EXPONENT
+    samples = len(sampled_us)
+    return {
+        "timestamp": (sampled_us + round(barometer.latency_ms * 1e3)).astype(np.int64),
+        "timestamp_sample": sampled_us.astype(np.int64),
+        "baro_device_id": np.full(samples, DEVICE_ID, np.uint32),
+        "baro_alt_meter": altitude.astype(np.float32),
+        "baro_pressure_pa": pressure.astype(np.float32),
+        "ambient_temperature": (temperature - ZERO_CELSIUS_K).astype(np.float32),
+        "rho": (pressure / (GAS_CONSTANT_AIR_J_KG_K * temperature)).astype(np.float32),
+        "temperature_source": np.zeros(samples, np.uint8),
+        "calibration_count": np.ones(samples, np.uint8),
+    }
+
+
+def _errors(truth: Truth, barometer: Barometer, sampled_us: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Error of the altitude, (N,) m: constant, steady drift, wander, noise and ground effect."""
+    samples = len(sampled_us)
+    offset, rate = barometer.offset_m * rng.standard_normal(), barometer.drift_rate_m_s * rng.standard_normal()
+    wander = gauss_markov(rng, samples, 1, 1.0 / barometer.rate_hz, barometer.drift_m, barometer.drift_time_s)[:, 0]
+    noise = barometer.noise_m * rng.standard_normal(samples)
+    above_ground = np.maximum(-truth.at(sampled_us, truth.position[:, 2]), 0.0)
+    thrust = truth.at(sampled_us, truth.rotor_speed) ** 2
+    wash = barometer.ground_effect_m * thrust * np.exp(-above_ground / barometer.ground_effect_height_m)
+    drift = rate * (sampled_us - truth.timestamp_us[0]) * 1e-6
+    return np.asarray(offset + drift + wander + noise - wash)

@@ -1,0 +1,1 @@
+"""What truly happens: the earth, the wind, the path and the motion of the vehicle."""

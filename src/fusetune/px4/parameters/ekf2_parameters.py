@@ -1,0 +1,261 @@
+"""EKF2 parameters: metadata per release, validation, and the way of old parameter sets to the baseline release.
+
+Imports nothing but the standard library, so that reading a study stays cheap.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import math
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from types import MappingProxyType
+from typing import Literal
+
+from fusetune.px4.parameters.parameter_migration import PREDECESSORS, migrate_names
+
+Release = tuple[int, int] | tuple[int, int, int]
+
+BASELINE_RELEASE = (1, 16)
+"""The release whose estimator is replayed; its parameters are the ones that count."""
+
+_DEVELOPMENT_RELEASE = (1, 18)
+_FLOAT = struct.Struct("<f")
+
+
+class ParameterError(ValueError):
+    """A parameter or its value is not acceptable.
+
+    Attributes
+    ----------
+    name, reason, remedy
+        The parameter as given, what is wrong, and what to do about it.
+    """
+
+    def __init__(self, name: str, reason: str, remedy: str) -> None:
+        self.name, self.reason, self.remedy = name, reason, remedy
+        super().__init__(name, reason, remedy)
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.reason}. {self.remedy}."
+
+
+@dataclass(frozen=True)
+class ParameterMetadata:
+    """What PX4 says about one parameter."""
+
+    name: str
+    type: Literal["INT32", "FLOAT"]
+    kind: Literal["float", "int32", "boolean", "enum", "bitmask"]
+    default_history: tuple[tuple[tuple[int, int], float], ...]
+    """(release, default) at each change, oldest first."""
+    first_release: tuple[int, int]
+    last_release: tuple[int, int]
+    minimum: float | None
+    maximum: float | None
+    unit: str
+    reboot_required: bool
+    values: Mapping[int, str]
+    """Meaning of each value (enum) or bit (bitmask)."""
+    became: tuple[str, ...]
+    """Parameters that took over in later releases."""
+    description: str
+
+    @property
+    def default(self) -> float:
+        """Default in the baseline release, or the last one it had."""
+        return self.default_in(BASELINE_RELEASE)
+
+    @property
+    def renamed_from(self) -> tuple[str, ...]:
+        """Parameters of older releases that this one took over from."""
+        return tuple(name for name, other in ALL_PARAMETERS.items() if self.name in other.became)
+
+    def default_in(self, release: Release) -> float:
+        """Default in a release, as the float32 (or whole number) that PX4 holds.
+
+        Releases before the first or after the last one known take the nearest known default.
+        """
+        known = [value for since, value in self.default_history if since <= release[:2]]
+        return known[-1] if known else self.default_history[0][1]
+
+    def exists_in(self, release: Release) -> bool:
+        """Whether a release has this parameter."""
+        return self.first_release <= release[:2] <= self.last_release
+
+
+def as_float32(value: float) -> float:
+    """The value as PX4 stores it: rounded to single precision."""
+    return float(_FLOAT.unpack(_FLOAT.pack(value))[0])
+
+
+def check_value(name: str, value: object) -> None:
+    """Refuse a parameter of the baseline release that is unknown, of the wrong type or out of range.
+
+    Raises
+    ------
+    ParameterError
+        With the reason and the remedy in words.
+    """
+    metadata = metadata_of(name)
+    number = number_of(metadata, value)
+    if metadata.kind == "bitmask":
+        _check_bits(metadata, int(number))
+    elif metadata.values and int(number) not in metadata.values:
+        choices = ", ".join(f"{key} ({meaning})" for key, meaning in metadata.values.items())
+        raise ParameterError(name, f"{value} is none of its values", f"Choose one of {choices}")
+    _check_range(metadata, number)
+
+
+def metadata_of(name: str) -> ParameterMetadata:
+    """Metadata of a parameter of the baseline release.
+
+    Raises
+    ------
+    ParameterError
+        The baseline release has no such parameter; names the closest one, or what took over from it.
+    """
+    if name in PARAMETERS:
+        return PARAMETERS[name]
+    baseline = "v{}.{}".format(*BASELINE_RELEASE)
+    old = ALL_PARAMETERS.get(name)
+    if old is not None and old.became:
+        raise ParameterError(name, f"{baseline} no longer has it", f"Use {' / '.join(old.became)} instead")
+    if old is not None:
+        raise ParameterError(name, f"{baseline} does not have it, only other releases do", "Leave it out")
+    close = difflib.get_close_matches(str(name).upper(), PARAMETERS, n=1, cutoff=0.6)
+    remedy = f"Use {close[0]} if you mean that one" if close else "Look the name up in QGroundControl's parameter list"
+    raise ParameterError(str(name), "unknown EKF2 parameter", remedy)
+
+
+def migrate(logged: Mapping[str, float | int], release: Release | None = None) -> dict[str, float]:
+    """Logged parameters under the names, and in the meaning, of the baseline release.
+
+    Parameters
+    ----------
+    logged
+        All parameters of a log.
+    release
+        Firmware release of the log; `None` where unknown. Decides nothing where the log already holds the new name.
+
+    Returns
+    -------
+    dict
+        Only parameters that the log determines; values rounded to float32. Values that are no numbers count as missing.
+    """
+    known = (name for name in logged if name in PARAMETERS or name in PREDECESSORS)
+    sound = {name: logged[name] for name in known if math.isfinite(logged[name])}
+    return {name: as_float32(float(value)) for name, value in migrate_names(sound).items() if name in PARAMETERS}
+
+
+def complete(
+    logged: Mapping[str, float | int], overrides: Mapping[str, float | int], release: Release | None = None
+) -> dict[str, float]:
+    """All EKF2 parameters of the baseline release: overrides before logged ones before defaults.
+
+    Parameters
+    ----------
+    logged
+        Parameters of the log, in the names of its own release.
+    overrides
+        Parameters of a set, in the names of the baseline release.
+    release
+        Firmware release of the log.
+
+    Raises
+    ------
+    ParameterError
+        An override is not a parameter of the baseline release.
+    """
+    for name in overrides:
+        metadata_of(name)
+    values = _DEFAULTS | migrate(logged, release)
+    values.update({name: as_float32(float(value)) for name, value in overrides.items()})
+    return values
+
+
+def number_of(metadata: ParameterMetadata, value: object) -> float:
+    """The value of a parameter as a finite number, whole where its type is INT32; raises `ParameterError`."""
+    expected = "a whole number" if metadata.type == "INT32" else "a number"
+    if metadata.kind == "boolean" and isinstance(value, bool):
+        return float(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(metadata.name, f"{value!r} is not {expected}", f"Give {expected}, {_range_text(metadata)}")
+    if not math.isfinite(value) or (metadata.type == "INT32" and value != int(value)):
+        raise ParameterError(metadata.name, f"{value!r} is not {expected}", f"Give {expected}, {_range_text(metadata)}")
+    return float(value)
+
+
+def _check_bits(metadata: ParameterMetadata, value: int) -> None:
+    if value < 0 or value >> (max(metadata.values) + 1):
+        bits = ", ".join(f"{1 << bit} ({meaning})" for bit, meaning in metadata.values.items())
+        raise ParameterError(metadata.name, f"{value} sets bits that do not exist", f"Add up some of {bits}")
+
+
+def _check_range(metadata: ParameterMetadata, value: float) -> None:
+    low = -math.inf if metadata.minimum is None else metadata.minimum
+    high = math.inf if metadata.maximum is None else metadata.maximum
+    if metadata.kind == "boolean":
+        low, high = 0.0, 1.0
+    if not low <= value <= high:
+        raise ParameterError(metadata.name, f"{value:g} is out of range", f"Give {_range_text(metadata)}")
+
+
+def _range_text(metadata: ParameterMetadata) -> str:
+    unit = f" {metadata.unit}" if metadata.unit else ""
+    if metadata.kind == "boolean":
+        return "0 or 1"
+    if metadata.minimum is not None and metadata.maximum is not None:
+        return f"between {metadata.minimum:g} and {metadata.maximum:g}{unit}"
+    if metadata.minimum is not None:
+        return f"at least {metadata.minimum:g}{unit}"
+    if metadata.maximum is not None:
+        return f"at most {metadata.maximum:g}{unit}"
+    return f"the default is {metadata.default:g}{unit}"
+
+
+def _release_of(text: str) -> tuple[int, int]:
+    if text == "main":
+        return _DEVELOPMENT_RELEASE
+    major, minor = text.removeprefix("v").split(".")
+    return int(major), int(minor)
+
+
+def _metadata_from(row: dict[str, str]) -> ParameterMetadata:
+    changes = [change.split("=") for change in row["defaults"].split()]
+    labels = [entry.split("=", 1) for entry in row["values"].split(";") if entry]
+    return ParameterMetadata(
+        name=row["name"],
+        type="INT32" if row["type"] == "INT32" else "FLOAT",
+        kind=row["kind"],  # type: ignore[arg-type]
+        default_history=tuple((_release_of(since), as_float32(float(value))) for since, value in changes),
+        first_release=_release_of(row["first_release"]),
+        last_release=_release_of(row["last_release"]),
+        minimum=float(row["minimum"]) if row["minimum"] else None,
+        maximum=float(row["maximum"]) if row["maximum"] else None,
+        unit=row["unit"],
+        reboot_required=row["reboot_required"] == "1",
+        values=MappingProxyType({int(key): meaning for key, meaning in labels}),
+        became=tuple(row["became"].split()),
+        description=row["description"],
+    )
+
+
+def _read_metadata() -> dict[str, ParameterMetadata]:
+    file = resources.files(__package__) / "ekf2_parameters.csv"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return {row["name"]: _metadata_from(row) for row in csv.DictReader(lines)}
+
+
+ALL_PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(_read_metadata())
+"""EKF2 parameters of every release from v1.8 on."""
+
+PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
+    {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE_RELEASE)}
+)
+"""EKF2 parameters of the baseline release, by name in alphabetical order."""
+
+_DEFAULTS = {name: metadata.default for name, metadata in PARAMETERS.items()}

@@ -1,0 +1,1 @@
+"""ULog files: reading them whatever their damage, and writing them."""

@@ -1,0 +1,127 @@
+"""Drawing without a display: the style, colours of the sets, and files that are the same bytes every time."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Literal
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from fusetune.storage.files import AnyPath, atomic_path
+
+STYLE = Path(__file__).with_name("figures.mplstyle")
+
+PRESENT_COLOUR = "#222222"
+CHOSEN_COLOUR = "#0072B2"
+CANDIDATE_COLOUR = "#56B4E9"
+VETOED_COLOUR = "#B0B0B0"
+
+_PNG_COLOURS = 96
+_PANEL_COLUMNS = 3
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Everything drawn inside has the report's style."""
+    with matplotlib.rc_context(fname=STYLE):
+        yield
+
+
+def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure of a size in inches, drawn by Agg, with room made for its labels.
+
+    With `layout=None` the caller places the axes; finding the room takes longer than drawing a figure.
+    """
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save_svg(figure: Figure, path: AnyPath) -> None:
+    """Write an SVG without date or random names."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="svg", metadata={"Date": None, "Creator": None})
+
+
+def save_png(figure: Figure, path: AnyPath) -> None:
+    """Write a PNG with a small palette: a third of the size of full colour, and no difference to see in a plot."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": None})
+    image = Image.open(buffer).convert("RGB")
+    with atomic_path(path) as temporary:
+        image.quantize(_PNG_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
+            temporary, format="PNG", optimize=True
+        )
+
+
+def set_colours(sets: Sequence[str], present: str) -> dict[str, str]:
+    """A colour per set: black for the present one, the cycle for the others."""
+    cycle = [entry["color"] for entry in matplotlib.rcParams["axes.prop_cycle"] if entry["color"] != "#000000"]
+    others = [name for name in sets if name != present]
+    colours = {name: _hex(cycle[i % len(cycle)]) for i, name in enumerate(others)}
+    colours[present] = PRESENT_COLOUR
+    return colours
+
+
+def _hex(colour: str) -> str:
+    return colour if colour.startswith("#") else f"#{colour}"
+
+
+def empty_figure(message: str) -> Figure:
+    """A figure that says why there is nothing to see."""
+    figure = new_figure(7.0, 1.2)
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, message, ha="center", va="center", color="#666666", transform=axes.transAxes)
+    return figure
+
+
+def panel_grid(panels: int, names: Sequence[str], row_height: float, title: str) -> tuple[Figure, list[Axes]]:
+    """Panels in three columns, one row per name in each, with the names at the left edge only.
+
+    Parameters
+    ----------
+    names : sets, the first on top
+    row_height : height of a name's row, inch
+
+    Returns
+    -------
+    The figure and its `panels` axes. Margins are reckoned from the names, not sought: that is three times as fast.
+    """
+    columns = min(_PANEL_COLUMNS, panels)
+    rows = -(-panels // columns)
+    left = 0.25 + 0.068 * max(len(name) for name in names)
+    panel_height, gap, head = row_height * (len(names) + 0.3), 0.72, 0.62
+    width, height = left + columns * 2.3 + 0.1, head + rows * (panel_height + gap) - 0.2
+    figure = new_figure(width, height, layout=None)
+    grid = figure.subplots(
+        rows,
+        columns,
+        squeeze=False,
+        gridspec_kw={
+            "left": left / width,
+            "right": 1.0 - 0.1 / width,
+            "top": 1.0 - head / height,
+            "bottom": (gap - 0.2) / height,
+            "hspace": gap / panel_height,
+            "wspace": 0.1,
+        },
+    )
+    for index, axes in enumerate(grid.flat):
+        axes.set_visible(index < panels)
+        label_sets(axes, names)
+        axes.tick_params(labelleft=index % columns == 0, left=index % columns == 0)
+    figure.text(0.1 / width, 1.0 - 0.1 / height, title, ha="left", va="top", fontsize=9.5)
+    return figure, list(grid.flat)[:panels]
+
+
+def label_sets(axes: Axes, sets: Sequence[str]) -> None:
+    """One row per set, the first on top."""
+    axes.set_yticks(range(len(sets)), sets)
+    axes.set_ylim(len(sets) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")

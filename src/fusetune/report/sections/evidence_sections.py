@@ -1,0 +1,241 @@
+"""The parts of the page about the evidence: comparison, drift, whether the choice holds, weights, the paper's rule."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from fusetune.analyze.sources import AID_SOURCES
+from fusetune.apply.evidence import AIDED, UNAIDED
+from fusetune.report.comparison import percent_change
+from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, signed, table
+from fusetune.report.results import Results
+from fusetune.report.sections.ranking_tables import (
+    NOT_KNOWN,
+    criteria_table,
+    interval_text,
+    objections_table,
+    ranking_table,
+    set_name,
+    sign_table,
+)
+from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY, Withheld, drift_summary
+from fusetune.storage.files import AnyPath
+
+
+def evidence_section(results: Results, figures: AnyPath) -> str:
+    """Forest plot, heat map, signs per flight, ranking and objections."""
+    figures = Path(figures)
+    rule = results.decision["rule"]
+    title = "What the flights say"
+    if not results.flights:
+        return section(title, paragraph("No flight has a say, so there is nothing to compare the sets by."))
+    return section(
+        title,
+        paragraph(
+            "Every set was replayed on every flight, so the sets saw the same samples. They are judged by two kinds of "
+            "prediction. Aided: of each measurement, one step ahead, before it was used. Unaided: of velocity and "
+            "position, after seconds without GNSS. A set is better when its errors are smaller; how large it sets the "
+            "uncertainty that it claims does not count."
+        ),
+        figure(
+            figures / "differences.svg",
+            f"Dot: mean over the flights; bar: {rule['confidence']:.0%} interval from redrawing flights and their "
+            "blocks of about 10 s. A set replaces the present one only if its bar in the first column lies wholly left "
+            "of the line, and none of its other bars wholly right of it. A dot without a bar: how far chance could do "
+            "that is not known. The columns have scales of their own; arrows point at what lies outside.",
+        ),
+        objections_table(results),
+        figure(
+            figures / "flights_by_sets.svg",
+            "Does it hold on each flight? A set that is good should be so on most. The colours fit the usual sets; "
+            "what is beyond them has the colour of the end.",
+        ),
+        sign_table(results),
+        ranking_table(results),
+        details("All other criteria", criteria_table(results)),
+    )
+
+
+def withheld_section(results: Results, figures: AnyPath) -> str:
+    """Drift while sensors are withheld, and the two aims against each other; empty where no flight has a say."""
+    figures = Path(figures)
+    if not results.flights:
+        return ""
+    parts = [
+        paragraph(
+            "Several times in each flight GNSS, and at other times the barometer or the magnetometer, was kept from "
+            "the estimator for some seconds while it flew on. What the sensor measured in the end shows how far the "
+            "prediction had drifted: the better the estimator knew its velocity, attitude and biases, the less."
+        ),
+        figure(
+            figures / "drift.svg",
+            "Above: drift (RMS over the gaps of a flight, mean over the flights); the shade holds the middle half of "
+            "the flights. Below: change against the present set on the same gaps, mean over the flights ± one "
+            "standard error.",
+        ),
+        figure(
+            figures / "pareto.svg",
+            f"Dot: mean; cross: {results.decision['rule']['confidence']:.0%} intervals. No set on the dotted line can "
+            "be bettered in one of the two without loss in the other.",
+        ),
+    ]
+    others = _drift_table(results, (BAROMETER, MAGNETOMETER), "Without barometer, without magnetometer")
+    parts += [others, _drift_note(results)] if others else []
+    gnss = _drift_table(results, (POSITION, VELOCITY), "Without GNSS, horizontal")
+    parts += [details("Figures of the drift without GNSS", gnss)] if gnss else []
+    return section("Without a sensor", *parts)
+
+
+def _drift_table(results: Results, withheld: tuple[Withheld, ...], caption: str) -> str:
+    summaries = [(one, summary) for one in withheld if len(summary := drift_summary(results, one))]
+    if not summaries:
+        return ""
+    head = ["set"]
+    for one, summary in summaries:
+        head += [f"{_sensed(one)} after {seconds:g} s [{one.unit}]" for seconds in _horizons(summary)]
+        head += ["change %"]
+    rows = []
+    for name in results.shown:
+        row: list[Cell | str] = [set_name(name, results)]
+        for _, summary in summaries:
+            last = _horizons(summary)[-1]
+            row += [number(_figure(summary, name, seconds, "mean")) for seconds in _horizons(summary)]
+            row.append(signed(None if name == results.present else _figure(summary, name, last, "change")))
+        rows.append(row)
+    return table(head, rows, f"{caption}: drift, mean over the flights; change: at the end, against the present set")
+
+
+def _drift_note(results: Results) -> str:
+    flights = [
+        f"{one.label}: {int(summary['flights'].max())} flights"
+        for one in (BAROMETER, MAGNETOMETER)
+        if len(summary := drift_summary(results, one))
+    ]
+    return paragraph(f"Shown, not ranked by ({'; '.join(flights)}).", "note")
+
+
+def _sensed(withheld: Withheld) -> str:
+    return {"gnss_pos": "position", "gnss_vel": "velocity", "baro_hgt": "height", "mag": "field"}[withheld.source]
+
+
+def _horizons(summary: pd.DataFrame) -> list[float]:
+    return sorted(set(summary.index.get_level_values("horizon_s")))
+
+
+def _figure(summary: pd.DataFrame, name: str, horizon_s: float, column: str) -> float | None:
+    return float(summary[column].loc[name, horizon_s]) if (name, horizon_s) in summary.index else None
+
+
+def holds_section(results: Results) -> str:
+    """Each flight left out in turn: what would have been chosen, and what that was worth there."""
+    validated = results.decision["leave_one_out"]
+    title = "Does the choice hold?"
+    if validated is None:
+        if not results.flights:
+            return ""
+        return section(title, paragraph("With fewer than three flights that count none can be left out to see."))
+    chosen, worth = validated["chosen"], validated["differences"]
+    rows = [(flight, set_name(name, results), _worth(worth[flight])) for flight, name in sorted(chosen.items())]
+    rows.append((Cell("mean", "quiet"), Cell(""), signed(float(percent_change(validated["difference"])))))
+    return section(
+        title,
+        paragraph(_holds(results)),
+        table(("flight left out", "best set of the others", "change of the error there %"), rows),
+        paragraph(
+            "Each flight was left out in turn, the best eligible set chosen from the others and judged on the flight "
+            "that had no part in choosing it. Below 0 is better than the present set. This shows how much hangs on "
+            "single flights; whether a set is proved better is told by its interval and by p, all sets.",
+            "note",
+        ),
+    )
+
+
+def _worth(difference: float) -> Cell:
+    kind = "number good" if difference < 0.0 else "number bad" if difference > 0.0 else "number"
+    return signed(float(percent_change(difference)), kind=kind)
+
+
+def _holds(results: Results) -> str:
+    validated = results.decision["leave_one_out"]
+    count, stays = len(validated["chosen"]), validated["stays"]
+    names = set(validated["chosen"].values())
+    if names == {results.present}:
+        return "Whichever flight is left out, no set does better than the present one on the others."
+    change = float(percent_change(validated["difference"]))
+    confidence = results.decision["rule"]["confidence"]
+    ends = interval_text(validated["lower"], validated["upper"])
+    span = f"{confidence:.0%} interval {ends}{'' if ends == NOT_KNOWN else ' %'}"
+    size = f"{abs(change):.1f} % {'larger' if change >= 0.0 else 'smaller'} than now"
+    if stays == count:
+        same = "the same set is best whichever flight is left out"
+    else:
+        same = f"the best set is the same without any one of {stays} of the {count} flights, another without the rest"
+    return f"On a flight that had no part in the choice the errors are {size} on average ({span}); {same}."
+
+
+def weights_section(results: Results) -> str:
+    """How much each kind of prediction counts on each flight, and the whiteness behind it."""
+    weights, rule = results.decision["weights"], results.decision["rule"]
+    if not weights:
+        return ""
+    shares = _white_shares(results)
+    sources = [name for name, weight in rule["sources"].items() if weight > 0.0 and name in shares.columns]
+    rows = [
+        (
+            flight,
+            *(_share(shares, flight, source) for source in sources),
+            Cell(f"{100.0 * of_aim.get(AIDED, 0.0):.0f} %", "number"),
+            Cell(f"{100.0 * of_aim.get(UNAIDED, 0.0):.0f} %", "number"),
+        )
+        for flight, of_aim in sorted(weights.items())
+    ]
+    head = ("flight", *(f"{AID_SOURCES[one].label}, white" for one in sources), "weight aided", "weight unaided")
+    text = (
+        "A filter that follows a wandering measurement predicts it well without knowing better, so the predictions one "
+        "step ahead count only as far as the error of the measurement is white: fully from "
+        f"{100.0 * rule['trust_white_share']:.0f} % on, not at all below {100.0 * rule['distrust_white_share']:.0f} %. "
+        "Where a flight has only one kind of prediction to tell of, that one decides there."
+    )
+    unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
+    note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")
+    return section("What counts how much", paragraph(text), table(head, rows), note if unknown else "")
+
+
+def _white_shares(results: Results) -> pd.DataFrame:
+    """White share of the error by flight and source as the present set sees it: the mean over the axes."""
+    metrics = results.metrics
+    rows = metrics[
+        (metrics["metric"] == "white_share")
+        & (metrics["set"] == results.present)
+        & metrics["axis"].isin(("x", "y", "z"))
+    ]
+    rows = rows[np.isfinite(rows["value"].astype(float))]
+    found = rows.assign(flight=rows["flight"].astype(str), source=rows["source"].astype(str))
+    return found.groupby(["flight", "source"])["value"].mean().unstack()
+
+
+def _share(shares: pd.DataFrame, flight: str, source: str) -> Cell:
+    value = shares[source].get(flight, np.nan)
+    return Cell(f"{100.0 * value:.0f} %", "number") if np.isfinite(value) else Cell(NOT_KNOWN, "number quiet")
+
+
+def paper_section(results: Results) -> str:
+    """What the paper's own rule would choose, and where and why it differs from the decision."""
+    mode = results.decision["paper_mode"]
+    if mode["first"] is None:
+        return ""
+    text = f"For comparison, the rule of the paper that this method comes from ({mode['rule']}). " + (
+        "It agrees with the decision." if mode["agrees"] else "It does not agree with the decision."
+    )
+    rows = [
+        (
+            set_name(one["name"], results),
+            number(one["aggregate_rms"], 4),
+            {True: "yes", False: "no", None: "unknown"}[one["consistent"]],
+            number(100.0 * one["break_rate"], 3),
+        )
+        for one in mode["ranking"]
+    ]
+    head = ("set", "aggregate RMS", "NIS inside the χ² bounds", "break rate %")
+    return section("Paper mode", paragraph(text), bullets(mode["why"]), table(head, rows))

@@ -1,0 +1,1 @@
+"""Runs of the pipeline beside and after each other: locks, recovery, jobs of a cluster."""

@@ -1,0 +1,151 @@
+"""Compiled kernels are taken where they are those of these sources and this processor, and nowhere else."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from numba.core import config
+
+import fusetune
+from fusetune.ekf2.compiled import compilation, kernel_cache
+from fusetune.ekf2.compiled.compilation import ensure_compiled
+from fusetune.ekf2.compiled.kernel_locator import KernelLocator
+from fusetune.ekf2.replay import loop
+from fusetune.ekf2.replay.warm_up import compile_kernels
+from fusetune.errors import UserError
+
+LOADS = """
+import fusetune.ekf2.compiled.compilation
+from fusetune.ekf2.replay.loop import run_estimator
+from fusetune.ekf2.replay.warm_up import compile_kernels
+compile_kernels()
+print(fusetune.__file__, len(run_estimator.stats.cache_hits), len(run_estimator.stats.cache_misses))
+"""
+
+
+@pytest.fixture(scope="module")
+def kernels() -> Path:
+    """The folder of the kernels of this processor, compiled."""
+    if config.DISABLE_JIT:
+        pytest.skip("Numba is switched off")
+    compile_kernels()
+    return compilation.kernel_folder()
+
+
+@pytest.fixture
+def cache(kernels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the cache in use that takes its place; where it would be compiled, nothing is."""
+    caches = Path(config.CACHE_DIR)
+    copied = tmp_path / "cache"
+    shutil.copytree(kernels, copied / kernels.relative_to(caches))
+    monkeypatch.setattr(config, "CACHE_DIR", str(copied))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(copied))
+    return copied / kernels.relative_to(caches)
+
+
+@pytest.fixture
+def compilations(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """The commands by which the estimator would have been compiled."""
+    commands: list[list[str]] = []
+    monkeypatch.setattr(compilation.subprocess, "run", lambda command, **_: commands.append(command))
+    ensure_compiled.cache_clear()
+    return commands
+
+
+def test_a_copy_of_the_checkout_with_other_times_loads_what_was_compiled(kernels: Path, tmp_path: Path) -> None:
+    package, checkout = Path(fusetune.__file__).parent, tmp_path / "elsewhere"
+    shutil.copytree(package, checkout / "src" / "fusetune", ignore=shutil.ignore_patterns("__pycache__"))
+    for file in checkout.rglob("*.py"):
+        os.utime(file, (2e9, 2e9))
+    (checkout / "Snakefile").touch()
+    caches = Path(config.CACHE_DIR)
+    place = checkout / ".cache" / "numba" / caches.name / kernels.relative_to(caches)
+    shutil.copytree(kernels, place)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    environment["PYTHONPATH"] = str(checkout / "src")
+    command = [sys.executable, "-c", LOADS]
+    printed = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True, cwd=tmp_path)
+    assert printed.stdout.split() == [str(checkout / "src" / "fusetune" / "__init__.py"), "1", "0"]
+
+
+def test_what_is_as_it_was_compiled_is_not_compiled_again(cache: Path, compilations: list[list[str]]) -> None:
+    ensure_compiled()
+    assert compilations == []
+
+
+@pytest.mark.parametrize("damage", ["flipped bit", "lost file", "lost record"])
+def test_damaged_kernels_are_deleted_and_compiled(cache: Path, compilations: list[list[str]], damage: str) -> None:
+    code = next(cache.glob("*.nbc"))
+    if damage == "flipped bit":
+        content = bytearray(code.read_bytes())
+        content[len(content) // 2] ^= 1
+        code.write_bytes(content)
+    else:
+        (code if damage == "lost file" else cache / compilation.RECORD_NAME).unlink()
+    ensure_compiled()
+    assert len(compilations) == 1
+    assert list(cache.iterdir()) == []
+
+
+def test_kernels_of_another_processor_are_left_alone(
+    cache: Path, compilations: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = cache.parents[2] / "another processor" / "ekf2" / "replay"
+    monkeypatch.setattr(compilation, "kernel_folder", lambda: other)
+    before = {file: file.read_bytes() for file in cache.iterdir()}
+    ensure_compiled()
+    assert len(compilations) == 1
+    assert {file: file.read_bytes() for file in cache.iterdir()} == before
+
+
+@pytest.mark.parametrize("place", [".", "..", "*.nbc"])
+def test_kernels_that_others_could_have_written_are_deleted_and_compiled_out_of_their_reach(
+    cache: Path, compilations: list[list[str]], place: str
+) -> None:
+    exposed = next(cache.glob(place)) if "*" in place else cache / place
+    exposed.chmod(exposed.stat().st_mode | 0o002)
+    ensure_compiled()
+    assert len(compilations) == 1
+    assert list(cache.iterdir()) == []
+    assert not kernel_cache.others_may_write_kernels(cache)
+
+
+def test_kernels_are_loaded_from_where_nothing_can_be_written(
+    cache: Path, compilations: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locator = KernelLocator.from_function(loop.run_estimator.py_func, loop.__file__)
+    assert locator is not None
+    assert Path(locator.get_cache_path()) == cache
+
+    def refuse(**_: object) -> None:
+        raise PermissionError("read-only file system")
+
+    monkeypatch.setattr("numba.core.caching.tempfile.TemporaryFile", refuse)
+    assert KernelLocator.from_function(loop.run_estimator.py_func, loop.__file__) is not None
+    ensure_compiled()
+    assert compilations == []
+
+
+def test_a_cache_without_kernels_that_cannot_be_made_is_named(
+    tmp_path: Path, compilations: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "file" / "cache"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", config.CACHE_DIR)
+    with pytest.raises(UserError, match="does not hold the estimator for this processor"):
+        ensure_compiled()
+    assert compilations == []
+
+
+def test_the_processor_is_part_of_the_place(kernels: Path) -> None:
+    code = "from fusetune.ekf2.compiled import compilation; print(compilation.kernel_folder())"
+    environment = os.environ | {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    run = subprocess.run([sys.executable, "-c", code], env=environment, check=True, stdout=subprocess.PIPE, text=True)
+    other = Path(run.stdout.strip())
+    assert other != kernels
+    assert other.parents[2] == kernels.parents[2]

@@ -1,0 +1,187 @@
+"""What the page says of the evidence, on a made study of which the answer is known, and where something is missing."""
+
+import dataclasses
+import re
+from html import unescape
+from pathlib import Path
+
+import pytest
+from tests.analyze.made_flight import MadeSet
+from tests.report.made_report import make_report
+
+from fusetune.report.comparison import AIM_LABELS, aim_changes, flight_changes
+from fusetune.report.figures.difference_figures import differences, flights_by_sets, pareto
+from fusetune.report.figures.figures import figure_style
+from fusetune.report.results import Results, read_results
+from fusetune.report.sections.evidence_sections import holds_section, paper_section, weights_section, withheld_section
+from fusetune.report.sections.ranking_tables import objections_table, ranking_table, sign_table
+
+
+@pytest.fixture(scope="module")
+def results(made: tuple[Path, str]) -> Results:
+    root, _ = made
+    return read_results([root / "analyze" / f"flight_{i}" for i in range(5)], root / "apply")
+
+
+def cells(html: str) -> list[list[str]]:
+    """Text of the cells of all rows of a table."""
+    rows = re.findall(r"<tr>(.*?)</tr>", html, flags=re.S)
+    return [
+        [unescape(re.sub("<.*?>", "", one)).replace("\xa0", " ") for one in re.findall(r"<t[dh].*?</t[dh]>", row)]
+        for row in rows
+    ]
+
+
+def with_decision(results: Results, **changes: object) -> Results:
+    return dataclasses.replace(results, decision=results.decision | changes)
+
+
+def test_the_forest_plot_has_a_column_for_each_kind_of_prediction(results: Results) -> None:
+    with figure_style():
+        figure = differences(results)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == list(AIM_LABELS.values())
+    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert names == ["better", "drifting (not eligible)", "<restless> (not eligible)"]
+    for axes, aim in zip(figure.axes, AIM_LABELS, strict=True):
+        change = aim_changes(results, aim)["change"]
+        dots = [line for line in axes.lines if line.get_marker() == "o"]
+        drawn = {round(float(line.get_ydata()[0])): float(line.get_xdata()[0]) for line in dots}
+        # Row 0 is the set to choose: it is there in every column, left of the line.
+        assert drawn[0] == pytest.approx(change["better"])
+        assert drawn[0] < 0.0
+
+
+def test_a_set_out_of_the_plot_has_an_arrow_with_its_figure(results: Results) -> None:
+    with figure_style():
+        figure = differences(results)
+    change = aim_changes(results, "unaided")["change"]["drifting"]
+    # 5 m/s against 1.3 m/s is +285 %, where the others lie within some ten.
+    assert change > 200.0
+    axes = figure.axes[2]
+    assert axes.get_xlim()[1] < change
+    assert any(f"{change:+.0f} % ▶" in text.get_text() for text in axes.texts)
+
+
+def test_the_heat_map_numbers_the_flights_as_the_table_of_signs_does(results: Results) -> None:
+    with figure_style():
+        axes = flights_by_sets(results).axes[0]
+    assert [label.get_text().split()[-1] for label in axes.get_yticklabels()] == ["1", "2", "3", "4", "5"]
+    head, *rows = cells(sign_table(results))
+    assert head == ["set", "better on", "p", "1", "2", "3", "4", "5"]
+    changes = flight_changes(results)
+    for row in rows:
+        marks = ["✓" if value < 0.0 else "✗" for value in changes[row[0]]]
+        assert row[3:] == marks
+        assert row[1] == f"{marks.count('✓')} of 5"
+    assert "1: flight_0; 2: flight_1" in sign_table(results)
+
+
+def test_the_pareto_figure_shades_what_is_better_in_both_and_names_who_is_outside(results: Results) -> None:
+    with figure_style():
+        axes = pareto(results).axes[0]
+    (shade,) = axes.patches
+    assert (shade.get_x() + shade.get_width(), shade.get_y() + shade.get_height()) == pytest.approx((0.0, 0.0))
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert any(label.startswith("drifting (not eligible), outside: ") for label in labels)
+    assert "present (flies now)" in labels
+    better = next(line for line in axes.lines if line.get_label() == "better")
+    assert float(better.get_xdata()[0]) == pytest.approx(aim_changes(results, "aided")["change"]["better"])
+    assert float(better.get_ydata()[0]) == pytest.approx(aim_changes(results, "unaided")["change"]["better"])
+
+
+def test_sets_are_not_eligible_for_a_veto_or_for_one_of_the_two_kinds(results: Results) -> None:
+    rows = {row[0]: row[1] for row in cells(objections_table(results))}
+    assert "5 resets, the present set has 0" in rows["<restless>"]
+    assert "after seconds without GNSS its errors are" in rows["drifting"]
+    assert "better" not in rows
+    status = {row[0]: row[1] for row in cells(ranking_table(results))}
+    assert status == {
+        "set": "",
+        "present": "flies now",
+        "better": "eligible",
+        "drifting": "not eligible",
+        "<restless>": "not eligible",
+    }
+
+
+def test_many_reasons_against_a_set_are_cut_short(results: Results) -> None:
+    ranking = [dict(one) for one in results.decision["ranking"]]
+    for one in ranking:
+        if one["name"] == "<restless>":
+            one["reasons"] = [f"reason {i}" for i in range(20)]
+    html = objections_table(with_decision(results, ranking=ranking))
+    assert "reason 3; and 16 more of this kind" in html
+    assert "reason 4" not in html
+
+
+def test_each_flight_left_out_is_a_row_with_what_the_choice_was_worth_there(results: Results) -> None:
+    head, *rows = cells(holds_section(results))
+    assert head == ["flight left out", "best set of the others", "change of the error there %"]
+    changes = flight_changes(results)["better"]
+    assert [row[:2] for row in rows[:-1]] == [[f"flight_{i}", "better"] for i in range(5)]
+    assert [row[2] for row in rows[:-1]] == [f"{value:+.1f}".replace("-", "−") for value in changes]
+    assert rows[-1][0] == "mean"
+    text = holds_section(results)
+    assert "the same set is best whichever flight is left out" in text
+    assert "on average" in text
+
+
+def test_a_choice_that_hangs_on_single_flights_is_said_to(results: Results) -> None:
+    validated = results.decision["leave_one_out"] | {"stays": 3, "upper": 0.1}
+    text = holds_section(with_decision(results, leave_one_out=validated))
+    assert "the same without any one of 3 of the 5 flights" in text
+    kept = validated | {"chosen": dict.fromkeys(validated["chosen"], "present")}
+    assert "no set does better than the present one" in holds_section(with_decision(results, leave_one_out=kept))
+    assert "fewer than three flights that count" in holds_section(with_decision(results, leave_one_out=None))
+
+
+def test_weights_stand_beside_the_whiteness_that_they_come_from(results: Results) -> None:
+    head, *rows = cells(weights_section(results))
+    assert head == ["flight", "GNSS velocity, white", "weight aided", "weight unaided"]
+    for flight, white, aided, unaided in rows:
+        weights = results.decision["weights"][flight]
+        assert aided == f"{100 * weights['aided']:.0f} %"
+        assert unaided == f"{100 * weights['unaided']:.0f} %"
+        # The made errors are white.
+        assert float(white.removesuffix(" %")) > 80.0
+
+
+def test_unknown_whiteness_is_called_unknown(results: Results) -> None:
+    known = results.metrics[results.metrics["metric"] != "white_share"]
+    html = weights_section(dataclasses.replace(results, metrics=known))
+    assert cells(html)[0] == ["flight", "weight aided", "weight unaided"]
+    assert "takes the mean of the others" in html
+    without_one = results.metrics[
+        (results.metrics["metric"] != "white_share") | (results.metrics["flight"] != "flight_2")
+    ]
+    html = weights_section(dataclasses.replace(results, metrics=without_one))
+    assert {row[0]: row[1] for row in cells(html)}["flight_2"] == "not known"
+    assert "takes the mean of the others" in html
+
+
+def test_drift_without_the_barometer_is_a_table_of_the_sets(made: tuple[Path, str], results: Results) -> None:
+    root, _ = made
+    head, *rows = cells(withheld_section(results, root / "report").split("<details>")[0])
+    assert head == ["set", "height after 3 s [m]", "height after 6 s [m]", "height after 9 s [m]", "change %"]
+    drift = {row[0]: float(row[3]) for row in rows}
+    # Half of the drift of the velocity: 0.65 m and 2.5 m; five flights of six gaps each.
+    assert drift["present"] == pytest.approx(0.65, rel=0.3)
+    assert drift["drifting"] == pytest.approx(2.5, rel=0.3)
+    assert float(rows[0][1]) == pytest.approx(drift["present"] / 3.0, rel=0.02)
+
+
+def test_paper_mode_tells_why(results: Results) -> None:
+    why = ["The paper's rule takes “a”, the decision is “b”.", "Because <of> this."]
+    mode = results.decision["paper_mode"] | {"why": why, "agrees": False}
+    html = paper_section(with_decision(results, paper_mode=mode))
+    assert "It does not agree with the decision." in html
+    assert "<li>Because &lt;of&gt; this.</li>" in html
+    agreed = with_decision(results, paper_mode=mode | {"agrees": True})
+    assert "It agrees with the decision." in paper_section(agreed)
+    assert cells(html)[0] == ["set", "aggregate RMS", "NIS inside the χ² bounds", "break rate %"]
+
+
+def test_without_any_gap_and_with_one_set_there_is_still_a_page(tmp_path: Path) -> None:
+    page = make_report(tmp_path, {"present": MadeSet()}, flights=1)
+    assert "Without a sensor" in page
+    assert "With fewer than three flights that count" in page
