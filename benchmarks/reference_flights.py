@@ -5,7 +5,7 @@ from __future__ import annotations
 import lzma
 from pathlib import Path
 
-from fusetune.analyze.set_input import existing_folder
+from fusetune.analyze.replaying.set_input import existing_folder
 from fusetune.errors import UserError
 
 GOLDEN = Path(__file__).resolve().parents[1] / "tests/golden"

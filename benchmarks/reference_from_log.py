@@ -16,17 +16,18 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from fusetune.analyze.onboard import onboard_samples, write_onboard
-from fusetune.documents import write_document
+from fusetune.analyze.scoring.onboard import onboard_samples, write_onboard
+from fusetune.ekf2.replay.recording import LOCAL_POSITION_ROW
 from fusetune.errors import UserError
-from fusetune.files import atomic_path
-from fusetune.parquet import write_table
-from fusetune.px4.ekf2_parameters import complete
 from fusetune.px4.flight import Flight, TopicTable, row_count
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import read_ulog
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.ulog.reader import read_ulog
+from fusetune.storage.documents import write_document
+from fusetune.storage.files import atomic_path
+from fusetune.storage.parquet import write_table
 
-RESET_COUNTERS = tuple(f"{what}_reset_counter" for what in ("xy", "z", "vxy", "vz", "heading"))
+RESET_COUNTERS = tuple(name for name in LOCAL_POSITION_ROW.names or () if name.endswith("_reset_counter"))
 REMEDY = "Replay with SDLOG_PROFILE 3 and EKF2_LOG_VERBOSE 1, so that PX4 logs what its estimator computes"
 
 
@@ -57,7 +58,7 @@ def write_reference(folder: Path, name: str, flown: Flight, replayed: Flight) ->
     folder : of the flight's reference
     name : of the set
     flown : gives the parameters from which those of the set differ
-    replayed : in the layout of `fusetune.px4.release_layouts.canonical`
+    replayed : in the layout of `fusetune.px4.layouts.release_layouts.canonical`
 
     Raises
     ------

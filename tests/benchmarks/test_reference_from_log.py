@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from benchmarks.reference_from_log import main
 
-from fusetune.analyze.fidelity import compare_folders
-from fusetune.analyze.replay_flight import replay_log
-from fusetune.documents import read_document
+from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.trust.fidelity import compare_folders
 from fusetune.px4.flight import Flight
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.ulog.writer import write_ulog
+from fusetune.storage.documents import read_document
 
 
 @pytest.fixture(scope="module")

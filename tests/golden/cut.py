@@ -10,23 +10,22 @@ as long as liblzma and PyArrow are the same; with others the content is equal.
 from __future__ import annotations
 
 import lzma
-import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.compute as pc
+from benchmarks.reference_flights import GOLDEN
+from tests.shared_folder import SHARED
 
-from fusetune.documents import read_document, write_document
-from fusetune.files import atomic_path
-from fusetune.parquet import read_table, write_table
 from fusetune.px4.flight import Flight, TopicTable, select_rows
-from fusetune.px4.ulog_reader import read_ulog
-from fusetune.px4.ulog_writer import write_ulog
+from fusetune.px4.ulog.reader import read_ulog
+from fusetune.px4.ulog.writer import write_ulog
+from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.files import atomic_path
+from fusetune.storage.parquet import read_table, write_table
 
-GOLDEN = Path(__file__).resolve().parent
-SHARED = Path(os.environ.get("FUSETUNE_SHARED", GOLDEN.parents[2] / "shared"))
 MADE = "synthetic__"
 """What the names of the made logs begin with."""
 
@@ -80,8 +79,6 @@ FIELDS = {
 }  # fmt: skip
 """Topics and fields that the replay reads of a made flight; of an array all its elements."""
 
-RESET_COUNTERS = tuple(f"{what}_reset_counter" for what in ("xy", "z", "vxy", "vz", "heading"))
-
 
 def main() -> None:
     cut_all(SHARED / "logs", SHARED / "reference", GOLDEN)
@@ -131,7 +128,8 @@ def cut_reference(reference: Path, name: str, until_us: int, target: Path) -> No
     whole = read_document(reference / f"{name}.json", sealed=False)
     part = {key: whole[key] for key in ("version", "set", "mode", "overrides", "params")}
     with atomic_path(target / f"{name}.json") as path:
-        resets = {counter: position[counter][-1].as_py() for counter in RESET_COUNTERS}
+        counters = [name for name in position.column_names if name.endswith("_reset_counter")]
+        resets = {counter: position[counter][-1].as_py() for counter in counters}
         write_document(path, part | {"resets": resets})
 
 

@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tests.ekf2.equal_rows import assert_equal_rows
-from tests.ekf2.px4_agreement import Limits, assert_replay_agrees
+from tests.ekf2.replay.equal_rows import assert_equal_rows
+from tests.ekf2.replay.px4_agreement import Limits, assert_replay_agrees
 
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete

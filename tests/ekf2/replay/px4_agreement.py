@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusetune.analyze.fidelity import AxisFidelity, ReplayFidelity, compare_folders
-from fusetune.analyze.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.trust.fidelity import AxisFidelity, ReplayFidelity, compare_folders
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The largest figures of `fusetune.analyze.fidelity` that count as agreement.
+    """The largest figures of `fusetune.analyze.trust.fidelity` that count as agreement.
 
     What remains of a right estimator is PX4's single precision, see docs/fidelity.md. Decisions, resets and samples
     must be the same in any case.

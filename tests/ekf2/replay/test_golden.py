@@ -14,17 +14,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.reference_flights import GOLDEN
-from tests.ekf2.equal_rows import assert_equal_rows
-from tests.ekf2.px4_agreement import Limits, assert_replay_agrees, departures
+from tests.ekf2.replay.equal_rows import assert_equal_rows
+from tests.ekf2.replay.px4_agreement import Limits, assert_replay_agrees, departures
 from tests.golden.cut import GOLDEN_FLIGHTS, MADE, cut_all
 
-from fusetune.analyze.fidelity import COMPARED_SOURCES, compare_folders, comparison_start, load_innovations
-from fusetune.analyze.replay_flight import replay_log
-from fusetune.documents import read_document
-from fusetune.ekf2.inputs import build_inputs
-from fusetune.parquet import read_table
-from fusetune.px4.release_layouts import canonical
-from fusetune.px4.ulog_reader import read_ulog
+from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.trust.fidelity import COMPARED_SOURCES, compare_folders, comparison_start, load_innovations
+from fusetune.ekf2.feed.inputs import build_inputs
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.ulog.reader import read_ulog
+from fusetune.storage.documents import read_document
+from fusetune.storage.parquet import read_table
 
 LIMITS = {
     "fw_airspeed": Limits(2.2e-4, 6e-6, 2.5e-5, 2e-4, 1.0e-7, flags_equal=1.0),
