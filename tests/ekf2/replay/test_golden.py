@@ -1,7 +1,7 @@
 """The estimator against PX4 v1.16's own EKF2 on the golden flights, which every clone of the project holds.
 
 Expected: the figures in tests/golden/reference, which PX4's C++ computed. The limits are some 1.3 times what was
-measured; 1 % of one parameter is far outside of them.
+measured; a change of most parameters by 1 % is outside of them.
 """
 
 from __future__ import annotations
