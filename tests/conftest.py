@@ -1,4 +1,4 @@
-"""What all tests share: the kernel cache, and the logs and reference figures that lie beside the project."""
+"""What all tests share: the kernel cache, the logs and reference figures beside the project, and `--update`."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from tests.made_text import UpToDate, compare
+from tests.shared_folder import ROOT, SHARED
 
 from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 
 if TYPE_CHECKING:
     from fusetune.px4.flight import Flight
-
-ROOT = Path(__file__).resolve().parents[1]
 
 # Both are read on import, so they are set before any test module is imported. The matrices are small: on several
 # threads their algebra takes ten times as long.
@@ -22,8 +22,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SHARING_FOLDERS = ("tests/workflow", "tests/ekf2", "tests/report")
 """Folders whose files share what takes long to make: a run of the pipeline, compiled functions, a report."""
-
-SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
 
 
 def _shared_part(name: str) -> Path:
@@ -37,6 +35,17 @@ def _shared_scope(nodeid: str) -> str:
     """Folder or file whose tests share fixtures."""
     file = nodeid.partition("::")[0]
     return next((folder for folder in SHARING_FOLDERS if file.startswith(f"{folder}/")), file)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--update`: what is made from the code and kept in the repository is written anew where it is out of date."""
+    parser.addoption("--update", action="store_true", help="renew tables and pictures that are made from the code")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Two processes that renew parts of one file would lose one of them."""
+    if config.getoption("--update") and getattr(config.option, "numprocesses", None):
+        raise pytest.UsageError("--update works in one process: leave out -n")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -63,6 +72,13 @@ def project_root() -> Path:
     return ROOT
 
 
+@pytest.fixture
+def up_to_date(request: pytest.FixtureRequest) -> UpToDate:
+    """Compare made text in the repository with what the code says; with `--update`, renew it (`tests/made_text.py`)."""
+    command, update = f"pytest {request.node.nodeid} --update", request.config.getoption("--update")
+    return lambda file, block, text: compare(file, block, text, command, update)
+
+
 @pytest.fixture(scope="session")
 def survey_flight(project_root: Path) -> Flight:
     """The survey mission as a simulated vehicle flies it, with its own estimator on board; not to be changed."""
@@ -74,6 +90,25 @@ def survey_flight(project_root: Path) -> Flight:
     mission = load_mission(project_root / "config/missions/survey.yaml")
     vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
     return canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
+
+
+@pytest.fixture(scope="session")
+def golden_logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the golden flights' logs, unpacked; not to be changed."""
+    from benchmarks.reference_flights import GOLDEN_LOGS, GOLDEN_REFERENCE, log_of, reference_folders
+
+    folder = tmp_path_factory.mktemp("golden_logs")
+    for reference in reference_folders(GOLDEN_REFERENCE):
+        log_of(reference.name, GOLDEN_LOGS, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def golden_reference() -> Path:
+    """Folder of what PX4's own estimator computed on the golden flights."""
+    from benchmarks.reference_flights import GOLDEN_REFERENCE
+
+    return GOLDEN_REFERENCE
 
 
 @pytest.fixture(scope="session")
