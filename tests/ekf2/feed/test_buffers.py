@@ -9,6 +9,7 @@ from fusetune.ekf2.feed.buffers import (
     MAX_SAMPLE_AGE_US,
     RING,
     find_newest_due,
+    may_be_due,
     newest_time_us,
     push,
     reset_ring,
@@ -24,6 +25,7 @@ def make_ring(size):
 
 def pop(ring, horizon_us):
     index = find_newest_due(ring, horizon_us)
+    assert index < 0 or may_be_due(ring, horizon_us)
     if index < 0:
         return None
     slot = int(ring["slot"][index])

@@ -72,12 +72,6 @@ def test_refused_sample_is_not_the_newest_but_the_sensor_exists(ekf):
     assert baro["newest_time_us"] == 0
 
 
-def test_nothing_arrives_without_a_sample(ekf):
-    baro = ekf["sensors"]["baro"]
-    assert not receive(ekf, baro, np.zeros(1, BARO_SAMPLE), -1, 0.0)
-    assert not baro["exists"]
-
-
 def test_what_is_not_wanted_stays_in_the_ring(ekf):
     samples, baro = np.zeros(1, BARO_SAMPLE), ekf["sensors"]["baro"]
     samples["time_us"] = TIME_US

@@ -9,7 +9,7 @@ from fusetune.ekf2.filter.bias_estimator import bias_estimator as be
 from fusetune.ekf2.filter.bias_estimator import height_bias_estimator as hbe
 from fusetune.ekf2.filter.bias_estimator import position_bias_estimator as pbe
 
-EKF = np.dtype([("height_sensor_ref", "i8"), ("position_sensor_ref", "i8")])
+EKF = np.dtype([("height_sensor_ref", "i8"), ("position_sensor_ref", "i8"), ("P", "f8", (24, 24))])
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_height_bias_rests_while_its_source_is_the_reference_or_not_fused():
         ekf["height_sensor_ref"] = reference
         record["fusion_active"] = active
         hbe.predict_height_bias(ekf, record, 1, 0.01)
-        hbe.fuse_height_bias(ekf, record, 1, 1e-3, 0.5)
+        hbe.update_height_bias(ekf, record, 1, 1e-3, 0.5)
         assert bool(record["bias"] != 0.0) is moves
         assert bool(record["bias_var"] != 0.0) is moves
 

@@ -82,10 +82,14 @@ def push(ring, time_us, slot):
 
 
 @kernel
+def may_be_due(ring, horizon_us):
+    """False where `find_newest_due` finds nothing: the oldest is yet to come, or the newest is too old or taken."""
+    return ring.time_us[ring.tail] <= horizon_us < ring.time_us[ring.head] + MAX_SAMPLE_AGE_US
+
+
+@kernel
 def find_newest_due(ring, horizon_us):
     """Index in the ring of the newest sample due at the horizon and at most 0.1 s old, or -1."""
-    if ring.time_us[ring.tail] > horizon_us:
-        return -1
     for age in range(ring.size):
         index = (ring.head - age) % ring.size
         if ring.time_us[index] <= horizon_us < ring.time_us[index] + MAX_SAMPLE_AGE_US:

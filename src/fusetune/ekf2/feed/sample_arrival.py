@@ -11,22 +11,20 @@ them.
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.feed.buffers import RING_CAPACITY, find_newest_due, offer, push, take
+from fusetune.ekf2.feed.buffers import RING_CAPACITY, find_newest_due, may_be_due, offer, push, take
 
 NO_DELAY_MS = 0.0
 
 
 @kernel
 def receive(ekf, sensor, samples, slot, delay_ms):
-    """Buffer the sample at position `slot` of `samples`, -1 for none; return whether it was taken.
+    """Buffer the sample at position `slot` of `samples`; return whether it was taken.
 
     Parameters
     ----------
     sensor : sub-record of `ekf.sensors`
     delay_ms : the sensor's delay against the IMU
     """
-    if slot < 0:
-        return False
     sensor.exists = True
     if not offer(ekf, sensor.ring, samples[slot].time_us, delay_ms, slot):
         return False
@@ -44,9 +42,18 @@ def pop(ekf, sensor, samples, wanted):
     -------
     int : place in the ring that the sample had, -1 without one
     """
-    place = find_newest_due(sensor.ring, ekf.time_delayed_us) if wanted else -1
-    sensor.data_ready = place >= 0
+    sensor.data_ready = False
+    if not wanted or not may_be_due(sensor.ring, ekf.time_delayed_us):
+        return -1
+    return _take_newest_due(ekf, sensor, samples)
+
+
+@kernel
+def _take_newest_due(ekf, sensor, samples):
+    """The longer part of `pop`, apart so that the compiler joins the shorter one, mostly enough, with its callers."""
+    place = find_newest_due(sensor.ring, ekf.time_delayed_us)
     if place >= 0:
+        sensor.data_ready = True
         sensor.sample = samples[sensor.ring.slot[place]]
         sensor.sample.time_us = sensor.ring.time_us[place]
         take(sensor.ring, place)
@@ -63,29 +70,33 @@ def is_fusion_due(sensor):
 def receive_aiding(ekf, params, inputs, arrivals):
     """Buffer what arrived with this IMU sample, in the order of PX4's module."""
     sensors = ekf.sensors
-    receive(ekf, sensors.airspeed, inputs.airspeed, arrivals.airspeed, params.EKF2_ASP_DELAY)
-    receive(ekf, sensors.auxvel, inputs.auxvel, arrivals.auxvel, params.EKF2_AVEL_DELAY)
+    if arrivals.airspeed >= 0:
+        receive(ekf, sensors.airspeed, inputs.airspeed, arrivals.airspeed, params.EKF2_ASP_DELAY)
+    if arrivals.auxvel >= 0:
+        receive(ekf, sensors.auxvel, inputs.auxvel, arrivals.auxvel, params.EKF2_AVEL_DELAY)
     if arrivals.baro >= 0:
         ekf.air_density = inputs.air_density[arrivals.baro]
-    receive(ekf, sensors.baro, inputs.baro, arrivals.baro, params.EKF2_BARO_DELAY)
-    if receive(ekf, sensors.ev, inputs.ev, arrivals.ev, params.EKF2_EV_DELAY):
+        receive(ekf, sensors.baro, inputs.baro, arrivals.baro, params.EKF2_BARO_DELAY)
+    if arrivals.ev >= 0 and receive(ekf, sensors.ev, inputs.ev, arrivals.ev, params.EKF2_EV_DELAY):
         note_vision_noise(sensors.ev, params)
         ekf.ev.newest_quality = inputs.ev[arrivals.ev].quality
     if arrivals.flow >= 0:
         ekf.flow.max_rate = inputs.flow_limits[arrivals.flow, 0]
         ekf.flow.min_distance = inputs.flow_limits[arrivals.flow, 1]
         ekf.flow.max_distance = inputs.flow_limits[arrivals.flow, 2]
-    receive(ekf, sensors.flow, inputs.flow, arrivals.flow, params.EKF2_OF_DELAY)
-    if receive(ekf, sensors.gnss, inputs.gnss, arrivals.gnss, params.EKF2_GPS_DELAY):
+        receive(ekf, sensors.flow, inputs.flow, arrivals.flow, params.EKF2_OF_DELAY)
+    if arrivals.gnss >= 0 and receive(ekf, sensors.gnss, inputs.gnss, arrivals.gnss, params.EKF2_GPS_DELAY):
         note_antenna_yaw_offset(sensors.gnss, params)
         if np.isfinite(inputs.gnss[arrivals.gnss].yaw):
             sensors.gnss.newest_yaw_time_us = ekf.time_latest_us
-    receive(ekf, sensors.mag, inputs.mag, arrivals.mag, params.EKF2_MAG_DELAY)
-    receive(ekf, sensors.range, inputs.range, arrivals.range, params.EKF2_RNG_DELAY)
+    if arrivals.mag >= 0:
+        receive(ekf, sensors.mag, inputs.mag, arrivals.mag, params.EKF2_MAG_DELAY)
     if arrivals.range >= 0:
+        receive(ekf, sensors.range, inputs.range, arrivals.range, params.EKF2_RNG_DELAY)
         ekf.range.sensor_min_distance = inputs.range_limits[arrivals.range, 0]
         ekf.range.sensor_max_distance = inputs.range_limits[arrivals.range, 1]
-    receive(ekf, sensors.system_flags, inputs.system_flags, arrivals.system_flags, NO_DELAY_MS)
+    if arrivals.system_flags >= 0:
+        receive(ekf, sensors.system_flags, inputs.system_flags, arrivals.system_flags, NO_DELAY_MS)
 
 
 @kernel

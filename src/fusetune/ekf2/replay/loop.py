@@ -40,7 +40,8 @@ def run_estimator(ekf, params, inputs, views, recorder, records, runs):
             reset_gyro_bias(ekf, params)
         receive_imu(ekf, params, inputs.imu[run])
         receive_aiding(ekf, params, inputs, arrivals)
-        pretend_fused(ekf)
+        if ekf.imu_updated:
+            pretend_fused(ekf)
         if update(ekf, params, inputs):
             save_declination(ekf, params)
             record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
