@@ -26,8 +26,8 @@ from scipy.stats import kendalltau
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import ReconstructionSettings
 from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.replaying.replay_settings import StartSettings
 from fusetune.analyze.replaying.set_input import WRITTEN_BACK, read_set_files
-from fusetune.analyze.replaying.start_choice import StartSettings
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.trust.as_flown_figures import replayed_innovations
 from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from fusetune.files import atomic_path
+from fusetune.storage.files import atomic_path
 
 UpToDate = Callable[[Path, str | None, str], None]
 """What the fixture `up_to_date` gives: file, name of the block (None for the whole file), what should stand there."""

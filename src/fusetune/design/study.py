@@ -15,10 +15,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fusetune.design.config_file import load_schema, raise_problems, validate
 from fusetune.design.names import name_problem, one_line
 from fusetune.design.parameter_check import parameter_problem, typed_values
-from fusetune.design.yaml_reader import read_yaml
+from fusetune.settings.checking import load_schema, raise_problems, validate
+from fusetune.settings.yaml_reader import read_yaml
 
 RESERVED_SET_NAMES = ("present", "as_flown", "onboard", "sets", "scoring", "fidelity")
 """Names the product gives itself, and files of its own that those of a set so called would replace.

@@ -23,7 +23,6 @@ from fusetune.analyze.trust.trust_grade import (
 )
 from fusetune.analyze.trust.trust_settings import FIGURES, TrustSettings
 from fusetune.analyze.trust.trust_words import limits_in_words, not_compared_in_words
-from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.layouts.estimator_instances import (
     instance_shares,
@@ -127,14 +126,6 @@ def test_distance_is_one_at_the_limits_of_b():
     limit = AsFlownFigures({"heading": 1.6}, 0.15, 4.0, 1.0, 0.225, 0.9, 0.9, 60.0, {})
     assert distance(PERFECT, SETTINGS) == 0.0
     assert distance(limit, SETTINGS) == pytest.approx(1.0)
-
-
-def test_limits_must_rise():
-    with pytest.raises(UserError, match="Expected three rising numbers"):
-        TrustSettings.from_mapping({"heading_deg": [4, 2, 10]})
-    with pytest.raises(UserError, match="names 'speed'"):
-        TrustSettings.from_mapping({"needed_for_b": ["speed"]})
-    assert TrustSettings.from_mapping({"needed_for_a": []}).needed_for_a == ()
 
 
 @pytest.fixture(scope="module")

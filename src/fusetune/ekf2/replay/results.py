@@ -16,7 +16,7 @@ class Gap:
 
     Attributes
     ----------
-    sensor : a key of `fusetune.ekf2.replay.withholding.WITHHOLDABLE`
+    sensor : a key of `fusetune.ekf2.replay.withholdable.WITHHOLDABLE`
     start, stop : IMU timestamps (µs)
     """
 
