@@ -88,7 +88,10 @@ def test_all_files_and_the_command_line_make_one_configuration(tmp_path: Path) -
         ({"decision": {"withheld_sources": {"gnss_pos.z": 1}}}, ("the key 'gnss_pos.z'", "'gnss_pos.y'")),
         ({"decision": {"lowest_grade": "E"}}, ("decision.lowest_grade is 'E'; expected one of 'A', 'B', 'C', 'D'",)),
         ({"decision": {"seed": 2}}, ("decision: unknown key 'seed'",)),
-        ({"demonstration": {"faults": {"flight_1": {}}}}, ("demonstration.faults.flight_1 is an empty mapping; expected a list",)),
+        (
+            {"demonstration": {"faults": {"flight_1": {}}}},
+            ("demonstration.faults.flight_1 is an empty mapping; expected a list",),
+        ),
     ],
 )
 def test_what_cannot_be_meant_is_told_with_file_key_and_expectation(

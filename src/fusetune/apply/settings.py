@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from fusetune.analyze.sources import AID_SOURCES, AXES
-from fusetune.ekf2.replay.withholdable import WITHHOLDABLE
+from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES, WITHHOLDABLE
 from fusetune.settings.declaration import setting
 
 
 def _withheld_sources() -> tuple[str, ...]:
     """Sources that are predicted without their sensor, whole ("gnss_pos") and by axis ("gnss_vel.z")."""
     sources = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
-    return (*sources, *(f"{source}.{axis}" for source in sources for axis in AXES[: AID_SOURCES[source].axes]))
+    return (*sources, *(f"{source}.{axis}" for source in sources for axis in AXES[: MEASURED_SOURCES[source].axes]))
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class DecisionSettings:
         "out",
         low=0,
         high=1_000_000,
-        choices=tuple(sorted(AID_SOURCES)),
+        choices=tuple(sorted(MEASURED_SOURCES)),
         at_least=1,
     )
     withheld_sources: Mapping[str, float] = setting(

@@ -17,7 +17,7 @@ from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.replaying.replay_settings import WithholdingSettings
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.results import Gap, GapResult
-from fusetune.ekf2.replay.withholdable import WITHHOLDABLE
+from fusetune.px4.aid_sources import WITHHOLDABLE
 from fusetune.px4.flight import Flight
 
 HORIZONS = 3

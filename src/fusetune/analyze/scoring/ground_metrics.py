@@ -18,7 +18,7 @@ from fusetune.analyze.scoring.measurement_alignment import PairedSamples, Sample
 from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, groups_of
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.scoring.scoring_window import ScoringWindow, cuts_within
-from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 
 BEFORE_TAKE_OFF_US = 2_000_000
 """Cut from the ground time before a take-off: the rotors run, and the land detector tells late."""
@@ -59,7 +59,7 @@ def add_ground_metrics(
     if not ground.intervals:
         return
     standing = [record for record in records if record.name not in ground.excluded]
-    for source in AID_SOURCES.values():
+    for source in MEASURED_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         for axis in range(source.axes):
             found = paired_samples(standing, (source.name, axis), present, ground)

@@ -17,7 +17,7 @@ from fusetune.analyze.metrics.likelihood import winsor_limit
 from fusetune.analyze.replaying.sample_spool import SampleSpool, SpooledRows
 from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord, SourceAxis
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES
 
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""

@@ -22,7 +22,7 @@ from fusetune.analyze.scoring.measurement_alignment import PairedSamples, Sample
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.sensors.source_whiteness import Whiteness
-from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.px4.aid_sources import AID_SOURCES, AXES
 
 Array = npt.NDArray[np.float64]
 

@@ -15,8 +15,7 @@ from fusetune.analyze.replaying.set_files import SetRecord, read_columns
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
-from fusetune.analyze.sources import AID_SOURCES, AXES
-from fusetune.ekf2.replay.withholdable import WITHHOLDABLE
+from fusetune.px4.aid_sources import AID_SOURCES, AXES, WITHHOLDABLE
 from fusetune.storage.files import AnyPath
 
 Array = npt.NDArray[np.float64]

@@ -25,7 +25,6 @@ from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.start_choice import START_TOPICS, Start, choose_start
 from fusetune.analyze.scoring.onboard import onboard_samples
-from fusetune.analyze.sources import AID_SOURCES, HORIZONTAL_AIDING
 from fusetune.analyze.trust.as_flown_figures import (
     GROUPS,
     AsFlownFigures,
@@ -39,6 +38,7 @@ from fusetune.analyze.trust.trust_words import limits_in_words, not_compared_in_
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, HORIZONTAL_AIDING, MEASURED_SOURCES
 from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows
 from fusetune.px4.layouts.estimator_instances import instance_shares
 from fusetune.px4.parameters.ekf2_parameters import BASELINE_RELEASE
@@ -59,7 +59,7 @@ TRUST_TOPICS = (
             "estimator_innovation_variances",
             "estimator_innovation_test_ratios",
             "ekf2_innovations",
-            *(f"estimator_aid_src_{name}" for name in AID_SOURCES),
+            *(source.topic for source in MEASURED_SOURCES.values()),
         )
     ),
 )
@@ -320,7 +320,7 @@ def _instances(flight: Flight) -> tuple[InstanceFigures, ...]:
     """Innovations of every estimator instance of the vehicle, while it flew."""
     shares = instance_shares(flight)
     airborne = airborne_intervals(flight, {})
-    topics = [name for name, _ in flight.topics if name.startswith("estimator_aid_src_")]
+    topics = [name for name, _ in flight.topics if name.startswith(AID_SOURCE_TOPIC)]
     figures = []
     for instance in sorted({k for name in topics for k in flight.instances(name)}):
         samples = onboard_samples(flight, instance)

@@ -26,7 +26,7 @@ def kernel_cache() -> Path:
     The user's cache serves where there is no checkout, where this user may not write there, and where more people may
     than may write the package.
     """
-    checkout, below = PACKAGE.parents[1], Path("numba") / source_digest("ekf2")[:16]
+    checkout, below = PACKAGE.parents[1], Path("numba") / source_digest("ekf2", "px4/aid_sources.py")[:16]
     folder = checkout / ".cache" / below
     existing = next(part for part in (folder, *folder.parents) if part.exists())
     ours = os.access(existing, os.W_OK | os.X_OK) and not others_may_write(checkout, PACKAGE)

@@ -7,7 +7,7 @@ innovations show is its own prediction.
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.replay.withholdable import WITHHOLDABLE
+from fusetune.px4.aid_sources import WITHHOLDABLE
 
 WITHHELD = np.dtype([(sensor, "?") for sensor in WITHHOLDABLE])
 """The estimator's sub-record `ekf.withheld`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from fusetune.ekf2.feed.given_samples import GivenSamples, given_samples
 from fusetune.ekf2.feed.message_samples import gnss_refusals, taken
+from fusetune.px4.aid_sources import AID_SOURCES, SENSORS, AidSource
 from fusetune.px4.flight import Flight, LeftOut, row_count
 from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.px4.sensor_limits import LACKS_FIELD
@@ -21,37 +22,14 @@ from fusetune.save.log_facts import rate_hz
 from fusetune.save.thresholds import VerdictThresholds
 
 _FIX_3D = 3
-_MAG_TYPE_NONE = 5
-_GNSS, _VISION = "vehicle_gps_position", "vehicle_visual_odometry"
-_MAG, _BARO = "vehicle_magnetometer", "vehicle_air_data"
-_POSITION, _ALTITUDE, _VELOCITY, _YAW = 0b0001, 0b0010, 0b0100, 0b1000
-"""Bits of EKF2_GPS_CTRL and EKF2_EV_CTRL."""
-
-_HORIZONTAL = _POSITION | _VELOCITY
-_VISION_PARTS = {
-    "ev_pos": ("position", _POSITION | _ALTITUDE),
-    "ev_vel": ("velocity", _VELOCITY),
-    "ev_yaw": ("heading", _YAW),
-}
-_WORDS = {
-    "gnss": "GNSS",
-    "gnss_yaw": "GNSS's heading",
-    "mag": "magnetometer",
-    "baro": "barometer",
-    "range": "range finder",
-    "flow": "optical flow",
-    "airspeed": "airspeed",
-    "auxvel": "landing target",
-} | {sensor: f"external vision's {part}" for sensor, (part, _) in _VISION_PARTS.items()}
+_GNSS, _MAG, _BARO = (SENSORS[name].topics[0].name for name in ("gnss", "mag", "baro"))
 _DROPPED = "Mend what the sensor's driver reports, or switch the sensor off"
 _BETTER_SKY = "Wait for a fix before take-off, with a free sky"
-_ONBOARD_AIDS = {
-    "cs_gnss_pos": "GNSS",
-    "cs_ev_pos": "external vision",
-    "cs_ev_vel": "external vision",
-    "cs_opt_flow": "optical flow",
-    "cs_aux_gpos": "an auxiliary position",
-}
+_HEIGHTS = tuple(one for one in AID_SOURCES.values() if one.sensor and one.quantity == "height")
+_HORIZONTAL_AIDS = tuple(one for one in AID_SOURCES.values() if one.stops_drift and one.flags)
+"""Auxiliary velocity, which has no flag, is fused only beside another of them."""
+
+_ONBOARD_AIDS = {flag: SENSORS[one.sensor].label for one in _HORIZONTAL_AIDS for flag in one.flags}
 """Control flags of the vehicle's own estimator that stand for horizontal aiding."""
 
 
@@ -71,9 +49,27 @@ class _Aids:
         """Whether the estimator is given a sample of any of these sensors."""
         return any(sensor in self.given and self.given[sensor].given for sensor in sensors)
 
-    def uses(self, parameter: str, bits: int) -> bool:
-        """Whether a control parameter of the estimator has any of some bits."""
-        return bool(int(self.parameters[parameter]) & bits)
+    def is_switched_on(self, part: str) -> bool:
+        """Whether a source of some samples, by the name of their sensor or part of it, may be fused."""
+        sources = [one for one in AID_SOURCES.values() if one.code is not None and part in (one.sensor, one.part)]
+        return any(map(self.may_fuse, sources))
+
+    def may_fuse(self, source: AidSource) -> bool:
+        """Whether the parameters let a source be fused."""
+        return source.switch is None or source.switch.is_on(self.parameters[source.switch.parameter])
+
+    def has_samples(self, source: AidSource) -> bool:
+        """Whether the log holds samples that a source can be made of."""
+        if source.sensor == "gnss":
+            return bool(self.usable_fixes)
+        if not SENSORS[source.sensor].buffered:
+            return any(self.flight.topic(topic.name) is not None for topic in SENSORS[source.sensor].topics)
+        return self.is_given(source.part or source.sensor)
+
+    def from_sensors(self, sources: Iterable[AidSource]) -> list[str]:
+        """Labels of the sensors, as each of some sources has its samples and may be fused."""
+        labels = (SENSORS[one.sensor].label for one in sources if self.may_fuse(one) and self.has_samples(one))
+        return list(dict.fromkeys(labels))
 
     def lacks_fields(self, topic: str) -> LeftOut | None:
         """The topic as it was left out, since it lacks a field that the estimator needs."""
@@ -90,7 +86,7 @@ class _Aids:
     @property
     def uses_gnss(self) -> bool:
         table = self.flight.topic(_GNSS)
-        return self.uses("EKF2_GPS_CTRL", ~0) and table is not None and bool(len(table["timestamp"]))
+        return self.is_switched_on("gnss") and table is not None and bool(len(table["timestamp"]))
 
     @cached_property
     def fix_share(self) -> float:
@@ -117,9 +113,9 @@ def checks(flight: Flight, limits: VerdictThresholds) -> list[Check]:
 def magnetometer(aids: _Aids) -> Check:
     """Whether the heading has its usual reference."""
     name, threshold = "magnetometer", aids.limits.low_magnetometer_rate_hz
-    if aids.parameters["EKF2_MAG_TYPE"] == _MAG_TYPE_NONE:
+    if not aids.is_switched_on("mag"):
         return Check(name, "does-not-apply", "EKF2_MAG_TYPE switches the magnetometer off")
-    rate = rate_hz(aids.flight.topic("vehicle_magnetometer"))
+    rate = rate_hz(aids.flight.topic(_MAG))
     if rate is None:
         why, remedy = aids.why_no_samples(_MAG, "magnetometer")
         return Check(name, "warning", f"{why}: the heading comes from other sources only", remedy, 0.0, threshold)
@@ -137,25 +133,19 @@ def mounting(aids: _Aids) -> Check:
 def barometer(aids: _Aids) -> Check:
     """Whether the height has a reference: the barometer, or another source that takes its place."""
     name, threshold = "barometer", aids.limits.low_barometer_rate_hz
-    rate = rate_hz(aids.flight.topic("vehicle_air_data"))
+    rate = rate_hz(aids.flight.topic(_BARO))
     if rate is not None and rate >= threshold:
         return Check(name, "pass", f"the barometer is logged at {rate:.1f} Hz", "", rate, threshold)
     if rate is not None:
         reason = slowness(aids.flight, _BARO, "barometer", rate)
         return Check(name, "warning", reason, log_more(aids.flight, _BARO), rate, threshold)
-    others = []
-    if aids.uses("EKF2_GPS_CTRL", _ALTITUDE) and aids.usable_fixes:
-        others.append("GNSS")
-    if aids.uses("EKF2_EV_CTRL", _ALTITUDE) and aids.is_given("ev_pos"):
-        others.append("external vision")
-    if aids.parameters["EKF2_RNG_CTRL"] > 0 and aids.is_given("range"):
-        others.append("range finder")
+    others = aids.from_sensors(one for one in _HEIGHTS if one.sensor != "baro")
     why, remedy = aids.why_no_samples(_BARO, "barometer")
     if not others:
         said = "nothing in the log measures the height"
         reason = f"{said} ({why})" if aids.lacks_fields(_BARO) else said
         return Check(name, "fail", reason, remedy, 0.0, threshold)
-    if not aids.parameters["EKF2_BARO_CTRL"]:
+    if not aids.is_switched_on("baro"):
         return Check(name, "does-not-apply", "EKF2_BARO_CTRL switches the barometer off")
     return Check(name, "warning", f"{why}; height from {', '.join(others)}", remedy, 0.0, threshold)
 
@@ -163,7 +153,7 @@ def barometer(aids: _Aids) -> Check:
 def gnss(aids: _Aids) -> Check:
     """Presence and rate of GNSS, and whether the estimator is given it."""
     name, threshold = "gnss", aids.limits.low_gnss_rate_hz
-    if not aids.uses("EKF2_GPS_CTRL", ~0):
+    if not aids.is_switched_on("gnss"):
         return Check(name, "does-not-apply", "EKF2_GPS_CTRL switches GNSS off")
     rate = rate_hz(aids.flight.topic(_GNSS))
     if rate is None:
@@ -229,13 +219,15 @@ def horizontal_aid(aids: _Aids) -> Check:
     the log does not hold, still has heights, heading and tilt to judge.
     """
     name = "horizontal_aid"
-    found = _horizontal_aids(aids)
+    found = aids.from_sensors(_HORIZONTAL_AIDS)
     if found:
         return Check(name, "pass", f"horizontal aiding by {', '.join(found)}", "", float(len(found)), 1.0)
     onboard = _onboard_aids(aids.flight)
     flown = f"the vehicle was aided by {', '.join(onboard)}" if onboard else ""
     never_fixed = (
-        aids.uses("EKF2_GPS_CTRL", _HORIZONTAL) and aids.flight.topic(_GNSS) is not None and not aids.fix_share
+        any(one.sensor == "gnss" and aids.may_fuse(one) for one in _HORIZONTAL_AIDS)
+        and aids.flight.topic(_GNSS) is not None
+        and not aids.fix_share
     )
     unusable = list(_unusable_aids(aids))
     if never_fixed and not onboard:
@@ -253,37 +245,17 @@ def horizontal_aid(aids: _Aids) -> Check:
     return Check(name, "warning", reason, "Log GNSS, optical flow or external vision", 0.0, 1.0)
 
 
-def _horizontal_aids(aids: _Aids) -> list[str]:
-    found = []
-    if aids.uses("EKF2_GPS_CTRL", _HORIZONTAL) and aids.usable_fixes:
-        found.append("GNSS")
-    vision = (("ev_pos", _POSITION), ("ev_vel", _VELOCITY))
-    if any(aids.uses("EKF2_EV_CTRL", bit) and aids.is_given(sensor) for sensor, bit in vision):
-        found.append("external vision")
-    if aids.parameters["EKF2_OF_CTRL"] and aids.is_given("flow"):
-        found.append("optical flow")
-    if aids.uses("EKF2_AGP_CTRL", ~0) and aids.flight.topic("aux_global_position") is not None:
-        found.append("an auxiliary position")
-    return found
-
-
 def _unusable_aids(aids: _Aids) -> Iterator[tuple[str, str, str]]:
     """Horizontal aids that are switched on and logged, but not given to the estimator; why not, and the remedy."""
-    switched_on = {
-        "gnss": aids.uses("EKF2_GPS_CTRL", _HORIZONTAL),
-        "ev_pos": aids.uses("EKF2_EV_CTRL", _POSITION),
-        "ev_vel": aids.uses("EKF2_EV_CTRL", _VELOCITY),
-        "flow": bool(aids.parameters["EKF2_OF_CTRL"]),
-    }
-    topics = {"gnss": ("GNSS", _GNSS), "flow": ("optical flow", "vehicle_optical_flow")}
     told = set()
-    for sensor in (sensor for sensor, is_on in switched_on.items() if is_on):
-        words, topic = topics.get(sensor, ("external vision", _VISION))
+    switched_on = {one.part or one.sensor: SENSORS[one.sensor] for one in _HORIZONTAL_AIDS if aids.may_fuse(one)}
+    for part, sensor in switched_on.items():
+        topic = sensor.topics[0].name
         if aids.lacks_fields(topic) and topic not in told:
             told.add(topic)
-            yield sensor, *aids.why_no_samples(topic, words)
-        elif sensor in aids.given and aids.given[sensor].is_withheld:
-            yield sensor, _told(aids.given[sensor]), _DROPPED
+            yield part, *aids.why_no_samples(topic, sensor.label)
+        elif part in aids.given and aids.given[part].is_withheld:
+            yield part, _told(aids.given[part]), _DROPPED
 
 
 def _onboard_aids(flight: Flight) -> list[str]:
@@ -296,18 +268,8 @@ def _onboard_aids(flight: Flight) -> list[str]:
 
 def samples_given(aids: _Aids) -> Check:
     """How many samples of each sensor in use the estimator is given, and why not the others."""
-    name, parameters = "samples_given", aids.parameters
-    switched_on = {
-        "gnss": aids.uses("EKF2_GPS_CTRL", ~0),
-        "gnss_yaw": aids.uses("EKF2_GPS_CTRL", _YAW),
-        "mag": parameters["EKF2_MAG_TYPE"] != _MAG_TYPE_NONE,
-        "baro": bool(parameters["EKF2_BARO_CTRL"]),
-        "range": parameters["EKF2_RNG_CTRL"] > 0,
-        "flow": bool(parameters["EKF2_OF_CTRL"]),
-        "airspeed": parameters["EKF2_ARSP_THR"] > 0.0,
-        "auxvel": True,
-    } | {sensor: aids.uses("EKF2_EV_CTRL", bits) for sensor, (_, bits) in _VISION_PARTS.items()}
-    used = [one for sensor, one in aids.given.items() if switched_on[sensor]]
+    name = "samples_given"
+    used = [one for sensor, one in aids.given.items() if aids.is_switched_on(sensor)]
     if not used:
         return Check(name, "does-not-apply", "the log holds no messages of a sensor in use")
     withheld = [one for one in used if one.is_withheld and one.sensor != "gnss"]
@@ -317,14 +279,21 @@ def samples_given(aids: _Aids) -> Check:
     return Check(name, "pass", f"the estimator is given {counts}", "", 0.0, 0.0)
 
 
+def _words(part: str) -> str:
+    """What samples are called, by the name of their sensor or part of it."""
+    if part in SENSORS:
+        return SENSORS[part].label
+    return f"{SENSORS[AID_SOURCES[part].sensor].label}'s {AID_SOURCES[part].quantity}"
+
+
 def _told(one: GivenSamples) -> str:
     why = one.refusals or "none arrives before the next of its kind"
-    return f"the estimator is given {one.given} of {one.messages} samples of {_WORDS[one.sensor]} ({why})"
+    return f"the estimator is given {one.given} of {one.messages} samples of {_words(one.sensor)} ({why})"
 
 
 def _count(one: GivenSamples) -> str:
     why = f" ({one.refusals})" if one.refused else ""
-    return f"{one.given} of {one.messages} of {_WORDS[one.sensor]}{why}"
+    return f"{one.given} of {one.messages} of {_words(one.sensor)}{why}"
 
 
 CHECKS: tuple[Callable[[_Aids], Check], ...] = (
