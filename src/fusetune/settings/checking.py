@@ -11,13 +11,10 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
-from functools import cache
-from importlib import resources
 from itertools import islice
 from typing import Any
 
 import jsonschema
-import yaml
 
 from fusetune.errors import UserError
 from fusetune.settings.declaration import Settings, built
@@ -60,14 +57,6 @@ _Validator = jsonschema.validators.extend(
         "integer", lambda checker, value: isinstance(value, int) and not isinstance(value, bool)
     ),
 )
-
-
-@cache
-def load_schema(package: str, name: str) -> dict[str, Any]:
-    """JSON schema `name` that ships in ``package/schemas/``, e.g. ``("fusetune.design", "study")``."""
-    text = resources.files(package).joinpath("schemas", f"{name}.schema.yaml").read_text(encoding="utf-8")
-    schema: dict[str, Any] = yaml.safe_load(text)
-    return schema
 
 
 def checked(kind: type[Settings], document: Mapping[str, Any], path: str | os.PathLike[str]) -> Settings:

@@ -41,7 +41,7 @@ class Declaration:
     pattern: str = ""
     """Regular expression for the whole of a text, or for the keys of a mapping."""
     at_least: int = 0
-    """Characters of a text, entries of a list or mapping."""
+    """Characters of a text, entries of a list or mapping and of lists in it."""
     filled_in: bool = False
     """A file may leave it out although it has no default: who reads the file knows it."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, is_dataclass
+from dataclasses import MISSING, asdict, is_dataclass, replace
 from types import NoneType
 from typing import Any, Literal, get_args, get_origin
 
@@ -77,7 +77,7 @@ def _of_mapping(values: Any, declaration: Declaration) -> dict[str, Any]:
     names: dict[str, Any] = {"enum": list(declaration.choices)} if declaration.choices else {}
     if declaration.pattern:
         names = {"type": "string", "pattern": declaration.pattern}
-    of_each = Declaration(low=declaration.low, above=declaration.above, high=declaration.high)
+    of_each = replace(declaration, choices=(), pattern="")
     return {
         "type": "object",
         **_least("minProperties", declaration),
