@@ -33,9 +33,7 @@ rule simulate_flight:
     params:
         overrides=lambda wildcards: OVERRIDES[INPUTS.simulated[wildcards.flight]],
         faults=lambda wildcards: SETTINGS.demonstration.faults.get(wildcards.flight, ()),
-        seed=lambda wildcards: 1000 * SETTINGS.demonstration.seed
-        + list(INPUTS.simulated).index(wildcards.flight)
-        + 1,
+        seed=lambda wildcards: 1000 * SETTINGS.demonstration.seed + list(INPUTS.simulated).index(wildcards.flight) + 1,
         contents=contents(SETTINGS.mission, SETTINGS.demonstration.vehicle),
         code=DIGEST["execute"],
     message:
