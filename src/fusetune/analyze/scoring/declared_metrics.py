@@ -58,22 +58,20 @@ def metrics_page() -> str:
 
 
 def _table(family: Family) -> str:
-    lines = [f"**{family.title}**", "", "| metric | unit | what it is | better | read by |", "|---|---|---|---|---|"]
-    for one in family.metrics:
-        of_groups = isinstance(one, InnovationMetric) and one.of_groups
-        cells = (f"`{one.name}`{' ●' if of_groups else ''}", one.unit, one.words, one.better, ", ".join(one.used))
-        lines.append("| " + " | ".join(cells) + " |")
-        if isinstance(one, InnovationMetric):
-            lines += _other_rows(one)
-        elif one in ON_GROUND:
-            lines.append(f"| `{GROUND}{one.name}` | {one.unit} | the same on the ground | {one.better} | |")
-    return "\n".join(lines)
+    head = [f"**{family.title}**", "", "| metric | unit | what it is | better | read by |", "|---|---|---|---|---|"]
+    return "\n".join([*head, *(row for metric in family.metrics for row in _rows(metric))])
 
 
-def _other_rows(metric: InnovationMetric) -> Iterator[str]:
-    if metric.window is not None:
-        words = "largest of any window of 30 s; all windows are in `windows.parquet`"
-        yield f"| `{metric.window.worst}` ● | {metric.unit} | {words} | {metric.better} | |"
-    if metric.on_ground:
-        words = "the same on the ground, two seconds before take-off excluded"
-        yield f"| `{GROUND}{metric.name}` ● | {metric.unit} | {words} | {metric.better} | |"
+def _rows(metric: Metric[Any]) -> Iterator[str]:
+    mark = " ●" if isinstance(metric, InnovationMetric) and metric.of_groups else ""
+
+    def row(name: str, words: str, used: Sequence[str] = ()) -> str:
+        return f"| `{name}`{mark} | {metric.unit} | {words} | {metric.better} | {', '.join(used)} |"
+
+    yield row(metric.name, metric.words, metric.used)
+    if isinstance(metric, InnovationMetric) and metric.window is not None:
+        yield row(metric.window.worst, "largest of any window of 30 s; all windows are in `windows.parquet`")
+    if isinstance(metric, InnovationMetric) and metric.on_ground:
+        yield row(GROUND + metric.name, "the same on the ground, two seconds before take-off excluded")
+    if metric in ON_GROUND:
+        yield row(GROUND + metric.name, "the same on the ground, all kinds together")

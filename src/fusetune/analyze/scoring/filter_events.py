@@ -58,12 +58,12 @@ class FilterEvents:
 EVENT_METRICS: tuple[Metric[FilterEvents], ...] = (
     Metric(
         "resets", "1", "how often the state was reset, by kind",
-        lambda events: {**events.resets, "all": events.total_resets}, "lower", ("apply",),
+        lambda events: {**events.resets, "all": events.total_resets}, "lower", ("apply", "report"),
     ),
     Metric(
         "timeouts", "1", "how often a source that was fused stopped being fused, by source",
         lambda events: {**{name: n for name, n in events.timeouts.items() if n}, "all": events.total_timeouts},
-        "lower", ("apply",),
+        "lower", ("apply", "report"),
     ),
     Metric(
         "fault_flags", "1", "largest value of `filter_fault_flags`",
