@@ -144,7 +144,6 @@ def _says(folder: str) -> str:
     file = Path(str(getattr(find_spec(folder), "origin", None)))
     paragraph = (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").partition("\n\n")[0]
     said = " ".join(paragraph.split()).replace('"', "'").removesuffix(".")
-    before, colon, after = said.partition(": ")
-    if colon and folder.rpartition(".")[2] in before.lower().split():
-        said = after
+    name = folder.rpartition(".")[2]
+    said = said.removeprefix(f"The {name} room: ").removeprefix(f"The {name}: ")
     return f"<br/>{said}" if said else ""

@@ -14,10 +14,6 @@ def test_the_pictures_of_what_imports_what_show_the_imports(project_root: Path, 
     up_to_date(project_root / "docs" / "architecture.md", "imports", f"\n{pictures('fusetune')}\n\n")
 
 
-def test_no_folders_import_each_other() -> None:
-    assert "⇅" not in pictures("fusetune")
-
-
 def test_an_import_that_a_chain_of_others_implies_is_left_out() -> None:
     assert without_shortcuts({"a": {"b", "c", "d"}, "b": {"c"}, "c": set(), "d": {"c"}}) == {
         "a": {"b", "d"},

@@ -34,8 +34,8 @@ def process_that(request: pytest.FixtureRequest, project_root: Path) -> ProcessT
     @contextmanager
     def process_that(call: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
         code = (
-            f"{request.param}from fusetune.run_lock import *; from fusetune.errors import UserError; import sys\n"
-            "folder = sys.argv[1]\n"
+            f"{request.param}from fusetune.running.run_lock import *; from fusetune.errors import UserError\n"
+            "import sys; folder = sys.argv[1]\n"
             f"try: print({call}, flush=True)\n"
             "except UserError as error: print(error, flush=True)\n"
             "sys.stdin.readline()"

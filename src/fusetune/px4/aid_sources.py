@@ -394,11 +394,11 @@ REPLAYED_SOURCES: tuple[str, ...] = tuple(
 """Sources of the replay's estimator, by their codes."""
 
 WITHHOLDABLE: Mapping[str, tuple[str, ...]] = {
-    sensor: sources
-    for sensor in SENSORS
-    if (sources := tuple(one.name for one in AID_SOURCES.values() if one.sensor == sensor and one.withheld))
+    source.sensor: tuple(one.name for one in AID_SOURCES.values() if one.sensor == source.sensor and one.withheld)
+    for source in AID_SOURCES.values()
+    if source.withheld
 }
-"""Sensor → the aid sources whose innovations go on while it is withheld."""
+"""Sensor → the aid sources whose innovations go on while it is withheld; gaps are planned in this order."""
 
 HORIZONTAL_AIDING: tuple[str, ...] = tuple(one.name for one in AID_SOURCES.values() if one.stops_drift)
 """Sources that stop the horizontal drift; the warm-up ends some seconds after the first of them is fused."""

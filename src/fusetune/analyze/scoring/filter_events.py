@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.metrics.metric import Metric
 from fusetune.analyze.replaying.set_files import SetRecord
 from fusetune.px4.aid_sources import AID_SOURCES
 
@@ -52,6 +53,39 @@ class FilterEvents:
     @property
     def total_timeouts(self) -> int:
         return sum(self.timeouts.values())
+
+
+EVENT_METRICS: tuple[Metric[FilterEvents], ...] = (
+    Metric(
+        "resets", "1", "how often the state was reset, by kind",
+        lambda events: {**events.resets, "all": events.total_resets}, "lower", ("apply", "report"),
+    ),
+    Metric(
+        "timeouts", "1", "how often a source that was fused stopped being fused, by source",
+        lambda events: {**{name: n for name, n in events.timeouts.items() if n}, "all": events.total_timeouts},
+        "lower", ("apply", "report"),
+    ),
+    Metric(
+        "fault_flags", "1", "largest value of `filter_fault_flags`",
+        lambda events: {"all": events.fault_flags}, "lower", ("apply",),
+    ),
+    Metric(
+        "dead_reckoning_s", "s", "time without any horizontal aiding",
+        lambda events: {"horizontal": events.dead_reckoning_s}, "lower",
+    ),
+)  # fmt: skip
+"""What the filter did beside fusing, by kind."""
+
+ON_GROUND = EVENT_METRICS[:2]
+"""Given for the time on the ground as well, all kinds together."""
+
+SERVICE_METRICS: tuple[Metric[SourceAid], ...] = (
+    Metric("fused_share", "1", "share of the samples that was fused", lambda aid: aid.fused_share, "higher"),
+    Metric(
+        "longest_without_fusion_s", "s", "longest time without a fused one", lambda aid: aid.longest_without_s, "lower"
+    ),
+)
+"""How a source served in flight after the warm-up."""
 
 
 def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEvents:

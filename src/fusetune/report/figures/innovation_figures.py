@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
+from fusetune.analyze.metrics import break_rate
 from fusetune.analyze.metrics.break_rate import clopper_pearson
 from fusetune.apply.paper.paper_mode import PAPER_VARIABLES
 from fusetune.px4.aid_sources import AID_SOURCES, AXES, REPORTED_SOURCES
@@ -17,7 +18,8 @@ from fusetune.report.figures.set_styles import status_colour
 from fusetune.report.results import PooledSamples, Results, figure_values
 
 _CONSISTENCY_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
-_BREAK_METRICS = {"break_rate_3sd": "3 σ", "break_rate_5sd": "5 σ", "break_rate_gate": "gate"}
+_BREAK_METRICS = {metric.name: metric.label for metric in break_rate.METRICS}
+_BREAK_STYLES = (("#56B4E9", -0.22), ("#E69F00", 0.0), ("#D55E00", 0.22))
 _WHISKERS = (5.0, 25.0, 50.0, 75.0, 95.0)
 
 
@@ -165,13 +167,7 @@ def breaks(results: Results) -> Figure:
 
 def _break_panel(axes: Axes, results: Results, source: str) -> None:
     confidence = results.decision["rule"]["confidence"]
-    styles = {
-        "break_rate_3sd": ("#56B4E9", -0.22),
-        "break_rate_5sd": ("#E69F00", 0.0),
-        "break_rate_gate": ("#D55E00", 0.22),
-    }
-    for metric, label in _BREAK_METRICS.items():
-        colour, offset = styles[metric]
+    for (metric, label), (colour, offset) in zip(_BREAK_METRICS.items(), _BREAK_STYLES, strict=True):
         pooled = _pooled_breaks(results, source, metric)
         for row, name in enumerate(results.shown):
             if name not in pooled:
