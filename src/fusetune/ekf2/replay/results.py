@@ -16,7 +16,7 @@ class Gap:
 
     Attributes
     ----------
-    sensor : a key of `fusetune.px4.aid_sources.WITHHOLDABLE`
+    sensor : a key of `fusetune.ekf2.replay.withholding.WITHHOLDABLE`
     start, stop : IMU timestamps (µs)
     """
 
