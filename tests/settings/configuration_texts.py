@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, is_dataclass
+from dataclasses import MISSING, asdict, is_dataclass
 from typing import Any, Literal, get_args, get_origin
 
 import yaml
 
 from fusetune.configuration import Configuration
-from fusetune.settings.declaration import Declaration, DeclaredSetting, declared, without_none
+from fusetune.execute.sensors.faults import KINDS
+from fusetune.settings.declaration import Declaration, DeclaredSetting, declared, meaning_of, without_none
 from fusetune.settings.schema import DIALECT, schema_of
 
 WIDTH = 120
@@ -41,20 +42,34 @@ def configuration_text() -> str:
     return "\n".join(parts)
 
 
-def manual_text() -> str:
-    """The table in `config/README.md`."""
+def manual_text(kind: type) -> str:
+    """A table in `config/README.md`: the keys of a file that becomes this dataclass."""
     rows = ["| key | meaning | unit, range | default |", "|---|---|---|---|"]
-    for place, one in leaves(Configuration):
+    for place, one in leaves(kind):
         values = ", ".join(filter(None, (one.declaration.unit, _range_of(one))))
-        rows.append(f"| `{place}` | {one.meaning} | {values} | {_shown(one.default)} |")
+        rows.append(
+            f"| `{place}` | {one.meaning} | {values} | {'empty' if one.declaration.filled_in else _shown(one.default)} |"
+        )
     return "\n".join(row.replace("  ", " ") for row in rows)
+
+
+def faults_text() -> str:
+    """The table of faults in `config/README.md`."""
+    rows = ["| kind | what happens | keys, those in brackets may be left out |", "|---|---|---|"]
+    for name, kind in KINDS.items():
+        keys = (f"`{one.name}`" if one.default is MISSING else f"[`{one.name}`]" for one in declared(kind))
+        rows.append(f"| `{name}` | {meaning_of(kind)} | {', '.join(keys)} |")
+    return "\n".join(rows)
 
 
 def leaves(kind: type, place: str = "") -> Iterator[tuple[str, DeclaredSetting]]:
     """All settings with their places (`section.key`)."""
     for one in declared(kind):
+        entry = next(iter(get_args(one.kind)), None)
         if is_dataclass(one.kind):
             yield from leaves(one.kind, f"{place}{one.name}.")  # type: ignore[arg-type]
+        elif is_dataclass(entry):
+            yield from leaves(entry, f"{place}{one.name}[].")  # type: ignore[arg-type]
         else:
             yield f"{place}{one.name}", one
 
@@ -101,20 +116,25 @@ def _range_of(one: DeclaredSetting) -> str:
 
 
 def _numbers(declaration: Declaration) -> str:
+    if declaration.above is not None:
+        return f"above {declaration.above:g}" + (f", to {declaration.high:g}" if declaration.high else "")
     if declaration.low is None:
         return ""
     if declaration.high is None:
         return f"from {declaration.low:g}"
-    return f"{declaration.low:.12g}–{declaration.high:.12g}"
+    between = " to " if declaration.low < 0 else "–"
+    return f"{declaration.low:.12g}{between}{declaration.high:.12g}".replace("-", "−")
 
 
 def _shown(default: Any) -> str:
+    if default is MISSING:
+        return "to be given"
     if isinstance(default, bool):
         return str(default).lower()
     if isinstance(default, Mapping):
         return ", ".join(f"`{key}`: {_shown(value)}" for key, value in default.items()) or "none"
     if isinstance(default, tuple):
         return ", ".join(_shown(one) for one in default)
-    if default is None:
+    if default is None or default == "":
         return "empty"
     return f"`{default}`" if isinstance(default, str) else f"{default:.12g}"

@@ -15,11 +15,13 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 from tests.made_text import UpToDate
-from tests.settings.configuration_texts import configuration_text, leaves, manual_text, schema_text
+from tests.settings.configuration_texts import configuration_text, faults_text, leaves, manual_text, schema_text
 
 from fusetune.analyze.replaying.replay_settings import IN_USE
 from fusetune.configuration import Configuration, read_configuration
+from fusetune.design.mission import Mission
 from fusetune.errors import UserError
+from fusetune.execute.vehicle import Vehicle
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.settings.checking import checked
 
@@ -27,7 +29,11 @@ from fusetune.settings.checking import checked
 def test_schema_file_and_manual_say_what_is_declared(project_root: Path, up_to_date: UpToDate) -> None:
     up_to_date(project_root / "workflow" / "schemas" / "config.schema.yaml", None, schema_text())
     up_to_date(project_root / "config" / "config.yaml", None, configuration_text())
-    up_to_date(project_root / "config" / "README.md", "settings", f"\n{manual_text()}\n\n")
+    manual = project_root / "config" / "README.md"
+    up_to_date(manual, "settings", f"\n{manual_text(Configuration)}\n\n")
+    up_to_date(manual, "mission", f"\n{manual_text(Mission)}\n\n")
+    up_to_date(manual, "vehicle", f"\n{manual_text(Vehicle)}\n\n")
+    up_to_date(manual, "faults", f"\n{faults_text()}\n\n")
 
 
 def test_the_schema_is_a_schema(project_root: Path) -> None:
