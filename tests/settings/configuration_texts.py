@@ -47,9 +47,8 @@ def manual_text(kind: type) -> str:
     rows = ["| key | meaning | unit, range | default |", "|---|---|---|---|"]
     for place, one in leaves(kind):
         values = ", ".join(filter(None, (one.declaration.unit, _range_of(one))))
-        rows.append(
-            f"| `{place}` | {one.meaning} | {values} | {'empty' if one.declaration.filled_in else _shown(one.default)} |"
-        )
+        default = "empty" if one.declaration.filled_in else _shown(one.default)
+        rows.append(f"| `{place}` | {one.meaning} | {values} | {default} |")
     return "\n".join(row.replace("  ", " ") for row in rows)
 
 
@@ -87,17 +86,16 @@ def _plain(default: Any) -> Any:
 
 
 def _lines(key: str, value: Any, indent: str = "") -> Iterator[str]:
-    """Lines of YAML; a section is a block, and so is a value that does not fit into a line."""
+    """Lines of YAML; a section is a block, and so is a list that does not fit into a line."""
     flow = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=10_000).removesuffix("...\n").rstrip()
     line = f"{indent}{key}: {'' if value is None else flow}".rstrip()
-    if (isinstance(value, Mapping) and value and not indent) or len(line) > WIDTH:
+    if isinstance(value, Mapping) and not indent:
+        yield f"{key}:\n"
+        for name, part in value.items():
+            yield from _lines(name, part, "  ")
+    elif isinstance(value, list) and len(line) > WIDTH:
         yield f"{indent}{key}:\n"
-        entries = value.items() if isinstance(value, Mapping) else (("-", one) for one in value)
-        for name, entry in entries:
-            if name == "-":
-                yield f"{indent}  - {entry}\n"
-            else:
-                yield from _lines(name, entry, f"{indent}  ")
+        yield from (f"{indent}  - {entry}\n" for entry in value)
     else:
         yield f"{line}\n"
 
