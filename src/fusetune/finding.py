@@ -45,6 +45,11 @@ class Finding:
     stop_us: int | None = None
     evidence: Evidence = field(default_factory=dict, hash=False)
 
+    @property
+    def in_words(self) -> str:
+        """What was found, with the remedy in brackets."""
+        return f"{self.found} ({self.remedy})" if self.remedy else self.found
+
     def document(self) -> dict[str, Any]:
         """The finding as a JSON object, as all result files hold findings."""
         return asdict(self)

@@ -36,8 +36,6 @@ GIVEN = (
     "airspeed",
     "airspeed_validated",
     "landing_target_pose",
-    "vehicle_status",
-    LAND_DETECTOR,
 )
 """What tells which samples the estimator is given."""
 
