@@ -108,7 +108,9 @@ def test_gaps_between_imu_samples() -> None:
     imu = flight.topics["sensor_combined", 0]
     flight.topics["sensor_combined", 0] = {name: np.delete(values, slice(1000, 1100)) for name, values in imu.items()}
     check = check_of(flight, "imu_gaps")
-    assert (check.severity, check.figure) == ("warning", pytest.approx(101 * 0.005))
+    assert (check.severity, check.figure, check.unit) == ("warning", pytest.approx(101 * 0.005), "s")
+    # row 999 and the former row 1100, 5 ms apart each, the first at 1 s
+    assert (check.start_us, check.stop_us, check.evidence) == (5_995_000, 6_500_000, {"gaps": 1})
     flight = made_flight(seconds=120.0)
     flight.topics["sensor_combined", 0]["timestamp"][12_000:] += 40_000_000
     assert "no IMU samples for 40 s" in judged(flight).reasons[0]
