@@ -77,19 +77,18 @@ def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
 
 
 def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: dict[str, Any]) -> None:
-    from fusetune.analyze.sources import AID_SOURCES
-    from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+    from fusetune.px4.aid_sources import MEASURED_SOURCES, WITHHOLDABLE
 
     decision = schema["properties"]["decision"]["properties"]
-    assert decision["sources"]["propertyNames"]["enum"] == sorted(AID_SOURCES)
+    assert decision["sources"]["propertyNames"]["enum"] == sorted(MEASURED_SOURCES)
     pattern = re.compile(decision["withheld_sources"]["propertyNames"]["pattern"])
     for source in (source for sources in WITHHOLDABLE.values() for source in sources):
-        axes = "xyz"[: AID_SOURCES[source].axes]
+        axes = "xyz"[: MEASURED_SOURCES[source].axes]
         assert pattern.match(source)
         assert [axis for axis in "xyz" if pattern.match(f"{source}.{axis}")] == list(axes)
 
 
-LOCK_FILES = {"requirements.lock": "dev", "requirements-slurm.lock": "slurm"}
+LOCK_FILES = {"requirements.lock": ("test", "dev"), "requirements-slurm.lock": ("slurm",)}
 
 
 def locked(file: Path) -> dict[str, tuple[str, list[str]]]:
@@ -110,7 +109,7 @@ def test_a_lock_file_pins_all_that_the_project_asks_for(project_root: Path, name
     pins = locked(project_root / name)
     project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     asked = [Requirement(text) for text in project["dependencies"]]
-    asked += [Requirement(text) for text in project["optional-dependencies"][LOCK_FILES[name]]]
+    asked += [Requirement(text) for extra in LOCK_FILES[name] for text in project["optional-dependencies"][extra]]
     for requirement in asked:
         version, hashes = pins[requirement.name.lower()]
         assert version in requirement.specifier, requirement

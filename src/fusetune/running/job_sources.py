@@ -22,7 +22,6 @@ JOB_SOURCES = {
         "analyze/metrics",
         "analyze/reconstruction",
         "analyze/replaying",
-        "analyze/sources.py",
     ),
     "score": (*BASE, "ekf2", "save", "analyze"),
     "apply": (*BASE, "apply"),

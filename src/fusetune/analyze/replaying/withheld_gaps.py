@@ -17,7 +17,7 @@ import pyarrow as pa
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.results import Gap, GapResult
-from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+from fusetune.px4.aid_sources import WITHHOLDABLE
 from fusetune.px4.flight import Flight
 from fusetune.settings import setting, settings_from_mapping
 from fusetune.storage.files import AnyPath

@@ -10,12 +10,12 @@ from fusetune.analyze.flight.intervals import Cut, subtract
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.replaying.replay_flight import PreparedFlight
 from fusetune.analyze.scoring.onboard import onboard_samples
-from fusetune.analyze.sources import HORIZONTAL_AIDING
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, Interval, as_flown_figures, compared_rows
 from fusetune.analyze.trust.trust_settings import FALLING, TrustSettings
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 from fusetune.px4.flight import Flight
 
 COLD_WARM_UP_US = 10_000_000

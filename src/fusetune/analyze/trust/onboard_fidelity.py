@@ -20,6 +20,7 @@ from fusetune.analyze.trust.log_lacks import log_lacks
 from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, TrustGrade, grade_flight
 from fusetune.analyze.trust.trust_settings import TrustSettings
 from fusetune.finding import Finding
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.storage.documents import write_document
@@ -31,10 +32,7 @@ AS_FLOWN = "as_flown"
 FIDELITY_TOPICS = (*dict.fromkeys((*TRUST_TOPICS, "sensor_gps")),)
 """What the comparison and the grade read of a flight."""
 
-JUDGED_SOURCES = (
-    "gnss_vel", "gnss_pos", "gnss_hgt", "gnss_yaw", "baro_hgt", "rng_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt",
-    "ev_yaw", "optical_flow",
-)  # fmt: skip
+JUDGED_SOURCES = tuple(one.name for one in AID_SOURCES.values() if one.judged)
 MATCH_TOLERANCE_US = 30_000
 MIN_SAMPLES = 8
 WARM_UP_US = 10_000_000

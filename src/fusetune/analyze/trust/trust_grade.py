@@ -22,13 +22,13 @@ from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.start_choice import START_TOPICS, Start
 from fusetune.analyze.scoring.onboard import onboard_samples
-from fusetune.analyze.sources import AID_SOURCES
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, distance
 from fusetune.analyze.trust.as_flown_figures import GROUPS, AsFlownFigures, rms
 from fusetune.analyze.trust.grade_causes import causes_of, cost_of
 from fusetune.analyze.trust.trust_settings import FALLING, FIGURES, TrustSettings
 from fusetune.analyze.trust.trust_words import limits_of_grade, not_compared
 from fusetune.finding import Finding
+from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import instance_shares
 
@@ -48,7 +48,7 @@ TRUST_TOPICS = (
             "estimator_innovation_variances",
             "estimator_innovation_test_ratios",
             "ekf2_innovations",
-            *(f"estimator_aid_src_{name}" for name in AID_SOURCES),
+            *(source.topic for source in MEASURED_SOURCES.values()),
         )
     ),
 )
@@ -202,7 +202,7 @@ def _instances(flight: Flight) -> tuple[InstanceFigures, ...]:
     """Innovations of every estimator instance of the vehicle, while it flew."""
     shares = instance_shares(flight)
     airborne = airborne_intervals(flight, {})
-    topics = [name for name, _ in flight.topics if name.startswith("estimator_aid_src_")]
+    topics = [name for name, _ in flight.topics if name.startswith(AID_SOURCE_TOPIC)]
     figures = []
     for instance in sorted({k for name in topics for k in flight.instances(name)}):
         samples = onboard_samples(flight, instance)

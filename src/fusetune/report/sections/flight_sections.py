@@ -6,8 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from fusetune.analyze.sources import AID_SOURCES
 from fusetune.finding import from_documents
+from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
 from fusetune.report.figures.innovation_figures import rms_table
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
 from fusetune.report.results import Results, as_flown, figure_values
@@ -25,13 +25,7 @@ _TRUE_ERRORS = (
     ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity without GNSS m/s"),
     ("truth_velocity", "all", "nees", "velocity NEES / 3"),
 )
-_AS_FLOWN_GROUPS = (
-    ("gnss_vel", "all"),
-    ("gnss_pos", "horizontal"),
-    ("gnss_hgt", "vertical"),
-    ("baro_hgt", "vertical"),
-    ("mag", "all"),
-)
+_AS_FLOWN_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
 
 
 def flights_section(results: Results, flights_table: AnyPath) -> str:

@@ -22,7 +22,7 @@ _VELOCITY = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
 def gnss(judged: JudgedFlight) -> Finding:
     """Presence and rate of GNSS, and whether the estimator is given it."""
     limits = judged.limits
-    if not judged.uses("EKF2_GPS_CTRL"):
+    if not judged.is_switched_on("gnss"):
         return gnss.does_not_apply("EKF2_GPS_CTRL switches GNSS off")
     rate = rate_hz(judged.flight.topic(GNSS))
     if rate is None:
@@ -89,14 +89,14 @@ def _accuracy(asked: Check[JudgedFlight], judged: JudgedFlight, column: str, thr
 def _is_used(judged: JudgedFlight) -> bool:
     """Whether GNSS is switched on and logged."""
     table = judged.flight.topic(GNSS)
-    return judged.uses("EKF2_GPS_CTRL") and table is not None and bool(len(table["timestamp"]))
+    return judged.is_switched_on("gnss") and table is not None and bool(len(table["timestamp"]))
 
 
 @check(topics=(GNSS, *STUCK_TOPICS), thresholds=STUCK_AID, unit="s")
 def gnss_stuck(judged: JudgedFlight) -> Finding:
     """Whether GNSS position or velocity stands still in flight, while there is a fix."""
     table = judged.flight.topic(GNSS)
-    if table is None or "fix_type" not in table or not judged.uses("EKF2_GPS_CTRL"):
+    if table is None or "fix_type" not in table or not judged.is_switched_on("gnss"):
         return gnss_stuck.does_not_apply("GNSS is switched off or not logged")
     table = select_rows(table, table["fix_type"] >= FIX_3D)
     groups = [group for group in (_POSITION, _VELOCITY) if all(column in table for column in group)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from fusetune.ekf2.feed.given_samples import GivenSamples, given_samples
 from fusetune.ekf2.feed.message_samples import gnss_refusals, taken
+from fusetune.px4.aid_sources import AID_SOURCES, SENSORS, AidSource
 from fusetune.px4.flight import Flight, LeftOut, TopicTable, row_count
 from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.px4.sensor_limits import LACKS_FIELD
@@ -16,35 +18,17 @@ from fusetune.save.checks.logging_advice import WHOLE_LOG, log_more
 from fusetune.save.thresholds import VerdictThresholds
 
 IMU = "sensor_combined"
-MAG, BARO = "vehicle_magnetometer", "vehicle_air_data"
-GNSS, VISION, FLOW = "vehicle_gps_position", "vehicle_visual_odometry", "vehicle_optical_flow"
+MAG, BARO, GNSS = (SENSORS[name].topics[0].name for name in ("mag", "baro", "gnss"))
 LAND_DETECTOR = "vehicle_land_detected"
 
 IN_THE_AIR = (IMU, LAND_DETECTOR)
 """What tells when the vehicle is in the air."""
 IS_COMPLETE = ("ekf2_timestamps",)
 """What names every sample that the estimator took."""
-GIVEN = (
-    IMU,
-    *IS_COMPLETE,
-    MAG,
-    BARO,
-    GNSS,
-    VISION,
-    FLOW,
-    "distance_sensor",
-    "airspeed",
-    "airspeed_validated",
-    "landing_target_pose",
-)
+GIVEN = (IMU, *IS_COMPLETE, *(topic.name for sensor in SENSORS.values() for topic in sensor.topics))
 """What tells which samples the estimator is given."""
 
-POSITION, ALTITUDE, VELOCITY, YAW = 0b0001, 0b0010, 0b0100, 0b1000
-"""Bits of EKF2_GPS_CTRL and EKF2_EV_CTRL."""
-ANY_BIT = ~0
-HORIZONTAL = POSITION | VELOCITY
 FIX_3D = 3
-_MAG_TYPE_NONE = 5
 
 
 @dataclass(frozen=True)
@@ -75,14 +59,27 @@ class JudgedFlight:
         """Parameters of the estimator that the log begins with, those that it lacks at their defaults."""
         return complete(self.flight.parameters.initial, {}, self.flight.release)
 
-    def uses(self, parameter: str, bits: int = ANY_BIT) -> bool:
-        """Whether a control parameter of the estimator has any of some bits."""
-        return bool(int(self.parameters[parameter]) & bits)
+    def may_fuse(self, source: AidSource) -> bool:
+        """Whether the parameters let a source be fused."""
+        return source.switch is None or source.switch.is_on(self.parameters[source.switch.parameter])
 
-    @property
-    def uses_magnetometer(self) -> bool:
-        """Whether the estimator takes a heading from the magnetometer."""
-        return self.parameters["EKF2_MAG_TYPE"] != _MAG_TYPE_NONE
+    def is_switched_on(self, part: str) -> bool:
+        """Whether a source of some samples, by the name of their sensor or part of it, may be fused."""
+        sources = [one for one in AID_SOURCES.values() if one.code is not None and part in (one.sensor, one.part)]
+        return any(map(self.may_fuse, sources))
+
+    def has_samples(self, source: AidSource) -> bool:
+        """Whether the log holds samples that a source can be made of."""
+        if source.sensor == "gnss":
+            return bool(self.usable_fixes)
+        if not SENSORS[source.sensor].buffered:
+            return any(self.flight.topic(topic.name) is not None for topic in SENSORS[source.sensor].topics)
+        return self.is_given(source.part or source.sensor)
+
+    def from_sensors(self, sources: Iterable[AidSource]) -> list[str]:
+        """Labels of the sensors, as each of some sources has its samples and may be fused."""
+        labels = (SENSORS[one.sensor].label for one in sources if self.may_fuse(one) and self.has_samples(one))
+        return list(dict.fromkeys(labels))
 
     @cached_property
     def given(self) -> dict[str, GivenSamples]:

@@ -22,7 +22,7 @@ _OFF = "the magnetometer is switched off or not logged"
 def magnetometer(judged: JudgedFlight) -> Finding:
     """Whether the heading has its usual reference."""
     threshold = judged.limits.low_magnetometer_rate_hz
-    if not judged.uses_magnetometer:
+    if not judged.is_switched_on("mag"):
         return magnetometer.does_not_apply("EKF2_MAG_TYPE switches the magnetometer off")
     rate = rate_hz(judged.flight.topic(MAG))
     if rate is None:
@@ -38,7 +38,7 @@ def magnetometer(judged: JudgedFlight) -> Finding:
 def magnetometer_stuck(judged: JudgedFlight) -> Finding:
     """Whether an axis of the magnetometer stands still."""
     table = judged.flight.topic(MAG)
-    if table is None or len(table["timestamp"]) < FEWEST_STUCK_ROWS or not judged.uses_magnetometer:
+    if table is None or len(table["timestamp"]) < FEWEST_STUCK_ROWS or not judged.is_switched_on("mag"):
         return magnetometer_stuck.does_not_apply(_OFF)
     axes = [[column] for column in field_names(table, "magnetometer_ga")]
     return stuck(magnetometer_stuck, judged, Subject("the magnetometer", table, axes, judged.limits.high_stuck_aid_s))
@@ -48,7 +48,7 @@ def magnetometer_stuck(judged: JudgedFlight) -> Finding:
 def magnetometer_strength(judged: JudgedFlight) -> Finding:
     """Median strength of the measured field, which the earth's bounds."""
     table = judged.flight.topic(MAG)
-    if table is None or not len(table["timestamp"]) or not judged.uses_magnetometer:
+    if table is None or not len(table["timestamp"]) or not judged.is_switched_on("mag"):
         return magnetometer_strength.does_not_apply(_OFF)
     strength = float(np.median(np.linalg.norm(stacked(table, "magnetometer_ga"), axis=1)))
     said = f"the magnetometer measures a field of {strength:.3g} Gs"
