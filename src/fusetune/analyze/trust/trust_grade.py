@@ -26,13 +26,12 @@ from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, distan
 from fusetune.analyze.trust.as_flown_figures import GROUPS, AsFlownFigures, rms
 from fusetune.analyze.trust.grade_causes import causes_of, cost_of
 from fusetune.analyze.trust.trust_settings import FALLING, FIGURES, TrustSettings
-from fusetune.analyze.trust.trust_words import limits_of_grade, not_compared
+from fusetune.analyze.trust.trust_words import GRADES, limits_of_grade, not_compared
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import instance_shares
 
-GRADES = "ABCD"
 GRADE_WORDS = {
     "A": "The replay repeats what the vehicle's own filter did.",
     "B": "The replay follows the vehicle's own filter closely; differences between sets can be trusted.",

@@ -20,8 +20,7 @@ FIGURE_NAMES = {
     "flags_equal": "flags",
     "height_flags_equal": "the sources of height",
 }
-
-
+GRADES = "ABCD"
 SEVERITIES: dict[str, Severity] = {"B": "note", "C": "warning", "D": "fail"}
 """Of what gives a flight such a grade; an A is given by nothing."""
 _UNITS = {"velocity_m_s": "m/s", "heading_deg": "°", "height_m": "m", "vertical_velocity_m_s": "m/s"}
@@ -31,7 +30,7 @@ def limits_of_grade(
     figures: AsFlownFigures, names: Sequence[str], grade: str, settings: TrustSettings
 ) -> list[Finding]:
     """How the replay departs from the vehicle in the figures that have some grade; `threshold` is that of the next."""
-    better = "ABCD".index(grade) - 1
+    better = GRADES.index(grade) - 1
     return [
         Finding(
             name,
