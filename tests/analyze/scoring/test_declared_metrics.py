@@ -112,4 +112,4 @@ def innovations(axes: int, sets: int, seed: int) -> Innovations:
     variance = generator.uniform(0.5, 2.0, (axes, sets, 600))
     innovation = generator.standard_normal(variance.shape) * np.sqrt(variance)
     ratio = np.square(innovation) / (9.0 * variance)
-    return Innovations(innovation, variance, ratio, ratio > 1.0, lambda: [5.0] * axes)
+    return Innovations(innovation, variance, ratio, ratio > 1.0, lambda: [5.0] * axes, of_group=axes > 1)

@@ -62,6 +62,7 @@ class Innovations:
     ----------
     winsor_limits : gives those of the axes, (D,), see `fusetune.analyze.metrics.likelihood.winsor_limit`
     confidence : of intervals
+    of_group : whether they stand for a group of axes, which may be one alone
     """
 
     innovation: Array
@@ -70,6 +71,7 @@ class Innovations:
     rejected: npt.NDArray[np.bool_]
     winsor_limits: Callable[[], Sequence[float]]
     confidence: float = 0.95
+    of_group: bool = False
     _made: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property

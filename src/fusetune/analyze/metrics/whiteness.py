@@ -76,9 +76,9 @@ def _correlation(given: Innovations) -> Array:
 
 
 def independent_samples(given: Innovations) -> Array:
-    """Number of independent samples, (S,); of several axes, the mean of their shares."""
+    """Number of independent samples, (S,); of a group of axes by the mean of their shares."""
     found = effective_samples(given.once(_correlation), given.samples)
-    return found[0] if given.dimension == 1 else given.samples * np.mean(found / given.samples, axis=0)
+    return given.samples * np.mean(found / given.samples, axis=0) if given.of_group else found[0]
 
 
 def _ljung_box(given: Innovations) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.replaying.replay_settings import WithholdingSettings
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.results import Gap, GapResult
-from fusetune.px4.aid_sources import WITHHOLDABLE
+from fusetune.px4.aid_sources import SENSORS, WITHHOLDABLE
 from fusetune.px4.flight import Flight
 
 HORIZONS = 3
@@ -25,8 +25,6 @@ HORIZONS = 3
 
 AVERAGED_S = 1.0
 """Innovations of so long before a horizon are averaged: they share the drift, but not the measurement's noise."""
-
-_TOPICS = {"gnss": "vehicle_gps_position", "baro": "vehicle_air_data", "mag": "vehicle_magnetometer"}
 
 _POSITION_FIELDS = ("timestamp", "x", "y", "z", "vx", "vy", "vz")
 
@@ -39,7 +37,7 @@ def plan_gaps(flight: Flight, airborne: Sequence[Interval], settings: Withholdin
     gaps = []
     for sensor in WITHHOLDABLE:
         length, step = (round(seconds * 1e6) for seconds in (settings.length_s(sensor), settings.every_s(sensor)))
-        if length == 0 or flight.topic(_TOPICS[sensor]) is None:
+        if length == 0 or flight.topic(SENSORS[sensor].topics[0].name) is None:
             continue
         for start, stop in airborne:
             gaps += [Gap(sensor, first, first + length) for first in range(start, stop - length + 1, step)]

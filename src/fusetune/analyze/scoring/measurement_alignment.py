@@ -76,7 +76,7 @@ FIGURES = ("innovation", "innovation_variance", "test_ratio", "rejected")
 
 
 def innovations_of(
-    members: Sequence[PairedSamples], confidence: float = np.nan
+    members: Sequence[PairedSamples], confidence: float = np.nan, *, of_group: bool = False
 ) -> Iterator[tuple[SamplesOfSet, Innovations]]:
     """Several axes that share their samples and sets: the samples of the first of them and what metrics are made of,
     of one set at a time."""
@@ -86,7 +86,7 @@ def innovations_of(
 
     for axes in zip(*(member.each() for member in members), strict=True):
         innovation, variance, ratio, rejected = (_stacked([getattr(one, name) for one in axes]) for name in FIGURES)
-        yield axes[0], Innovations(innovation, variance, ratio, rejected, limits, confidence)
+        yield axes[0], Innovations(innovation, variance, ratio, rejected, limits, confidence, of_group)
 
 
 def _stacked(axes: list[np.ndarray]) -> np.ndarray:

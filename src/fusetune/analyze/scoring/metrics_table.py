@@ -105,7 +105,7 @@ def add_innovation_metrics(
     prefix : to the names of the metrics
     """
     tables = []
-    for first, given in innovations_of(members, confidence):
+    for first, given in innovations_of(members, confidence, of_group=axis not in AXES):
         one = MetricsTable(table.flight)
         for metric in metrics:
             value = metric.function(given)
