@@ -4,7 +4,7 @@ A setting stands nowhere else. The JSON schema by which files are checked follow
 as do the shipped configuration and its manual. A field that declares nothing is no setting.
 
 Imports nothing but the standard library, for every job loads it: a job gets values that the workflow has checked, so
-that neither jsonschema nor pydantic, of which each takes a tenth of a second to load, is needed there.
+that neither jsonschema nor pydantic is needed there, either of which costs a process a tenth of a second.
 """
 
 from __future__ import annotations
