@@ -48,6 +48,7 @@ from fusetune.analyze.scoring.withheld_scores import (
     withheld_rows,
 )
 from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
+from fusetune.finding import documents
 from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
@@ -306,7 +307,7 @@ def _summary(
         "warm_up_end_us": window.warm_up_end,
         "intervals_us": [list(interval) for interval in window.intervals],
         "block_edges_us": window.block_edges(settings.block_s).tolist() if window.intervals else [],
-        "cuts": [{"start_us": cut.start, "stop_us": cut.stop, "reason": cut.reason} for cut in window.cuts],
+        "cuts": documents(cut.finding for cut in window.cuts),
         "sets": {
             name: _set_summary(record, by_name[present], window, events[name], flight)
             for name, record in by_name.items()

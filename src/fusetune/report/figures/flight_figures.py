@@ -12,6 +12,7 @@ from fusetune.analyze.flight.ground_truth import Truth, read_truth
 from fusetune.analyze.metrics.attitude import interpolate
 from fusetune.analyze.replaying.sample_spool import SampleSpool
 from fusetune.analyze.replaying.set_files import AxisSamples, ColumnsOnDisk, SourceAxis, read_innovations
+from fusetune.finding import from_documents
 from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.report.figures.figures import empty_figure, figure_style, new_figure, save_png, set_colours
@@ -245,7 +246,8 @@ def _breaks(axes: Axes, data: _FlightData, colours: dict[str, str]) -> None:
 def _reset_times(data: _FlightData, name: str) -> Array:
     if name != data.present:
         return np.zeros(0)
-    return np.array([(cut["start_us"] - data.start) * 1e-6 for cut in data.summary["cuts"]])
+    starts = [cut.start_us for cut in from_documents(data.summary["cuts"]) if cut.start_us is not None]
+    return np.array([(start - data.start) * 1e-6 for start in starts])
 
 
 def _shade_unscored(axes: Axes, data: _FlightData) -> None:
