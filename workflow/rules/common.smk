@@ -17,7 +17,6 @@ REPLAY_PARTS = (
     "gaps.parquet",
     "json",
 )
-REPLAY_SECTIONS = ("withheld", "reconstruction", "start")
 SCORE_PARTS = (
     "metrics.parquet",
     "scores.parquet",

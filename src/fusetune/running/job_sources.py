@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fusetune.storage.digest import source_digest
 
-BASE = ("errors.py", "number_settings.py", "px4", "settings.py", "storage", "time_limit.py")
+BASE = ("check.py", "errors.py", "finding.py", "px4", "quaternions.py", "settings", "storage", "time_limit.py")
 
 JOB_SOURCES = {
     "design": (*BASE, "design"),
@@ -22,7 +22,6 @@ JOB_SOURCES = {
         "analyze/metrics",
         "analyze/reconstruction",
         "analyze/replaying",
-        "analyze/sources.py",
     ),
     "score": (*BASE, "ekf2", "save", "analyze"),
     "apply": (*BASE, "apply"),

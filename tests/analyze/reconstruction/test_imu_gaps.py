@@ -7,8 +7,8 @@ from fusetune.analyze.reconstruction.gap_values import fill_missing
 from fusetune.analyze.reconstruction.gyro_by_attitude import correct_gyro
 from fusetune.analyze.reconstruction.imu_gaps import fill_imu_gaps, find_imu_gaps
 from fusetune.analyze.reconstruction.trial_gaps import try_gaps, variance_per_second
-from fusetune.ekf2.numerics.quaternions import from_rotation_vector, multiply
 from fusetune.px4.flight import select_rows
+from fusetune.quaternions import from_rotation_vector, multiply
 
 INTERVAL_US = 5_000
 

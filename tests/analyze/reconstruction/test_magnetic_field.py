@@ -4,7 +4,7 @@ import numpy as np
 
 from fusetune.analyze.reconstruction.attitude import to_body, to_earth
 from fusetune.analyze.reconstruction.magnetic_field import magnetic_field
-from fusetune.ekf2.numerics.quaternions import from_rotation_vector, multiply
+from fusetune.quaternions import from_rotation_vector, multiply
 
 EARTH = np.array([0.21, 0.03, 0.43])
 BODY = np.array([0.02, -0.015, 0.01])

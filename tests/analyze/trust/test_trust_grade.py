@@ -11,19 +11,13 @@ from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
 from fusetune.analyze.replaying.replay_flight import REPLAY_TOPICS, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE
 from fusetune.analyze.scoring.score_flight import SCORE_TOPICS
+from fusetune.analyze.trust.as_flown_comparison import distance
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
+from fusetune.analyze.trust.grade_causes import GNSS, cost_of, with_half_the_gnss, without_repair
 from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS
-from fusetune.analyze.trust.trust_grade import (
-    GNSS,
-    distance,
-    grade_flight,
-    grade_of,
-    with_half_the_gnss,
-    without_repair,
-)
+from fusetune.analyze.trust.trust_grade import grade_flight, grade_of
 from fusetune.analyze.trust.trust_settings import FIGURES, TrustSettings
-from fusetune.analyze.trust.trust_words import limits_in_words, not_compared_in_words
-from fusetune.errors import UserError
+from fusetune.analyze.trust.trust_words import limits_of_grade, not_compared
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.layouts.estimator_instances import (
     instance_shares,
@@ -106,17 +100,18 @@ def test_a_figure_less_never_betters_the_grade(names):
     assert (graded.grade == "A") == (not names)
 
 
-def test_the_reason_names_the_resets_and_what_could_not_be_compared():
+def test_limits_name_the_resets_and_what_could_not_be_compared():
     figures = changed(velocity_m_s=None, resets={"height": (144, 0), "vertical velocity": (1, 1)})
-    assert limits_in_words(figures, ["height_resets"]) == [
-        "the replay resets its height 144 times where the vehicle did so 0 times"
-    ]
-    assert not_compared_in_words(["velocity_m_s"]) == "the log does not let horizontal velocity be compared"
-    assert not_compared_in_words(["velocity_m_s", "heading_deg", "flags_equal"]) == (
+    (resets,) = limits_of_grade(figures, ["height_resets"], "D", SETTINGS)
+    assert resets.found == "the replay resets its height 144 times where the vehicle did so 0 times"
+    # a C would have been given for up to three
+    assert (resets.id, resets.severity, resets.figure, resets.threshold) == ("height_resets", "fail", 144, 3.0)
+    assert not_compared(["velocity_m_s"]).found == "the log does not let horizontal velocity be compared"
+    assert not_compared(["velocity_m_s", "heading_deg", "flags_equal"]).found == (
         "the log does not let horizontal velocity, heading and flags be compared"
     )
     worst = changed(innovation_ratio={"heading": 0.5, "vision_position": 1.8}, resets={"vertical velocity": (1, 4)})
-    assert limits_in_words(worst, FIGURES)[:3] == [
+    assert [limit.found for limit in limits_of_grade(worst, FIGURES, "B", SETTINGS)][:3] == [
         "the replay resets its vertical velocity once where the vehicle did so 4 times",
         "the replay takes its height from the vehicle's sources in only 100% of the time",
         "innovations of heading are 0.5 times the vehicle's",
@@ -127,14 +122,6 @@ def test_distance_is_one_at_the_limits_of_b():
     limit = AsFlownFigures({"heading": 1.6}, 0.15, 4.0, 1.0, 0.225, 0.9, 0.9, 60.0, {})
     assert distance(PERFECT, SETTINGS) == 0.0
     assert distance(limit, SETTINGS) == pytest.approx(1.0)
-
-
-def test_limits_must_rise():
-    with pytest.raises(UserError, match="Expected three rising numbers"):
-        TrustSettings.from_mapping({"heading_deg": [4, 2, 10]})
-    with pytest.raises(UserError, match="names 'speed'"):
-        TrustSettings.from_mapping({"needed_for_b": ["speed"]})
-    assert TrustSettings.from_mapping({"needed_for_a": []}).needed_for_a == ()
 
 
 @pytest.fixture(scope="module")
@@ -156,9 +143,11 @@ def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
         | {("sensor_combined", 0): select_rows(imu, ~lost)}
     )
     grade = grade_flight(small)
-    causes = {cause.cause: cause for cause in grade.causes if cause.measured}
-    assert causes["missing IMU rows"].repaired
-    assert causes["missing IMU rows"].cost > 0.1
+    causes = {cause.found: cause for cause in grade.causes if cause.evidence["measured"]}
+    assert causes["missing IMU rows"].evidence["repaired"]
+    assert causes["missing IMU rows"].id == "imu_coverage"
+    assert cost_of(causes["missing IMU rows"]) > 0.1
+    assert grade.reason.startswith("; ".join(limit.found for limit in grade.limits))
     assert grade.grade <= grade.as_logged_grade
 
 

@@ -3,7 +3,10 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from fusetune.finding import Finding
+
 Interval = tuple[int, int]
+NOT_SCORED = "not_scored"
 
 
 @dataclass(frozen=True)
@@ -13,6 +16,14 @@ class Cut:
     start: int
     stop: int
     reason: str
+
+    @property
+    def finding(self) -> Finding:
+        """The cut in the form that all rooms share, for it to be told."""
+        seconds = (self.stop - self.start) * 1e-6
+        return Finding(
+            NOT_SCORED, "note", self.reason, figure=seconds, unit="s", start_us=self.start, stop_us=self.stop
+        )
 
 
 def subtract(intervals: Sequence[Interval], cuts: Iterable[Cut]) -> tuple[Interval, ...]:

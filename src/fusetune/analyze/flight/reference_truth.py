@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.ground_truth import Truth, read_truth, sample_times
 from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
-from fusetune.ekf2.numerics.quaternions import rotation_matrix
 from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.px4.layouts import sensor_layouts
+from fusetune.quaternions import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.ekf2.numerics.quaternions import conjugate, multiply, rotation_vector
+from fusetune.quaternions import conjugate, multiply, rotation_vector
 
 Array = npt.NDArray[np.float64]
 

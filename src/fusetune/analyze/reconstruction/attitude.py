@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from fusetune.ekf2.numerics.quaternions import conjugate, from_rotation_vector, multiply, normalised, rotation_vector
 from fusetune.px4.flight import TopicTable, row_count, stacked
+from fusetune.quaternions import conjugate, from_rotation_vector, multiply, normalised, rotation_vector
 
 MAX_INTERVAL_US = 1_000_000
 """Over a longer pause of the logged attitude nothing is interpolated."""

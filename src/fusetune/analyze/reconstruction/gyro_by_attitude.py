@@ -10,8 +10,8 @@ import numpy as np
 from fusetune.analyze.reconstruction.attitude import attitude_at, integrated_gyro, logged_attitude
 from fusetune.analyze.reconstruction.gap_surplus import MIN_INTERVALS, surplus_rate
 from fusetune.analyze.reconstruction.trial_gaps import try_gaps, variance_per_second
-from fusetune.ekf2.numerics.quaternions import conjugate, multiply, rotation_vector
 from fusetune.px4.flight import TopicTable
+from fusetune.quaternions import conjugate, multiply, rotation_vector
 
 MAX_INTERVAL_US = 250_000
 

@@ -20,9 +20,9 @@ from fusetune.analyze.reconstruction import (
     reconstruct,
 )
 from fusetune.analyze.replaying.replay_files import ReplayIdentity, finish_replay, replay_writer
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.replay_settings import ReplaySettings, StartSettings
 from fusetune.analyze.replaying.set_input import read_set_files
-from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, Start, StartSettings, choose_start
+from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, Start, choose_start
 from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.filter.common.parameters import complete

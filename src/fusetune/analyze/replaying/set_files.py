@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.replaying.sample_spool import AxisSamples, SampleSpool, SourceAxis, SpooledSamples
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_pieces, read_schema, read_table

@@ -7,20 +7,18 @@ counts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.replaying.replay_settings import WithholdingSettings
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.results import Gap, GapResult
-from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+from fusetune.px4.aid_sources import SENSORS, WITHHOLDABLE
 from fusetune.px4.flight import Flight
-from fusetune.settings import setting, settings_from_mapping
-from fusetune.storage.files import AnyPath
 
 HORIZONS = 3
 """Predictions are compared at a third, two thirds and at the end of a gap."""
@@ -28,38 +26,7 @@ HORIZONS = 3
 AVERAGED_S = 1.0
 """Innovations of so long before a horizon are averaged: they share the drift, but not the measurement's noise."""
 
-_TOPICS = {"gnss": "vehicle_gps_position", "baro": "vehicle_air_data", "mag": "vehicle_magnetometer"}
-
 _POSITION_FIELDS = ("timestamp", "x", "y", "z", "vx", "vy", "vz")
-
-
-@dataclass(frozen=True)
-class WithholdingSettings:
-    """How long each sensor is withheld, and how often; a length of 0 leaves a sensor alone."""
-
-    gnss_s: float = setting(9.0, 0.0, 60.0, "s", "length of the gaps without GNSS")
-    gnss_every_s: float = setting(4.5, 0.5, 600.0, "s", "time from the start of one gap without GNSS to the next")
-    baro_s: float = setting(9.0, 0.0, 60.0, "s", "length of the gaps without barometer")
-    baro_every_s: float = setting(18.0, 0.5, 600.0, "s", "time from the start of one gap without barometer to the next")
-    mag_s: float = setting(9.0, 0.0, 60.0, "s", "length of the gaps without magnetometer")
-    mag_every_s: float = setting(
-        18.0, 0.5, 600.0, "s", "time from the start of one gap without magnetometer to the next"
-    )
-
-    @classmethod
-    def from_mapping(
-        cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml"
-    ) -> WithholdingSettings:
-        """Read the section `withheld`; a missing section or key means the default."""
-        return settings_from_mapping(cls, values, "withheld", file)
-
-    def length_s(self, sensor: str) -> float:
-        """Length of a sensor's gaps, s."""
-        return float(getattr(self, f"{sensor}_s"))
-
-    def every_s(self, sensor: str) -> float:
-        """Time between the starts of two gaps of a sensor, s."""
-        return float(getattr(self, f"{sensor}_every_s"))
 
 
 def plan_gaps(flight: Flight, airborne: Sequence[Interval], settings: WithholdingSettings) -> list[Gap]:
@@ -70,7 +37,7 @@ def plan_gaps(flight: Flight, airborne: Sequence[Interval], settings: Withholdin
     gaps = []
     for sensor in WITHHOLDABLE:
         length, step = (round(seconds * 1e6) for seconds in (settings.length_s(sensor), settings.every_s(sensor)))
-        if length == 0 or flight.topic(_TOPICS[sensor]) is None:
+        if length == 0 or flight.topic(SENSORS[sensor].topics[0].name) is None:
             continue
         for start, stop in airborne:
             gaps += [Gap(sensor, first, first + length) for first in range(start, stop - length + 1, step)]

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.metrics.likelihood import winsor_limit
+from fusetune.analyze.metrics.metric import Innovations
 from fusetune.analyze.replaying.sample_spool import SampleSpool, SpooledRows
 from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord, SourceAxis
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES
 
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""
@@ -74,9 +75,22 @@ class PairedSamples:
 FIGURES = ("innovation", "innovation_variance", "test_ratio", "rejected")
 
 
-def each_of(members: Sequence[PairedSamples]) -> Iterator[list[SamplesOfSet]]:
-    """Several axes that share their sets, of one set at a time."""
-    return (list(one) for one in zip(*(member.each() for member in members), strict=True))
+def innovations_of(
+    members: Sequence[PairedSamples], confidence: float = np.nan, *, of_group: bool = False
+) -> Iterator[tuple[SamplesOfSet, Innovations]]:
+    """Several axes that share their samples and sets: the samples of the first of them and what metrics are made of,
+    of one set at a time."""
+
+    def limits() -> list[float]:
+        return [one.winsor_limit for one in members]
+
+    for axes in zip(*(member.each() for member in members), strict=True):
+        innovation, variance, ratio, rejected = (_stacked([getattr(one, name) for one in axes]) for name in FIGURES)
+        yield axes[0], Innovations(innovation, variance, ratio, rejected, limits, confidence, of_group)
+
+
+def _stacked(axes: list[np.ndarray]) -> np.ndarray:
+    return axes[0][None] if len(axes) == 1 else np.stack(axes)
 
 
 def paired_rows(columns: Mapping[str, npt.NDArray]) -> np.ndarray:

@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from fusetune.analyze.replaying.row_groups import tables_in_groups
 from fusetune.analyze.replaying.set_files import AxisSamples, SourceAxis
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import MEASURED_SOURCES
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.storage.files import AnyPath
@@ -36,9 +36,8 @@ class OnboardSamples(Mapping[SourceAxis, AxisSamples]):
     def __init__(self, flight: Flight, instance: int | None) -> None:
         self._tables: dict[str, TopicTable] = {}
         self._columns: dict[SourceAxis, str] = {}
-        for name, source in AID_SOURCES.items():
-            topic = f"estimator_aid_src_{name}"
-            table = rows_of_primary(flight, topic) if instance is None else flight.topic(topic, instance)
+        for name, source in MEASURED_SOURCES.items():
+            table = rows_of_primary(flight, source.topic) if instance is None else flight.topic(source.topic, instance)
             if table is None or table["timestamp"].size == 0:
                 continue
             self._tables[name] = table

@@ -48,7 +48,8 @@ from fusetune.analyze.scoring.withheld_scores import (
     withheld_rows,
 )
 from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
-from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.finding import documents
+from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
@@ -68,10 +69,7 @@ SAMPLES_SCHEMA = pa.schema(
     ]
 )
 
-_NOT_IN_SAMPLES = ("gravity",)
-"""Sampled at every update: the samples would fill the disk and no plot shows them."""
-
-_AID_SOURCE_TOPICS = tuple(f"estimator_aid_src_{name}" for name in AID_SOURCES)
+_AID_SOURCE_TOPICS = tuple(source.topic for source in MEASURED_SOURCES.values())
 _LARGE_TOPICS = (*IMU_TOPICS, *_AID_SOURCE_TOPICS)
 
 SCORE_TOPICS = (
@@ -227,7 +225,7 @@ def _score_samples(
 ) -> tuple[list[pa.Table], list[pa.Table]]:
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
     blocks, windows = [], []
-    for source in AID_SOURCES.values():
+    for source in MEASURED_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         spool = SampleSpool(folder)
         for axis in range(source.axes):
@@ -237,7 +235,8 @@ def _score_samples(
         for one in pairs.values():
             add_axis_metrics(table, one, settings)
             blocks.append(block_rows(table.flight, one, edges))
-            if source.name not in _NOT_IN_SAMPLES:
+            # of what is sampled at every update the samples would fill the disk, and no plot shows them
+            if not source.every_update:
                 for of_set in one.each():
                     write_samples(_sample_rows(of_set))
         if pairs:
@@ -277,7 +276,7 @@ def _add_onboard(
 ) -> None:
     """Append the vehicle's own figures, on the same part of the flight but at the times that it logged."""
     record = SetRecord(ONBOARD, parameters, {}, {}, onboard, {}, {})
-    for source in AID_SOURCES.values():
+    for source in MEASURED_SOURCES.values():
         pairs = {}
         for axis in range(source.axes):
             found = paired_samples([record], (source.name, axis), ONBOARD, window)
@@ -308,7 +307,7 @@ def _summary(
         "warm_up_end_us": window.warm_up_end,
         "intervals_us": [list(interval) for interval in window.intervals],
         "block_edges_us": window.block_edges(settings.block_s).tolist() if window.intervals else [],
-        "cuts": [{"start_us": cut.start, "stop_us": cut.stop, "reason": cut.reason} for cut in window.cuts],
+        "cuts": documents(cut.finding for cut in window.cuts),
         "sets": {
             name: _set_summary(record, by_name[present], window, events[name], flight)
             for name, record in by_name.items()

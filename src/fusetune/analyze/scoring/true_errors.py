@@ -12,7 +12,7 @@ from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures
 from fusetune.analyze.replaying.filter_states import FilterStates
 from fusetune.analyze.replaying.set_files import SetRecord
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
-from fusetune.ekf2.numerics.quaternions import multiply, rotation_matrix
+from fusetune.quaternions import multiply, rotation_matrix
 
 __all__ = [
     "EARTH_RADIUS_M",

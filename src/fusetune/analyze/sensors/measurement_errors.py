@@ -14,17 +14,21 @@ import numpy.typing as npt
 from fusetune.analyze.replaying.filter_states import FilterStates
 from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
 from fusetune.analyze.scoring.measurement_alignment import match, measurement_time
-from fusetune.analyze.sources import AID_SOURCES
 from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
-from fusetune.ekf2.numerics.quaternions import rotation_matrix
+from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
+from fusetune.quaternions import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 
-VELOCITY_SOURCES = ("gnss_vel", "ev_vel", "aux_vel")
-HEADING_SOURCES = ("gnss_yaw", "ev_yaw")
-PLANE_SOURCES = ("gnss_pos", "ev_pos")
-HEIGHT_SOURCES = ("gnss_hgt", "baro_hgt", "rng_hgt", "ev_hgt")
+
+def _sources(quantity: str) -> tuple[str, ...]:
+    """Sources of the replay that measure a quantity."""
+    return tuple(one.name for one in MEASURED_SOURCES.values() if one.quantity == quantity and one.is_replayed)
+
+
+VELOCITY_SOURCES, HEADING_SOURCES = _sources("velocity"), _sources("heading")
+PLANE_SOURCES, HEIGHT_SOURCES = _sources("position"), _sources("height")
 COVERED = (*VELOCITY_SOURCES, *HEADING_SOURCES, *PLANE_SOURCES, *HEIGHT_SOURCES, "mag")
 """Sources for which `measurement_errors` finds a series."""
 

@@ -15,24 +15,18 @@ import numpy as np
 
 from fusetune.analyze.replaying.set_files import AxisSamples, SourceAxis
 from fusetune.analyze.scoring.onboard import onboard_samples
-from fusetune.analyze.sources import HORIZONTAL_AIDING
 from fusetune.ekf2.filter.common import state as S
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS, RecordArrays, with_fields
 from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import AID_SOURCES, HORIZONTAL_AIDING, MEASURED_SOURCES
 from fusetune.px4.flight import Flight, TopicTable, row_count
 from fusetune.px4.layouts.estimator_instances import instance_switches, rows_of_primary
 
 GROUPS: Mapping[str, tuple[SourceAxis, ...]] = {
-    "horizontal_velocity": (("gnss_vel", 0), ("gnss_vel", 1)),
-    "horizontal_position": (("gnss_pos", 0), ("gnss_pos", 1)),
-    "heading": (("mag_heading", 0),),
-    "gnss_heading": (("gnss_yaw", 0),),
-    "magnetic_field": (("mag", 0), ("mag", 1), ("mag", 2)),
-    "vision_velocity": (("ev_vel", 0), ("ev_vel", 1)),
-    "vision_position": (("ev_pos", 0), ("ev_pos", 1)),
-    "vision_heading": (("ev_yaw", 0),),
-    "optical_flow": (("optical_flow", 0), ("optical_flow", 1)),
+    source.size_figure: tuple((source.name, axis) for axis in source.groups[0][1])
+    for source in AID_SOURCES.values()
+    if source.size_figure
 }
 """Innovations that are compared by their size."""
 
@@ -45,7 +39,9 @@ COMPARED_FLAGS = (
 )  # fmt: skip
 """Flags that mean the same in all releases."""
 
-HEIGHT_FLAGS = ("cs_baro_hgt", "cs_gps_hgt", "cs_rng_hgt", "cs_ev_hgt")
+HEIGHT_FLAGS = tuple(
+    flag for source in MEASURED_SOURCES.values() if source.quantity == "height" for flag in source.flags
+)
 """What the height is taken from."""
 
 ONE_HEIGHT_SOURCE_BEFORE = (1, 14)

@@ -14,10 +14,10 @@ import numpy as np
 
 from fusetune.ekf2.feed.inputs import EstimatorInputs
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH
-from fusetune.ekf2.numerics.quaternions import rotation_matrix
 from fusetune.ekf2.replay.replay import begin_course
 from fusetune.ekf2.replay.warm_start import quaternion_product
 from fusetune.px4.layouts.logged_state import LoggedState
+from fusetune.quaternions import rotation_matrix
 
 FIELD_STATES = np.r_[ATTITUDE : ATTITUDE + 3, MAG_EARTH : MAG_EARTH + 3, MAG_BODY : MAG_BODY + 3]
 """Error states that the magnetometer moves at once: attitude (3), earth field (3), body field (3)."""

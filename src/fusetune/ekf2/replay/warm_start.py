@@ -20,9 +20,9 @@ from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MAG_BODY, MAG_EARTH, TERRAIN, WIND
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import reproject
-from fusetune.ekf2.numerics.quaternions import conjugate, rotation_matrix
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
 from fusetune.px4.layouts.logged_state import LoggedState
+from fusetune.quaternions import conjugate, rotation_matrix
 
 CARRIED = (
     "time_delayed_us", "time_latest_us", "imu_delayed", "imu_newest", "imu_updated", "dt_ekf_avg", "accel_lpf",

@@ -6,9 +6,6 @@ innovations show is its own prediction.
 
 from fusetune.ekf2.compiled.kernel import kernel
 
-WITHHOLDABLE = {"gnss": ("gnss_pos", "gnss_vel", "gnss_hgt"), "baro": ("baro_hgt",), "mag": ("mag",)}
-"""Sensor → the aid sources whose innovations go on while it is withheld."""
-
 
 @kernel
 def pretend_fused(ekf):

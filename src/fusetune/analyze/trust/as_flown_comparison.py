@@ -1,0 +1,68 @@
+"""Replays of the parameters that flew against the log, and how far each is from what the vehicle did."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fusetune.analyze.flight.intervals import Cut, subtract
+from fusetune.analyze.flight.phases import airborne_intervals
+from fusetune.analyze.replaying.replay_flight import PreparedFlight
+from fusetune.analyze.scoring.onboard import onboard_samples
+from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, Interval, as_flown_figures, compared_rows
+from fusetune.analyze.trust.trust_settings import FALLING, TrustSettings
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import HORIZONTAL_AIDING
+from fusetune.px4.flight import Flight
+
+COLD_WARM_UP_US = 10_000_000
+
+
+def distance(figures: AsFlownFigures, settings: TrustSettings) -> float:
+    """How far a replay is from the vehicle: mean of the figures, each as a share of the limit of grade B."""
+    shares = []
+    if figures.innovation_factor is not None:
+        shares.append(math.log(figures.innovation_factor) / math.log(settings.innovation_factor[1]))
+    for name in ("velocity_m_s", "heading_deg", "height_m", "vertical_velocity_m_s"):
+        if getattr(figures, name) is not None:
+            shares.append(getattr(figures, name) / getattr(settings, name)[1])
+    for name in FALLING:
+        if getattr(figures, name) is not None:
+            shares.append((1.0 - getattr(figures, name)) / (1.0 - getattr(settings, name)[1]))
+    return float(np.mean(shares)) if shares else math.nan
+
+
+class AsFlownComparison:
+    """Replays of the parameters that flew against the log, all over the same part of the flight."""
+
+    def __init__(self, flight: Flight, settings: TrustSettings):
+        self.flight, self.settings = flight, settings
+        self.params = complete(flight.parameters.initial, {}, flight.release)
+        self.onboard = onboard_samples(flight)
+        self.intervals: tuple[Interval, ...] | None = None
+
+    def figures(self, prepared: PreparedFlight) -> AsFlownFigures:
+        """Figures of one replay; the first one, which is the one in use, decides which part is compared."""
+        result, measured = prepared.replay(self.params, keep=compared_rows(self.onboard))
+        if self.intervals is None:
+            self.intervals = self._compared(result)
+        return as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)
+
+    def distance(self, prepared: PreparedFlight) -> float:
+        """How far one replay is from the vehicle."""
+        return distance(self.figures(prepared), self.settings)
+
+    def _compared(self, result: ReplayResult) -> tuple[Interval, ...]:
+        settle_us = round(self.settings.settle_s * 1e6)
+        if result.warm_start_us is not None:
+            begin = result.warm_start_us + settle_us
+        else:
+            sources = [AID_SOURCE_NAMES.index(name) for name in HORIZONTAL_AIDING if name in AID_SOURCE_NAMES]
+            fused = result.innovations["fused"] & np.isin(result.innovations["source"], sources)
+            # a filter without horizontal aid settles from its start
+            times = result.innovations["timestamp_sample"][fused] if fused.any() else result.states["timestamp_sample"]
+            begin = int(times.min(initial=2**62)) + settle_us + COLD_WARM_UP_US
+        return subtract(airborne_intervals(self.flight, {}), [Cut(-(2**62), begin, "warm-up")])
