@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from fusetune.px4.layouts.sensor_layouts import STANDARD_AIR_DENSITY_KG_M3
-
 ONE_G = 9.80665
 """Standard gravity (m/s²), which PX4 uses everywhere."""
 
-AIR_DENSITY_SEA_LEVEL = STANDARD_AIR_DENSITY_KG_M3
+AIR_DENSITY_SEA_LEVEL = 1.225
 """Air density (kg/m³) at 15 °C."""
 
 RADIUS_OF_EARTH = 6371000.0
