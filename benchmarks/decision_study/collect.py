@@ -17,6 +17,7 @@ from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings
 from fusetune.analyze.scoring.score_flight import score_saved_flight
 from fusetune.design.mission import load_mission
+from fusetune.design.set_names import PRESENT
 from fusetune.design.study import load_study
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import Vehicle, load_vehicle
@@ -24,7 +25,6 @@ from fusetune.save import save_log
 from fusetune.storage.digest import source_digest
 
 HERE = Path(__file__).parent
-PRESENT = "present"
 KEPT = ("scoring.json", "scores.parquet", "withheld.parquet", "metrics.parquet")
 FIRST_SEED = 1000
 

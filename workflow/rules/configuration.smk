@@ -5,9 +5,8 @@ from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study
 from fusetune.execute.vehicle import load_vehicle
 from fusetune.save.discovery import discover_logs
+from fusetune.save.present import PRESENT, FlightSets
 
-PRESENT = "present"
-AS_FLOWN = "as_flown"
 NO_FLIGHT = "(?!)"
 CONFIG_FILE = configuration_files()[-1]
 
@@ -67,11 +66,7 @@ def check_demonstration():
 SETTINGS = with_defaults(ASKED, CONFIG_SCHEMA)
 STUDY = told_in_one_line(load_study, SETTINGS["study"])
 MISSION = told_in_one_line(load_mission, SETTINGS["mission"])
-OVERRIDES = {pset.name: pset.overrides for pset in STUDY.sets}
-SETS = [PRESENT, *OVERRIDES]
-VARIED = sorted({name for overrides in OVERRIDES.values() for name in overrides})
-# The log's own parameters are replayed, too, to be compared with what the vehicle logged; they are not ranked.
-REPLAYED = [*SETS, AS_FLOWN]
+SETS = FlightSets({pset.name: pset.overrides for pset in STUDY.sets})
 DEMONSTRATION = demonstration_flights()
 FAULTS = told_in_one_line(checked_faults)
 FOUND = told_in_one_line(discovery)

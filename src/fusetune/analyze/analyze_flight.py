@@ -1,8 +1,9 @@
-"""All that is made of one saved flight: replays of the parameter sets, their scores, and how far they can be trusted.
+"""All that the pipeline makes of one saved flight: replays of the parameter sets, their scores, and how far they can be
+trusted.
 
 One process does it all, for its start, the reading of the flight, its reconstruction and the loading of the compiled
-estimator together take longer than the work itself. It takes one step after the other, each with the topics that it
-needs, so that memory is that of the largest step.
+estimator together take longer than the work itself. Replays, grade and scores share one prepared flight; of it only
+what scores need stays in memory while they are made.
 """
 
 from __future__ import annotations
@@ -10,15 +11,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fusetune.analyze.replaying.replay_flight import REPLAY_TOPICS, replay_flight
+from fusetune.analyze.replaying.onboard import onboard_samples
+from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare_flight
+from fusetune.analyze.replaying.replay_flight import write_replay
 from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
-from fusetune.analyze.scoring.score_flight import SCORE_TOPICS, score_flight
+from fusetune.analyze.scoring.score_flight import spooled_flight, write_scores
+from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, ScoredFlight
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS, graded, write_flight_fidelity
-from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, TrustGrade
+from fusetune.analyze.trust.as_flown_figures import compared_rows
+from fusetune.analyze.trust.onboard_fidelity import write_flight_fidelity
+from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, AsFlownReplay, grade_flight
 from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.design.set_names import AS_FLOWN, PRESENT
+from fusetune.ekf2.replay.recording import RecordArrays
+from fusetune.ekf2.replay.replay import result_of
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
+
+ANALYSIS_TOPICS = (*dict.fromkeys((*REPLAY_TOPICS, *TRUST_TOPICS, *SCORE_TOPICS)),)
+"""What is read of a saved flight."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +47,10 @@ def analyze_flight(
     replayed: Mapping[str, Mapping[str, float]],
     scored: Sequence[str],
     *,
-    present: str = "present",
+    present: str = PRESENT,
     settings: AnalysisSettings | None = None,
 ) -> None:
-    """Replay some sets on a saved flight, then score all of them and grade the flight.
+    """Replay some sets on a saved flight, then grade the flight and score all sets.
 
     Parameters
     ----------
@@ -54,16 +65,8 @@ def analyze_flight(
         If the saved flight, or a file of a replay made before, is missing or damaged.
     """
     settings = settings or AnalysisSettings()
-    grade = _replay_and_grade(flight_folder, output_folder, replayed, settings)
-    score_flight(
-        load_flight(flight_folder, topics=SCORE_TOPICS),
-        output_folder,
-        scored,
-        present=present,
-        settings=settings.scoring,
-    )
-    flight = load_flight(flight_folder, topics=FIDELITY_TOPICS)
-    write_flight_fidelity(flight, output_folder, settings.replay, settings.trust, grade)
+    flight = _replay_and_grade(flight_folder, output_folder, replayed, settings)
+    write_scores(flight, output_folder, scored, present=present, settings=settings.scoring)
 
 
 def _replay_and_grade(
@@ -71,10 +74,26 @@ def _replay_and_grade(
     output_folder: AnyPath,
     replayed: Mapping[str, Mapping[str, float]],
     settings: AnalysisSettings,
-) -> TrustGrade:
-    """The grade is made of the same samples as the replays; nothing of them is in memory when the sets are scored."""
-    flight = load_flight(flight_folder, topics=REPLAY_TOPICS)
-    prepared = replay_flight(flight, replayed, output_folder, settings.replay)
-    compared = load_flight(flight_folder, topics={*TRUST_TOPICS} - {*REPLAY_TOPICS})
-    flight = flight.with_topics(dict(sorted((flight.topics | compared.topics).items())))
-    return graded(flight, settings.replay, settings.trust, prepared)
+) -> ScoredFlight:
+    """All but the scores; what these need of the flight."""
+    prepared = prepare_flight(load_flight(flight_folder, topics=ANALYSIS_TOPICS), settings.replay)
+    as_flown = write_replays(prepared, replayed, output_folder)
+    grade = grade_flight(prepared, settings.replay, settings.trust, as_flown)
+    write_flight_fidelity(prepared, output_folder, grade)
+    return spooled_flight(prepared.flight, output_folder, settings.scoring)
+
+
+def write_replays(
+    prepared: PreparedFlight, replayed: Mapping[str, Mapping[str, float]], folder: AnyPath
+) -> AsFlownReplay | None:
+    """Replay sets and write their files; what the grade compares of the as-flown one, where it is among them."""
+    keep, kept = compared_rows(onboard_samples(prepared.flight)), list[RecordArrays]()
+    as_flown = None
+    for name, overrides in replayed.items():
+        if name != AS_FLOWN:
+            write_replay(prepared, name, overrides, folder)
+            continue
+        summary = write_replay(prepared, name, overrides, folder, also=lambda rows: kept.append(keep(rows)))
+        result = result_of(summary, kept)
+        as_flown = AsFlownReplay(result, prepared.measured(result.innovations, prepared.parameters(overrides), result))
+    return as_flown

@@ -18,13 +18,8 @@ from typing import Any
 from fusetune.design.config_file import load_schema, raise_problems, validate
 from fusetune.design.names import name_problem, one_line
 from fusetune.design.parameter_check import parameter_problem, typed_values
+from fusetune.design.set_names import RESERVED_SET_NAMES
 from fusetune.design.yaml_reader import read_yaml
-
-RESERVED_SET_NAMES = ("present", "as_flown", "onboard", "sets", "scoring", "fidelity")
-"""Names the product gives itself, and files of its own that those of a set so called would replace.
-
-The vehicle's present parameters, those as logged, its own estimator; `sets.parquet`, `scoring.json`, `fidelity.json`.
-"""
 
 MOST_SETS = 2000
 """More sets than this are a slip of the pen: each is replayed on every flight."""

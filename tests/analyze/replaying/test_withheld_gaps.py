@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings, gap_table, plan_gaps, prediction_table
+from fusetune.analyze.replaying.store.columns import gap_table, prediction_table
+from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings, plan_gaps
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import INNOVATION_ROW, LOCAL_POSITION_ROW
 from fusetune.ekf2.replay.results import Gap, GapResult

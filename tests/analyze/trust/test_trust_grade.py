@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
-from fusetune.analyze.replaying.replay_flight import REPLAY_TOPICS, prepare
+from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE
-from fusetune.analyze.scoring.score_flight import SCORE_TOPICS
+from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
 from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS
 from fusetune.analyze.trust.trust_grade import (
@@ -143,7 +143,7 @@ def flight(survey_flight) -> Flight:
 
 
 def test_whole_log_of_the_same_estimator_is_an_a(flight):
-    grade = grade_flight(flight)
+    grade = grade_flight(prepare(flight, IN_USE.reconstruction, IN_USE.start))
     assert grade.grade == "A", grade
     assert grade.reason == ""
 
@@ -155,7 +155,7 @@ def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
         {key: table for key, table in flight.topics.items() if key[0] != "ekf2_timestamps"}
         | {("sensor_combined", 0): select_rows(imu, ~lost)}
     )
-    grade = grade_flight(small)
+    grade = grade_flight(prepare(small, IN_USE.reconstruction, IN_USE.start))
     causes = {cause.cause: cause for cause in grade.causes if cause.measured}
     assert causes["missing IMU rows"].repaired
     assert causes["missing IMU rows"].cost > 0.1

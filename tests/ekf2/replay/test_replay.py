@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_log import replay_log
 from fusetune.analyze.trust.fidelity import compare_set
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete

@@ -211,8 +211,8 @@ def test_limits_are_checked(values: dict[str, float]) -> None:
 
 
 def test_what_later_rooms_read_is_kept() -> None:
-    from fusetune.analyze.replaying.replay_flight import REPLAY_TOPICS
-    from fusetune.analyze.scoring.score_flight import SCORE_TOPICS
+    from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
+    from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
     from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS
 
     for topic in {*FIDELITY_TOPICS, *REPLAY_TOPICS, *SCORE_TOPICS}:

@@ -5,7 +5,6 @@ import numpy.typing as npt
 from scipy.special import betaincinv
 
 from fusetune.analyze.metrics.consistency import Bounds
-from fusetune.analyze.scoring.measurement_alignment import SamplesOfSet
 
 Array = npt.NDArray[np.float64]
 
@@ -15,9 +14,9 @@ def beyond_standard_deviations(innovation: Array, innovation_variance: Array, li
     return np.square(innovation) > limit * limit * innovation_variance
 
 
-def beyond_gate(pairs: SamplesOfSet) -> npt.NDArray[np.bool_]:
-    """True where the axis is beyond its gate; where its gate is unknown, where the source was rejected."""
-    return np.where(np.isfinite(pairs.test_ratio), pairs.test_ratio > 1.0, pairs.rejected)
+def beyond_gate(test_ratio: Array, rejected: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """True where the axis is beyond its gate; where its gate is unknown (NaN), where the source was rejected."""
+    return np.where(np.isfinite(test_ratio), test_ratio > 1.0, rejected)
 
 
 def clopper_pearson(breaks: npt.ArrayLike, samples: int, confidence: float) -> Bounds:

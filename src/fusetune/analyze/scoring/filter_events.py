@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
 
 AIDING_FLAGS = (
     "cs_gnss_pos",
@@ -70,7 +70,7 @@ class FilterEvents:
         return sum(self.timeouts.values())
 
 
-def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEvents:
+def filter_events(record: ReplayedSet, flight: tuple[Interval, ...]) -> FilterEvents:
     """Count the events of one replay.
 
     Parameters
@@ -99,7 +99,7 @@ def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEven
     )
 
 
-def _source_aid(record: SetRecord, intervals: tuple[Interval, ...]) -> dict[str, SourceAid]:
+def _source_aid(record: ReplayedSet, intervals: tuple[Interval, ...]) -> dict[str, SourceAid]:
     """Axis 0 speaks for its source: PX4 fuses or rejects all axes of a sample but for rare faults."""
     found = {}
     for source, axis in record.first_fused:

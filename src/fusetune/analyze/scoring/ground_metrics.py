@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from fusetune.analyze.flight.intervals import Cut, Interval, merged, subtract
-from fusetune.analyze.metrics.break_rate import beyond_gate, break_rate
+from fusetune.analyze.metrics.break_rate import break_rate
 from fusetune.analyze.metrics.consistency import mean_nis, paper_bounds
 from fusetune.analyze.metrics.innovation_metrics import rms_innovation, rms_norm
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.filter_events import FilterEvents
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, SamplesOfSet, each_of, paired_samples
 from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, groups_of
@@ -26,7 +26,7 @@ AFTER_LANDING_US = 1_000_000
 
 
 def ground_window(
-    records: Sequence[SetRecord],
+    records: Sequence[ReplayedSet],
     present: str,
     airborne: Sequence[Interval],
     log: Interval,
@@ -53,7 +53,7 @@ def ground_window(
 
 
 def add_ground_metrics(
-    table: MetricsTable, records: Sequence[SetRecord], present: str, ground: ScoringWindow, confidence: float
+    table: MetricsTable, records: Sequence[ReplayedSet], present: str, ground: ScoringWindow, confidence: float
 ) -> None:
     """Append `ground_rms_innovation`, `ground_mean_nis` and `ground_break_rate_gate` of every source and axis."""
     if not ground.intervals:
@@ -81,7 +81,7 @@ def _of_one_set(flight: str, members: list[SamplesOfSet], axis: str, confidence:
     variance = np.stack([one.innovation_variance for one in members])
     rms = rms_innovation(innovation[0]) if len(members) == 1 else rms_norm(innovation)
     bounds = paper_bounds(mean_nis(innovation, variance), n, len(members), confidence)
-    broken = np.logical_or.reduce([beyond_gate(one) for one in members])
+    broken = np.logical_or.reduce([one.beyond_gate for one in members])
     table.add_each(first.sets, first.source, axis, "ground_rms_innovation", rms, n)
     table.add_bounds(first.sets, first.source, axis, "ground_mean_nis", bounds, n)
     table.add_bounds(first.sets, first.source, axis, "ground_break_rate_gate", break_rate(broken, confidence), n)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.metrics import likelihood
-from fusetune.analyze.metrics.break_rate import beyond_gate, beyond_standard_deviations, break_rate
+from fusetune.analyze.metrics.break_rate import beyond_standard_deviations, break_rate
 from fusetune.analyze.metrics.consistency import Bounds, c_nis, effective_bounds, j_nis, mean_nis, paper_bounds
 from fusetune.analyze.metrics.error_figures import ErrorFigure
 from fusetune.analyze.metrics.innovation_metrics import mean_innovation, rms_innovation, rms_norm
@@ -108,7 +108,7 @@ def _axis_metrics(flight: str, pairs: SamplesOfSet, limit: float, settings: Scor
     for deviations in (3, 5):
         broken = beyond_standard_deviations(innovation, variance, deviations)
         table.add_bounds(sets, source, axis, f"break_rate_{deviations}sd", break_rate(broken, settings.confidence), n)
-    table.add_bounds(sets, source, axis, "break_rate_gate", break_rate(beyond_gate(pairs), settings.confidence), n)
+    table.add_bounds(sets, source, axis, "break_rate_gate", break_rate(pairs.beyond_gate, settings.confidence), n)
     return table
 
 
@@ -173,7 +173,7 @@ def _group_metrics(
     for metric, broken in (
         ("break_rate_3sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 3) for one in members]),
         ("break_rate_5sd", [beyond_standard_deviations(one.innovation, one.innovation_variance, 5) for one in members]),
-        ("break_rate_gate", [beyond_gate(one) for one in members]),
+        ("break_rate_gate", [one.beyond_gate for one in members]),
     ):
         rate = break_rate(np.logical_or.reduce(broken), settings.confidence)
         table.add_bounds(sets, source, group, metric, rate, n)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Cut, Interval, duration, merged, subtract
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.sources import HORIZONTAL_AIDING
 
@@ -46,7 +46,7 @@ class ScoringWindow:
         return start + (np.arange(blocks + 1, dtype=np.int64) * (stop - start)) // blocks
 
 
-def aiding_start(record: SetRecord) -> int | None:
+def aiding_start(record: ReplayedSet) -> int | None:
     """Time at which the set first fuses something that stops horizontal drift, else anything at all, µs."""
     for sources in (HORIZONTAL_AIDING, tuple({source for source, _ in record.samples} - {"gravity"})):
         starts = [start for (source, _), start in record.first_fused.items() if source in sources]
@@ -56,7 +56,7 @@ def aiding_start(record: SetRecord) -> int | None:
 
 
 def scoring_window(
-    records: Sequence[SetRecord],
+    records: Sequence[ReplayedSet],
     present: str,
     airborne: Sequence[Interval],
     gaps: Sequence[Interval],
@@ -129,7 +129,7 @@ def _plural(reason: str) -> str:
     return f"{first}s {rest}"
 
 
-def _failure(record: SetRecord) -> str:
+def _failure(record: ReplayedSet) -> str:
     if record.status != "ok":
         return f"{record.status}: {record.summary.get('reason', '')}".rstrip(": ")
     if aiding_start(record) is None:
@@ -138,7 +138,7 @@ def _failure(record: SetRecord) -> str:
 
 
 def cuts_within(
-    records: Sequence[SetRecord],
+    records: Sequence[ReplayedSet],
     excluded: dict[str, str],
     flying: Sequence[Interval],
     present: str,
@@ -164,7 +164,7 @@ def cuts_within(
     return [cut for cut in dict.fromkeys(cuts) if any(cut.stop > start and cut.start < stop for start, stop in flying)]
 
 
-def _around_resets(record: SetRecord, after_us: int) -> list[Cut]:
+def _around_resets(record: ReplayedSet, after_us: int) -> list[Cut]:
     return [
         Cut(int(time) - FUSION_DELAY_US, int(time) + after_us, f"reset of {kind.replace('_', ' ')}")
         for kind, times in record.reset_times.items()

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from fusetune.analyze.metrics.break_rate import beyond_gate, beyond_standard_deviations
+from fusetune.analyze.metrics.break_rate import beyond_standard_deviations
 from fusetune.analyze.metrics.likelihood import gaussian_nll, winsorised
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, SamplesOfSet, each_of
 from fusetune.analyze.scoring.metrics_table import MetricsTable
@@ -115,7 +115,7 @@ def _figures(
     for limit in (3, 5):
         beyond = [beyond_standard_deviations(one.innovation, one.innovation_variance, limit) for one in members]
         values[f"break_rate_{limit}sd"] = mean(np.logical_or.reduce(beyond))
-    values["break_rate_gate"] = mean(np.logical_or.reduce([beyond_gate(one) for one in members]))
+    values["break_rate_gate"] = mean(np.logical_or.reduce([one.beyond_gate for one in members]))
     return values
 
 

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.metrics.attitude import rotation_matrices
-from fusetune.analyze.replaying.filter_states import FilterStates
-from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
-from fusetune.analyze.scoring.measurement_alignment import match, measurement_time
+from fusetune.analyze.replaying.measurement_times import match, measurement_time
+from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
+from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.sources import AID_SOURCES
 from fusetune.ekf2.numerics.geodesy import RADIUS_OF_EARTH
 from fusetune.px4.flight import Flight
@@ -40,7 +40,7 @@ class ErrorSeries:
     values: Array
 
 
-def measurement_errors(record: SetRecord, states: FilterStates, flight: Flight, source: str) -> ErrorSeries | None:
+def measurement_errors(record: ReplayedSet, states: FilterStates, flight: Flight, source: str) -> ErrorSeries | None:
     """Series of a source, unit of the source, from the first sample that was fused.
 
     * Velocity: y_k = −ν_k + Σ_{j<k} c_j, where c_j is how much the update at measurement j moved the state. Adding
@@ -75,7 +75,7 @@ def measurement_errors(record: SetRecord, states: FilterStates, flight: Flight, 
 
 
 def _values(
-    record: SetRecord,
+    record: ReplayedSet,
     states: FilterStates,
     flight: Flight,
     source: str,

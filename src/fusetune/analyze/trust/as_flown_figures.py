@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusetune.analyze.replaying.set_files import AxisSamples, SourceAxis
-from fusetune.analyze.scoring.onboard import onboard_samples
+from fusetune.analyze.replaying.onboard import onboard_samples
+from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.sources import HORIZONTAL_AIDING
 from fusetune.ekf2.filter.common import state as S
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES

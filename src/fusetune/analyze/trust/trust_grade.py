@@ -21,11 +21,11 @@ from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS, ReconstructedFlight
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
-from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.start_choice import START_TOPICS, Start, choose_start
-from fusetune.analyze.scoring.onboard import onboard_samples
-from fusetune.analyze.sources import AID_SOURCES, HORIZONTAL_AIDING
+from fusetune.analyze.sources import HORIZONTAL_AIDING
 from fusetune.analyze.trust.as_flown_figures import (
     GROUPS,
     AsFlownFigures,
@@ -55,11 +55,7 @@ TRUST_TOPICS = (
         (
             *RECONSTRUCTION_TOPICS,
             *START_TOPICS,
-            "estimator_innovations",
-            "estimator_innovation_variances",
-            "estimator_innovation_test_ratios",
-            "ekf2_innovations",
-            *(f"estimator_aid_src_{name}" for name in AID_SOURCES),
+            *INNOVATION_TOPICS,
         )
     ),
 )
@@ -119,6 +115,14 @@ class TrustGrade:
     instances: tuple[InstanceFigures, ...]
 
 
+class AsFlownReplay(NamedTuple):
+    """A replay of the parameters that flew, of which `as_flown_figures.compared_rows` were kept."""
+
+    result: ReplayResult
+    measured: np.ndarray
+    """Whether the sample of each innovation stands in the log."""
+
+
 class Graded(NamedTuple):
     """Grade of some figures, that of each, and which could not be compared."""
 
@@ -173,23 +177,23 @@ def distance(figures: AsFlownFigures, settings: TrustSettings) -> float:
 
 
 def grade_flight(
-    flight: Flight,
+    prepared: PreparedFlight,
     replay: ReplaySettings = IN_USE,
     settings: TrustSettings | None = None,
-    prepared: PreparedFlight | None = None,
+    as_flown: AsFlownReplay | None = None,
 ) -> TrustGrade:
     """Grade one flight.
 
     Parameters
     ----------
-    flight : in the layout of `fusetune.px4.layouts.release_layouts.canonical`, following the primary instance
-    replay : as its replays are made; they are compared without gaps
-    prepared : what these replays shared, to spare doing it again
+    prepared : with `TRUST_TOPICS`
+    replay : as it was prepared
+    as_flown : of the parameters that flew, where they have been replayed already
     """
-    settings = settings or TrustSettings()
-    prepared = dataclasses.replace(prepared or prepare(flight, replay.reconstruction, replay.start), gaps=())
+    settings, flight = settings or TrustSettings(), prepared.flight
     comparison = _Comparison(flight, settings)
-    repaired = comparison.figures(prepared)
+    prepared = dataclasses.replace(prepared, gaps=())
+    repaired = comparison.figures(prepared, as_flown)
     raw = comparison.figures(_as_logged(flight, prepared, replay))
     graded = grade_of(repaired, settings)
     causes: tuple[Cause, ...] = ()
@@ -239,13 +243,26 @@ class _Comparison:
         self.params = complete(flight.parameters.initial, {}, flight.release)
         self.onboard = onboard_samples(flight)
         self.intervals: tuple[Interval, ...] | None = None
+        self.done: list[tuple[PreparedFlight, AsFlownFigures]] = []
+        """Replays of the samples in use; others are not worth their memory."""
 
-    def figures(self, prepared: PreparedFlight) -> AsFlownFigures:
-        """Figures of one replay; the first one, which is the one in use, decides which part is compared."""
-        result, measured = prepared.replay(self.params, keep=compared_rows(self.onboard))
+    def figures(self, prepared: PreparedFlight, done: AsFlownReplay | None = None) -> AsFlownFigures:
+        """Figures of one replay; the first one, which is the one in use, decides which part is compared.
+
+        Parameters
+        ----------
+        done : the replay, where it has been made already
+        """
+        for other, figures in self.done:
+            if _is_same_course(prepared, other):
+                return figures
+        result, measured = done or prepared.replay(self.params, keep=compared_rows(self.onboard))
         if self.intervals is None:
             self.intervals = self._compared(result)
-        return as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)
+        figures = as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)
+        if not self.done or prepared.inputs is self.done[0][0].inputs:
+            self.done.append((prepared, figures))
+        return figures
 
     def distance(self, prepared: PreparedFlight) -> float:
         return distance(self.figures(prepared), self.settings)
@@ -261,6 +278,12 @@ class _Comparison:
             times = result.innovations["timestamp_sample"][fused] if fused.any() else result.states["timestamp_sample"]
             begin = int(times.min(initial=2**62)) + settle_us + COLD_WARM_UP_US
         return subtract(airborne_intervals(self.flight, {}), [Cut(-(2**62), begin, "warm-up")])
+
+
+def _is_same_course(one: PreparedFlight, other: PreparedFlight) -> bool:
+    """Whether two prepared flights give the same replay, as where the one in use starts from nothing anyway."""
+    same = ((one.inputs, other.inputs), (one.start.state, other.start.state), (one.handovers, other.handovers))
+    return all(left is right for left, right in same)
 
 
 def _causes(
