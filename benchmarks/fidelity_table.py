@@ -1,11 +1,12 @@
 """Replay every reference flight with every reference set and print how close the replay is, as Markdown.
 
-    python benchmarks/fidelity_table.py LOGS_DIR REFERENCE_DIR > table.md
-    python benchmarks/fidelity_table.py LOGS_DIR RANDOM_REFERENCE_DIR --by-set > table.md
+    python -m benchmarks.fidelity_table                                    # the golden flights of the project
+    python -m benchmarks.fidelity_table LOGS_DIR REFERENCE_DIR > table.md
+    python -m benchmarks.fidelity_table LOGS_DIR RANDOM_REFERENCE_DIR --by-set > table.md
 
-REFERENCE_DIR holds one folder per log (its stem), with what PX4's own estimator computed, in the layout of
-`results/analyze/<flight>`. A line stands for a flight with all its sets, or with `--by-set` for a single set:
-where sets are drawn at random, each asks something else of the estimator.
+REFERENCE_DIR holds one folder per log (its stem), with what PX4's own estimator computed, as docs/fidelity.md
+describes it. A line stands for a flight with all its sets, or with `--by-set` for a single set: where sets are drawn at
+random, each asks something else of the estimator. A flight that cannot be compared says why, and the status is 1.
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ import math
 import statistics
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+from benchmarks.reference_flights import GOLDEN_LOGS, GOLDEN_REFERENCE, log_of, reference_folders
 
 from fusetune.analyze.replaying.replay_log import replay_log
 from fusetune.analyze.trust.fidelity import ReplayFidelity, compare_folders, order_agreement
+from fusetune.errors import UserError
 
 HEADER = (
     "| flight | sets | RMS diff., median | worst | worst axis | variance | decisions equal | flags equal | resets | "
@@ -27,27 +31,55 @@ HEADER = (
 )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("logs", type=Path)
-    parser.add_argument("reference", type=Path)
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.fidelity_table",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("logs", type=Path, nargs="?", default=GOLDEN_LOGS)
+    parser.add_argument("reference", type=Path, nargs="?", default=GOLDEN_REFERENCE)
     parser.add_argument("--by-set", action="store_true", help="a line for each parameter set")
     parser.add_argument("--skip", metavar="FLIGHT", action="append", default=[], help="leave a flight out")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
+    if (options.logs == GOLDEN_LOGS) != (options.reference == GOLDEN_REFERENCE):
+        parser.error("name both folders, or none for the golden flights")
+    try:
+        folders = [path for path in reference_folders(options.reference) if path.name not in options.skip]
+    except UserError as error:
+        parser.exit(2, f"{error}\n")
     print(HEADER)
     print("|---" * HEADER.count(" | ") + "|---|")
     everything: list[ReplayFidelity] = []
-    for folder in sorted(
-        path for path in options.reference.iterdir() if path.is_dir() and path.name not in options.skip
-    ):
-        with tempfile.TemporaryDirectory() as scratch:
-            replay_log(options.logs / f"{folder.name}.ulg", folder, Path(scratch))
-            results = compare_folders(folder, Path(scratch))
+    failed = False
+    for folder in folders:
+        try:
+            results = compared(folder, options.logs)
+        except UserError as error:
+            print(f"| {folder.name} | – | {error} " + "| – " * 11 + "|", flush=True)
+            failed = True
+            continue
         everything += results
         lines = [(f"{folder.name} {one.set}", [one]) for one in results] if options.by_set else [(folder.name, results)]
         for name, line in lines:
             print(row(name, line), flush=True)
     print(row("**all**", everything, with_order=False))
+    return int(failed)
+
+
+def compared(reference: Path, logs: Path) -> list[ReplayFidelity]:
+    """Replay every set of one flight's reference on its log, and compare.
+
+    Raises
+    ------
+    UserError
+        The log, or a file of the reference, is missing or damaged.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        log = log_of(reference.name, logs, Path(scratch))
+        replays = Path(scratch) / "replays"
+        replay_log(log, reference, replays)
+        return compare_folders(reference, replays)
 
 
 def row(name: str, results: list[ReplayFidelity], *, with_order: bool = True) -> str:

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from tests.shared_folder import ROOT, SHARED
 
 from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 
 if TYPE_CHECKING:
     from fusetune.px4.flight import Flight
-
-ROOT = Path(__file__).resolve().parents[1]
 
 # Both are read on import, so they are set before any test module is imported. The matrices are small: on several
 # threads their algebra takes ten times as long.
@@ -22,8 +21,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SHARING_FOLDERS = ("tests/workflow", "tests/ekf2", "tests/report")
 """Folders whose files share what takes long to make: a run of the pipeline, compiled functions, a report."""
-
-SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))
 
 
 def _shared_part(name: str) -> Path:
@@ -74,6 +71,25 @@ def survey_flight(project_root: Path) -> Flight:
     mission = load_mission(project_root / "config/missions/survey.yaml")
     vehicle = load_vehicle(project_root / "config/vehicles/quadrotor.yaml")
     return canonical(fly(mission, vehicle, {}, seed=4, with_estimator=True))
+
+
+@pytest.fixture(scope="session")
+def golden_logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the golden flights' logs, unpacked; not to be changed."""
+    from benchmarks.reference_flights import GOLDEN_LOGS, GOLDEN_REFERENCE, log_of, reference_folders
+
+    folder = tmp_path_factory.mktemp("golden_logs")
+    for reference in reference_folders(GOLDEN_REFERENCE):
+        log_of(reference.name, GOLDEN_LOGS, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def golden_reference() -> Path:
+    """Folder of what PX4's own estimator computed on the golden flights."""
+    from benchmarks.reference_flights import GOLDEN_REFERENCE
+
+    return GOLDEN_REFERENCE
 
 
 @pytest.fixture(scope="session")

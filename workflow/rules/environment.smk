@@ -37,9 +37,9 @@ from snakemake.exceptions import WorkflowError
 
 from fusetune.running.cluster_jobs import cancel_queued_jobs
 from fusetune.storage.content import ContentDigests
-from fusetune.storage.digest import source_digest
 from fusetune.errors import UserError, demand_room, write_error
 from fusetune.running.job_environment import use_job_environment
+from fusetune.running.job_sources import JOB_SOURCES, job_digest
 from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 from fusetune.running.recovery import (
     belong_together,
@@ -147,23 +147,7 @@ if not workflow.is_main_process:
         told_and_ended(error)
 
 # Changed sources run again what depends on them.
-BASE = ("errors.py", "number_settings.py", "px4", "settings.py", "storage", "time_limit.py")
-REPLAY_SOURCES = (
-    "ekf2",
-    "save",
-    "analyze/flight",
-    "analyze/reconstruction",
-    "analyze/replaying",
-)
-DIGEST = {
-    "design": source_digest(*BASE, "design"),
-    "execute": source_digest(*BASE, "ekf2", "design", "execute"),
-    "save": source_digest(*BASE, "ekf2/feed", "save"),
-    "replay": source_digest(*BASE, *REPLAY_SOURCES),
-    "score": source_digest(*BASE, "ekf2", "save", "analyze"),
-    "apply": source_digest(*BASE, "apply"),
-    "report": source_digest(*BASE, "apply", "report"),
-}
+DIGEST = {kind: job_digest(kind) for kind in JOB_SOURCES}
 
 # Kernels are compiled once by a rule; the folder is named by the state of their sources.
 KERNELS_READY = os.path.join(use_kernel_cache(inherit=not workflow.is_main_process), "ready.json")

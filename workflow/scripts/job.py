@@ -48,7 +48,11 @@ def _fault_of_the_user(error: Exception) -> UserError | None:
 
 
 class _Absent:
-    """Finds nothing of some packages, as if they were not installed."""
+    """Finds nothing of some packages, as if they were not installed.
+
+    A finder is how Python lets a program say so. `None` in `sys.modules` would be shorter, but Cython takes that for
+    the module itself, and PyArrow is written in it.
+    """
 
     def __init__(self, packages: tuple[str, ...]) -> None:
         self.packages = packages

@@ -74,8 +74,18 @@ def test_folder_without_the_sets_is_a_clear_error(tmp_path):
         compare_folders(tmp_path / "a", tmp_path / "b")
 
 
-def test_reference_agrees_with_itself(shared_reference):
+def test_reference_agrees_with_itself(golden_reference):
+    for folder in golden_reference.iterdir():
+        assert_agrees_with_itself(compare_folders(folder, folder))
+
+
+def test_order_of_the_sets_agrees_with_itself(shared_reference):
     folder = shared_reference / "erdemarslan380__sitl_max_80"
     results = compare_folders(folder, folder)
-    assert all(r.median_relative_rms == 0 and r.missing == 0 and r.flags_equal == 1 for r in results)
-    assert len(results) < 3 or order_agreement(results) == pytest.approx(1)
+    assert_agrees_with_itself(results)
+    assert len(results) == 8
+    assert order_agreement(results) == pytest.approx(1)
+
+
+def assert_agrees_with_itself(results):
+    assert all(r.axes and r.median_relative_rms == 0 and r.missing == 0 and r.flags_equal == 1 for r in results)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 from numba.core import config
 
@@ -50,9 +51,14 @@ def cache(kernels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
 
 @pytest.fixture
 def compilations(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """The commands by which the estimator would have been compiled."""
+    """The commands by which the estimator would have been compiled; each leaves something that may be loaded."""
     commands: list[list[str]] = []
-    monkeypatch.setattr(compilation.subprocess, "run", lambda command, **_: commands.append(command))
+
+    def compiled(command: list[str], **_: object) -> None:
+        commands.append(command)
+        monkeypatch.setattr(compilation, "_may_be_loaded", lambda _: True)
+
+    monkeypatch.setattr(compilation.subprocess, "run", compiled)
     ensure_compiled.cache_clear()
     return commands
 
@@ -149,3 +155,65 @@ def test_the_processor_is_part_of_the_place(kernels: Path) -> None:
     other = Path(run.stdout.strip())
     assert other != kernels
     assert other.parents[2] == kernels.parents[2]
+
+
+def test_what_cannot_be_compiled_in_one_piece_is_compiled_the_usual_way(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commands: list[list[str]] = []
+    monkeypatch.setattr(compilation.subprocess, "run", lambda command, **_: commands.append(command[3:]))
+    (cache / compilation.RECORD_NAME).unlink()
+    ensure_compiled.cache_clear()
+    ensure_compiled()
+    assert commands == [[], [compilation.PLAIN]]
+    assert f"Numba {numba.__version__} does not compile the estimator in one piece" in capsys.readouterr().err
+
+
+PARTS = """
+import sys, hashlib
+import numpy as np
+from contextlib import nullcontext
+from fusetune.ekf2.compiled.compilation import PLAIN, joined_without_optimising
+from fusetune.ekf2.compiled.kernel import entry_kernel
+from fusetune.ekf2.filter.estimator import EKF, initialise_estimator
+from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
+from fusetune.ekf2.filter.common.parameters import complete, parameter_record
+
+@entry_kernel
+def entry(ekf, params, steps):
+    initialise_estimator(ekf, params)
+    for step in range(steps):
+        imu = ekf.imu_delayed
+        for axis in range(3):
+            imu.delta_ang[axis] = 0.001 * (axis + 1) * np.sin(0.1 * step)
+            imu.delta_vel[axis] = 0.02 * np.cos(0.07 * step + axis)
+            ekf.P[3 + axis, 3 + axis] += 1e-3
+        imu.delta_ang_dt = 0.01
+        imu.delta_vel_dt = 0.01
+        predict_covariance(ekf, params)
+        predict_state(ekf, params)
+
+ekf, params = np.zeros(1, EKF), parameter_record(complete({}, {}, None))
+with nullcontext() if PLAIN in sys.argv else joined_without_optimising():
+    entry(ekf[0], params[0], 500)
+assert np.isfinite(ekf["P"]).all() and ekf["P"].any()
+print(hashlib.sha256(ekf.tobytes()).hexdigest())
+"""
+
+
+def test_in_one_piece_and_the_usual_way_the_same_bits_are_computed(tmp_path: Path) -> None:
+    if config.DISABLE_JIT:
+        pytest.skip("Numba is switched off")
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), compilation.CHILD_MARK: "1"}
+    (tmp_path / "parts.py").write_text(PARTS, encoding="utf-8")
+    printed = [
+        subprocess.run(
+            [sys.executable, str(tmp_path / "parts.py"), *options],
+            env=environment | {"NUMBA_CACHE_DIR": str(tmp_path / f"cache{len(options)}")},
+            check=True,
+            stdout=subprocess.PIPE,
+            text=True,
+        ).stdout
+        for options in ([], [compilation.PLAIN])
+    ]
+    assert printed[0] == printed[1]

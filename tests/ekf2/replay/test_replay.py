@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from tests.ekf2.replay.equal_rows import assert_equal_rows
+from tests.ekf2.replay.px4_agreement import Limits, assert_replay_agrees
 
-from fusetune.analyze.replaying.replay_log import replay_log
-from fusetune.analyze.trust.fidelity import compare_set
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.course import RUNS_PER_STRETCH
@@ -48,12 +48,6 @@ def shifted(flight: Flight, shift_us: int) -> Flight:
         if "timestamp_sample" in table:
             table["timestamp_sample"] = np.where(table["timestamp_sample"] == shift_us, 0, table["timestamp_sample"])
     return dataclasses.replace(flight, topics=topics)
-
-
-def assert_equal_rows(left, right, names=None):
-    """Field by field, bit by bit (the padding between fields is not part of the result)."""
-    for name in names or left.dtype.names:
-        np.testing.assert_array_equal(left[name], right[name])
 
 
 def test_rows_are_handed_on_a_stretch_at_a_time(flight, result):
@@ -202,21 +196,13 @@ LOGS = (
 )  # fmt: skip
 
 
+MADE_AND_REAL = Limits(relative_rms=0.002, variance=5e-4, velocity_rms=0.005, attitude_rms_deg=0.05)
+
+
 @pytest.mark.parametrize("name", LOGS)
 def test_replay_is_that_of_px4(shared_logs, shared_reference, tmp_path, name):
     """Expected: what PX4 v1.16's own EKF2 computes on the same log, for every parameter set of the reference."""
-    reference = shared_reference / name
-    for set_name in replay_log(shared_logs / f"{name}.ulg", reference, tmp_path):
-        found = compare_set(reference, tmp_path, set_name)
-        assert found.missing == 0
-        assert found.resets_equal
-        assert found.flags_equal > 0.999
-        for axis in found.axes:
-            assert not axis.relative_rms > 0.002
-            assert axis.variance_difference < 5e-4
-            assert axis.fused_equal == axis.rejected_equal == 1.0
-        assert found.velocity_rms < 0.005
-        assert found.attitude_rms_deg < 0.05
+    assert_replay_agrees(shared_logs / f"{name}.ulg", shared_reference / name, tmp_path, MADE_AND_REAL)
 
 
 RANDOM_LIMITS = {"synthetic__mc_flow": 0.008, "synthetic__mc_vision": 0.004}
@@ -228,18 +214,12 @@ RANDOM_LIMITS = {"synthetic__mc_flow": 0.008, "synthetic__mc_vision": 0.004}
 )
 def test_replay_is_that_of_px4_with_random_parameters(shared_logs, shared_reference_random, tmp_path, name):
     """Expected: what PX4 v1.16's own EKF2 computes with some 120 parameters drawn at once from their ranges."""
-    reference = shared_reference_random / name
-    sets = replay_log(shared_logs / f"{name}.ulg", reference, tmp_path)
-    assert len(sets) == 6
-    for set_name in sets:
-        found = compare_set(reference, tmp_path, set_name)
-        assert found.missing == 0
-        assert found.resets_equal
-        assert found.flags_equal > 0.999
-        assert found.median_relative_rms < 0.003
-        for axis in found.axes:
-            assert axis.relative_rms < RANDOM_LIMITS.get(name, 0.0015)
-            assert axis.variance_difference < 1e-3
-            assert axis.fused_equal == axis.rejected_equal == 1.0
-        assert found.velocity_rms < 0.01
-        assert found.attitude_rms_deg < 0.05
+    limits = Limits(
+        relative_rms=RANDOM_LIMITS.get(name, 0.0015),
+        median_relative_rms=0.003,
+        variance=1e-3,
+        velocity_rms=0.01,
+        attitude_rms_deg=0.05,
+    )
+    found = assert_replay_agrees(shared_logs / f"{name}.ulg", shared_reference_random / name, tmp_path, limits)
+    assert len(found) == 6

@@ -14,12 +14,13 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numba
 from numba.core import codegen, compiler, config, types
 
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
@@ -33,6 +34,11 @@ ENTRY_SOURCE = Path(__file__).parents[1] / "replay" / "loop.py"
 COMPILES = "fusetune.ekf2.replay.warm_up"
 """The module that, when it is run, calls the entry once and so compiles all."""
 CHILD_MARK = "FUSETUNE_COMPILING"
+PLAIN = "--plain"
+NOT_IN_ONE_PIECE = (
+    f"Numba {numba.__version__} does not compile the estimator in one piece: it is done function by function, "
+    "which takes some minutes longer and gives the same results."
+)
 
 
 @cache
@@ -40,7 +46,7 @@ def ensure_compiled() -> None:
     """Make sure the kernel cache holds the estimator for this processor; one process compiles and others wait.
 
     Kernels that have lost or changed a byte, or that others could have written, are made again. Does nothing where
-    Numba is switched off. If the child fails, the caller compiles the usual, slower way.
+    Numba is switched off. What cannot be compiled in one piece is compiled the usual, slower way, after a warning.
 
     Raises
     ------
@@ -65,8 +71,15 @@ def ensure_compiled() -> None:
             for file in folder.iterdir():
                 file.unlink()  # Numba would stumble over a damaged one
             print("Compiling the estimator for this processor ...", file=sys.stderr)
-            environment = os.environ | {"NUMBA_CACHE_DIR": str(caches), "NUMBA_CACHE_LOCATOR_CLASSES": LOCATOR}
-            subprocess.run([sys.executable, "-m", COMPILES], env=environment, umask=0o022, check=False)
+            _compile(caches)
+            if not _may_be_loaded(folder):
+                print(NOT_IN_ONE_PIECE, file=sys.stderr)
+                _compile(caches, PLAIN)
+
+
+def _compile(caches: Path, *options: str) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(caches), "NUMBA_CACHE_LOCATOR_CLASSES": LOCATOR}
+    subprocess.run([sys.executable, "-m", COMPILES, *options], env=environment, umask=0o022, check=False)
 
 
 def _setting(name: str) -> Any:
@@ -98,7 +111,12 @@ def _may_be_loaded(folder: Path) -> bool:
 
 @contextmanager
 def joined_without_optimising() -> Iterator[None]:
-    """Join functions as they are compiled; only what is compiled last, the entry, is optimised and translated."""
+    """Join functions as they are compiled; only what is compiled last, the entry, is optimised and translated.
+
+    This replaces methods of Numba's code generator, which another release may have otherwise: `pyproject.toml` bounds
+    Numba from above, a test compares what is computed with what Numba compiles its own way, bit by bit, and where the
+    child fails the warning says so.
+    """
     library, native = codegen.JITCodeLibrary, codegen.JITCPUCodegen
     finalize, pointer, set_env = library.finalize, library.get_pointer_to_function, native.set_env
     compile_function = compiler.CompilerBase.compile_extra
@@ -154,10 +172,15 @@ def _short_repr(record: types.Record) -> str:
     return f"Record({len(record.fields)} fields, {record.size} bytes)"
 
 
-def compile_in_one_piece(call_entry: Callable[[], None]) -> None:
-    """Compile by a first call of the entry, and record what is now in the cache; the work of the child process."""
+def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = ()) -> None:
+    """Compile by a first call of the entry, and record what is now in the cache; the work of the child process.
+
+    Parameters
+    ----------
+    options : of the command line; with `PLAIN` Numba compiles its own way
+    """
     os.environ[CHILD_MARK] = "1"
-    with joined_without_optimising():
+    with nullcontext() if PLAIN in options else joined_without_optimising():
         call_entry()
     folder = kernel_folder()
     with atomic_path(folder / RECORD_NAME) as temporary:

@@ -18,6 +18,8 @@ from fusetune.storage.files import AnyPath
 
 LOCATOR = "fusetune.ekf2.compiled.kernel_locator.KernelLocator"
 PACKAGE = Path(__file__).resolve().parents[2]
+KERNEL_SOURCES = ("ekf2",)
+"""What the machine code follows from."""
 
 
 def kernel_cache() -> Path:
@@ -26,7 +28,7 @@ def kernel_cache() -> Path:
     The user's cache serves where there is no checkout, where this user may not write there, and where more people may
     than may write the package.
     """
-    checkout, below = PACKAGE.parents[1], Path("numba") / source_digest("ekf2")[:16]
+    checkout, below = PACKAGE.parents[1], Path("numba") / source_digest(*KERNEL_SOURCES)[:16]
     folder = checkout / ".cache" / below
     existing = next(part for part in (folder, *folder.parents) if part.exists())
     ours = os.access(existing, os.W_OK | os.X_OK) and not others_may_write(checkout, PACKAGE)

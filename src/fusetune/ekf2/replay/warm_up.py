@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
-from fusetune.ekf2.compiled.compilation import compile_in_one_piece
+from fusetune.ekf2.compiled.compilation import compile_and_record
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.replay import replay
@@ -41,4 +43,4 @@ def _imu_at_rest() -> TopicTable:
 
 
 if __name__ == "__main__":
-    compile_in_one_piece(compile_kernels)
+    compile_and_record(compile_kernels, sys.argv[1:])

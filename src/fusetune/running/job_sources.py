@@ -1,0 +1,36 @@
+"""Which sources the outcome of a job follows from: when they change, the job runs again.
+
+What earlier jobs were made by need not be repeated: their files are made again, and by that all that was made of these.
+A test compares these lists with what the scripts of the jobs import.
+"""
+
+from __future__ import annotations
+
+from fusetune.storage.digest import source_digest
+
+BASE = ("errors.py", "number_settings.py", "px4", "settings.py", "storage", "time_limit.py")
+
+JOB_SOURCES = {
+    "design": (*BASE, "design"),
+    "execute": (*BASE, "ekf2", "design", "execute"),
+    "save": (*BASE, "ekf2/feed", "save"),
+    "replay": (
+        *BASE,
+        "ekf2",
+        "save",
+        "analyze/flight",
+        "analyze/metrics",
+        "analyze/reconstruction",
+        "analyze/replaying",
+        "analyze/sources.py",
+    ),
+    "score": (*BASE, "ekf2", "save", "analyze"),
+    "apply": (*BASE, "apply"),
+    "report": (*BASE, "apply", "report"),
+}
+"""Kind of job → files and folders of the package."""
+
+
+def job_digest(kind: str) -> str:
+    """One figure for the state of the sources of a kind of job, one of `JOB_SOURCES`."""
+    return source_digest(*JOB_SOURCES[kind])
