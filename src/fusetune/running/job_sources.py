@@ -13,7 +13,7 @@ BASE = ("errors.py", "number_settings.py", "px4", "settings.py", "storage", "tim
 JOB_SOURCES = {
     "design": (*BASE, "design"),
     "execute": (*BASE, "ekf2", "design", "execute"),
-    "save": (*BASE, "ekf2/feed", "save"),
+    "save": (*BASE, "ekf2/feed", "design/set_names.py", "save"),
     "replay": (
         *BASE,
         "ekf2",
@@ -24,9 +24,9 @@ JOB_SOURCES = {
         "analyze/replaying",
         "analyze/sources.py",
     ),
-    "score": (*BASE, "ekf2", "save", "analyze"),
-    "apply": (*BASE, "apply"),
-    "report": (*BASE, "apply", "report"),
+    "score": (*BASE, "ekf2", "design/set_names.py", "save", "analyze"),
+    "apply": (*BASE, "design/set_names.py", "apply"),
+    "report": (*BASE, "design/set_names.py", "apply", "report"),
 }
 """Kind of job → files and folders of the package."""
 
