@@ -30,7 +30,7 @@ from fusetune.analyze.replaying.replay_settings import IN_USE
 from fusetune.analyze.replaying.set_input import WRITTEN_BACK, read_set_files
 from fusetune.analyze.replaying.start_choice import StartSettings
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.trust.as_flown_figures import replayed_innovations
+from fusetune.analyze.trust.compared_innovations import replayed_innovations
 from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES
 from fusetune.analyze.trust.trust_grade import grade_flight
 from fusetune.design.mission import load_mission

@@ -17,11 +17,11 @@ from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings
 from fusetune.analyze.scoring.score_flight import score_saved_flight
 from fusetune.design.mission import load_mission
-from fusetune.design.set_names import PRESENT
 from fusetune.design.study import load_study
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import Vehicle, load_vehicle
 from fusetune.save import save_log
+from fusetune.set_names import PRESENT
 from fusetune.storage.digest import source_digest
 
 HERE = Path(__file__).parent

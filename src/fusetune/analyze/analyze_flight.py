@@ -22,10 +22,10 @@ from fusetune.analyze.trust.as_flown_figures import compared_rows
 from fusetune.analyze.trust.onboard_fidelity import write_flight_fidelity
 from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, AsFlownReplay, grade_flight
 from fusetune.analyze.trust.trust_settings import TrustSettings
-from fusetune.design.set_names import AS_FLOWN, PRESENT
 from fusetune.ekf2.replay.recording import RecordArrays
 from fusetune.ekf2.replay.replay import result_of
 from fusetune.save.flight_folder import load_flight
+from fusetune.set_names import AS_FLOWN, PRESENT
 from fusetune.storage.files import AnyPath
 
 ANALYSIS_TOPICS = (*dict.fromkeys((*REPLAY_TOPICS, *TRUST_TOPICS, *SCORE_TOPICS)),)

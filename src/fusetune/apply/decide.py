@@ -19,8 +19,8 @@ from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
-from fusetune.design.set_names import PRESENT
 from fusetune.errors import UserError
+from fusetune.set_names import PRESENT
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path

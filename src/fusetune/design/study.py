@@ -18,8 +18,8 @@ from typing import Any
 from fusetune.design.config_file import load_schema, raise_problems, validate
 from fusetune.design.names import name_problem, one_line
 from fusetune.design.parameter_check import parameter_problem, typed_values
-from fusetune.design.set_names import RESERVED_SET_NAMES
 from fusetune.design.yaml_reader import read_yaml
+from fusetune.set_names import RESERVED_SET_NAMES
 
 MOST_SETS = 2000
 """More sets than this are a slip of the pen: each is replayed on every flight."""

@@ -13,7 +13,7 @@ import pandas as pd
 from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.apply.evidence import AIMS
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
-from fusetune.design.set_names import ONBOARD
+from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_pieces, read_table

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from fusetune.storage.digest import source_digest
 
-BASE = ("errors.py", "number_settings.py", "px4", "settings.py", "storage", "time_limit.py")
+BASE = ("errors.py", "number_settings.py", "px4", "set_names.py", "settings.py", "storage", "time_limit.py")
 
 JOB_SOURCES = {
     "design": (*BASE, "design"),
     "execute": (*BASE, "ekf2", "design", "execute"),
-    "save": (*BASE, "ekf2/feed", "design/set_names.py", "save"),
+    "save": (*BASE, "ekf2/feed", "save"),
     "replay": (
         *BASE,
         "ekf2",
@@ -24,9 +24,9 @@ JOB_SOURCES = {
         "analyze/replaying",
         "analyze/sources.py",
     ),
-    "score": (*BASE, "ekf2", "design/set_names.py", "save", "analyze"),
-    "apply": (*BASE, "design/set_names.py", "apply"),
-    "report": (*BASE, "design/set_names.py", "apply", "report"),
+    "score": (*BASE, "ekf2", "save", "analyze"),
+    "apply": (*BASE, "apply"),
+    "report": (*BASE, "apply", "report"),
 }
 """Kind of job → files and folders of the package."""
 

@@ -16,8 +16,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from fusetune.design.set_names import AS_FLOWN, PRESENT
 from fusetune.errors import UserError
+from fusetune.set_names import AS_FLOWN, PRESENT
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import atomic_path
 

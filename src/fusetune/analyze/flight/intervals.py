@@ -3,6 +3,9 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 Interval = tuple[int, int]
 
 
@@ -13,6 +16,14 @@ class Cut:
     start: int
     stop: int
     reason: str
+
+
+def inside(time: npt.NDArray[np.int64], intervals: Iterable[Interval]) -> npt.NDArray[np.bool_]:
+    """True for the times (N,), µs, that lie in one of the intervals."""
+    found = np.zeros(time.shape, dtype=bool)
+    for start, stop in intervals:
+        found |= (time >= start) & (time < stop)
+    return found
 
 
 def subtract(intervals: Sequence[Interval], cuts: Iterable[Cut]) -> tuple[Interval, ...]:

@@ -29,7 +29,7 @@ from fusetune.analyze.scoring.window_scores import (
     window_rows,
 )
 from fusetune.analyze.sources import AID_SOURCES, AXES
-from fusetune.design.set_names import ONBOARD
+from fusetune.set_names import ONBOARD
 from fusetune.storage.files import AnyPath
 
 SAMPLES_SCHEMA = pa.schema(

@@ -30,8 +30,8 @@ from fusetune.analyze.scoring.withheld_scores import (
     withheld_rows,
 )
 from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
-from fusetune.design.set_names import PRESENT
 from fusetune.px4.flight import Flight
+from fusetune.set_names import PRESENT
 from fusetune.storage.files import AnyPath
 
 SCORE_TOPICS = (

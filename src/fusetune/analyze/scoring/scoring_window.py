@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.flight.intervals import Cut, Interval, duration, merged, subtract
+from fusetune.analyze.flight.intervals import Cut, Interval, duration, inside, merged, subtract
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.sources import HORIZONTAL_AIDING
@@ -34,10 +34,7 @@ class ScoringWindow:
 
     def contains(self, time: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
         """True for the times (N,), µs, that are scored."""
-        inside = np.zeros(time.shape, dtype=bool)
-        for start, stop in self.intervals:
-            inside |= (time >= start) & (time < stop)
-        return inside
+        return inside(time, self.intervals)
 
     def block_edges(self, length_s: float) -> npt.NDArray[np.int64]:
         """Edges of blocks of equal length, as near to `length_s` as the span of the window allows, µs."""

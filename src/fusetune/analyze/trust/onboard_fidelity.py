@@ -21,7 +21,6 @@ from fusetune.analyze.replaying.store.parts import table_file
 from fusetune.analyze.replaying.store.reader import read_innovations
 from fusetune.analyze.trust.fidelity import mean_nll
 from fusetune.analyze.trust.trust_grade import TrustGrade
-from fusetune.design.set_names import AS_FLOWN
 from fusetune.px4.estimator_samples import is_complete, logged_share
 from fusetune.px4.flight import Flight
 from fusetune.px4.logger_settings import (
@@ -32,6 +31,7 @@ from fusetune.px4.logger_settings import (
     logs_from_boot,
 )
 from fusetune.px4.parameters.ekf2_parameters import BASELINE_RELEASE
+from fusetune.set_names import AS_FLOWN
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fusetune.analyze.flight.intervals import Cut, subtract
+from fusetune.analyze.flight.intervals import Cut, Interval, inside, subtract
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS, ReconstructedFlight
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
@@ -26,14 +26,8 @@ from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.start_choice import START_TOPICS, Start, choose_start
 from fusetune.analyze.sources import HORIZONTAL_AIDING
-from fusetune.analyze.trust.as_flown_figures import (
-    GROUPS,
-    AsFlownFigures,
-    Interval,
-    as_flown_figures,
-    compared_rows,
-    rms,
-)
+from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, as_flown_figures, compared_rows
+from fusetune.analyze.trust.compared_innovations import GROUPS, rms
 from fusetune.analyze.trust.trust_settings import FALLING, FIGURES, TrustSettings
 from fusetune.analyze.trust.trust_words import limits_in_words, not_compared_in_words
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
@@ -353,10 +347,7 @@ def _instances(flight: Flight) -> tuple[InstanceFigures, ...]:
             for key in keys:
                 if key in samples:
                     one = samples[key]
-                    flying = np.zeros(len(one.innovation), np.bool_)
-                    for begin, end in airborne:
-                        flying |= (one.timestamp_sample >= begin) & (one.timestamp_sample < end)
-                    parts.append(one.innovation[flying & one.fused])
+                    parts.append(one.innovation[inside(one.timestamp_sample, airborne) & one.fused])
             if parts and sum(map(len, parts)):
                 sizes[group] = rms(parts)
         figures.append(InstanceFigures(instance, shares.get(instance, 0.0), sizes))

@@ -13,10 +13,10 @@ from fusetune.analyze.metrics.attitude import interpolate
 from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis
 from fusetune.analyze.replaying.store.reader import ColumnsOnDisk, read_innovations
 from fusetune.analyze.sources import AID_SOURCES
-from fusetune.design.set_names import PRESENT
 from fusetune.px4.flight import Flight
 from fusetune.report.figures.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
+from fusetune.set_names import PRESENT
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
