@@ -8,13 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
-from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, prepare
+from fusetune.analyze.replaying.onboard import onboard_samples
+from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
-from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
+from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, compared_rows
 from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS
 from fusetune.analyze.trust.trust_grade import (
     GNSS,
+    AsFlownReplay,
     distance,
     grade_flight,
     grade_of,
@@ -146,6 +148,22 @@ def test_whole_log_of_the_same_estimator_is_an_a(flight):
     grade = grade_flight(prepare(flight, IN_USE.reconstruction, IN_USE.start))
     assert grade.grade == "A", grade
     assert grade.reason == ""
+
+
+def test_what_is_at_hand_or_known_is_not_replayed_again(flight, monkeypatch):
+    """A whole log that begins on the ground: as it was logged it is what is in use."""
+    prepared = prepare(flight, IN_USE.reconstruction, IN_USE.start)
+    kept = prepared.replay(prepared.parameters({}), keep=compared_rows(onboard_samples(flight)))
+    replays, replay = [], PreparedFlight.replay
+    monkeypatch.setattr(PreparedFlight, "replay", lambda *args, **named: replays.append(1) or replay(*args, **named))
+    anew = grade_flight(prepared)
+    assert len(replays) == 1
+    assert grade_flight(prepared, as_flown=AsFlownReplay(*kept)) == anew
+    assert len(replays) == 1
+    warm = dataclasses.replace(IN_USE.start, mode="warm")
+    assert grade_flight(prepare(flight, IN_USE.reconstruction, warm)).as_logged == anew.as_logged
+    # the one in use, and from nothing as the log is; the cause "start from nothing" is known by then
+    assert len(replays) == 3
 
 
 def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
