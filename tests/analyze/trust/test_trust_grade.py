@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fusetune.analyze.analyze_flight import ANALYSIS_TOPICS
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE
+from fusetune.analyze.replaying.start_choice import StartSettings
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, compared_rows
-from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS
 from fusetune.analyze.trust.trust_grade import (
     GNSS,
     AsFlownReplay,
@@ -151,8 +152,8 @@ def test_whole_log_of_the_same_estimator_is_an_a(flight):
 
 
 def test_what_is_at_hand_or_known_is_not_replayed_again(flight, monkeypatch):
-    """A whole log that begins on the ground: as it was logged it is what is in use."""
-    prepared = prepare(flight, IN_USE.reconstruction, IN_USE.start)
+    """A whole log that is replayed from nothing: as it was logged it is what is in use."""
+    prepared = prepare(flight, IN_USE.reconstruction, StartSettings(mode="cold"))
     kept = prepared.replay(prepared.parameters({}), keep=compared_rows(onboard_samples(flight)))
     replays, replay = [], PreparedFlight.replay
     monkeypatch.setattr(PreparedFlight, "replay", lambda *args, **named: replays.append(1) or replay(*args, **named))
@@ -160,9 +161,10 @@ def test_what_is_at_hand_or_known_is_not_replayed_again(flight, monkeypatch):
     assert len(replays) == 1
     assert grade_flight(prepared, as_flown=AsFlownReplay(*kept)) == anew
     assert len(replays) == 1
-    warm = dataclasses.replace(IN_USE.start, mode="warm")
-    assert grade_flight(prepare(flight, IN_USE.reconstruction, warm)).as_logged == anew.as_logged
-    # the one in use, and from nothing as the log is; the cause "start from nothing" is known by then
+    warm = grade_flight(prepare(flight, IN_USE.reconstruction, StartSettings(mode="warm")))
+    assert warm.start.startswith("warm")
+    assert [one.cost for one in warm.causes] == [distance(warm.as_logged, SETTINGS) - distance(warm.repaired, SETTINGS)]
+    # the one in use, and from nothing as the log is; what the start from nothing costs is known by then
     assert len(replays) == 3
 
 
@@ -280,7 +282,7 @@ def test_replay_scores_and_grade_of_a_flight_see_the_same_sensors_where_instance
     flight = with_two_imus(two_instances())
     shapes = [
         canonical(flight.with_topics({key: one for key, one in flight.topics.items() if key[0] in topics}))
-        for topics in (REPLAY_TOPICS, SCORE_TOPICS, FIDELITY_TOPICS)
+        for topics in (REPLAY_TOPICS, SCORE_TOPICS, ANALYSIS_TOPICS)
     ]
     for shape in shapes:
         time = shape.topics["sensor_combined", 0]["timestamp"]

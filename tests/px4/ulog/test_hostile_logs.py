@@ -211,11 +211,9 @@ def test_limits_are_checked(values: dict[str, float]) -> None:
 
 
 def test_what_later_rooms_read_is_kept() -> None:
-    from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
-    from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
-    from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS
+    from fusetune.analyze.analyze_flight import ANALYSIS_TOPICS
 
-    for topic in {*FIDELITY_TOPICS, *REPLAY_TOPICS, *SCORE_TOPICS}:
+    for topic in ANALYSIS_TOPICS:
         assert is_used(topic), topic
     assert not is_used("actuator_outputs")
 

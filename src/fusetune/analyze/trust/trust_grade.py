@@ -50,10 +50,11 @@ TRUST_TOPICS = (
             *RECONSTRUCTION_TOPICS,
             *START_TOPICS,
             *INNOVATION_TOPICS,
+            "sensor_gps",
         )
     ),
 )
-"""What the grade reads of a flight."""
+"""What the grade, and the comparison with the vehicle, read of a flight."""
 
 COLD_WARM_UP_US = 10_000_000
 FULL_GNSS_RATE_HZ = 4.5
