@@ -1,8 +1,14 @@
-# make       sets up .venv where that is needed, then runs the pipeline
-# make test  sets up .venv where that is needed, then runs the tests
+# make                sets up .venv where that is needed, then runs the pipeline
+# make test           … then runs the tests
+# make lint           … then looks for slips, form, and imports that the house forbids
+# make types          … then checks the types
+# make demonstration  … then runs the pipeline and looks whether it made all and would do nothing twice
+# These are the checks of a change; .ci/run and .github/workflows/checks.yml call them.
 CORES ?= 2
 LOCKS ?= requirements.lock
 PYTHON ?= $(shell command -v python3.11 || command -v python3 || command -v python)
+# A Python that is asked for is the one of .venv; otherwise uv may choose, and fetch, any that serves.
+UV_PYTHON := $(if $(filter environment command,$(firstword $(origin PYTHON))),$(PYTHON),>=3.11)
 BIN := .venv/bin
 READY := .venv/.ready
 # The package has no hash, so it is installed by itself, built with the locked setuptools.
@@ -14,7 +20,10 @@ LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --genera
 export PYTHONDONTWRITEBYTECODE :=
 export UV_COMPILE_BYTECODE := 1
 
-.PHONY: all setup test lock clean
+# What the demonstration is for; with real logs the same files come.
+MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
+
+.PHONY: all setup test lint types demonstration lock clean
 
 all: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -24,12 +33,26 @@ setup: $(READY)
 test: $(READY)
 	$(BIN)/pytest -n $(CORES) --no-loadscope-reorder
 
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
+	$(BIN)/lint-imports
+
+types: $(READY)
+	$(BIN)/mypy
+
+demonstration: all
+	@for file in $(MADE); do [ -s "$$file" ] || { echo "$$file is missing or empty" >&2; exit 1; }; done
+	@$(BIN)/snakemake --cores 1 --dry-run | grep -q "Nothing to be done" || { echo "a second run would not be idle" >&2; exit 1; }
+
 # The stamp goes first and comes last: a set-up that was interrupted is done again from nothing.
 $(READY): $(LOCKS) pyproject.toml
 	@if [ ! -e $@ ]; then rm -rf .venv; fi; rm -f $@
 	@if command -v uv >/dev/null 2>&1; then \
 		echo "Setting up .venv with uv ..." && \
-		{ [ -d .venv ] || uv venv --quiet --python '>=3.11' .venv; } && \
+		{ [ -d .venv ] || uv venv --quiet --python '$(UV_PYTHON)' .venv; } && \
 		for lock in $(LOCKS); do uv pip install --quiet --python $(BIN)/python --require-hashes -r $$lock || exit 1; done && \
 		uv pip install --quiet --python $(BIN)/python $(ITSELF); \
 	elif [ -n "$(PYTHON)" ] && "$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then \
@@ -44,7 +67,7 @@ $(READY): $(LOCKS) pyproject.toml
 
 # Writes the lock files anew, keeping their versions where they still fit; `make lock UPGRADE=--upgrade` takes the newest.
 lock:
-	$(LOCK) $(UPGRADE) --extra dev --output-file requirements.lock
+	$(LOCK) $(UPGRADE) --extra test --extra dev --output-file requirements.lock
 	$(LOCK) $(UPGRADE) --extra slurm --constraint requirements.lock --output-file requirements-slurm.lock
 
 # Removes what the pipeline has made; logs in flights/ and the environment stay.

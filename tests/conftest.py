@@ -1,4 +1,4 @@
-"""What all tests share: the kernel cache, and the logs and reference figures that lie beside the project."""
+"""What all tests share: the kernel cache, the logs and reference figures beside the project, and `--update`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from tests.made_text import UpToDate, compare
 from tests.shared_folder import ROOT, SHARED
 
 from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
@@ -36,6 +37,17 @@ def _shared_scope(nodeid: str) -> str:
     return next((folder for folder in SHARING_FOLDERS if file.startswith(f"{folder}/")), file)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--update`: what is made from the code and kept in the repository is written anew where it is out of date."""
+    parser.addoption("--update", action="store_true", help="renew tables and pictures that are made from the code")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Two processes that renew parts of one file would lose one of them."""
+    if config.getoption("--update") and getattr(config.option, "numprocesses", None):
+        raise pytest.UsageError("--update works in one process: leave out -n")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the folders that take longest."""
     order = {folder: number for number, folder in enumerate(SHARING_FOLDERS)}
@@ -58,6 +70,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def project_root() -> Path:
     """Folder that holds the Snakefile."""
     return ROOT
+
+
+@pytest.fixture
+def up_to_date(request: pytest.FixtureRequest) -> UpToDate:
+    """Compare made text in the repository with what the code says; with `--update`, renew it (`tests/made_text.py`)."""
+    command, update = f"pytest {request.node.nodeid} --update", request.config.getoption("--update")
+    return lambda file, block, text: compare(file, block, text, command, update)
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,8 @@ def test_names_that_meet_are_told_apart_by_a_digest_of_the_path(tmp_path: Path) 
         "flights.csv.ulg",
         "Flights.Parquet.ulg",
     )
+    if len(os.listdir(tmp_path)) < 7:
+        pytest.skip("this file system takes some of these names for the same")
     found = names(discover_logs(tmp_path))
     assert len({name.casefold() for name in found}) == 7
     assert "A_B" in found  # the first by name of those in the fewest folders
@@ -85,7 +88,10 @@ def test_names_that_meet_are_told_apart_by_a_digest_of_the_path(tmp_path: Path) 
 def test_names_are_kept_as_far_as_all_that_lies_behind_can_carry_them(
     tmp_path: Path, file: str | bytes, flight: str
 ) -> None:
-    make(tmp_path, file)
+    try:
+        make(tmp_path, file)
+    except OSError as error:
+        pytest.skip(f"this file system does not take the name ({error.strerror})")
     (log,) = discover_logs(tmp_path).logs
     assert log.flight == flight
     assert Path(log.path).read_bytes() == b"ULog"
@@ -169,16 +175,12 @@ def test_any_names_give_flights_that_differ_and_can_be_written(
     tmp_path_factory: pytest.TempPathFactory, stems: list[str]
 ) -> None:
     folder = tmp_path_factory.mktemp("flights")
-    files = []
     for stem in stems:
-        try:
+        with suppress(OSError, UnicodeEncodeError):  # longer than names can be; half of a surrogate pair
             (folder / f"{stem}.ulg").write_bytes(b"ULog")
-        except (OSError, UnicodeEncodeError):  # longer than names can be; half of a surrogate pair
-            continue
-        if not stem.startswith("."):
-            files.append(stem)
+    files = [file for file in os.listdir(folder) if not file.startswith(".")]
     found = names(discover_logs(folder))
-    assert len({name.casefold() for name in found}) == len(set(files))
+    assert len({name.casefold() for name in found}) == len(files)
     for name in found:
         (folder / name).mkdir()
         assert not set(name) & set("{}/\n\0")

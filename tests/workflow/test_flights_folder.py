@@ -6,6 +6,7 @@ import csv
 import hashlib
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -36,8 +37,10 @@ def test_no_entry_stops_the_others(workspace: Workspace, flights: Path) -> None:
     for session in ("sess001", "sess002"):
         (flights / "log" / session).mkdir(parents=True)
         (flights / "log" / session / "log001.ulg").write_bytes(session.encode())
-    for name in (b"{a}.ulg", b"new\nline.ulg", b"\xff.ulg", b"flights.csv.ulg", b"it's <b> & $(id), 100%.ulg"):
-        Path(os.fsdecode(os.path.join(os.fsencode(flights), name))).write_bytes(name)
+    # not every file system takes bytes that are no text
+    odd = "\udcff.ulg" if sys.platform == "linux" else "\u202e.ulg"
+    for name in ("{a}.ulg", "new\nline.ulg", odd, "flights.csv.ulg", "it's <b> & $(id), 100%.ulg"):
+        (flights / name).write_bytes(os.fsencode(name))
     (flights / "dangling.ulg").symlink_to("/nowhere/b.ulg")
     os.mkfifo(flights / "pipe.ulg")
     (flights / "folder.ulg").mkdir()

@@ -1,4 +1,4 @@
-"""Design: the mission that is flown and the parameter sets that are compared on it."""
+"""The design room: the mission that is flown and the parameter sets that are compared on it."""
 
 from fusetune.design.outputs import write_design
 

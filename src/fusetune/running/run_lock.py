@@ -8,7 +8,6 @@ people, and for jobs: they work for the run that is named there, and for no othe
 from __future__ import annotations
 
 import atexit
-import errno
 import json
 import os
 import socket
@@ -20,27 +19,17 @@ from pathlib import Path
 from typing import IO
 
 from fusetune.errors import UserError
-
-try:
-    import fcntl
-except ImportError:  # Windows has no such locks; there an interrupted run needs `snakemake --unlock`.
-    fcntl = None  # type: ignore[assignment]
+from fusetune.storage.file_lock import POLL_INTERVAL_S, LocksUnavailableError, lock
 
 RUN_LOCK = "fusetune_run.lock"
 JOBS_LOCK = "fusetune_jobs.lock"
 RUN_VARIABLE = "FUSETUNE_RUN"
 """Environment variable that tells a job which run it works for."""
-POLL_INTERVAL_S = 0.2
 
-_TAKEN = {errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES}
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 _held: list[IO[bytes]] = []
 _claimed: dict[Path, IO[bytes]] = {}
-
-
-class LocksUnavailableError(Exception):
-    """The file system, or the system, has no locks that end with their process."""
 
 
 @dataclass(frozen=True)
@@ -177,27 +166,23 @@ def holder_of(folder: str | os.PathLike[str]) -> Holder | None:
 
 def _open_and_lock(path: Path, exclusive: bool, wait: bool = False) -> IO[bytes] | None:
     """The open file with the lock; `None` where another process has it."""
-    if fcntl is None:
-        raise LocksUnavailableError
-    kind = (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB)
     while True:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            # open for writing, without which network file systems give no exclusive lock
-            file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+            file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
         except OSError as error:
             reason = f"cannot be written ({error.strerror})"
             raise UserError(path, reason, "Make room, or mend the permissions of its folder") from error
         try:
-            fcntl.flock(file, kind)
-        except OSError as error:
+            locked = lock(file, exclusive, wait)
+        except LocksUnavailableError:
             file.close()
-            if error.errno in _TAKEN:
-                return None
-            raise LocksUnavailableError(error.strerror) from error
-        if _is_still(path, file):
+            raise
+        if locked and _is_still(path, file):
             return file
         file.close()
+        if not locked:
+            return None
 
 
 def _is_still(path: Path, file: IO[bytes]) -> bool:

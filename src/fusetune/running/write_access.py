@@ -1,7 +1,8 @@
 """Who may change what this process is going to run.
 
 Others are all but this process's user, root, and those who may write a folder of code that is run anyway (`like`
-below): its owner, and, where its mode says so, its group or everybody.
+below): its owner, and, where its mode says so, its group or everybody. Windows keeps that in lists that the mode does
+not show: there everything passes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ def others_may_write(path: AnyPath, like: AnyPath) -> bool:
         state, trusted = os.stat(path), os.stat(like)
     except (FileNotFoundError, NotADirectoryError):
         return False
-    return state.st_uid not in (0, os.getuid(), trusted.st_uid) or bool(_excess(state, trusted))
+    return state.st_uid not in (0, _this_user(), trusted.st_uid) or bool(_excess(state, trusted))
 
 
 def others_may_write_below(top: AnyPath, folder: AnyPath, like: AnyPath) -> bool:
@@ -40,7 +41,7 @@ def take_write_access(top: AnyPath, folder: AnyPath, like: AnyPath) -> None:
     for path in _way(Path(top), Path(folder)):
         path.mkdir(mode=0o755, parents=True, exist_ok=True)
         state = path.stat()
-        if state.st_uid in (os.getuid(), 0):
+        if state.st_uid in (_this_user(), 0):
             path.chmod(stat.S_IMODE(state.st_mode) & ~_excess(state, os.stat(like)))
         if others_may_write(path, like):
             raise UserError(
@@ -48,6 +49,10 @@ def take_write_access(top: AnyPath, folder: AnyPath, like: AnyPath) -> None:
                 "another user may write to it, and could put any program in the place of the compiled estimator",
                 "Delete it, or make it yours alone (chown, chmod), and start again",
             )
+
+
+def _this_user() -> int:
+    return os.getuid() if hasattr(os, "getuid") else 0
 
 
 def _excess(state: os.stat_result, trusted: os.stat_result) -> int:

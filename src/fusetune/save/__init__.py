@@ -1,4 +1,4 @@
-"""Third room: every log becomes a folder of tables with a verdict.
+"""The save room: every log becomes a folder of tables with a verdict.
 
 The functions load what they need when they are asked for, so that reading a saved flight costs no more than NumPy and
 pyarrow.

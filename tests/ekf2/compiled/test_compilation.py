@@ -19,6 +19,7 @@ from fusetune.ekf2.compiled.kernel_locator import KernelLocator
 from fusetune.ekf2.replay import loop
 from fusetune.ekf2.replay.warm_up import compile_kernels
 from fusetune.errors import UserError
+from fusetune.storage.file_lock import LocksUnavailableError
 
 LOADS = """
 import fusetune.ekf2.compiled.compilation
@@ -155,6 +156,19 @@ def test_the_processor_is_part_of_the_place(kernels: Path) -> None:
     other = Path(run.stdout.strip())
     assert other != kernels
     assert other.parents[2] == kernels.parents[2]
+
+
+def test_where_the_file_system_has_no_locks_nobody_is_waited_for(
+    tmp_path: Path, compilations: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> bool:
+        raise LocksUnavailableError("no locks available")
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", config.CACHE_DIR)
+    monkeypatch.setattr(compilation, "lock", refuse)
+    ensure_compiled()
+    assert compilations
 
 
 def test_what_cannot_be_compiled_in_one_piece_is_compiled_the_usual_way(

@@ -8,14 +8,13 @@ process that compiled this way, so it is a child that does it; everybody else lo
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from numba.core import codegen, compiler, config, types
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
 from fusetune.ekf2.compiled.kernel_locator import KernelLocator
 from fusetune.errors import UserError
+from fusetune.storage.file_lock import LocksUnavailableError, lock
 from fusetune.storage.files import atomic_path
 
 LOCK_NAME = "compile.lock"
@@ -60,12 +60,13 @@ def ensure_compiled() -> None:
         return
     try:
         caches.mkdir(parents=True, exist_ok=True)
-        lock = (caches / LOCK_NAME).open("w")
+        queue = (caches / LOCK_NAME).open("w+b")
     except OSError as error:
         reason = f"does not hold the estimator for this processor, and cannot be written ({error.strerror})"
         raise UserError(caches, reason, "Start the pipeline where it can, or make room") from error
-    with lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with queue:
+        with suppress(LocksUnavailableError):  # then each process compiles for itself
+            lock(queue, exclusive=True, wait=True)
         if not _may_be_loaded(folder):
             keep_others_out(folder)
             for file in folder.iterdir():
