@@ -30,7 +30,7 @@ from fusetune.save.flight_folder import read_metadata
 # All else is imported where it is needed: what a job does not load must not count as its memory.
 
 STUDY = ROOT / "config/studies/paper_table11.yaml"
-ANALYSIS_STEPS = ("write_replays", "grade_flight", "write_flight_fidelity", "write_scores")
+ANALYSIS_STEPS = ("write_replays", "write_as_flown", "grade_flight", "write_flight_fidelity", "write_scores")
 
 
 def main() -> None:

@@ -24,12 +24,20 @@ from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, AsFlownReplay, grad
 from fusetune.analyze.trust.trust_settings import TrustSettings
 from fusetune.ekf2.replay.recording import RecordArrays
 from fusetune.ekf2.replay.replay import result_of
+from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
 from fusetune.set_names import AS_FLOWN, PRESENT
 from fusetune.storage.files import AnyPath
 
-ANALYSIS_TOPICS = (*dict.fromkeys((*REPLAY_TOPICS, *TRUST_TOPICS, *SCORE_TOPICS)),)
-"""What is read of a saved flight."""
+COMPARED_TOPICS = (
+    *(topic for topic in dict.fromkeys((*TRUST_TOPICS, *SCORE_TOPICS)) if topic not in REPLAY_TOPICS),
+    "estimator_selector_status",
+    "estimator_status",
+)
+"""What is read of a saved flight beside `REPLAY_TOPICS`, with what the canonical form of these topics depends on.
+
+They take memory and are not asked for before the sets have been replayed.
+"""
 
 
 @dataclass(frozen=True)
@@ -76,24 +84,24 @@ def _replay_and_grade(
     settings: AnalysisSettings,
 ) -> ScoredFlight:
     """All but the scores; what these need of the flight."""
-    prepared = prepare_flight(load_flight(flight_folder, topics=ANALYSIS_TOPICS), settings.replay)
-    as_flown = write_replays(prepared, replayed, output_folder)
+    prepared = prepare_flight(load_flight(flight_folder, topics=REPLAY_TOPICS), settings.replay)
+    write_replays(prepared, {name: values for name, values in replayed.items() if name != AS_FLOWN}, output_folder)
+    prepared = prepared.with_log(canonical(load_flight(flight_folder, topics=COMPARED_TOPICS)))
+    as_flown = write_as_flown(prepared, output_folder) if AS_FLOWN in replayed else None
     grade = grade_flight(prepared, settings.replay, settings.trust, as_flown)
     write_flight_fidelity(prepared, output_folder, grade)
     return spooled_flight(prepared.flight, output_folder, settings.scoring)
 
 
-def write_replays(
-    prepared: PreparedFlight, replayed: Mapping[str, Mapping[str, float]], folder: AnyPath
-) -> AsFlownReplay | None:
-    """Replay sets and write their files; what the grade compares of the as-flown one, where it is among them."""
-    keep, kept = compared_rows(onboard_samples(prepared.flight)), list[RecordArrays]()
-    as_flown = None
+def write_replays(prepared: PreparedFlight, replayed: Mapping[str, Mapping[str, float]], folder: AnyPath) -> None:
+    """Replay sets and write their files."""
     for name, overrides in replayed.items():
-        if name != AS_FLOWN:
-            write_replay(prepared, name, overrides, folder)
-            continue
-        summary = write_replay(prepared, name, overrides, folder, also=lambda rows: kept.append(keep(rows)))
-        result = result_of(summary, kept)
-        as_flown = AsFlownReplay(result, prepared.measured(result.innovations, prepared.parameters(overrides), result))
-    return as_flown
+        write_replay(prepared, name, overrides, folder)
+
+
+def write_as_flown(prepared: PreparedFlight, folder: AnyPath) -> AsFlownReplay:
+    """Replay the parameters that flew and write their files; what the grade compares of the replay."""
+    keep, kept = compared_rows(onboard_samples(prepared.flight)), list[RecordArrays]()
+    summary = write_replay(prepared, AS_FLOWN, {}, folder, also=lambda rows: kept.append(keep(rows)))
+    result = result_of(summary, kept)
+    return AsFlownReplay(result, prepared.measured(result.innovations, prepared.parameters({}), result))

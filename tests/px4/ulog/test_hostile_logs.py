@@ -211,9 +211,10 @@ def test_limits_are_checked(values: dict[str, float]) -> None:
 
 
 def test_what_later_rooms_read_is_kept() -> None:
-    from fusetune.analyze.analyze_flight import ANALYSIS_TOPICS
+    from fusetune.analyze.analyze_flight import COMPARED_TOPICS
+    from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
 
-    for topic in ANALYSIS_TOPICS:
+    for topic in (*REPLAY_TOPICS, *COMPARED_TOPICS):
         assert is_used(topic), topic
     assert not is_used("actuator_outputs")
 

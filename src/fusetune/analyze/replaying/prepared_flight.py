@@ -93,6 +93,10 @@ class PreparedFlight:
         """The same flight, started alike, with another sensor stream."""
         return dataclasses.replace(self, inputs=build_inputs(reconstructed.flight), reconstructed=reconstructed)
 
+    def with_log(self, logged: Flight) -> PreparedFlight:
+        """The same flight with further topics of its log, canonical, which no replay reads."""
+        return dataclasses.replace(self, flight=self.flight.with_topics(self.flight.topics | logged.topics))
+
     def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the summary of a replay: how it started and what was reconstructed."""
         warm = result.warm_start_us is not None

@@ -14,11 +14,11 @@ from fusetune.analyze.replaying.replayed_set import STATE_BLOCKS, Columns, Repla
 from fusetune.analyze.replaying.samples import SampleSpool, SpooledSamples, gate_of
 from fusetune.analyze.replaying.store.columns import (
     PREDICTED_TABLES,
-    columns_of,
     flags_table,
     innovation_table,
     local_position_table,
 )
+from fusetune.analyze.replaying.store.reader import columns_of
 from fusetune.analyze.replaying.store.writer import finish_replay, replay_writer
 from fusetune.ekf2.replay.recording import (
     FLAGS_ROW,

@@ -55,7 +55,7 @@ class ScoredFlight:
 
     Attributes
     ----------
-    flight : canonical; without its largest topics, which nothing asks for any more
+    flight : canonical; of its topics only what nothing else stands for here
     log_gaps : gaps in the IMU samples of the log, µs
     onboard : innovations that the vehicle logged, by source and axis
     """
@@ -112,8 +112,8 @@ def scored_flight(
     """
     settings = settings or ScoringSettings()
     log_gaps = imu_gaps(flight, settings.log_gap_s)
-    large = (*IMU_TOPICS, *INNOVATION_TOPICS)
-    rest = {key: table for key, table in flight.topics.items() if key[0] not in large}
+    asked = {*SCORE_TOPICS} - {*IMU_TOPICS, *INNOVATION_TOPICS}
+    rest = {key: table for key, table in flight.topics.items() if key[0] in asked}
     return ScoredFlight(flight.with_topics(rest), log_gaps, onboard_samples(flight) if onboard is None else onboard)
 
 

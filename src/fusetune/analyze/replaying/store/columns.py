@@ -111,8 +111,3 @@ RECORDED_TABLES: Mapping[str, RecordedTable] = dict(
 PREDICTED_TABLES: Mapping[str, Callable[[Sequence[GapResult]], pa.Table]] = dict(
     zip(PREDICTED, (prediction_table, gap_table), strict=True)
 )
-
-
-def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
-    """A table as NumPy arrays."""
-    return {name: table[name].to_numpy() for name in table.column_names}

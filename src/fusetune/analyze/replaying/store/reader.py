@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
 
 from fusetune.analyze.replaying.replayed_set import (
     STATE_BLOCKS,
@@ -23,7 +24,6 @@ from fusetune.analyze.replaying.replayed_set import (
     values_of,
 )
 from fusetune.analyze.replaying.samples import SampleSpool, SpooledSamples, gate_of
-from fusetune.analyze.replaying.store.columns import columns_of
 from fusetune.analyze.replaying.store.parts import summary_file, table_file
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
@@ -57,6 +57,11 @@ def read_columns(path: AnyPath, columns: list[str] | None = None) -> dict[str, n
         If the file is missing or damaged.
     """
     return columns_of(read_table(path, columns, sealed=False))
+
+
+def columns_of(table: pa.Table) -> dict[str, npt.NDArray[Any]]:
+    """A table as NumPy arrays."""
+    return {name: table[name].to_numpy() for name in table.column_names}
 
 
 def read_set(folder: AnyPath, name: str, spool: SampleSpool | None = None) -> ReplayedSet:
