@@ -141,7 +141,7 @@ def sound_case(folder: Path) -> Sound:
 
 
 def warned(verdict: Verdict) -> frozenset[str]:
-    return frozenset(check.name for check in verdict.checks if check.status in ("warning", "fail"))
+    return frozenset(check.id for check in verdict.findings if check.severity in ("warning", "fail"))
 
 
 def saved_case(content: bytes, folder: Path) -> tuple[Verdict, Flight | None]:

@@ -32,6 +32,7 @@ from fusetune.analyze.replaying.start_choice import StartSettings
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.trust.compared_innovations import replayed_innovations
 from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES
+from fusetune.analyze.trust.grade_causes import cost_of
 from fusetune.analyze.trust.trust_grade import grade_flight
 from fusetune.design.mission import load_mission
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
@@ -246,10 +247,10 @@ def _print_vehicle(logs: Path) -> None:
             raw = [grade.as_logged.innovation_ratio.get(name, float("nan")) for name in groups]
             lost = _lost_s(flight)
             collected.append([*sizes, *raw, *lost])
-            open_causes = [cause for cause in grade.causes if not cause.repaired]
-            worst = max(open_causes, key=lambda cause: cause.cost, default=None)
+            open_causes = [cause for cause in grade.causes if not cause.evidence["repaired"]]
+            worst = max(open_causes, key=cost_of, default=None)
             cells = [log.stem, f"{grade.grade} ({grade.as_logged_grade})", *map(_number, sizes + raw)]
-            cells += [worst.cause if worst else "–", _number(worst.cost) if worst else "–", *map(_number, lost)]
+            cells += [worst.found if worst else "–", _number(cost_of(worst)) if worst else "–", *map(_number, lost)]
             print("| " + " | ".join(cells) + " |", flush=True)
     if collected:
         medians = [statistics.median(v for v in column if np.isfinite(v)) for column in zip(*collected, strict=True)]

@@ -15,7 +15,7 @@ import argparse
 import io
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,7 @@ from fusetune.errors import UserError
 
 if TYPE_CHECKING:
     from fusetune.analyze.trust.fidelity import ReplayFidelity
-    from fusetune.save.checks.check import Check
+    from fusetune.finding import Finding
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
@@ -172,7 +172,7 @@ def _save(options: argparse.Namespace) -> int:
     verdicts = []
     for log in options.logs:
         verdict = save_log(log, options.out / log.stem)
-        print(f"{log.stem}: {verdict.status}", *_advice(verdict.checks), sep="\n  ")
+        print(f"{log.stem}: {verdict.status}", *map(_advice, verdict.failures), sep="\n  ")
         verdicts.append(verdict)
     return DONE_STATUS if all(verdict.status == "replayable" for verdict in verdicts) else REFUSED_STATUS
 
@@ -188,9 +188,9 @@ def _check_names(logs: Sequence[Path]) -> None:
             raise UserError(log, f"would be saved into the same folder as {other}", "Rename one, or save it elsewhere")
 
 
-def _advice(checks: Iterable[Check]) -> list[str]:
-    """What did not pass, and what to do about it."""
-    return [f"{check.reason}. {check.remedy}." for check in checks if check.status == "fail"]
+def _advice(finding: Finding) -> str:
+    """What is wrong, and what to do about it."""
+    return f"{finding.found}. {finding.remedy}."
 
 
 def _add_replay(commands: Commands) -> None:

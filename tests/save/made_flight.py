@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fusetune.finding import Finding
 from fusetune.px4.flight import Flight, ParameterHistory
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.save.checks.check import Check
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.save.verdict import Verdict, judge
 
@@ -66,6 +66,6 @@ def judged(flight: Flight, thresholds: VerdictThresholds | None = None) -> Verdi
     return judge(canonical(flight), thresholds)
 
 
-def check_of(flight: Flight, name: str) -> Check:
+def check_of(flight: Flight, name: str) -> Finding:
     """One check of a flight."""
-    return next(check for check in judged(flight).checks if check.name == name)
+    return next(check for check in judged(flight).findings if check.id == name)

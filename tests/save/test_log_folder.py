@@ -171,7 +171,7 @@ def test_bad_log_becomes_a_refusal(tmp_path: Path, content: bytes, reason: str) 
     verdict = save_log(tmp_path / "bad.ulg", tmp_path / "bad")
     assert verdict.status == "refused"
     assert reason in verdict.reasons[0]
-    assert verdict.checks[0].remedy
+    assert verdict.findings[0].remedy
     with pytest.raises(UserError, match="readable flight"):
         load_flight(tmp_path / "bad")
 
@@ -238,8 +238,8 @@ def test_all_checks_are_in_metadata_and_table(tmp_path: Path, log: Path) -> None
     assert metadata["verdict"] == verdict.document()
     write_flights_table([tmp_path / "made"], tmp_path / "flights.parquet", tmp_path / "flights.csv")
     (row,) = pq.read_table(tmp_path / "flights.parquet").to_pylist()
-    for check in verdict.checks:
-        assert f"{check.name} {check.status}" in row["checks"]
+    for check in verdict.findings:
+        assert f"{check.id} {check.severity}" in row["checks"]
 
 
 def test_remedies_of_what_did_not_pass_are_in_the_table(tmp_path: Path, log: Path) -> None:
@@ -249,8 +249,8 @@ def test_remedies_of_what_did_not_pass_are_in_the_table(tmp_path: Path, log: Pat
     write_flights_table([tmp_path / "made", tmp_path / "bad"], tmp_path / "flights.parquet", tmp_path / "flights.csv")
     rows = pq.read_table(tmp_path / "flights.parquet").to_pylist()
     for row, told in zip(rows, (verdict, refused), strict=True):
-        expected = {check.name: check.remedy for check in told.checks if check.status in ("warning", "fail")}
-        assert {one["check"]: one["remedy"] for one in row["advice"]} == expected
+        expected = {check.id: check.remedy for check in told.findings if check.severity in ("warning", "fail")}
+        assert {one["id"]: one["remedy"] for one in row["advice"]} == expected
     assert rows[0]["advice"]
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fusetune.finding import Finding
 from fusetune.px4.flight import Flight, ParameterHistory, TopicKey, TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.px4.ulog.writer import write_ulog
 from fusetune.save import load_flight, save_log
-from fusetune.save.checks.check import Check
 from fusetune.save.verdict import Verdict
 
 FIRST_US, SECONDS, IMU_HZ, SLOW_HZ = 5_000_000, 12, 200, 20
@@ -111,8 +111,8 @@ def saved(tmp_path: Path, content: bytes) -> Verdict:
     return save_log(tmp_path / "log.ulg", tmp_path / "log")
 
 
-def check_of(verdict: Verdict, name: str) -> Check:
-    return next(check for check in verdict.checks if check.name == name)
+def check_of(verdict: Verdict, name: str) -> Finding:
+    return next(check for check in verdict.findings if check.id == name)
 
 
 def data_begin(content: bytes) -> int:
@@ -133,9 +133,9 @@ def test_every_release_is_replayable_and_means_the_same(tmp_path: Path, release:
     verdict = save_log(tmp_path / "old.ulg", tmp_path / "old")
     assert verdict.status == "replayable", verdict.reasons
     for name in ("magnetometer", "barometer", "gnss", "gnss_fix", "imu_coverage", "sensor_values", "definitions"):
-        assert check_of(verdict, name).status == "pass", (name, check_of(verdict, name).reason)
-    assert "aiding by GNSS" in check_of(verdict, "horizontal_aid").reason
-    assert check_of(verdict, "firmware").status == ("pass" if release == (1, 16) else "warning")
+        assert check_of(verdict, name).severity == "pass", (name, check_of(verdict, name).found)
+    assert "aiding by GNSS" in check_of(verdict, "horizontal_aid").found
+    assert check_of(verdict, "firmware").severity == ("pass" if release == (1, 16) else "warning")
     assert check_of(verdict, "airborne").figure == pytest.approx(SECONDS - 1.0, abs=0.01)
     flight = canonical(load_flight(tmp_path / "old"))
     gnss_table = flight.topics["vehicle_gps_position", 0]
@@ -155,8 +155,8 @@ def test_file_that_is_cut_keeps_what_came_before_and_names_the_cut(tmp_path: Pat
         position = end
     verdict = saved(tmp_path, content[:cut])
     check = check_of(verdict, "readable")
-    assert check.status == "warning"
-    assert f"breaks off within a record, at byte {position} of {cut}" in check.reason
+    assert check.severity == "warning"
+    assert f"breaks off within a record, at byte {position} of {cut}" in check.found
     whole, kept = imu()["timestamp"], load_flight(tmp_path / "log").topics["sensor_combined", 0]["timestamp"]
     np.testing.assert_array_equal(kept, whole[: len(kept)])
     assert 0.8 * len(whole) < len(kept) < len(whole)
@@ -185,7 +185,7 @@ def test_data_appended_after_a_crash_are_read(tmp_path: Path, content: bytes) ->
     flight = load_flight(tmp_path / "log")
     assert ("ERROR", "hard fault") in [(message.level, message.text) for message in flight.messages]
     assert len(flight.topics["sensor_combined", 0]["timestamp"]) >= len(TIME) - 1
-    assert "breaks off within a record" in check_of(verdict, "readable").reason
+    assert "breaks off within a record" in check_of(verdict, "readable").found
 
 
 def test_places_of_appended_data_that_cannot_be_are_no_harm(tmp_path: Path, content: bytes) -> None:
@@ -194,7 +194,7 @@ def test_places_of_appended_data_that_cannot_be_are_no_harm(tmp_path: Path, cont
     flags[3 + 16 : 3 + 24] = (1 << 60).to_bytes(8, "little")
     verdict = saved(tmp_path, content[:16] + bytes(flags) + content[16 + 43 :])
     assert verdict.status == "replayable"
-    assert "places of appended data" in check_of(verdict, "readable").reason
+    assert "places of appended data" in check_of(verdict, "readable").found
 
 
 def test_unknown_features_of_the_format_are_refused(tmp_path: Path, content: bytes) -> None:
@@ -209,8 +209,8 @@ def test_unknown_message_ids_and_kinds_of_records_are_passed_over(tmp_path: Path
     strange = record(b"D", struct.pack("<HQ", 999, 6_000_000)) * 5 + record(b"Z", b"from the future")
     verdict = saved(tmp_path, content[:begin] + strange + content[begin:])
     assert verdict.status == "replayable"
-    assert "message ids that the log does not define (999)" in check_of(verdict, "readable").reason
-    assert "1 record of unknown kind" in check_of(verdict, "readable").reason
+    assert "message ids that the log does not define (999)" in check_of(verdict, "readable").found
+    assert "1 record of unknown kind" in check_of(verdict, "readable").found
     assert len(load_flight(tmp_path / "log").topics["sensor_combined", 0]["timestamp"]) == len(TIME)
 
 
@@ -219,7 +219,7 @@ def test_definition_whose_name_is_not_utf8_costs_its_topic_alone(tmp_path: Path,
     broken = content.replace(name, b"\xff\xfe" + name[2:], 1)
     assert len(broken) == len(content)
     verdict = saved(tmp_path, broken)
-    assert name[:-1].decode() in check_of(verdict, "definitions").reason
+    assert name[:-1].decode() in check_of(verdict, "definitions").found
     topics = load_flight(tmp_path / "log").topics
     assert (name[:-1].decode(), 0) not in topics
     assert len(topics["sensor_combined", 0]["timestamp"]) == len(TIME)
@@ -256,7 +256,7 @@ def test_absurd_definitions_cost_neither_time_nor_memory(tmp_path: Path, content
     strange += record(b"D", struct.pack("<HQ", 500, 6_000_000))
     verdict = saved(tmp_path, content[:begin] + strange + content[begin:])
     assert verdict.status == "replayable"
-    assert "lacks the message definitions of a" in check_of(verdict, "definitions").reason
+    assert "lacks the message definitions of a" in check_of(verdict, "definitions").found
 
 
 def test_single_time_stamps_that_cannot_be_cost_their_messages_alone(tmp_path: Path, content: bytes) -> None:
@@ -271,7 +271,7 @@ def test_single_time_stamps_that_cannot_be_cost_their_messages_alone(tmp_path: P
         damaged[place + 5 : place + 13] = time.to_bytes(8, "little")
     verdict = saved(tmp_path, bytes(damaged))
     assert verdict.status == "replayable"
-    assert check_of(verdict, "time_stamps").status == "warning"
+    assert check_of(verdict, "time_stamps").severity == "warning"
     flight = load_flight(tmp_path / "log")
     assert sum(entry.rows for entry in flight.left_out) == 5
     assert all(np.all(np.diff(table["timestamp"]) >= 0) for table in flight.topics.values())
@@ -284,8 +284,8 @@ def test_log_with_ground_time_only_is_replayable_with_a_warning(tmp_path: Path) 
     write_ulog(tmp_path / "log.ulg", flight)
     verdict = save_log(tmp_path / "log.ulg", tmp_path / "log")
     assert verdict.status == "replayable"
-    assert check_of(verdict, "airborne").reason == "never airborne"
-    assert check_of(verdict, "log_start").status == "does-not-apply"
+    assert check_of(verdict, "airborne").found == "never airborne"
+    assert check_of(verdict, "log_start").severity == "does-not-apply"
 
 
 @pytest.mark.parametrize(
@@ -304,7 +304,7 @@ def test_what_is_no_log_is_refused_with_its_reason(tmp_path: Path, content: byte
     verdict = saved(tmp_path, content)
     assert verdict.status == "refused"
     assert reason in verdict.reasons[0]
-    assert verdict.checks[0].remedy
+    assert verdict.findings[0].remedy
 
 
 def test_long_rubbish_in_a_log_is_passed_over(tmp_path: Path, content: bytes) -> None:
@@ -313,7 +313,7 @@ def test_long_rubbish_in_a_log_is_passed_over(tmp_path: Path, content: bytes) ->
     middle = data_begin(content) + 43_210
     verdict = saved(tmp_path, content[:middle] + rubbish + content[middle:])
     assert verdict.status == "replayable"
-    assert "are no records and were left out" in check_of(verdict, "readable").reason
+    assert "are no records and were left out" in check_of(verdict, "readable").found
     kept = load_flight(tmp_path / "log").topics["sensor_combined", 0]["timestamp"]
     # the record in which the rubbish lies is lost, and with it at most the few behind it that rubbish looked like
     assert len(kept) > len(TIME) - 20
@@ -345,7 +345,7 @@ def test_log_of_an_hour_is_read_as_a_whole(tmp_path: Path) -> None:
 def test_shared_logs_with_damage(tmp_path: Path, shared_logs: Path, name: str, status: str, said: str) -> None:
     verdict = save_log(shared_logs / f"{name}.ulg", tmp_path / name)
     assert verdict.status == status
-    assert said in check_of(verdict, "readable").reason
+    assert said in check_of(verdict, "readable").found
 
 
 @pytest.mark.parametrize(
@@ -400,8 +400,8 @@ def test_a_sensor_by_another_clock_is_left_out(tmp_path: Path) -> None:
     table = flight.topics["vehicle_magnetometer", 0]
     table["timestamp"] = table["timestamp"] // 1000  # milliseconds
     verdict = saved(tmp_path, with_messages_at(tmp_path, flight, "vehicle_magnetometer", SLOW))
-    assert "240 of vehicle_magnetometer: time stamps of another clock" in check_of(verdict, "time_stamps").reason
-    assert check_of(verdict, "magnetometer").status == "warning"
+    assert "240 of vehicle_magnetometer: time stamps of another clock" in check_of(verdict, "time_stamps").found
+    assert check_of(verdict, "magnetometer").severity == "warning"
     assert verdict.status == "replayable"
 
 

@@ -29,7 +29,7 @@ def test_good_flight_passes_every_check() -> None:
     flight = made_flight()
     verdict = judged(flight)
     assert verdict.status == "replayable"
-    assert {check.status for check in verdict.checks} == {"pass"}, verdict.warnings
+    assert {check.severity for check in verdict.findings} == {"pass"}, verdict.warnings
     assert check_of(flight, "imu_rate").figure == pytest.approx(200.0)
     # 600 rows of 20 Hz in the air
     assert check_of(flight, "airborne").figure == pytest.approx(30.0)
@@ -84,7 +84,7 @@ def test_gnss_without_fix_is_refused_only_where_nothing_else_aids() -> None:
     frame = {"pose_frame": np.ones(len(time), np.uint8)}
     vision.topics["vehicle_visual_odometry", 0] = {"timestamp": time, **frame, **position}
     assert judged(vision).status == "replayable"
-    assert "external vision" in check_of(vision, "horizontal_aid").reason
+    assert "external vision" in check_of(vision, "horizontal_aid").found
     flow = without_fix()
     pixels = {f"pixel_flow[{axis}]": np.zeros(len(time), np.float32) for axis in range(2)}
     pixels["integration_timespan_us"] = np.full(len(time), 50_000, np.uint32)
@@ -105,14 +105,14 @@ def test_aiding_that_the_log_does_not_hold_is_a_warning() -> None:
 def test_flight_without_gnss_switched_on_is_not_judged_by_gnss() -> None:
     flight = without_fix()
     flight.parameters.initial["EKF2_GPS_CTRL"] = 0
-    assert check_of(flight, "gnss").status == "does-not-apply"
-    assert check_of(flight, "horizontal_aid").status == "warning"
+    assert check_of(flight, "gnss").severity == "does-not-apply"
+    assert check_of(flight, "horizontal_aid").severity == "warning"
 
 
 def test_height_needs_some_source() -> None:
     flight = made_flight()
     del flight.topics["vehicle_air_data", 0]
-    assert check_of(flight, "barometer").status == "warning"
+    assert check_of(flight, "barometer").severity == "warning"
     flight.parameters.initial["EKF2_GPS_CTRL"] = 5
     assert "nothing in the log measures the height" in judged(flight).reasons[0]
 
@@ -120,15 +120,15 @@ def test_height_needs_some_source() -> None:
 def test_magnetometer_may_be_missing_or_switched_off() -> None:
     flight = made_flight()
     del flight.topics["vehicle_magnetometer", 0]
-    assert check_of(flight, "magnetometer").status == "warning"
+    assert check_of(flight, "magnetometer").severity == "warning"
     flight.parameters.initial["EKF2_MAG_TYPE"] = 5
-    assert check_of(flight, "magnetometer").status == "does-not-apply"
+    assert check_of(flight, "magnetometer").severity == "does-not-apply"
 
 
 def test_failures_and_warnings_name_a_remedy() -> None:
     for flight in (without_fix(), made_flight(rate_hz=20), made_flight(seconds=5.005)):
-        for check in judged(flight).checks:
-            assert check.remedy or check.status in ("pass", "does-not-apply")
+        for check in judged(flight).findings:
+            assert check.remedy or check.severity in ("pass", "does-not-apply")
 
 
 def test_verdicts_of_the_shared_logs(shared_logs: Path) -> None:

@@ -77,14 +77,13 @@ def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
 
 
 def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: dict[str, Any]) -> None:
-    from fusetune.analyze.sources import AID_SOURCES
-    from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+    from fusetune.px4.aid_sources import MEASURED_SOURCES, WITHHOLDABLE
 
     decision = schema["properties"]["decision"]["properties"]
-    assert decision["sources"]["propertyNames"]["enum"] == sorted(AID_SOURCES)
+    assert decision["sources"]["propertyNames"]["enum"] == sorted(MEASURED_SOURCES)
     pattern = re.compile(decision["withheld_sources"]["propertyNames"]["pattern"])
     for source in (source for sources in WITHHOLDABLE.values() for source in sources):
-        axes = "xyz"[: AID_SOURCES[source].axes]
+        axes = "xyz"[: MEASURED_SOURCES[source].axes]
         assert pattern.match(source)
         assert [axis for axis in "xyz" if pattern.match(f"{source}.{axis}")] == list(axes)
 

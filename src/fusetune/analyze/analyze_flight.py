@@ -18,9 +18,10 @@ from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.scoring.score_flight import spooled_flight, write_scores
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, ScoredFlight
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.trust.as_flown_comparison import AsFlownReplay
 from fusetune.analyze.trust.as_flown_figures import compared_rows
 from fusetune.analyze.trust.onboard_fidelity import write_flight_fidelity
-from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, AsFlownReplay, grade_flight
+from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, grade_flight
 from fusetune.analyze.trust.trust_settings import TrustSettings
 from fusetune.ekf2.replay.recording import RecordArrays
 from fusetune.ekf2.replay.replay import result_of

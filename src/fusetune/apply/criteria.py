@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.paper.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
+from fusetune.px4.aid_sources import AID_SOURCES, AXES
 
 Criteria = dict[str, float]
 
@@ -29,7 +30,7 @@ _FIGURES = {
 }
 """Criterion → source, axis and metric in the metrics table."""
 
-_AIDING = ("gnss_pos", "gnss_vel", "gnss_hgt", "baro_hgt", "rng_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt", "ev_yaw")
+_AIDING = tuple(source.name for source in AID_SOURCES.values() if source.summed)
 
 
 def metrics_of(flights: Sequence[AnalyzedFlight]) -> pa.Table:
@@ -67,13 +68,13 @@ def _criteria_of(
         label.format(source=source): mean(where.format(source=source), axis, metric)
         for label, (where, axis, metric) in _FIGURES.items()
     }
-    axes = [mean(source, axis, "lag1_correlation") for axis in ("x", "y", "z")]
+    axes = [mean(source, axis, "lag1_correlation") for axis in AXES]
     known = [value for value in axes if math.isfinite(value)]
     result[f"lag1_{source}"] = float(np.mean(known)) if known else math.nan
-    nlls = [mean(one, axis, "nll") for one in _AIDING for axis in ("x", "y", "z")]
+    nlls = [mean(one, axis, "nll") for one in _AIDING for axis in AXES]
     known = [value for value in nlls if math.isfinite(value)]
     result["nll_all_sources"] = float(np.sum(known)) if known else math.nan
-    rates = [mean(one, axis, "break_rate_gate") for one in _AIDING for axis in ("x", "y", "z")]
+    rates = [mean(one, axis, "break_rate_gate") for one in _AIDING for axis in AXES]
     known = [value for value in rates if math.isfinite(value)]
     result["break_rate_gate"] = float(np.mean(known)) if known else math.nan
     rms = rms_by_variable(name, index)

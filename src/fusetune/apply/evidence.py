@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.metrics.likelihood import profile_nll
-from fusetune.analyze.sources import AXES
 from fusetune.apply.settings import DecisionSettings
+from fusetune.px4.aid_sources import AXES
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table

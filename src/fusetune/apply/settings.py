@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fusetune.analyze.sources import AID_SOURCES, AXES
 from fusetune.errors import UserError
+from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES, WITHHOLDABLE
 from fusetune.settings import setting, settings_from_mapping
 from fusetune.storage.files import AnyPath
 
@@ -68,7 +68,7 @@ class DecisionSettings:
             values.setdefault("seed", seed)
         weights: dict[str, Any] = {
             key: _weights(values.pop(key), key, allowed, file)
-            for key, allowed in (("sources", tuple(AID_SOURCES)), ("withheld_sources", _withheld_sources()))
+            for key, allowed in (("sources", tuple(MEASURED_SOURCES)), ("withheld_sources", _withheld_sources()))
             if key in values
         }
         settings = settings_from_mapping(cls, values, "decision", file)
@@ -81,11 +81,8 @@ class DecisionSettings:
 
 def _withheld_sources() -> tuple[str, ...]:
     """Sources that are predicted without their sensor, whole and by axis."""
-    # imported where it is needed: it brings the estimator's compiler along, which readers of results have no use for
-    from fusetune.ekf2.replay.withholding import WITHHOLDABLE
-
     sources = tuple(source for sources in WITHHOLDABLE.values() for source in sources)
-    return (*sources, *(f"{source}.{axis}" for source in sources for axis in AXES[: AID_SOURCES[source].axes]))
+    return (*sources, *(f"{source}.{axis}" for source in sources for axis in AXES[: MEASURED_SOURCES[source].axes]))
 
 
 def _weights(value: Any, key: str, allowed: tuple[str, ...], file: AnyPath) -> dict[str, float]:

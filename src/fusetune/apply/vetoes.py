@@ -6,6 +6,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.apply.evidence import AnalyzedFlight
+from fusetune.px4.aid_sources import AXES
 from fusetune.px4.parameters.ekf2_parameters import check_value
 
 
@@ -73,7 +74,7 @@ def _breaks(name: str, present: str, flights: Sequence[str], metrics: pa.Table) 
     rows = metrics.filter(
         pc.and_(
             pc.equal(metrics["metric"], "break_rate_gate"),
-            pc.is_in(metrics["axis"], value_set=pa.array(["x", "y", "z"])),
+            pc.is_in(metrics["axis"], value_set=pa.array(AXES)),
         )
     ).to_pylist()
     figures = {(row["flight"], row["set"], row["source"], row["axis"]): row for row in rows}

@@ -9,7 +9,7 @@ import numpy as np
 from fusetune.execute.sensors.faults import DefaultProfile, Fault, LoggerDropout, of_kind
 from fusetune.execute.sensors.noise import random_stream
 from fusetune.execute.world.flight_plan import FlightEvents
-from fusetune.px4.estimator_samples import RELATIVE_TICK_US, RELATIVE_TIMESTAMP_INVALID
+from fusetune.px4.estimator_samples import RELATIVE_FIELDS, RELATIVE_TICK_US, RELATIVE_TIMESTAMP_INVALID
 from fusetune.px4.flight import Dropout, TopicKey, TopicTable, select_rows
 
 NO_SAMPLE = RELATIVE_TIMESTAMP_INVALID
@@ -17,15 +17,8 @@ ESTIMATOR_LATENCY_US = 450
 """From the end of an IMU sample to the run of the estimator that takes it."""
 LONGEST_LOSS = 4
 """A busy logger loses up to this many IMU samples in a row."""
-RELATIVE_TIMESTAMPS = {
-    "airspeed_timestamp_rel": None,
-    "airspeed_validated_timestamp_rel": None,
-    "distance_sensor_timestamp_rel": None,
-    "optical_flow_timestamp_rel": None,
-    "vehicle_air_data_timestamp_rel": "vehicle_air_data",
-    "vehicle_magnetometer_timestamp_rel": "vehicle_magnetometer",
-    "visual_odometry_timestamp_rel": None,
-}
+RELATIVE_TIMESTAMPS = dict(sorted((field, topic) for topic, field in RELATIVE_FIELDS.items()))
+"""Fields of `ekf2_timestamps`, in the order of the message, and the topics whose messages they name."""
 
 DEFAULT_INTERVAL_MS = {
     "vehicle_magnetometer": 500,
@@ -68,7 +61,7 @@ def ekf2_timestamps(topics: dict[TopicKey, TopicTable]) -> TopicTable:
     table: TopicTable = {"timestamp": imu_us.copy()}
     for column, topic in RELATIVE_TIMESTAMPS.items():
         relative = np.full(len(imu_us), NO_SAMPLE, np.int16)
-        if topic is not None and (topic, 0) in topics:
+        if (topic, 0) in topics:
             published_us = topics[topic, 0]["timestamp"]
             run = np.searchsorted(imu_us + ESTIMATOR_LATENCY_US, published_us)
             taken = run < len(imu_us)

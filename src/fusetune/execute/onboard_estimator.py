@@ -15,42 +15,29 @@ from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS
 from fusetune.ekf2.replay.replay import replay
 from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
 
-INNOVATION_FIELDS: dict[str, tuple[str, int] | None] = {
-    "gps_hvel[0]": ("gnss_vel", 0),
-    "gps_hvel[1]": ("gnss_vel", 1),
-    "gps_vvel": ("gnss_vel", 2),
-    "gps_hpos[0]": ("gnss_pos", 0),
-    "gps_hpos[1]": ("gnss_pos", 1),
-    "gps_vpos": ("gnss_hgt", 0),
-    "ev_hvel[0]": ("ev_vel", 0),
-    "ev_hvel[1]": ("ev_vel", 1),
-    "ev_vvel": ("ev_vel", 2),
-    "ev_hpos[0]": ("ev_pos", 0),
-    "ev_hpos[1]": ("ev_pos", 1),
-    "ev_vpos": ("ev_hgt", 0),
-    "rng_vpos": ("rng_hgt", 0),
-    "baro_vpos": ("baro_hgt", 0),
-    "aux_hvel[0]": ("aux_vel", 0),
-    "aux_hvel[1]": ("aux_vel", 1),
-    "flow[0]": ("optical_flow", 0),
-    "flow[1]": ("optical_flow", 1),
-    "heading": None,
-    "mag_field[0]": ("mag", 0),
-    "mag_field[1]": ("mag", 1),
-    "mag_field[2]": ("mag", 2),
-    "gravity[0]": ("gravity", 0),
-    "gravity[1]": ("gravity", 1),
-    "gravity[2]": ("gravity", 2),
-    "drag[0]": ("drag", 0),
-    "drag[1]": ("drag", 1),
-    "airspeed": ("airspeed", 0),
-    "beta": ("sideslip", 0),
-    "hagl": ("rng_hgt", 0),
-    "hagl_rate": None,
-}
+_MESSAGE_FIELDS = (
+    "gps_hvel[0]", "gps_hvel[1]", "gps_vvel", "gps_hpos[0]", "gps_hpos[1]", "gps_vpos",
+    "ev_hvel[0]", "ev_hvel[1]", "ev_vvel", "ev_hpos[0]", "ev_hpos[1]", "ev_vpos", "rng_vpos", "baro_vpos",
+    "aux_hvel[0]", "aux_hvel[1]", "flow[0]", "flow[1]", "heading", "mag_field[0]", "mag_field[1]", "mag_field[2]",
+    "gravity[0]", "gravity[1]", "gravity[2]", "drag[0]", "drag[1]", "airspeed", "beta", "hagl", "hagl_rate",
+)  # fmt: skip
+"""Fields of `estimator_innovations` in the order of the message."""
+
+_HEADING = "heading"
+"""Shared by sources of heading that the simulated vehicle does not have."""
+
+_FIELD_SOURCES = {
+    column: (source.name, axis)
+    for source in AID_SOURCES.values()
+    for axis, column in enumerate(source.innovations)
+    if column != _HEADING
+} | {"hagl": ("rng_hgt", 0)}
+
+INNOVATION_FIELDS: dict[str, tuple[str, int] | None] = {name: _FIELD_SOURCES.get(name) for name in _MESSAGE_FIELDS}
 """Field of `estimator_innovations` → aid source and axis; `None` where the simulated vehicle has no such source."""
 
 INNOVATION_TOPICS = {
@@ -71,7 +58,7 @@ def estimator_topics(flight: Flight) -> dict[TopicKey, TopicTable]:
     sources = {name: _Source(result, index) for index, name in enumerate(AID_SOURCE_NAMES)}
     active = {name: source for name, source in sources.items() if len(source.rows)}
     topics: dict[TopicKey, TopicTable] = {
-        (f"estimator_aid_src_{name}", 0): source.table() for name, source in active.items()
+        (AID_SOURCES[name].topic, 0): source.table() for name, source in active.items()
     }
     for topic, quantity in INNOVATION_TOPICS.items():
         topics[topic, 0] = _latest_values(result, active, quantity)

@@ -8,19 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from fusetune.px4.aid_sources import SENSOR_TOPICS
 from fusetune.px4.flight import Flight
 
 RELATIVE_TICK_US = 100
 RELATIVE_TIMESTAMP_INVALID = 0x7FFF
-RELATIVE_FIELDS = {
-    "airspeed": "airspeed_timestamp_rel",
-    "airspeed_validated": "airspeed_validated_timestamp_rel",
-    "distance_sensor": "distance_sensor_timestamp_rel",
-    "vehicle_optical_flow": "optical_flow_timestamp_rel",
-    "vehicle_air_data": "vehicle_air_data_timestamp_rel",
-    "vehicle_magnetometer": "vehicle_magnetometer_timestamp_rel",
-    "vehicle_visual_odometry": "visual_odometry_timestamp_rel",
-}
+RELATIVE_FIELDS = {topic.name: topic.relative_field for topic in SENSOR_TOPICS.values() if topic.relative_field}
 """Fields of `ekf2_timestamps` by the topics whose messages they name."""
 
 _ROUNDING_US = 150

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from fusetune.px4.aid_sources import SENSOR_TOPICS
 from fusetune.px4.flight import TopicTable
 
-STAMPED_BY_SAMPLE = frozenset(
-    {"vehicle_magnetometer", "vehicle_air_data", "airspeed", "vehicle_optical_flow", "vehicle_visual_odometry"}
-)
-"""Topics of which EKF2 takes `timestamp_sample`.
 
-GNSS, range finders, validated airspeed and landing targets are stamped with `timestamp`, whatever their sample time
-says; of GNSS that changed after v1.17.
-"""
+def is_stamped_by_sample(topic: str) -> bool:
+    """Whether EKF2 takes the sample time of a topic's messages, not the time of their publication."""
+    return topic in SENSOR_TOPICS and SENSOR_TOPICS[topic].stamped_by_sample
 
 
 def measurement_time(topic: str, table: TopicTable) -> np.ndarray:
@@ -22,7 +19,7 @@ def measurement_time(topic: str, table: TopicTable) -> np.ndarray:
     A sample time of zero counts as none.
     """
     timestamp = table["timestamp"].astype(np.int64)
-    if topic not in STAMPED_BY_SAMPLE or "timestamp_sample" not in table:
+    if not is_stamped_by_sample(topic) or "timestamp_sample" not in table:
         return timestamp
     sampled = table["timestamp_sample"].astype(np.int64)
     return np.where(sampled > 0, sampled, timestamp)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.results import Results
 
 _METRIC = re.compile(r"withheld_rms_([0-9.e+-]+)s")

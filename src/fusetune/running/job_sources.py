@@ -8,7 +8,17 @@ from __future__ import annotations
 
 from fusetune.storage.digest import source_digest
 
-BASE = ("errors.py", "number_settings.py", "px4", "set_names.py", "settings.py", "storage", "time_limit.py")
+BASE = (
+    "check.py",
+    "errors.py",
+    "finding.py",
+    "number_settings.py",
+    "px4",
+    "set_names.py",
+    "settings.py",
+    "storage",
+    "time_limit.py",
+)
 
 JOB_SOURCES = {
     "design": (*BASE, "design"),
@@ -22,7 +32,6 @@ JOB_SOURCES = {
         "analyze/metrics",
         "analyze/reconstruction",
         "analyze/replaying",
-        "analyze/sources.py",
     ),
     "score": (*BASE, "ekf2", "save", "analyze"),
     "apply": (*BASE, "apply"),

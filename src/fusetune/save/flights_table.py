@@ -9,6 +9,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from fusetune.finding import Finding, documents, from_documents, of_severity
 from fusetune.save.discovery import RefusedEntry
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
 from fusetune.save.log_folder import VERDICT_FILE
@@ -33,14 +34,14 @@ SCHEMA = pa.schema(
         ("airborne_s", pa.float64()),
         ("checksum", pa.string()),
         ("size_bytes", pa.int64()),
-        ("advice", pa.list_(pa.struct([(name, pa.string()) for name in ("check", "reason", "remedy")]))),
+        ("advice", pa.list_(pa.struct([(name, pa.string()) for name in ("id", "severity", "found", "remedy")]))),
     ]
 )
 """Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused.
 
 `file` is the path of the log below the folder of flights.
-`checks` holds name, status and figure of every check; `advice`, which the CSV leaves out, the remedies of those that
-did not pass.
+`checks` holds id, severity and figure of every check's finding; `advice`, which the CSV leaves out, those that did not
+pass and have a remedy, as findings (`fusetune.finding.from_documents`).
 """
 
 _DUPLICATE = "duplicate"
@@ -81,16 +82,10 @@ def write_flights_table(
 
 def _row(folder: Path) -> dict[str, Any]:
     verdict, metadata = (read_flight_document(folder / name) for name in (VERDICT_FILE, METADATA_FILE))
-    failed = [check for check in verdict["checks"] if check["status"] == "fail"]
-    warned = [check for check in verdict["checks"] if check["status"] == "warning"]
     return {
         "flight": verdict["flight"],
         "file": metadata["file"],
         "status": verdict["status"],
-        "reason": "; ".join(check["reason"] for check in failed),
-        "remedy": "; ".join(check["remedy"] for check in failed),
-        "warnings": "; ".join(check["reason"] for check in warned),
-        "checks": "; ".join(_compact(check) for check in verdict["checks"]),
         "firmware": metadata.get("firmware", "unknown"),
         "hardware": str(metadata.get("hardware", {}).get("ver_hw", "")),
         "recorded": metadata.get("recorded", ""),
@@ -98,28 +93,13 @@ def _row(folder: Path) -> dict[str, Any]:
         "airborne_s": metadata.get("airborne_s"),
         "checksum": metadata["checksum"],
         "size_bytes": metadata["size_bytes"],
-        "advice": [
-            {"check": check["name"], "reason": check["reason"], "remedy": check["remedy"]}
-            for check in (*failed, *warned)
-            if check["remedy"]
-        ],
-    }
+    } | _told(from_documents(verdict["findings"]))
 
 
 def _row_of_refused(entry: RefusedEntry) -> dict[str, Any]:
-    check = {"check": "readable", "reason": entry.reason, "remedy": entry.remedy}
-    texts = dict.fromkeys(("warnings", "hardware", "recorded", "checksum"), "")
-    return texts | {
-        "flight": entry.flight,
-        "file": entry.shown,
-        "status": "refused",
-        "reason": entry.reason,
-        "remedy": entry.remedy,
-        "checks": "readable fail",
-        "firmware": "unknown",
-        "size_bytes": 0,
-        "advice": [check],
-    }
+    row = dict.fromkeys(("hardware", "recorded", "checksum"), "") | {"firmware": "unknown", "size_bytes": 0}
+    row |= {"flight": entry.flight, "file": entry.shown, "status": "refused"}
+    return row | _told([Finding("readable", "fail", entry.reason, entry.remedy)])
 
 
 def _refuse_duplicates(rows: list[dict[str, Any]]) -> None:
@@ -128,15 +108,28 @@ def _refuse_duplicates(rows: list[dict[str, Any]]) -> None:
         if row["status"] != "replayable":
             continue
         original = first.setdefault(row["checksum"], row["flight"])
-        status = "pass" if original == row["flight"] else "fail"
-        row["checks"] += f"; {_DUPLICATE} {status}"
-        if status == "fail":
-            row["status"] = "refused"
-            row["reason"] = f"is the same log as {original}, which stands for both"
-            row["remedy"] = "Remove one of the two files"
-            row["advice"] = [{"check": _DUPLICATE, "reason": row["reason"], "remedy": row["remedy"]}]
+        if original == row["flight"]:
+            found = Finding(_DUPLICATE, "pass", "no other log is the same")
+        else:
+            said = f"is the same log as {original}, which stands for both"
+            found = Finding(_DUPLICATE, "fail", said, "Remove one of the two files")
+            told = _told([found])
+            row |= {"status": "refused"} | {name: told[name] for name in ("reason", "remedy", "advice")}
+        row["checks"] += f"; {_compact(found)}"
 
 
-def _compact(check: dict[str, Any]) -> str:
-    figure = "" if check["figure"] is None else f" {check['figure']:.4g}"
-    return f"{check['name']} {check['status']}{figure}"
+def _told(findings: Sequence[Finding]) -> dict[str, Any]:
+    """What some findings say, as columns of the table."""
+    failures, warnings = of_severity(findings, "fail"), of_severity(findings, "warning")
+    return {
+        "reason": "; ".join(finding.found for finding in failures),
+        "remedy": "; ".join(finding.remedy for finding in failures),
+        "warnings": "; ".join(finding.found for finding in warnings),
+        "checks": "; ".join(map(_compact, findings)),
+        "advice": documents(finding for finding in (*failures, *warnings) if finding.remedy),
+    }
+
+
+def _compact(finding: Finding) -> str:
+    figure = "" if finding.figure is None else f" {finding.figure:.4g}"
+    return f"{finding.id} {finding.severity}{figure}"

@@ -1,39 +1,50 @@
-"""Whether a flight can be replayed: named checks with figures, thresholds and remedies."""
+"""Whether a flight can be replayed: what its checks found, with figures, thresholds and remedies.
+
+Which checks there are is said in `fusetune.save.checks.registry`, what each asks in the file that is named for it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
+from fusetune.check import Check
 from fusetune.errors import UserError
+from fusetune.finding import Finding, documents, of_severity
 from fusetune.px4.flight import Flight
-from fusetune.save.checks import aid_checks, flight_checks, imu_checks, log_checks, sensor_checks
-from fusetune.save.checks.check import Check
+from fusetune.save.checks import registry
+from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.time_limit import Deadline
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Outcome of all checks of one flight."""
+    """What all checks of one flight found."""
 
     flight: str
-    checks: tuple[Check, ...]
+    findings: tuple[Finding, ...]
 
     @property
     def status(self) -> Literal["replayable", "refused"]:
         """Refused when any check failed."""
-        return "refused" if any(check.status == "fail" for check in self.checks) else "replayable"
+        return "refused" if self.failures else "replayable"
+
+    @property
+    def failures(self) -> tuple[Finding, ...]:
+        """For what the flight is refused; empty for a replayable one."""
+        return of_severity(self.findings, "fail")
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why the flight is refused; empty for a replayable one."""
-        return tuple(check.reason for check in self.checks if check.status == "fail")
+        """Why the flight is refused, in words."""
+        return tuple(finding.found for finding in self.failures)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What lessens the worth of the replay."""
-        return tuple(check.reason for check in self.checks if check.status == "warning")
+        """What lessens the worth of the replay, in words."""
+        return tuple(finding.found for finding in of_severity(self.findings, "warning"))
 
     def document(self) -> dict[str, Any]:
         """The verdict as a JSON object, in `verdict.json` and in `metadata.json`."""
@@ -42,7 +53,7 @@ class Verdict:
             "status": self.status,
             "reasons": list(self.reasons),
             "warnings": list(self.warnings),
-            "checks": [asdict(check) for check in self.checks],
+            "findings": documents(self.findings),
         }
 
 
@@ -57,24 +68,27 @@ def judge(flight: Flight, thresholds: VerdictThresholds | None = None, deadline:
     TimeLimitError
         The deadline passed.
     """
+    judged, deadline = JudgedFlight(flight, thresholds or VerdictThresholds()), deadline or Deadline()
+    findings = _asked((*registry.OF_THE_LOG, registry.NEEDED), judged, deadline)
+    if findings[-1].severity != "fail":
+        findings += _asked(registry.OF_THE_IMU, judged, deadline, until_failed=True)
+        findings += _asked(registry.OF_THE_FLIGHT, judged, deadline)
+    return Verdict(flight.name, tuple(findings))
 
-    limits, deadline = thresholds or VerdictThresholds(), deadline or Deadline()
-    checks = [check(flight, limits) for check in log_checks.CHECKS]
-    checks.append(imu_checks.imu_present(flight))
-    if checks[-1].status == "fail":
-        return Verdict(flight.name, tuple(checks))
-    for check in (*imu_checks.CHECKS, *sensor_checks.IMU_CHECKS):
+
+def _asked(
+    checks: Sequence[Check[JudgedFlight]], judged: JudgedFlight, deadline: Deadline, *, until_failed: bool = False
+) -> list[Finding]:
+    """What some checks find."""
+    findings: list[Finding] = []
+    for check in checks:
         deadline.check()
-        checks.append(check(flight, limits))
-        if checks[-1].status == "fail":
+        findings += check.findings(judged)
+        if until_failed and of_severity(findings, "fail"):
             break
-    checks += aid_checks.checks(flight, limits)
-    for check in (*sensor_checks.AID_CHECKS, *flight_checks.CHECKS):
-        deadline.check()
-        checks.append(check(flight, limits))
-    return Verdict(flight.name, tuple(checks))
+    return findings
 
 
 def unreadable(name: str, error: UserError) -> Verdict:
     """Verdict on a log that cannot be read."""
-    return Verdict(name, (Check("readable", "fail", f"the log {error.reason}", error.remedy),))
+    return Verdict(name, (Finding("readable", "fail", f"the log {error.reason}", error.remedy),))

@@ -58,6 +58,9 @@ def test_a_reset_of_one_set_is_cut_from_all(tmp_path: Path) -> None:
     window = scoring_window(made, "present", AIRBORNE, (), SETTINGS)
     assert window.intervals == ((at(10.0), at(40.0) - FUSION_DELAY_US), (at(43.0), at(LANDING_S)))
     assert [cut.reason for cut in window.cuts] == ["reset of horizontal position"]
+    finding = window.cuts[0].finding
+    assert (finding.severity, finding.found) == ("note", "reset of horizontal position")
+    assert (finding.start_us, finding.stop_us, finding.figure) == (at(40.0) - FUSION_DELAY_US, at(43.0), 3.5)
 
 
 def test_a_gap_in_the_log_is_cut_with_the_time_after_it(tmp_path: Path) -> None:

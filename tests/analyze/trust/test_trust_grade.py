@@ -14,19 +14,12 @@ from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFl
 from fusetune.analyze.replaying.replay_settings import IN_USE
 from fusetune.analyze.replaying.start_choice import StartSettings
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
+from fusetune.analyze.trust.as_flown_comparison import AsFlownReplay, distance
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, compared_rows
-from fusetune.analyze.trust.trust_grade import (
-    GNSS,
-    TRUST_TOPICS,
-    AsFlownReplay,
-    distance,
-    grade_flight,
-    grade_of,
-    with_half_the_gnss,
-    without_repair,
-)
+from fusetune.analyze.trust.grade_causes import GNSS, cost_of, with_half_the_gnss, without_repair
+from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, grade_flight, grade_of
 from fusetune.analyze.trust.trust_settings import FIGURES, TrustSettings
-from fusetune.analyze.trust.trust_words import limits_in_words, not_compared_in_words
+from fusetune.analyze.trust.trust_words import limits_of_grade, not_compared
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.layouts.estimator_instances import (
@@ -110,17 +103,18 @@ def test_a_figure_less_never_betters_the_grade(names):
     assert (graded.grade == "A") == (not names)
 
 
-def test_the_reason_names_the_resets_and_what_could_not_be_compared():
+def test_limits_name_the_resets_and_what_could_not_be_compared():
     figures = changed(velocity_m_s=None, resets={"height": (144, 0), "vertical velocity": (1, 1)})
-    assert limits_in_words(figures, ["height_resets"]) == [
-        "the replay resets its height 144 times where the vehicle did so 0 times"
-    ]
-    assert not_compared_in_words(["velocity_m_s"]) == "the log does not let horizontal velocity be compared"
-    assert not_compared_in_words(["velocity_m_s", "heading_deg", "flags_equal"]) == (
+    (resets,) = limits_of_grade(figures, ["height_resets"], "D", SETTINGS)
+    assert resets.found == "the replay resets its height 144 times where the vehicle did so 0 times"
+    # a C would have been given for up to three
+    assert (resets.id, resets.severity, resets.figure, resets.threshold) == ("height_resets", "fail", 144, 3.0)
+    assert not_compared(["velocity_m_s"]).found == "the log does not let horizontal velocity be compared"
+    assert not_compared(["velocity_m_s", "heading_deg", "flags_equal"]).found == (
         "the log does not let horizontal velocity, heading and flags be compared"
     )
     worst = changed(innovation_ratio={"heading": 0.5, "vision_position": 1.8}, resets={"vertical velocity": (1, 4)})
-    assert limits_in_words(worst, FIGURES)[:3] == [
+    assert [limit.found for limit in limits_of_grade(worst, FIGURES, "B", SETTINGS)][:3] == [
         "the replay resets its vertical velocity once where the vehicle did so 4 times",
         "the replay takes its height from the vehicle's sources in only 100% of the time",
         "innovations of heading are 0.5 times the vehicle's",
@@ -164,7 +158,9 @@ def test_what_is_at_hand_or_known_is_not_replayed_again(flight, monkeypatch):
     assert len(replays) == 1
     warm = grade_flight(prepare(flight, IN_USE.reconstruction, StartSettings(mode="warm")))
     assert warm.start.startswith("warm")
-    assert [one.cost for one in warm.causes] == [distance(warm.as_logged, SETTINGS) - distance(warm.repaired, SETTINGS)]
+    assert [cost_of(one) for one in warm.causes] == [
+        distance(warm.as_logged, SETTINGS) - distance(warm.repaired, SETTINGS)
+    ]
     # the one in use, and from nothing as the log is; what the start from nothing costs is known by then
     assert len(replays) == 3
 
@@ -177,9 +173,11 @@ def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
         | {("sensor_combined", 0): select_rows(imu, ~lost)}
     )
     grade = grade_flight(prepare(small, IN_USE.reconstruction, IN_USE.start))
-    causes = {cause.cause: cause for cause in grade.causes if cause.measured}
-    assert causes["missing IMU rows"].repaired
-    assert causes["missing IMU rows"].cost > 0.1
+    causes = {cause.found: cause for cause in grade.causes if cause.evidence["measured"]}
+    assert causes["missing IMU rows"].evidence["repaired"]
+    assert causes["missing IMU rows"].id == "imu_coverage"
+    assert cost_of(causes["missing IMU rows"]) > 0.1
+    assert grade.reason.startswith("; ".join(limit.found for limit in grade.limits))
     assert grade.grade <= grade.as_logged_grade
 
 

@@ -114,9 +114,9 @@ def test_thousands_of_topics_leave_those_that_are_used(tmp_path: Path) -> None:
     assert set(flight.topics) == {("vehicle_air_data", 0)}
     assert len(flight.beyond_limits) == 3000
     verdict = save_log(tmp_path / "hostile.ulg", tmp_path / "saved")
-    check = next(check for check in verdict.checks if check.name == "tables")
-    assert (check.status, check.figure) == ("warning", 3000.0)
-    assert "3000 of them did not become tables" in check.reason
+    check = next(check for check in verdict.findings if check.id == "tables")
+    assert (check.severity, check.figure) == ("warning", 3000.0)
+    assert "3000 of them did not become tables" in check.found
 
 
 def test_wide_instances_are_bounded_by_columns(tmp_path: Path) -> None:

@@ -2,8 +2,9 @@
 
 from fusetune.report.sections.advice import advice_table
 
-PROFILE = {"check": "logging_profile", "reason": "logged thinned", "remedy": "Set SDLOG_PROFILE = 3"}
-MOUNTING = {"check": "magnetometer_mounting", "reason": "sat by yaw 90°", "remedy": "Compare CAL_MAG0_ROT"}
+WARNING = {"severity": "warning"}
+PROFILE = WARNING | {"id": "logging_profile", "found": "logged thinned", "remedy": "Set SDLOG_PROFILE = 3"}
+MOUNTING = WARNING | {"id": "magnetometer_mounting", "found": "sat by yaw 90°", "remedy": "Compare CAL_MAG0_ROT"}
 
 
 def test_the_most_frequent_remedy_comes_first_with_its_flights():
@@ -17,7 +18,7 @@ def test_the_most_frequent_remedy_comes_first_with_its_flights():
 
 
 def test_a_flight_with_two_reasons_for_one_remedy_counts_once():
-    again = PROFILE | {"check": "barometer", "reason": "5 Hz"}
+    again = PROFILE | {"id": "barometer", "found": "5 Hz"}
     html = advice_table([{"flight": "log", "advice": [PROFILE, again]}])
     assert html.count("<td>log</td>") == 1
     assert "5 Hz" not in html

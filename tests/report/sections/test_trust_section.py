@@ -4,13 +4,18 @@ import re
 from pathlib import Path
 from typing import Any
 
+from fusetune.analyze.trust.grade_causes import cause
+from fusetune.finding import Finding
 from fusetune.report.sections.trust_section import trust_section
+from fusetune.save.checks.gnss import gnss
+from fusetune.save.checks.magnetometer import magnetometer
 from fusetune.storage.documents import write_document
 
 NOTHING: dict[str, Any] = {
     "innovation_ratio": {}, "velocity_m_s": None, "heading_deg": None, "height_m": None, "vertical_velocity_m_s": None,
     "flags_equal": None, "height_flags_equal": None, "resets": {},
 }  # fmt: skip
+LATE = Finding("log_start", "warning", "the log starts late", "wait longer")
 TRUST: dict[str, Any] = {
     "grade": "B",
     "as_logged_grade": "D",
@@ -25,14 +30,14 @@ TRUST: dict[str, Any] = {
     | {"height_m": 0.25, "resets": {"height": [1, 0], "vertical velocity": [1, 1]}},
     "figure_grades": {"innovation_factor": "A", "velocity_m_s": "B", "heading_deg": "A", "flags_equal": "A"},
     "causes": [
-        {"cause": "thinned magnetometer", "repaired": True, "measured": True, "cost": 2.0},
-        {"cause": "GNSS logged at 2.0 Hz", "repaired": False, "measured": True, "cost": 0.4},
+        cause(magnetometer, "thinned magnetometer", 2.0, repaired=True, measured=True).document(),
+        cause(gnss, "GNSS logged at 2.0 Hz", 0.4, repaired=False, measured=True).document(),
     ],
 }
 
 
 def write(folder: Path, name: str, **changes: Any) -> Path:
-    content = {"flight": name, "reasons": ["the log starts late"], "median_relative_rms": None, "axes": []} | changes
+    content = {"flight": name, "reasons": [LATE.document()], "median_relative_rms": None, "axes": []} | changes
     target = folder / name
     target.mkdir()
     write_document(target / "fidelity.json", content)
@@ -46,7 +51,7 @@ def test_a_graded_flight_says_what_was_repaired_and_what_remains(tmp_path: Path)
         assert text in table
     # What held only of the log as it is stands behind the click.
     assert "the log starts late" not in table
-    assert "As logged: the log starts late." in html
+    assert "As logged: the log starts late (wait longer)." in html
     assert "warm: the log begins 2 s before take-off" in html
 
 

@@ -9,6 +9,7 @@ from tests.save.made_flight import judged, made_flight
 
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
+from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.checks.magnetometer_mounting import (
     QUARTER_TURNS,
     described,
@@ -65,15 +66,15 @@ def leaning_flight(turn):
 
 
 def test_a_sensor_that_sits_as_told_passes():
-    (check,) = [check for check in judged(leaning_flight(np.eye(3))).checks if check.name == "magnetometer_mounting"]
-    assert check.status == "pass"
+    (check,) = [check for check in judged(leaning_flight(np.eye(3))).findings if check.id == "magnetometer_mounting"]
+    assert check.severity == "pass"
 
 
 def test_a_turned_sensor_is_told_with_its_turn():
     quarter = Rotation.from_euler("Z", 90, degrees=True).as_matrix()
-    (check,) = [check for check in judged(leaning_flight(quarter)).checks if check.name == "magnetometer_mounting"]
-    assert check.status == "warning"
-    assert "yaw 90°" in check.reason
+    (check,) = [check for check in judged(leaning_flight(quarter)).findings if check.id == "magnetometer_mounting"]
+    assert check.severity == "warning"
+    assert "yaw 90°" in check.found
     assert "CAL_MAG0_ROT" in check.remedy
 
 
@@ -86,7 +87,7 @@ def test_only_gazebos_magnetometer_is_turned_among_the_shared_logs(shared_logs):
         ("SkyRats__log_8_2021-8-12-15-53-14", "pass"),
     ):
         flight = canonical(read_ulog(shared_logs / f"{stem}.ulg"))
-        assert magnetometer_mounting(flight, VerdictThresholds()).status == expected
+        assert magnetometer_mounting.findings(JudgedFlight(flight, VerdictThresholds()))[0].severity == expected
 
 
 def test_the_quarter_turns_are_the_rotations_of_a_cube():

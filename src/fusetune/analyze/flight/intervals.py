@@ -6,7 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.finding import Finding
+
 Interval = tuple[int, int]
+NOT_SCORED = "not_scored"
 
 
 @dataclass(frozen=True)
@@ -16,6 +19,14 @@ class Cut:
     start: int
     stop: int
     reason: str
+
+    @property
+    def finding(self) -> Finding:
+        """The cut in the form that all rooms share, for it to be told."""
+        seconds = (self.stop - self.start) * 1e-6
+        return Finding(
+            NOT_SCORED, "note", self.reason, figure=seconds, unit="s", start_us=self.start, stop_us=self.stop
+        )
 
 
 def inside(time: npt.NDArray[np.int64], intervals: Iterable[Interval]) -> npt.NDArray[np.bool_]:

@@ -1,10 +1,12 @@
 """How often an observation is declared inconsistent, with the interval that the number of samples allows."""
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 from scipy.special import betaincinv
 
-from fusetune.analyze.metrics.consistency import Bounds
+from fusetune.analyze.metrics.metric import Bounds, InnovationMetric, Innovations, InWindow
 
 Array = npt.NDArray[np.float64]
 
@@ -15,7 +17,7 @@ def beyond_standard_deviations(innovation: Array, innovation_variance: Array, li
 
 
 def beyond_gate(test_ratio: Array, rejected: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """True where the axis is beyond its gate; where its gate is unknown (NaN), where the source was rejected."""
+    """True where the axis is beyond its gate; where its gate is unknown, where the source was rejected."""
     return np.where(np.isfinite(test_ratio), test_ratio > 1.0, rejected)
 
 
@@ -41,3 +43,35 @@ def clopper_pearson(breaks: npt.ArrayLike, samples: int, confidence: float) -> B
 def break_rate(broken: npt.NDArray[np.bool_], confidence: float) -> Bounds:
     """Fusion break rate t_FB = Σ o_i / N of (..., N) flags with its Clopper–Pearson interval."""
     return clopper_pearson(np.count_nonzero(broken, axis=-1), broken.shape[-1], confidence)
+
+
+def _any_beyond(given: Innovations, limit: float) -> npt.NDArray[np.bool_]:
+    beyond = beyond_standard_deviations(given.innovation, given.innovation_variance, limit)
+    return np.logical_or.reduce(beyond, axis=0)
+
+
+def _any_beyond_gate(given: Innovations) -> npt.NDArray[np.bool_]:
+    return np.logical_or.reduce(beyond_gate(given.test_ratio, given.rejected), axis=0)
+
+
+def _metric(
+    limit: str, label: str, words: str, broken: Callable[[Innovations], npt.NDArray[np.bool_]], used: tuple[str, ...]
+) -> InnovationMetric:
+    return InnovationMetric(
+        f"break_rate_{limit}",
+        "1",
+        f"share with any axis beyond {words}, with Clopper–Pearson bounds",
+        lambda given: break_rate(broken(given), given.confidence),
+        "lower",
+        used,
+        window=InWindow(f"worst_window_break_rate_{limit}", broken),
+        on_ground=limit == "gate",
+        label=label,
+    )
+
+
+METRICS = (
+    _metric("3sd", "3 σ", "3 σ", lambda given: _any_beyond(given, 3), ("report",)),
+    _metric("5sd", "5 σ", "5 σ", lambda given: _any_beyond(given, 5), ("report",)),
+    _metric("gate", "gate", "its gate", _any_beyond_gate, ("apply", "report")),
+)

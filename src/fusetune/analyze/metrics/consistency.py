@@ -1,21 +1,13 @@
 """Does the filter believe what it should? Mean normalised innovation squared (NIS) against its χ² bounds."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtri
 
+from fusetune.analyze.metrics.metric import Bounds, InnovationMetric, Innovations, InWindow
+from fusetune.analyze.metrics.whiteness import independent_samples
+
 Array = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """A figure with its two-sided bounds; all of the same shape."""
-
-    value: Array
-    lower: Array
-    upper: Array
 
 
 def mean_nis(innovation: Array, innovation_variance: Array) -> Array:
@@ -79,3 +71,41 @@ def c_nis(innovation: Array, innovation_variance: Array) -> Array:
     with np.errstate(divide="ignore"):
         spread = np.abs(np.log(np.var(nis, axis=-1, ddof=1) / (2.0 * dimension)))
     return j_nis(np.mean(nis, axis=-1), dimension) + spread
+
+
+def _nis_of_samples(given: Innovations) -> Array:
+    return np.asarray(np.sum(np.square(given.innovation) / given.innovation_variance, axis=0))
+
+
+def _mean_nis(given: Innovations) -> Array:
+    return mean_nis(given.innovation, given.innovation_variance)
+
+
+def _paper_bounds(given: Innovations) -> Bounds:
+    return paper_bounds(given.once(_mean_nis), given.samples, given.dimension, given.confidence)
+
+
+def _effective_bounds(given: Innovations) -> Bounds:
+    return effective_bounds(given.once(_mean_nis), given.once(independent_samples), given.dimension, given.confidence)
+
+
+METRICS = (
+    InnovationMetric(
+        "mean_nis", "1", "mean of ν²/S, summed over the axes, with χ² bounds for N samples (the paper's)",
+        _paper_bounds, "nearer to the number of axes", ("apply", "report"),
+        window=InWindow("worst_window_nis", _nis_of_samples), on_ground=True,
+    ),
+    InnovationMetric(
+        "mean_nis_effective", "1", "the same with bounds for N_eff = N / (1 + 2 Σ ρ²) samples",
+        _effective_bounds, "nearer to the number of axes", ("report",),
+        samples=lambda given: given.once(independent_samples),
+    ),
+    InnovationMetric(
+        "j_nis", "1", "\\|ln(mean NIS / n)\\|", lambda given: j_nis(given.once(_mean_nis), given.dimension),
+        "lower", ("apply",),
+    ),
+    InnovationMetric(
+        "c_nis", "1", "that plus \\|ln(var NIS / 2n)\\|",
+        lambda given: c_nis(given.innovation, given.innovation_variance), "lower", ("apply",),
+    ),
+)  # fmt: skip

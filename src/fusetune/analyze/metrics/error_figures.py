@@ -1,5 +1,6 @@
 """Figures of an error whose truth is known: RMSE and its relatives, along and across the track, NEES with bounds."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.metrics.attitude import down_in_body, heading, wrap
 from fusetune.analyze.metrics.consistency import effective_bounds, paper_bounds
+from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.metrics.whiteness import autocorrelation, effective_samples, lag_limit
 
 Array = npt.NDArray[np.float64]
@@ -31,22 +33,48 @@ class ErrorFigure:
     upper: float = np.nan
 
 
-def norm_figures(quantity: str, axis: str, norm: Array) -> list[ErrorFigure]:
-    """RMSE; average Euclidean, harmonic and geometric error; maximum of error norms (N,).
+def _harmonic(error: Array) -> float:
+    return float(1.0 / np.mean(1.0 / np.maximum(np.abs(error), 1e-12)))
 
-    References
-    ----------
-    García, Molina, Trincado, table 1; Li and Zhao, "Practical measures for performance evaluation", 2001.
-    """
-    positive = np.maximum(norm, 1e-12)
-    values = {
-        "rmse": np.sqrt(np.mean(np.square(norm))),
-        "average_euclidean_error": np.mean(norm),
-        "harmonic_error": 1.0 / np.mean(1.0 / positive),
-        "geometric_error": np.exp(np.mean(np.log(positive))),
-        "maximum_error": np.max(norm),
-    }
-    return [ErrorFigure(quantity, axis, metric, float(value), norm.size) for metric, value in values.items()]
+
+def _geometric(error: Array) -> float:
+    return float(np.exp(np.mean(np.log(np.maximum(np.abs(error), 1e-12)))))
+
+
+_RMSE: Metric[Array] = Metric(
+    "rmse", SOURCE_UNIT, "root mean square error", lambda error: np.sqrt(np.mean(np.square(error))), "lower",
+    ("apply", "report"),
+)  # fmt: skip
+_MEAN: Metric[Array] = Metric("mean_error", SOURCE_UNIT, "mean error of an axis", np.mean, "nearer to 0")
+_MAXIMUM: Metric[Array] = Metric(
+    "maximum_error", SOURCE_UNIT, "largest error", lambda error: np.max(np.abs(error)), "lower"
+)
+
+NORM_METRICS: tuple[Metric[Array], ...] = (
+    _RMSE,
+    Metric("average_euclidean_error", SOURCE_UNIT, "mean of the norm", np.mean, "lower"),
+    Metric("harmonic_error", SOURCE_UNIT, "harmonic mean of the norm", _harmonic, "lower"),
+    Metric("geometric_error", SOURCE_UNIT, "geometric mean of the norm", _geometric, "lower"),
+    _MAXIMUM,
+)
+"""Of the norms (N,) of errors of several axes.
+
+References
+----------
+García, Molina, Trincado, table 1; Li and Zhao, "Practical measures for performance evaluation", 2001.
+"""
+
+COMPONENT_METRICS = (_RMSE, _MEAN, _MAXIMUM)
+"""Of one component (N,) of errors."""
+
+
+def _figures(metrics: Iterable[Metric[Array]], quantity: str, axis: str, error: Array) -> list[ErrorFigure]:
+    return [ErrorFigure(quantity, axis, one.name, float(one.function(error)), error.size) for one in metrics]
+
+
+def norm_figures(quantity: str, axis: str, norm: Array) -> list[ErrorFigure]:
+    """The `NORM_METRICS` of error norms (N,)."""
+    return _figures(NORM_METRICS, quantity, axis, norm)
 
 
 def vector_figures(quantity: str, error: Array, true_velocity: Array) -> list[ErrorFigure]:
@@ -69,13 +97,8 @@ def vector_figures(quantity: str, error: Array, true_velocity: Array) -> list[Er
 
 
 def component_figures(quantity: str, axis: str, error: Array) -> list[ErrorFigure]:
-    """RMSE, mean and largest absolute error of one component (N,)."""
-    values = {
-        "rmse": np.sqrt(np.mean(np.square(error))),
-        "mean_error": np.mean(error),
-        "maximum_error": np.max(np.abs(error)),
-    }
-    return [ErrorFigure(quantity, axis, metric, float(value), error.size) for metric, value in values.items()]
+    """The `COMPONENT_METRICS` of one component (N,)."""
+    return _figures(COMPONENT_METRICS, quantity, axis, error)
 
 
 def attitude_figures(quaternion: Array, true_quaternion: Array) -> list[ErrorFigure]:
@@ -120,14 +143,23 @@ def nees_figures(
     plain = paper_bounds(nees, count, dimension, confidence)
     wide = effective_bounds(nees, independent, dimension, confidence)
     return [
-        ErrorFigure(quantity, axis, "nees", float(nees[0]), count, float(plain.lower[0]), float(plain.upper[0])),
+        ErrorFigure(quantity, axis, NEES.name, float(nees[0]), count, float(plain.lower[0]), float(plain.upper[0])),
         ErrorFigure(
             quantity,
             axis,
-            "nees_effective",
+            NEES_EFFECTIVE.name,
             float(nees[0]),
             float(independent[0]),
             float(wide.lower[0]),
             float(wide.upper[0]),
         ),
     ]
+
+
+NEES: Metric[list[ErrorFigure]] = Metric(
+    "nees", "1", "mean of Σ e²/P with χ² bounds for N samples", lambda figures: figures[0].value, "", ("report",)
+)
+NEES_EFFECTIVE: Metric[list[ErrorFigure]] = Metric(
+    "nees_effective", "1", "the same with bounds for N_eff samples", lambda figures: figures[1].value
+)
+"""Of what `nees_figures` gives; their expectation is the number of axes."""

@@ -3,6 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.metrics.metric import SOURCE_UNIT, InnovationMetric, Innovations, InWindow
+
 Array = npt.NDArray[np.float64]
 
 
@@ -41,3 +43,20 @@ def rms_norm(innovation: Array) -> Array:
 def mean_innovation(innovation: Array) -> Array:
     """Mean of the innovations, (..., N) → (...); an unbiased model has 0."""
     return np.mean(innovation, axis=-1)
+
+
+def _squared_norm(given: Innovations) -> Array:
+    return np.asarray(np.sum(np.square(given.innovation), axis=0))
+
+
+METRICS = (
+    InnovationMetric(
+        "mean_innovation", SOURCE_UNIT, "mean", lambda given: mean_innovation(given.innovation[0]), "nearer to 0",
+        of_groups=False,
+    ),
+    InnovationMetric(
+        "rms_innovation", SOURCE_UNIT, "root mean square; of a group, of the norm",
+        lambda given: rms_norm(given.innovation), "lower", ("apply", "report"),
+        window=InWindow("worst_window_rms", _squared_norm, np.sqrt), on_ground=True,
+    ),
+)  # fmt: skip

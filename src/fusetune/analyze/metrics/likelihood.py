@@ -3,10 +3,15 @@
 All are means per sample and axis in nat; lower is better. The term ln S punishes inflated noise.
 """
 
+import functools
 import math
+import operator
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import numpy.typing as npt
+
+from fusetune.analyze.metrics.metric import InnovationMetric, Innovations, InWindow
 
 Array = npt.NDArray[np.float64]
 
@@ -61,3 +66,54 @@ def profile_nll(mean_nis: Array, mean_log_variance: Array) -> Array:
     """
     with np.errstate(divide="ignore"):
         return 0.5 * np.log(mean_nis) + 0.5 * np.asarray(mean_log_variance)
+
+
+def _winsorised(given: Innovations) -> Array:
+    return np.stack([winsorised(nu, limit) for nu, limit in zip(given.innovation, given.winsor_limits(), strict=True)])
+
+
+def _mean_log_variance(given: Innovations) -> Array:
+    return np.asarray(np.mean(np.log(given.innovation_variance), axis=-1))
+
+
+def _sum(values: Iterable[Array]) -> Array:
+    """Likelihoods of several axes: the sum of theirs, each axis winsorised and scaled by itself."""
+    return functools.reduce(operator.add, values)
+
+
+def _mean(nll: Callable[[Array, Array], Array], innovation: Array, given: Innovations) -> Array:
+    return _sum(np.mean(nll(*axis), axis=-1) for axis in zip(innovation, given.innovation_variance, strict=True))
+
+
+def _profile(innovation: Array, given: Innovations) -> Array:
+    axes = zip(innovation, given.innovation_variance, given.once(_mean_log_variance), strict=True)
+    return _sum(profile_nll(np.mean(np.square(nu) / s, axis=-1), log_s) for nu, s, log_s in axes)
+
+
+def _winsorised_nll(given: Innovations) -> Array:
+    return _sum(map(gaussian_nll, given.once(_winsorised), given.innovation_variance))
+
+
+METRICS = (
+    InnovationMetric(
+        "nll", "nat", "negative log-likelihood per sample",
+        lambda given: _mean(gaussian_nll, given.innovation, given), "lower", ("apply",),
+    ),
+    InnovationMetric(
+        "nll_student_t", "nat", "the same under Student's t with 5 degrees of freedom",
+        lambda given: _mean(student_t_nll, given.innovation, given), "lower",
+    ),
+    InnovationMetric(
+        "nll_winsorised", "nat", "the same with innovations clipped at 5 robust standard deviations of all sets",
+        lambda given: _mean(gaussian_nll, given.once(_winsorised), given), "lower",
+        window=InWindow("worst_window_nll_winsorised", _winsorised_nll),
+    ),
+    InnovationMetric(
+        "nll_profile", "nat", "the same with the best constant factor on S, less ½ + ½ ln 2π",
+        lambda given: _profile(given.innovation, given), "lower",
+    ),
+    InnovationMetric(
+        "nll_profile_winsorised", "nat", "that of clipped innovations",
+        lambda given: _profile(given.once(_winsorised), given), "lower",
+    ),
+)  # fmt: skip

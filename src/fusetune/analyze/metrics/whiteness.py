@@ -5,6 +5,8 @@ import numpy.typing as npt
 from scipy.fft import next_fast_len
 from scipy.special import chdtrc
 
+from fusetune.analyze.metrics.metric import InnovationMetric, Innovations
+
 Array = npt.NDArray[np.float64]
 
 LJUNG_BOX_LAGS = 10
@@ -66,3 +68,34 @@ def ljung_box(correlation: Array, samples: int, lags: int = LJUNG_BOX_LAGS) -> t
     weights = 1.0 / (samples - np.arange(1, lags + 1))
     statistic = samples * (samples + 2.0) * np.sum(np.square(correlation[..., :lags]) * weights, axis=-1)
     return statistic, np.asarray(chdtrc(max(lags, 1), statistic), dtype=np.float64)
+
+
+def _correlation(given: Innovations) -> Array:
+    """Autocorrelation of ν/√S, (D, S, K)."""
+    return autocorrelation(given.innovation / np.sqrt(given.innovation_variance), lag_limit(given.samples))
+
+
+def independent_samples(given: Innovations) -> Array:
+    """Number of independent samples, (S,); of a group of axes by the mean of their shares."""
+    found = effective_samples(given.once(_correlation), given.samples)
+    return given.samples * np.mean(found / given.samples, axis=0) if given.of_group else found[0]
+
+
+def _ljung_box(given: Innovations) -> tuple[Array, Array]:
+    return ljung_box(given.once(_correlation)[0], given.samples)
+
+
+METRICS = (
+    InnovationMetric(
+        "lag1_correlation", "1", "correlation of successive ν/√S", lambda given: given.once(_correlation)[0, :, 0],
+        "nearer to 0", ("apply",), of_groups=False,
+    ),
+    InnovationMetric(
+        "ljung_box", "1", "Ljung–Box statistic of ν/√S over 10 lags", lambda given: given.once(_ljung_box)[0],
+        "lower", of_groups=False,
+    ),
+    InnovationMetric(
+        "ljung_box_p", "1", "its p-value under whiteness, χ²(10)", lambda given: given.once(_ljung_box)[1],
+        "higher", of_groups=False,
+    ),
+)  # fmt: skip

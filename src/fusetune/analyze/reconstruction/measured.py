@@ -6,12 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fusetune.analyze.reconstruction.reconstructed_flight import BARO, MAG, ReconstructedFlight
-from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
+from fusetune.analyze.reconstruction.reconstructed_flight import ReconstructedFlight
+from fusetune.px4.aid_sources import AID_SOURCES, REPLAYED_SOURCES, SENSORS
 from fusetune.px4.sample_times import measurement_time
-
-SENSORS = {"mag": (MAG, "EKF2_MAG_DELAY"), "baro_hgt": (BARO, "EKF2_BARO_DELAY")}
-"""Aid source → topic of its measurements and the parameter of their delay."""
 
 
 def measured_rows(
@@ -29,14 +26,18 @@ def measured_rows(
     interval_us : update interval of the replay
     """
     measured = np.ones(len(innovations), np.bool_)
-    for source, (topic, delay) in SENSORS.items():
+    for source in map(AID_SOURCES.__getitem__, REPLAYED_SOURCES):
+        if not source.sensor:
+            continue
+        sensor = SENSORS[source.sensor]
+        topic = sensor.topics[0].name
         mask = reconstructed.measured.get(topic)
         if mask is None:
             continue
-        rows = np.flatnonzero(innovations["source"] == AID_SOURCE_NAMES.index(source))
+        rows = np.flatnonzero(innovations["source"] == source.code)
         time = measurement_time(topic, reconstructed.flight.topics[topic, 0])
         order = np.argsort(time, kind="stable")
-        wanted = innovations["timestamp_sample"][rows] + parameters[delay] * 1e3 + 0.5 * interval_us
+        wanted = innovations["timestamp_sample"][rows] + parameters[sensor.delay_parameter] * 1e3 + 0.5 * interval_us
         measured[rows] = mask[order[_nearest(time[order], wanted)]]
     return measured
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.replaying.samples import AxisSamples
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES
 
 
 def measurement_time(samples: AxisSamples, source: str, parameters: Mapping[str, float]) -> npt.NDArray[np.int64]:

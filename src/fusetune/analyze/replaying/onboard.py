@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.replaying.store.row_groups import tables_in_groups
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import MEASURED_SOURCES
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.storage.files import AnyPath
@@ -18,7 +18,7 @@ INNOVATION_TOPICS = (
     "estimator_innovation_variances",
     "estimator_innovation_test_ratios",
     "ekf2_innovations",
-    *(f"estimator_aid_src_{name}" for name in AID_SOURCES),
+    *(source.topic for source in MEASURED_SOURCES.values()),
 )
 """Topics of any release that the innovations are read from, and those that `canonical` makes of them."""
 
@@ -42,9 +42,8 @@ class OnboardSamples(Mapping[SourceAxis, AxisSamples]):
     def __init__(self, flight: Flight, instance: int | None) -> None:
         self._tables: dict[str, TopicTable] = {}
         self._columns: dict[SourceAxis, str] = {}
-        for name, source in AID_SOURCES.items():
-            topic = f"estimator_aid_src_{name}"
-            table = rows_of_primary(flight, topic) if instance is None else flight.topic(topic, instance)
+        for name, source in MEASURED_SOURCES.items():
+            table = rows_of_primary(flight, source.topic) if instance is None else flight.topic(source.topic, instance)
             if table is None or table["timestamp"].size == 0:
                 continue
             self._tables[name] = table

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.storage.files import AnyPath
 
 SourceAxis = tuple[str, int]
@@ -138,7 +138,7 @@ class SpooledSamples(Mapping[SourceAxis, AxisSamples]):
         by_number = list(self._names)
         for start, stop in zip(starts.tolist(), [*starts[1:].tolist(), key.size], strict=True):
             name, axis = by_number[key[start] // _AXES], int(key[start] % _AXES)
-            if name in AID_SOURCES:
+            if name in MEASURED_SOURCES:
                 part = (place + start * self._dtype.itemsize, stop - start)
                 self._places.setdefault((name, axis), []).append(part)
 

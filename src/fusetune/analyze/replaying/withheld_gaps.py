@@ -13,12 +13,10 @@ from typing import Any
 
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.ekf2.replay.results import Gap
-from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+from fusetune.px4.aid_sources import SENSORS, WITHHOLDABLE
 from fusetune.px4.flight import Flight
 from fusetune.settings import setting, settings_from_mapping
 from fusetune.storage.files import AnyPath
-
-_TOPICS = {"gnss": "vehicle_gps_position", "baro": "vehicle_air_data", "mag": "vehicle_magnetometer"}
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def plan_gaps(flight: Flight, airborne: Sequence[Interval], settings: Withholdin
     gaps = []
     for sensor in WITHHOLDABLE:
         length, step = (round(seconds * 1e6) for seconds in (settings.length_s(sensor), settings.every_s(sensor)))
-        if length == 0 or flight.topic(_TOPICS[sensor]) is None:
+        if length == 0 or flight.topic(SENSORS[sensor].topics[0].name) is None:
             continue
         for start, stop in airborne:
             gaps += [Gap(sensor, first, first + length) for first in range(start, stop - length + 1, step)]

@@ -11,18 +11,10 @@ import numpy as np
 
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples
-from fusetune.analyze.scoring.parameter_sources import OBSERVATION_NOISE, required_sources, switched_off
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.analyze.scoring.parameter_sources import observation_noise_of, required_sources, switched_off
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
 
-_NOISE_FLOORS: dict[str, tuple[tuple[str, float, str], ...]] = {
-    "EKF2_GPS_P_NOISE": (("eph", 1.0, "gnss_pos"), ("epv", 1.5, "gnss_hgt")),
-    "EKF2_GPS_V_NOISE": (("s_variance_m_s", 1.0, "gnss_vel"),),
-}
-"""Parameter → the receiver's accuracies in `vehicle_gps_position`, each with the factor by which the floor of the
-source that it serves exceeds the parameter; below its floor the parameter acts."""
-
-_UNITS = {"EKF2_GPS_P_NOISE": "m", "EKF2_GPS_V_NOISE": "m/s"}
 _NEGLIGIBLE_SHARE = 0.02
 
 
@@ -87,23 +79,24 @@ def _absent_source(name: str, record: ReplayedSet, present: ReplayedSet) -> str:
 
 def _below_receiver_accuracy(name: str, record: ReplayedSet, present: ReplayedSet, flight: Flight) -> str:
     table = flight.topic("vehicle_gps_position")
-    if name not in _NOISE_FLOORS or table is None:
+    floors = [(one, floor) for one in AID_SOURCES.values() for floor in one.noise_floors if floor.parameter == name]
+    if not floors or table is None:
         return ""
     largest_floor = max(record.parameters[name], present.parameters.get(name, 0.0))
     fused = record.fused_sources | present.fused_sources
     reported = []
-    for field, factor, source in _NOISE_FLOORS[name]:
-        if source not in fused:
+    for source, floor in floors:
+        if source.name not in fused:
             continue
-        if field not in table or table[field].size == 0:
+        if floor.field not in table or table[floor.field].size == 0:
             return ""
-        accuracy = table[field].astype(np.float64)
-        if np.mean(accuracy < factor * largest_floor) > _NEGLIGIBLE_SHARE:
+        accuracy = table[floor.field].astype(np.float64)
+        if np.mean(accuracy < floor.factor * largest_floor) > _NEGLIGIBLE_SHARE:
             return ""
         reported.append(float(np.median(accuracy)))
     if not reported:
         return ""
-    unit = _UNITS[name]
+    unit = floors[0][0].unit
     return (
         f"is a floor of {record.parameters[name]:g} {unit}, and the receiver reports "
         f"{' and '.join(f'{value:.2g}' for value in reported)} {unit} (median), so it has no effect"
@@ -112,7 +105,7 @@ def _below_receiver_accuracy(name: str, record: ReplayedSet, present: ReplayedSe
 
 def _same_observation_variance(name: str, record: ReplayedSet, present: ReplayedSet) -> str:
     """A noise that is a floor, or that another figure overrides, leaves the observation variances as they were."""
-    keys = [key for key in record.samples if key[0] in OBSERVATION_NOISE.get(name, ())]
+    keys = [key for key in record.samples if key[0] in observation_noise_of(name)]
     keys = [key for key in keys if key in present.first_fused]
     if not keys:
         return ""

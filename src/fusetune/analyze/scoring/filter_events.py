@@ -6,29 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.metrics.metric import Metric
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.px4.aid_sources import AID_SOURCES
 
-AIDING_FLAGS = (
-    "cs_gnss_pos",
-    "cs_gnss_vel",
-    "cs_gps_hgt",
-    "cs_gnss_yaw",
-    "cs_baro_hgt",
-    "cs_rng_hgt",
-    "cs_mag_hdg",
-    "cs_mag_3d",
-    "cs_mag",
-    "cs_ev_pos",
-    "cs_ev_vel",
-    "cs_ev_hgt",
-    "cs_ev_yaw",
-    "cs_opt_flow",
-    "cs_fuse_aspd",
-    "cs_aux_gpos",
+_FLAGS_OF_SOURCES = tuple(
+    source.flags for source in AID_SOURCES.values() if source.sensor and source.flags and source.code is not None
 )
-"""Flags of `estimator_status_flags` that say a source is being fused."""
-
-_HEADING_BY_MAGNETOMETER = ("cs_mag_hdg", "cs_mag_3d", "cs_mag")
+"""Flags of `estimator_status_flags` of which one says that a source with a sensor is being fused."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +55,39 @@ class FilterEvents:
         return sum(self.timeouts.values())
 
 
+EVENT_METRICS: tuple[Metric[FilterEvents], ...] = (
+    Metric(
+        "resets", "1", "how often the state was reset, by kind",
+        lambda events: {**events.resets, "all": events.total_resets}, "lower", ("apply", "report"),
+    ),
+    Metric(
+        "timeouts", "1", "how often a source that was fused stopped being fused, by source",
+        lambda events: {**{name: n for name, n in events.timeouts.items() if n}, "all": events.total_timeouts},
+        "lower", ("apply", "report"),
+    ),
+    Metric(
+        "fault_flags", "1", "largest value of `filter_fault_flags`",
+        lambda events: {"all": events.fault_flags}, "lower", ("apply",),
+    ),
+    Metric(
+        "dead_reckoning_s", "s", "time without any horizontal aiding",
+        lambda events: {"horizontal": events.dead_reckoning_s}, "lower",
+    ),
+)  # fmt: skip
+"""What the filter did beside fusing, by kind."""
+
+ON_GROUND = EVENT_METRICS[:2]
+"""Given for the time on the ground as well, all kinds together."""
+
+SERVICE_METRICS: tuple[Metric[SourceAid], ...] = (
+    Metric("fused_share", "1", "share of the samples that was fused", lambda aid: aid.fused_share, "higher"),
+    Metric(
+        "longest_without_fusion_s", "s", "longest time without a fused one", lambda aid: aid.longest_without_s, "lower"
+    ),
+)
+"""How a source served in flight after the warm-up."""
+
+
 def filter_events(record: ReplayedSet, flight: tuple[Interval, ...]) -> FilterEvents:
     """Count the events of one replay.
 
@@ -79,11 +97,12 @@ def filter_events(record: ReplayedSet, flight: tuple[Interval, ...]) -> FilterEv
     """
     resets = {kind: int(np.count_nonzero(inside(times, flight))) for kind, times in record.reset_times.items()}
     time = record.flags.get("timestamp", np.zeros(0)).astype(np.int64)
+    columns = {}
     # The magnetometer changes between heading and three axes by itself; only its end is a loss.
-    columns = {flag: record.flags[flag] for flag in AIDING_FLAGS if flag in record.flags}
-    heading = [columns.pop(flag) for flag in _HEADING_BY_MAGNETOMETER if flag in columns]
-    if heading:
-        columns["cs_mag"] = np.logical_or.reduce(heading)
+    for flags in sorted(_FLAGS_OF_SOURCES, key=len):
+        ways = [record.flags[flag] for flag in flags if flag in record.flags]
+        if ways:
+            columns[flags[-1]] = np.logical_or.reduce(ways)
     timeouts = {}
     for flag, values in columns.items():
         stopped = time[1:][values[:-1].astype(bool) & ~values[1:].astype(bool)]

@@ -6,23 +6,21 @@ wait before take-off would hide how the sets differ. Apart, it shows noise witho
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from fusetune.analyze.flight.intervals import Cut, Interval, merged, subtract
-from fusetune.analyze.metrics.break_rate import break_rate
-from fusetune.analyze.metrics.consistency import mean_nis, paper_bounds
-from fusetune.analyze.metrics.innovation_metrics import rms_innovation, rms_norm
+from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
-from fusetune.analyze.scoring.filter_events import FilterEvents
-from fusetune.analyze.scoring.measurement_alignment import PairedSamples, SamplesOfSet, each_of, paired_samples
-from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, groups_of
+from fusetune.analyze.scoring.filter_events import ON_GROUND, FilterEvents
+from fusetune.analyze.scoring.measurement_alignment import PairedSamples, paired_samples
+from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, add_innovation_metrics, groups_of
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.scoring.scoring_window import ScoringWindow, cuts_within
-from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 
 BEFORE_TAKE_OFF_US = 2_000_000
 """Cut from the ground time before a take-off: the rotors run, and the land detector tells late."""
 AFTER_LANDING_US = 1_000_000
+GROUND = "ground_"
+"""Before the name of a metric that is given of the time on the ground."""
 
 
 def ground_window(
@@ -55,40 +53,24 @@ def ground_window(
 def add_ground_metrics(
     table: MetricsTable, records: Sequence[ReplayedSet], present: str, ground: ScoringWindow, confidence: float
 ) -> None:
-    """Append `ground_rms_innovation`, `ground_mean_nis` and `ground_break_rate_gate` of every source and axis."""
+    """Append the metrics that are given of the ground, of every source and axis, named `ground_…`."""
     if not ground.intervals:
         return
+    metrics = [metric for metric in INNOVATION_METRICS if metric.on_ground]
     standing = [record for record in records if record.name not in ground.excluded]
-    for source in AID_SOURCES.values():
+    for source in MEASURED_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         for axis in range(source.axes):
             found = paired_samples(standing, (source.name, axis), present, ground)
             if found is not None and found.time.size >= FEWEST_SAMPLES:
                 pairs[axis] = found
-                _add(table, [found], AXES[axis], confidence)
-        for group, members in groups_of(pairs):
-            _add(table, members, group, confidence)
-
-
-def _add(table: MetricsTable, members: list[PairedSamples], axis: str, confidence: float) -> None:
-    table.add_metric_by_metric([_of_one_set(table.flight, one, axis, confidence) for one in each_of(members)])
-
-
-def _of_one_set(flight: str, members: list[SamplesOfSet], axis: str, confidence: float) -> MetricsTable:
-    table = MetricsTable(flight)
-    first, n = members[0], members[0].time.size
-    innovation = np.stack([one.innovation for one in members])
-    variance = np.stack([one.innovation_variance for one in members])
-    rms = rms_innovation(innovation[0]) if len(members) == 1 else rms_norm(innovation)
-    bounds = paper_bounds(mean_nis(innovation, variance), n, len(members), confidence)
-    broken = np.logical_or.reduce([one.beyond_gate for one in members])
-    table.add_each(first.sets, first.source, axis, "ground_rms_innovation", rms, n)
-    table.add_bounds(first.sets, first.source, axis, "ground_mean_nis", bounds, n)
-    table.add_bounds(first.sets, first.source, axis, "ground_break_rate_gate", break_rate(broken, confidence), n)
-    return table
+        single = [(AXES[axis], [one]) for axis, one in pairs.items()]
+        for axis_name, members in (*single, *groups_of(pairs)):
+            add_innovation_metrics(table, members, axis_name, metrics, confidence, GROUND)
 
 
 def add_ground_events(table: MetricsTable, set_name: str, events: FilterEvents, ground: ScoringWindow) -> None:
     """Append resets and timeouts on the ground after the warm-up; `n` is the time there, s."""
-    for metric, count in (("ground_resets", events.total_resets), ("ground_timeouts", events.total_timeouts)):
-        table.add(set_name, "filter", "all", metric, count, ground.duration_s)
+    for metric in ON_GROUND:
+        count = metric.function(events)["all"]
+        table.add(set_name, "filter", "all", GROUND + metric.name, count, ground.duration_s)

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.metrics.break_rate import beyond_gate
 from fusetune.analyze.metrics.likelihood import winsor_limit
+from fusetune.analyze.metrics.metric import Innovations
 from fusetune.analyze.replaying.measurement_times import match, measurement_time
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import SampleSpool, SourceAxis, SpooledRows
@@ -36,11 +36,6 @@ class SamplesOfSet:
     innovation_variance: npt.NDArray[np.float64]
     test_ratio: npt.NDArray[np.float64]
     rejected: npt.NDArray[np.bool_]
-
-    @property
-    def beyond_gate(self) -> npt.NDArray[np.bool_]:
-        """Samples beyond the gate of their axis, see `fusetune.analyze.metrics.break_rate.beyond_gate`."""
-        return beyond_gate(self.test_ratio, self.rejected)
 
 
 @dataclass(frozen=True)
@@ -76,9 +71,22 @@ class PairedSamples:
 FIGURES = ("innovation", "innovation_variance", "test_ratio", "rejected")
 
 
-def each_of(members: Sequence[PairedSamples]) -> Iterator[list[SamplesOfSet]]:
-    """Several axes that share their sets, of one set at a time."""
-    return (list(one) for one in zip(*(member.each() for member in members), strict=True))
+def innovations_of(
+    members: Sequence[PairedSamples], confidence: float = np.nan, *, of_group: bool = False
+) -> Iterator[tuple[SamplesOfSet, Innovations]]:
+    """Several axes that share their samples and sets: the samples of the first of them and what metrics are made of,
+    of one set at a time."""
+
+    def limits() -> list[float]:
+        return [one.winsor_limit for one in members]
+
+    for axes in zip(*(member.each() for member in members), strict=True):
+        innovation, variance, ratio, rejected = (_stacked([getattr(one, name) for one in axes]) for name in FIGURES)
+        yield axes[0], Innovations(innovation, variance, ratio, rejected, limits, confidence, of_group)
+
+
+def _stacked(axes: list[np.ndarray]) -> np.ndarray:
+    return axes[0][None] if len(axes) == 1 else np.stack(axes)
 
 
 def paired_rows(columns: Mapping[str, npt.NDArray]) -> np.ndarray:

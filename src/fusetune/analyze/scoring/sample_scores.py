@@ -28,7 +28,7 @@ from fusetune.analyze.scoring.window_scores import (
     window_figures,
     window_rows,
 )
-from fusetune.analyze.sources import AID_SOURCES, AXES
+from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 from fusetune.set_names import ONBOARD
 from fusetune.storage.files import AnyPath
 
@@ -43,9 +43,6 @@ SAMPLES_SCHEMA = pa.schema(
         pa.field("test_ratio", pa.float32()),
     ]
 )
-
-_NOT_IN_SAMPLES = ("gravity",)
-"""Sampled at every update: the samples would fill the disk and no plot shows them."""
 
 
 class SampleScores(NamedTuple):
@@ -76,7 +73,7 @@ def score_samples(
     """
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
     blocks, windows = [], []
-    for source in AID_SOURCES.values():
+    for source in MEASURED_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         spool = SampleSpool(spool_folder)
         for axis in range(source.axes):
@@ -86,7 +83,8 @@ def score_samples(
         for one in pairs.values():
             add_axis_metrics(table, one, settings)
             blocks.append(block_rows(table.flight, one, edges))
-            if take_samples is not None and source.name not in _NOT_IN_SAMPLES:
+            # of what is sampled at every update the samples would fill the disk, and no plot shows them
+            if take_samples is not None and not source.every_update:
                 for of_set in one.each():
                     take_samples(_sample_rows(of_set))
         if pairs:
@@ -129,7 +127,7 @@ def add_onboard(
 ) -> None:
     """Append the vehicle's own figures, on the same part of the flight but at the times that it logged."""
     record = ReplayedSet(ONBOARD, parameters, {}, {}, onboard, {}, {})
-    for source in AID_SOURCES.values():
+    for source in MEASURED_SOURCES.values():
         pairs = {}
         for axis in range(source.axes):
             found = paired_samples([record], (source.name, axis), ONBOARD, window)

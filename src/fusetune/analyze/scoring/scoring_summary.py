@@ -13,7 +13,8 @@ from fusetune.analyze.scoring.filter_events import FilterEvents
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.sensors.source_whiteness import Whiteness
-from fusetune.analyze.sources import AXES
+from fusetune.finding import documents
+from fusetune.px4.aid_sources import AXES
 from fusetune.px4.flight import Flight
 
 
@@ -45,7 +46,7 @@ def scoring_summary(
         "warm_up_end_us": window.warm_up_end,
         "intervals_us": [list(interval) for interval in window.intervals],
         "block_edges_us": window.block_edges(settings.block_s).tolist() if window.intervals else [],
-        "cuts": [{"start_us": cut.start, "stop_us": cut.stop, "reason": cut.reason} for cut in window.cuts],
+        "cuts": documents(cut.finding for cut in window.cuts),
         "sets": {
             name: _set_summary(record, by_name[present], window, events[name], flight)
             for name, record in by_name.items()

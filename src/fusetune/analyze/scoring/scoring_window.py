@@ -9,7 +9,7 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import Cut, Interval, duration, inside, merged, subtract
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.sources import HORIZONTAL_AIDING
+from fusetune.px4.aid_sources import AID_SOURCES, HORIZONTAL_AIDING
 
 FUSION_DELAY_US = 500_000
 """Innovations belong to the fusion horizon, up to this much before the time of the output that shows a reset."""
@@ -45,7 +45,8 @@ class ScoringWindow:
 
 def aiding_start(record: ReplayedSet) -> int | None:
     """Time at which the set first fuses something that stops horizontal drift, else anything at all, µs."""
-    for sources in (HORIZONTAL_AIDING, tuple({source for source, _ in record.samples} - {"gravity"})):
+    anything = {source for source, _ in record.samples if not AID_SOURCES[source].every_update}
+    for sources in (HORIZONTAL_AIDING, anything):
         starts = [start for (source, _), start in record.first_fused.items() if source in sources]
         if starts:
             return min(starts)

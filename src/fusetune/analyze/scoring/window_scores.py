@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from fusetune.analyze.metrics.break_rate import beyond_standard_deviations
-from fusetune.analyze.metrics.likelihood import gaussian_nll, winsorised
-from fusetune.analyze.scoring.measurement_alignment import PairedSamples, SamplesOfSet, each_of
+from fusetune.analyze.metrics.declared import INNOVATION_METRICS
+from fusetune.analyze.metrics.metric import Innovations
+from fusetune.analyze.scoring.measurement_alignment import PairedSamples, innovations_of
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 
@@ -30,15 +30,7 @@ WINDOW_SCHEMA = pa.schema(
 )
 """One row per set, source, axis (or group of axes), window and metric; `n` is the number of samples behind it."""
 
-WORST_NAMES = {
-    "rms_innovation": "worst_window_rms",
-    "mean_nis": "worst_window_nis",
-    "nll_winsorised": "worst_window_nll_winsorised",
-    "break_rate_3sd": "worst_window_break_rate_3sd",
-    "break_rate_5sd": "worst_window_break_rate_5sd",
-    "break_rate_gate": "worst_window_break_rate_gate",
-}
-"""Metric of a window → name of its largest value in the metrics table."""
+_METRICS = tuple(metric for metric in INNOVATION_METRICS if metric.window is not None)
 
 _FULL_ENOUGH = 0.5
 """A window with less than this share of the samples of the fullest one cannot be the worst."""
@@ -87,43 +79,26 @@ def window_figures(members: list[PairedSamples], axis: str, edges: npt.NDArray[n
     index = np.clip(np.searchsorted(edges, first.time, side="right") - 1, 0, edges.size - 2)
     starts = np.flatnonzero(np.r_[True, np.diff(index) != 0])
     counts = np.diff(np.r_[starts, index.size])
-    limits = [one.winsor_limit for one in members]
-    of_sets = [_figures(one, limits, starts, counts) for one in each_of(members)]
+    of_sets = [_figures(given, starts, counts) for _, given in innovations_of(members)]
     values = {name: np.concatenate([one[name] for one in of_sets]) for name in of_sets[0]}
     return WindowFigures(first.source, axis, first.sets, index[starts], counts, values)
 
 
-def _figures(
-    members: list[SamplesOfSet], limits: list[float], starts: npt.NDArray[np.int64], counts: npt.NDArray[np.int64]
-) -> dict[str, Array]:
+def _figures(given: Innovations, starts: npt.NDArray[np.int64], counts: npt.NDArray[np.int64]) -> dict[str, Array]:
     """Figures (1, W) of one set in the windows that begin at the rows `starts` and hold `counts` samples."""
 
     def mean(values: npt.NDArray) -> Array:
         return np.add.reduceat(values.astype(np.float64), starts, axis=-1) / counts
 
-    squared = sum(np.square(one.innovation) for one in members)
-    nis = sum(np.square(one.innovation) / one.innovation_variance for one in members)
-    nll = sum(
-        gaussian_nll(winsorised(one.innovation, limit), one.innovation_variance)
-        for one, limit in zip(members, limits, strict=True)
-    )
-    values = {
-        "rms_innovation": np.sqrt(mean(np.asarray(squared))),
-        "mean_nis": mean(np.asarray(nis)),
-        "nll_winsorised": mean(np.asarray(nll)),
-    }
-    for limit in (3, 5):
-        beyond = [beyond_standard_deviations(one.innovation, one.innovation_variance, limit) for one in members]
-        values[f"break_rate_{limit}sd"] = mean(np.logical_or.reduce(beyond))
-    values["break_rate_gate"] = mean(np.logical_or.reduce([one.beyond_gate for one in members]))
-    return values
+    return {one.name: one.window.of_mean(mean(one.window.score(given))) for one in _METRICS if one.window}
 
 
 def add_worst_windows(table: MetricsTable, figures: WindowFigures) -> None:
     """Append the largest figure of any window; windows with few samples do not count."""
     full = figures.counts >= _FULL_ENOUGH * figures.counts.max()
-    for metric, name in WORST_NAMES.items():
-        worst = figures.values[metric][:, full].max(axis=1)
+    for metric in _METRICS:
+        worst = figures.values[metric.name][:, full].max(axis=1)
+        name = metric.window.worst if metric.window else ""
         table.add_each(figures.sets, figures.source, figures.axis, name, worst, figures.counts.sum())
 
 

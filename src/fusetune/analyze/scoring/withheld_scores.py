@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from fusetune.analyze.metrics.innovation_metrics import rms_innovation
 from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, winsorised
+from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
-from fusetune.analyze.sources import AID_SOURCES, AXES
-from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+from fusetune.px4.aid_sources import AID_SOURCES, AXES, WITHHOLDABLE
 
 Array = npt.NDArray[np.float64]
 
@@ -60,6 +61,24 @@ class PairedGaps:
     n: npt.NDArray[np.int64]
     error: Array
     variance: Array
+
+
+WITHHELD_METRICS: tuple[Metric[PairedGaps], ...] = (
+    Metric(
+        "withheld_rms_{horizon}s", SOURCE_UNIT, "root mean square error after so many seconds without the sensor",
+        lambda gaps: rms_innovation(gaps.error), "lower", ("report",),
+    ),
+    Metric(
+        "withheld_nll_{horizon}s", "nat", "negative log-likelihood of the same per gap",
+        lambda gaps: np.mean(gaussian_nll(gaps.error, gaps.variance), axis=1), "lower",
+    ),
+)  # fmt: skip
+"""By axis and horizon."""
+
+DRIFT: Metric[Sequence[PairedGaps]] = Metric(
+    "withheld_drift", SOURCE_UNIT, "root mean square of the error's norm at the last of these, of groups of axes",
+    lambda members: np.sqrt(np.mean(sum(np.square(one.error) for one in members), axis=1)), "lower",
+)  # fmt: skip
 
 
 def paired_gaps(records: Sequence[ReplayedSet], present: str, window: ScoringWindow) -> list[PairedGaps]:
@@ -159,29 +178,23 @@ def _rows_of(flight: str, group: PairedGaps, edges: npt.NDArray[np.int64]) -> pa
 
 
 def add_withheld_metrics(table: MetricsTable, groups: Sequence[PairedGaps]) -> None:
-    """Append RMS error and NLL per axis and horizon, and the drift at the end of the gaps.
-
-    Metrics are `withheld_rms_<horizon>s` and `withheld_nll_<horizon>s`; `withheld_drift` is the RMS of the error's
-    norm at the last horizon, in the plane for GNSS position and velocity, over all axes for the magnetometer.
-    """
+    """Append RMS error and NLL per axis and horizon, and the drift at the end of the gaps (by group of axes)."""
     last = {}
     for group in groups:
         gaps = group.error.shape[1]
         if gaps < FEWEST_GAPS:
             continue
-        label, axis = f"{group.horizon_s:g}s", AXES[group.axis]
-        rms = np.sqrt(np.mean(np.square(group.error), axis=1))
-        nll = np.mean(gaussian_nll(group.error, group.variance), axis=1)
-        table.add_each(group.sets, group.source, axis, f"withheld_rms_{label}", rms, gaps)
-        table.add_each(group.sets, group.source, axis, f"withheld_nll_{label}", nll, gaps)
+        for metric in WITHHELD_METRICS:
+            name = metric.name.format(horizon=f"{group.horizon_s:g}")
+            table.add_each(group.sets, group.source, AXES[group.axis], name, metric.function(group), gaps)
         if group.horizon_s >= max(other.horizon_s for other in groups if other.sensor == group.sensor):
             last[group.source, group.axis] = group
     for source in dict.fromkeys(source for source, _ in last):
         for name, axes in AID_SOURCES[source].groups:
             members = [last[source, axis] for axis in axes if (source, axis) in last]
             if len(members) == len(axes) and all(np.array_equal(one.gap, members[0].gap) for one in members):
-                drift = np.sqrt(np.mean(sum(np.square(one.error) for one in members), axis=1))
-                table.add_each(members[0].sets, source, name, "withheld_drift", drift, members[0].gap.size)
+                drift = DRIFT.function(members)
+                table.add_each(members[0].sets, source, name, DRIFT.name, drift, members[0].gap.size)
 
 
 def add_true_drift(table: MetricsTable, records: Sequence[ReplayedSet], truth: Truth, window: ScoringWindow) -> None:

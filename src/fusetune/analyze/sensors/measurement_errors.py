@@ -15,16 +15,20 @@ from fusetune.analyze.metrics.attitude import rotation_matrices
 from fusetune.analyze.replaying.measurement_times import match, measurement_time
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples
-from fusetune.analyze.sources import AID_SOURCES
 from fusetune.ekf2.numerics.geodesy import RADIUS_OF_EARTH
+from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
 
-VELOCITY_SOURCES = ("gnss_vel", "ev_vel", "aux_vel")
-HEADING_SOURCES = ("gnss_yaw", "ev_yaw")
-PLANE_SOURCES = ("gnss_pos", "ev_pos")
-HEIGHT_SOURCES = ("gnss_hgt", "baro_hgt", "rng_hgt", "ev_hgt")
+
+def _sources(quantity: str) -> tuple[str, ...]:
+    """Sources of the replay that measure a quantity."""
+    return tuple(one.name for one in MEASURED_SOURCES.values() if one.quantity == quantity and one.code is not None)
+
+
+VELOCITY_SOURCES, HEADING_SOURCES = _sources("velocity"), _sources("heading")
+PLANE_SOURCES, HEIGHT_SOURCES = _sources("position"), _sources("height")
 COVERED = (*VELOCITY_SOURCES, *HEADING_SOURCES, *PLANE_SOURCES, *HEIGHT_SOURCES, "mag")
 """Sources for which `measurement_errors` finds a series."""
 

@@ -34,6 +34,7 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 
 from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.sensors.measurement_errors import COVERED, VELOCITY_SOURCES, ErrorSeries, measurement_errors
 from fusetune.px4.flight import Flight
@@ -76,6 +77,27 @@ class Whiteness:
         """Share of the white noise in the variance of the error, 0 … 1."""
         total = self.white_noise**2 + self.correlated_noise**2
         return self.white_noise**2 / total if total > 0.0 else float("nan")
+
+
+def joint_white_share(members: Sequence[Whiteness]) -> float:
+    """Share of the white noise in the summed variances of several axes."""
+    white = sum(one.white_noise**2 for one in members)
+    total = white + sum(one.correlated_noise**2 for one in members)
+    return white / total if total > 0.0 else float("nan")
+
+
+WHITE_SHARE: Metric[Whiteness] = Metric(
+    "white_share", "1", "σ_w² / (σ_w² + σ_c² (1 − exp(−H/τ))); of a group, of the summed variances",
+    lambda one: one.white_share, "", ("apply", "report"),
+)  # fmt: skip
+
+WHITENESS_METRICS: tuple[Metric[Whiteness], ...] = (
+    WHITE_SHARE,
+    Metric("white_noise", SOURCE_UNIT, "σ_w", lambda one: one.white_noise),
+    Metric("correlated_noise", SOURCE_UNIT, "square root of σ_c² (1 − exp(−H/τ))", lambda one: one.correlated_noise),
+    Metric("error_correlation_s", "s", "τ", lambda one: one.correlation_time_s),
+)
+"""Of the error of the source itself, by axis; they belong to the flight, not to the set."""
 
 
 def horizon_s(source: str) -> float:

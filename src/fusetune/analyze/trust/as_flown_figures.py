@@ -16,13 +16,13 @@ import numpy as np
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
-from fusetune.analyze.sources import HORIZONTAL_AIDING
 from fusetune.analyze.trust.compared_flags import COMPARED_FLAGS, HEIGHT_FLAGS, FlagPairs
 from fusetune.analyze.trust.compared_innovations import GROUPS, innovation_ratios
 from fusetune.analyze.trust.compared_position import COMPARED_FIELDS, LocalPositions
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import RecordArrays, with_fields
 from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 from fusetune.px4.flight import Flight
 
 ONE_HEIGHT_SOURCE_BEFORE = (1, 14)

@@ -7,6 +7,7 @@ import numpy as np
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS
 from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import MEASURED_SOURCES
 from fusetune.px4.flight import Flight, row_count
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 
@@ -16,7 +17,9 @@ COMPARED_FLAGS = (
 )  # fmt: skip
 """Flags that mean the same in all releases."""
 
-HEIGHT_FLAGS = ("cs_baro_hgt", "cs_gps_hgt", "cs_rng_hgt", "cs_ev_hgt")
+HEIGHT_FLAGS = tuple(
+    flag for source in MEASURED_SOURCES.values() if source.quantity == "height" for flag in source.flags
+)
 """What the height is taken from."""
 
 

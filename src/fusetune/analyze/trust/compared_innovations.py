@@ -11,17 +11,12 @@ from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.ekf2.filter.common import state as S
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.results import ReplayResult
+from fusetune.px4.aid_sources import AID_SOURCES
 
 GROUPS: Mapping[str, tuple[SourceAxis, ...]] = {
-    "horizontal_velocity": (("gnss_vel", 0), ("gnss_vel", 1)),
-    "horizontal_position": (("gnss_pos", 0), ("gnss_pos", 1)),
-    "heading": (("mag_heading", 0),),
-    "gnss_heading": (("gnss_yaw", 0),),
-    "magnetic_field": (("mag", 0), ("mag", 1), ("mag", 2)),
-    "vision_velocity": (("ev_vel", 0), ("ev_vel", 1)),
-    "vision_position": (("ev_pos", 0), ("ev_pos", 1)),
-    "vision_heading": (("ev_yaw", 0),),
-    "optical_flow": (("optical_flow", 0), ("optical_flow", 1)),
+    source.size_figure: tuple((source.name, axis) for axis in source.groups[0][1])
+    for source in AID_SOURCES.values()
+    if source.size_figure
 }
 """Innovations that are compared by their size."""
 

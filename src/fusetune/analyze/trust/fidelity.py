@@ -15,16 +15,14 @@ import pyarrow as pa
 
 from fusetune.analyze.replaying.set_input import existing_folder
 from fusetune.errors import UserError
+from fusetune.px4.aid_sources import AID_SOURCES, REPLAYED_SOURCES
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
 
-COMPARED_SOURCES = (
-    "gnss_vel", "gnss_pos", "gnss_hgt", "gnss_yaw", "baro_hgt", "mag", "ev_pos", "ev_vel", "ev_hgt", "ev_yaw",
-    "rng_hgt", "optical_flow", "airspeed", "sideslip", "drag",
-)  # fmt: skip
-NLL_SOURCES = ("gnss_vel", "gnss_pos", "gnss_hgt", "baro_hgt", "mag")
-NOT_AN_AID = ("fake_pos", "fake_hgt", "gravity")
+NOT_AN_AID = tuple(one.name for one in AID_SOURCES.values() if one.every_update or not one.measures)
+COMPARED_SOURCES = tuple(name for name in REPLAYED_SOURCES if name not in NOT_AN_AID)
+NLL_SOURCES = tuple(one.name for one in AID_SOURCES.values() if one.orders_sets)
 MIN_SAMPLES = 10
 NLL_CAP = 50.0
 """A single sample weighs no more than this in the sum that orders sets, so that one outlier decides nothing."""

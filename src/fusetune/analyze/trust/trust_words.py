@@ -1,10 +1,14 @@
-"""The figures of the trust grade in words."""
+"""What limits a trust grade, in words: the figures that have it, and those that could not be compared."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
+from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.finding import Finding, Severity
+from fusetune.px4.flight import Flight
+from fusetune.px4.parameters.ekf2_parameters import BASELINE_RELEASE
 
 FIGURE_NAMES = {
     "innovation_factor": "the size of the innovations",
@@ -16,10 +20,31 @@ FIGURE_NAMES = {
     "flags_equal": "flags",
     "height_flags_equal": "the sources of height",
 }
+GRADES = "ABCD"
+SEVERITIES: dict[str, Severity] = {"B": "note", "C": "warning", "D": "fail"}
+"""Of what gives a flight such a grade; an A is given by nothing."""
+_UNITS = {"velocity_m_s": "m/s", "heading_deg": "°", "height_m": "m", "vertical_velocity_m_s": "m/s"}
 
 
-def limits_in_words(figures: AsFlownFigures, names: Sequence[str]) -> list[str]:
-    """How the replay departs from the vehicle in some of the figures, a clause each."""
+def limits_of_grade(
+    figures: AsFlownFigures, names: Sequence[str], grade: str, settings: TrustSettings
+) -> list[Finding]:
+    """How the replay departs from the vehicle in the figures that have some grade; `threshold` is that of the next."""
+    better = GRADES.index(grade) - 1
+    return [
+        Finding(
+            name,
+            SEVERITIES[grade],
+            found,
+            figure=getattr(figures, name),
+            threshold=getattr(settings, name)[better],
+            unit=_UNITS.get(name, ""),
+        )
+        for name, found in _limits_in_words(figures, names)
+    ]
+
+
+def _limits_in_words(figures: AsFlownFigures, names: Sequence[str]) -> list[tuple[str, str]]:
     words = {
         "height_resets": _resets,
         "height_flags_equal": lambda one: (
@@ -32,7 +57,7 @@ def limits_in_words(figures: AsFlownFigures, names: Sequence[str]) -> list[str]:
         "vertical_velocity_m_s": lambda one: f"vertical velocity differs by {one.vertical_velocity_m_s:.3g} m/s",
         "flags_equal": lambda one: f"the flags agree in {one.flags_equal:.0%} of the time",
     }
-    return [words[name](figures) for name in words if name in names]
+    return [(name, words[name](figures)) for name in words if name in names]
 
 
 def _resets(figures: AsFlownFigures) -> str:
@@ -55,8 +80,15 @@ def _times(number: int) -> str:
     return "once" if number == 1 else f"{number} times"
 
 
-def not_compared_in_words(names: Sequence[str]) -> str:
+def not_compared(names: Sequence[str]) -> Finding:
     """That the log does not let some figures be compared."""
     words = [FIGURE_NAMES[name] for name in names]
     listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
-    return f"the log does not let {listed} be compared"
+    return Finding("not_compared", "warning", f"the log does not let {listed} be compared", figure=float(len(names)))
+
+
+def other_release(flight: Flight) -> str:
+    """That the vehicle flew another release than the one that is replayed; empty where it did not, or is not known."""
+    if flight.release is None or flight.release[:2] == BASELINE_RELEASE:
+        return ""
+    return f"the vehicle flew {flight.release_name}, the replay behaves like {'v{}.{}'.format(*BASELINE_RELEASE)}"

@@ -18,7 +18,7 @@ from fusetune.storage.files import AnyPath
 
 LOCATOR = "fusetune.ekf2.compiled.kernel_locator.KernelLocator"
 PACKAGE = Path(__file__).resolve().parents[2]
-KERNEL_SOURCES = ("ekf2",)
+KERNEL_SOURCES = ("ekf2", "px4/aid_sources.py")
 """What the machine code follows from."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from fusetune.ekf2.feed import message_samples as convert
 from fusetune.ekf2.feed.arrival_order import schedule_runs
 from fusetune.ekf2.feed.message_samples import Refusal
-from fusetune.ekf2.feed.taken_samples import AIDING, TakenSamples
+from fusetune.ekf2.feed.taken_samples import AIDING, OfOneTopic, TakenSamples
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count
 
 _ORDINARY = (convert.NO_NUMBER, convert.NOT_DOWN, convert.NOT_STATIC)
@@ -76,17 +76,7 @@ def _given(flight: Flight, name: str, samples: TakenSamples) -> Iterator[GivenSa
         given = int(np.isfinite(_arrived_samples(samples)["yaw"]).sum())
         without = int((~np.isfinite(samples.samples["yaw"])).sum())
         refused = (("without a heading", without),) if without else ()
-        yield GivenSamples("gnss_yaw", _TOPICS["gnss"], messages, given, refused)
-
-
-_TOPICS = {
-    "gnss": "vehicle_gps_position",
-    "mag": "vehicle_magnetometer",
-    "baro": "vehicle_air_data",
-    "flow": "vehicle_optical_flow",
-    "auxvel": "landing_target_pose",
-}
-"""Sensors that are taken from instance 0 of one topic."""
+        yield GivenSamples("gnss_yaw", next(iter(topics))[0], messages, given, refused)
 
 
 def _messages(flight: Flight, name: str) -> tuple[dict[TopicKey, TopicTable], list[Refusal]]:
@@ -96,18 +86,11 @@ def _messages(flight: Flight, name: str) -> tuple[dict[TopicKey, TopicTable], li
         return topics, [refusal for table in topics.values() for refusal in convert.range_refusals(table)]
     if name == "airspeed":
         return _airspeed(flight)
-    key = (_TOPICS[name], 0)
-    table = flight.topics.get(key)
-    if table is None:
-        return {}, []
-    refusals = []
-    if name == "gnss":
-        refusals = convert.gnss_refusals(table, flight.release)
-    elif name == "flow":
-        refusals = convert.flow_refusals(table)
-    elif name == "auxvel":
-        refusals = convert.auxvel_refusals(table)
-    return {key: table}, refusals
+    sensor = AIDING[name]
+    if not isinstance(sensor, OfOneTopic):
+        raise TypeError(f"nothing says which messages of {name!r} are refused")
+    table = flight.topic(sensor.topic)
+    return ({}, []) if table is None else ({(sensor.topic, 0): table}, sensor.refusals(table, flight.release))
 
 
 def _airspeed(flight: Flight) -> tuple[dict[TopicKey, TopicTable], list[Refusal]]:

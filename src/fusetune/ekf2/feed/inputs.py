@@ -30,7 +30,7 @@ ESTIMATOR_COMMANDS = (
     COMMAND_EXTERNAL_WIND_ESTIMATE,
 )
 
-ARRIVAL_TOPICS = ("airspeed", "auxvel", "baro", "ev", "flow", "gnss", "mag", "range", "system_flags", "command")
+ARRIVAL_TOPICS = (*sorted(AIDING), "system_flags", "command")
 
 ARRIVALS = np.dtype(
     [(name, "i4") for name in ARRIVAL_TOPICS] + [("reset_accel_bias", "?"), ("reset_gyro_bias", "?")], align=True

@@ -23,6 +23,7 @@ from fusetune.ekf2.feed.sensor_samples import (
     GNSS_SAMPLE,
     MAG_SAMPLE,
 )
+from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import Flight, TopicTable, row_count
 
 AIRSPEED_VALIDATED_MAX_AGE_US = 3_000_000
@@ -51,23 +52,43 @@ def only_usable(newest: np.ndarray, usable: np.ndarray) -> np.ndarray:
     return np.where((newest >= 0) & usable[newest], newest, -1)
 
 
-def _gnss(flight: Flight, runs: RunSchedule) -> TakenSamples:
-    def refusals(table: TopicTable) -> list[convert.Refusal]:
-        return convert.gnss_refusals(table, flight.release)
-
-    return _of_topic(flight, runs, "vehicle_gps_position", GNSS_SAMPLE, convert.gnss_samples, refusals)
+_Refusals = Callable[[TopicTable, convert.Release | None], list[convert.Refusal]]
 
 
-def _mag(flight: Flight, runs: RunSchedule) -> TakenSamples:
-    return _of_topic(flight, runs, "vehicle_magnetometer", MAG_SAMPLE, convert.mag_samples)
+def _in_every_release(refusals: Callable[[TopicTable], list[convert.Refusal]]) -> _Refusals:
+    return lambda table, release: refusals(table)
 
 
-def _baro(flight: Flight, runs: RunSchedule) -> TakenSamples:
-    table = flight.topic("vehicle_air_data")
-    if table is None:
-        return _nothing(runs, BARO_SAMPLE)
-    samples, air_density = convert.baro_samples(table)
-    return TakenSamples(samples, runs.newest_message("vehicle_air_data", table["timestamp"]), air_density)
+@dataclass(frozen=True)
+class OfOneTopic:
+    """A sensor whose samples are the messages of instance 0 of one topic, less those that are refused.
+
+    Attributes
+    ----------
+    samples : table → samples, or these and what is `beside` them
+    refusals : table and release of the log → messages that the estimator is not given
+    """
+
+    sensor: str
+    dtype: np.dtype[Any]
+    samples: Callable[[TopicTable], np.ndarray | tuple[np.ndarray, np.ndarray]]
+    refusals: _Refusals = lambda table, release: []
+    beside_nothing: tuple[int, ...] = (0,)
+
+    @property
+    def topic(self) -> str:
+        return SENSORS[self.sensor].topics[0].name
+
+    def __call__(self, flight: Flight, runs: RunSchedule) -> TakenSamples:
+        table, beside = flight.topic(self.topic), np.zeros(self.beside_nothing)
+        if table is None:
+            return TakenSamples(np.zeros(0, self.dtype), np.full(len(runs.timestamp), -1), beside)
+        samples = self.samples(table)
+        if isinstance(samples, tuple):
+            samples, beside = samples
+        newest = runs.newest_message(self.topic, table["timestamp"])
+        refusals = self.refusals(table, flight.release)
+        return TakenSamples(samples, only_usable(newest, convert.taken(table, refusals)), beside)
 
 
 def _range(flight: Flight, runs: RunSchedule) -> TakenSamples:
@@ -75,27 +96,13 @@ def _range(flight: Flight, runs: RunSchedule) -> TakenSamples:
     return TakenSamples(ranges.samples, ranges.arrival, ranges.limits)
 
 
-def _flow(flight: Flight, runs: RunSchedule) -> TakenSamples:
-    table = flight.topic("vehicle_optical_flow")
-    if table is None:
-        return _nothing(runs, FLOW_SAMPLE, np.zeros((0, 3)))
-    samples, limits = convert.flow_samples(table)
-    newest = runs.newest_message("vehicle_optical_flow", table["timestamp"])
-    return TakenSamples(samples, only_usable(newest, convert.taken(table, convert.flow_refusals(table))), limits)
-
-
 def _vision(flight: Flight, runs: RunSchedule) -> TakenSamples:
     table = flight.topic("vehicle_visual_odometry")
     if table is None:
-        return _nothing(runs, EV_SAMPLE)
+        return TakenSamples(np.zeros(0, EV_SAMPLE), np.full(len(runs.timestamp), -1))
     samples, usable = convert.vision_samples(table, flight.release)
     newest = runs.newest_message("vehicle_visual_odometry", table["timestamp"])
     return TakenSamples(samples, only_usable(newest, usable))
-
-
-def _auxvel(flight: Flight, runs: RunSchedule) -> TakenSamples:
-    samples, refusals = convert.auxvel_samples, convert.auxvel_refusals
-    return _of_topic(flight, runs, "landing_target_pose", AUXVEL_SAMPLE, samples, refusals)
 
 
 def _airspeed(flight: Flight, runs: RunSchedule) -> TakenSamples:
@@ -129,36 +136,16 @@ def _airspeed(flight: Flight, runs: RunSchedule) -> TakenSamples:
     return TakenSamples(samples, arrival)
 
 
-def _of_topic(
-    flight: Flight,
-    runs: RunSchedule,
-    topic: str,
-    dtype: np.dtype[Any],
-    to_samples: Callable[[TopicTable], np.ndarray],
-    refusals: Callable[[TopicTable], list[convert.Refusal]] | None = None,
-) -> TakenSamples:
-    table = flight.topic(topic)
-    if table is None:
-        return _nothing(runs, dtype)
-    newest = runs.newest_message(topic, table["timestamp"])
-    if refusals is not None:
-        newest = only_usable(newest, convert.taken(table, refusals(table)))
-    return TakenSamples(to_samples(table), newest)
-
-
-def _nothing(runs: RunSchedule, dtype: np.dtype[Any], beside: np.ndarray | None = None) -> TakenSamples:
-    nothing = np.full(len(runs.timestamp), -1)
-    return TakenSamples(np.zeros(0, dtype), nothing, np.zeros(0) if beside is None else beside)
-
-
 AIDING: Mapping[str, Callable[[Flight, RunSchedule], TakenSamples]] = {
-    "gnss": _gnss,
-    "mag": _mag,
-    "baro": _baro,
+    "gnss": OfOneTopic("gnss", GNSS_SAMPLE, convert.gnss_samples, convert.gnss_refusals),
+    "mag": OfOneTopic("mag", MAG_SAMPLE, convert.mag_samples),
+    "baro": OfOneTopic("baro", BARO_SAMPLE, convert.baro_samples),
     "range": _range,
-    "flow": _flow,
+    "flow": OfOneTopic(
+        "flow", FLOW_SAMPLE, convert.flow_samples, _in_every_release(convert.flow_refusals), beside_nothing=(0, 3)
+    ),
     "ev": _vision,
     "airspeed": _airspeed,
-    "auxvel": _auxvel,
+    "auxvel": OfOneTopic("auxvel", AUXVEL_SAMPLE, convert.auxvel_samples, _in_every_release(convert.auxvel_refusals)),
 }
 """Aiding sensors by their names in the estimator's inputs."""

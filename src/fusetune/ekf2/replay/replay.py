@@ -26,7 +26,7 @@ from fusetune.ekf2.replay.recording import (
 )
 from fusetune.ekf2.replay.results import Gap, GapResult, ReplayResult, ReplaySummary
 from fusetune.ekf2.replay.warm_start import without_first_resets
-from fusetune.ekf2.replay.withholding import WITHHOLDABLE
+from fusetune.px4.aid_sources import WITHHOLDABLE
 from fusetune.px4.layouts.logged_state import Handover, LoggedState
 
 

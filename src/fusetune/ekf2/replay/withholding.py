@@ -7,9 +7,7 @@ innovations show is its own prediction.
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-
-WITHHOLDABLE = {"gnss": ("gnss_pos", "gnss_vel", "gnss_hgt"), "baro": ("baro_hgt",), "mag": ("mag",)}
-"""Sensor → the aid sources whose innovations go on while it is withheld."""
+from fusetune.px4.aid_sources import WITHHOLDABLE
 
 WITHHELD = np.dtype([(sensor, "?") for sensor in WITHHOLDABLE])
 """The estimator's sub-record `ekf.withheld`."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
@@ -42,7 +44,7 @@ _CONTROL_BITS = [
     "cs_synthetic_mag_z",
     "cs_vehicle_at_rest",
 ]
-"""Bits of `control_mode_flags`, from the lowest."""
+"""Bits of `control_mode_flags`, from the lowest, the same from v1.8 on."""
 
 _FAULT_BITS = [
     "fs_bad_mag_x",
@@ -65,6 +67,13 @@ _FAULT_BITS = [
     "fs_bad_acc_clipping",
 ]
 """Bits of `filter_fault_flags` in the releases that had no `estimator_status_flags` yet."""
+
+
+def control_bits(flags: Iterable[str]) -> int:
+    """Bits of `estimator_status.control_mode_flags` that stand for flags of v1.16; 0 where it has none of them."""
+    before = {new: old for old, names in _RENAMED_FLAGS.items() for new in names}
+    names = {before.get(flag, flag) for flag in flags}
+    return sum(1 << bit for bit, name in enumerate(_CONTROL_BITS) if name in names)
 
 
 def status_flags(table: TopicTable) -> TopicTable:

@@ -10,64 +10,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, AID_SOURCES, AidSource
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count, select_rows
+from fusetune.px4.layouts.estimator_layouts import control_bits
 from fusetune.px4.parameters.ekf2_parameters import complete
 
-_TOPIC_PREFIX = "estimator_aid_src_"
 _SAME_PUBLICATION_US = 2000
 """The three topics of v1.11+ are published one after the other; before v1.12 they share no sample time."""
 
-_CS_GNSS, _CS_FLOW, _CS_MAG_HDG, _CS_MAG_3D = 1 << 2, 1 << 3, 1 << 4, 1 << 5
-_CS_BARO_HGT, _CS_RNG_HGT, _CS_GNSS_HGT = 1 << 9, 1 << 10, 1 << 11
-_CS_EV_POS, _CS_EV_YAW, _CS_EV_HGT, _CS_BETA, _CS_AIRSPEED = 1 << 12, 1 << 13, 1 << 14, 1 << 15, 1 << 19
-_CS_GNSS_YAW, _CS_EV_VEL = 1 << 22, 1 << 24
-"""Bits of `estimator_status.control_mode_flags`, the same from v1.8 on."""
+_MAG_3D = control_bits(("cs_mag_3d",))
+_HEADING_FIELDS = (("heading",), ("heading_innov",))
+"""Written by the magnetometer's three axes as well, while these are fused; see `_SOURCES`."""
 
 _NO_MAG_HEADING_FROM = (1, 15)
 """From this release on no heading of the magnetometer is fused: `heading` then holds its largest field innovation."""
 
 
-@dataclass(frozen=True)
-class _Source:
-    """Where the innovations of an aid source stand."""
-
-    fields: tuple[str, ...]
-    active: int = 0
-    """Bits of the control mode flags of which one is set while the source is fused; 0: no flag tells."""
-    gate: str = ""
-    old_fields: tuple[str, ...] = ()
-    """The same in `ekf2_innovations`."""
-    unless: int = 0
-    """Bits while which something that is no aid source of its own is written to the same fields."""
-
-
-def _vector(name: str, length: int) -> tuple[str, ...]:
-    return tuple(f"{name}[{axis}]" for axis in range(length))
-
-
-_VELOCITY, _POSITION, _HEIGHT = _vector("vel_pos_innov", 6)[:3], _vector("vel_pos_innov", 6)[3:5], ("vel_pos_innov[5]",)
-_HEADING, _OLD_HEADING = ("heading",), ("heading_innov",)
-
-_SOURCES = {
-    "gnss_vel": _Source((*_vector("gps_hvel", 2), "gps_vvel"), _CS_GNSS, "EKF2_GPS_V_GATE", _VELOCITY),
-    "gnss_pos": _Source(_vector("gps_hpos", 2), _CS_GNSS, "EKF2_GPS_P_GATE", _POSITION),
-    "gnss_hgt": _Source(("gps_vpos",), _CS_GNSS_HGT, "EKF2_GPS_P_GATE", _HEIGHT),
-    "baro_hgt": _Source(("baro_vpos",), _CS_BARO_HGT, "EKF2_BARO_GATE", _HEIGHT),
-    "rng_hgt": _Source(("rng_vpos",), _CS_RNG_HGT, "EKF2_RNG_GATE", _HEIGHT),
-    "ev_vel": _Source((*_vector("ev_hvel", 2), "ev_vvel"), _CS_EV_VEL, "EKF2_EVV_GATE", _VELOCITY),
-    "ev_pos": _Source(_vector("ev_hpos", 2), _CS_EV_POS, "EKF2_EVP_GATE", _POSITION),
-    "ev_hgt": _Source(("ev_vpos",), _CS_EV_HGT, "EKF2_EVP_GATE", _HEIGHT),
-    "mag": _Source(_vector("mag_field", 3), _CS_MAG_HDG | _CS_MAG_3D, "EKF2_MAG_GATE", _vector("mag_innov", 3)),
-    "mag_heading": _Source(_HEADING, _CS_MAG_HDG, "EKF2_HDG_GATE", _OLD_HEADING, _CS_MAG_3D),
-    "gnss_yaw": _Source(_HEADING, _CS_GNSS_YAW, "EKF2_HDG_GATE", _OLD_HEADING, _CS_MAG_3D),
-    "ev_yaw": _Source(_HEADING, _CS_EV_YAW, "EKF2_HDG_GATE", _OLD_HEADING, _CS_MAG_3D),
-    "optical_flow": _Source(_vector("flow", 2), _CS_FLOW, "EKF2_OF_GATE", _vector("flow_innov", 2)),
-    "airspeed": _Source(("airspeed",), _CS_AIRSPEED, "EKF2_TAS_GATE", ("airspeed_innov",)),
-    "sideslip": _Source(("beta",), _CS_BETA, "EKF2_BETA_GATE", ("beta_innov",)),
-    "drag": _Source(_vector("drag", 2), old_fields=_vector("drag_innov", 2)),
-    "aux_vel": _Source(_vector("aux_hvel", 2), old_fields=_vector("aux_vel_innov", 2)),
-    "gravity": _Source(_vector("gravity", 3)),
-}
+_SOURCES = {source.name: source for source in AID_SOURCES.values() if source.innovations}
 """Fields that several sources name hold the innovations of whichever of them is in use, and of none of them in between.
 
 `heading` does so in all releases. From v1.14 on it holds the largest of the field innovations while the magnetometer is
@@ -84,7 +43,7 @@ def aid_source_tables(flight: Flight) -> dict[TopicKey, TopicTable]:
     An instance of which the log holds `estimator_aid_src_*` itself is left as it is.
     """
     tables: dict[TopicKey, TopicTable] = {}
-    own = {instance for name, instance in flight.topics if name.startswith(_TOPIC_PREFIX)}
+    own = {instance for name, instance in flight.topics if name.startswith(AID_SOURCE_TOPIC)}
     logged = {*flight.instances("estimator_innovations"), *flight.instances("ekf2_innovations")}
     gates = complete(flight.parameters.initial, {}, flight.release) if logged - own else {}
     for instance in sorted(logged - own):
@@ -93,7 +52,7 @@ def aid_source_tables(flight: Flight) -> dict[TopicKey, TopicTable]:
         for name, source in _SOURCES.items():
             table = None if series is None else _aid_source(name, source, series, gates)
             if table is not None:
-                tables[_TOPIC_PREFIX + name, instance] = table
+                tables[source.topic, instance] = table
     return tables
 
 
@@ -111,8 +70,8 @@ class _Series:
     old: bool
     has_mag_heading: bool
 
-    def columns(self, source: _Source) -> tuple[str, ...]:
-        return source.old_fields if self.old else source.fields
+    def columns(self, source: AidSource) -> tuple[str, ...]:
+        return source.ekf2_innovations if self.old else source.innovations
 
 
 def _modern_series(flight: Flight, instance: int) -> _Series | None:
@@ -169,7 +128,7 @@ def _control_flags(flight: Flight, instance: int, times: np.ndarray) -> tuple[np
     return flags[np.maximum(before, 0)], flags[np.minimum(after, len(flags) - 1)]
 
 
-def _aid_source(name: str, source: _Source, series: _Series, gates: dict[str, float]) -> TopicTable | None:
+def _aid_source(name: str, source: AidSource, series: _Series, gates: dict[str, float]) -> TopicTable | None:
     columns = series.columns(source)
     if not columns or any(column not in series.innovations or column not in series.variances for column in columns):
         return None
@@ -181,7 +140,7 @@ def _aid_source(name: str, source: _Source, series: _Series, gates: dict[str, fl
     innovation, variance = innovation[rows], variance[rows]
     logged = [series.ratios.get(column, np.full(len(series.timestamp), np.nan))[rows] for column in columns]
     logged_ratio = np.column_stack(logged).astype(np.float64)
-    ratio = innovation**2 / (gates[source.gate] ** 2 * variance) if source.gate else logged_ratio
+    ratio = innovation**2 / (gates[source.gate_parameter] ** 2 * variance) if source.gate_parameter else logged_ratio
     rejected = np.any(np.where(np.isfinite(logged_ratio), logged_ratio, ratio) > 1.0, axis=1)
     table: TopicTable = {
         "timestamp": series.timestamp[rows],
@@ -211,7 +170,7 @@ def _new_sample_rows(innovation: np.ndarray, variance: np.ndarray, belongs: np.n
     return rows[changed & belongs[rows]]
 
 
-def _belongs(name: str, source: _Source, series: _Series) -> np.ndarray:
+def _belongs(name: str, source: AidSource, series: _Series) -> np.ndarray:
     """Rows whose values are of this source; where several share the fields, those in which it alone is in use.
 
     A row between two messages of the status that do not agree on who that is belongs to none, nor does any where the
@@ -225,14 +184,16 @@ def _belongs(name: str, source: _Source, series: _Series) -> np.ndarray:
         return np.ones(len(series.timestamp), np.bool_)
     if series.control_flags is None:
         return np.zeros(len(series.timestamp), np.bool_)
-    writers = source.active | source.unless
+    active = control_bits(source.flags)
+    writers = active | (_MAG_3D if columns in _HEADING_FIELDS else 0)
     for other in rivals:
-        writers |= other.active
+        writers |= control_bits(other.flags)
     before, after = series.control_flags
-    return ((before & writers) == source.active) & ((after & writers) == source.active)
+    return ((before & writers) == active) & ((after & writers) == active)
 
 
-def _active(source: _Source, series: _Series, rows: np.ndarray) -> np.ndarray:
-    if not source.active or series.control_flags is None:
+def _active(source: AidSource, series: _Series, rows: np.ndarray) -> np.ndarray:
+    active = control_bits(source.flags)
+    if not active or series.control_flags is None:
         return np.ones(len(rows), np.bool_)
-    return (series.control_flags[0][rows] & source.active) != 0
+    return (series.control_flags[0][rows] & active) != 0

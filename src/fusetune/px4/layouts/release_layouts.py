@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fusetune.px4.aid_sources import SENSOR_TOPICS
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
 from fusetune.px4.layouts import sensor_layouts as layouts
 from fusetune.px4.layouts.estimator_instances import magnetometer_instance, primary_imu, primary_magnetometer
@@ -18,20 +19,9 @@ _FIX_3D = 3
 
 ESTIMATOR_TOPICS = (
     "sensor_combined",
-    "vehicle_magnetometer",
-    "vehicle_air_data",
-    "vehicle_gps_position",
+    *(name for topic in SENSOR_TOPICS.values() for name in (topic.name, *topic.older)),
     "vehicle_status",
     "vehicle_land_detected",
-    "distance_sensor",
-    "optical_flow",
-    "vehicle_optical_flow",
-    "vehicle_visual_odometry",
-    "vehicle_vision_position",
-    "vehicle_vision_attitude",
-    "airspeed",
-    "airspeed_validated",
-    "landing_target_pose",
     "launch_detection_status",
     "vehicle_command",
     "sensor_selection",

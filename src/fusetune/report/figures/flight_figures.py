@@ -12,7 +12,8 @@ from fusetune.analyze.flight.ground_truth import Truth, read_truth
 from fusetune.analyze.metrics.attitude import interpolate
 from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis
 from fusetune.analyze.replaying.store.reader import ColumnsOnDisk, read_innovations
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.finding import from_documents
+from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.report.figures.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
@@ -22,18 +23,7 @@ from fusetune.storage.files import AnyPath
 
 Array = npt.NDArray[np.float64]
 
-_SOURCES = (
-    "gnss_vel",
-    "gnss_pos",
-    "gnss_hgt",
-    "baro_hgt",
-    "mag",
-    "ev_pos",
-    "ev_vel",
-    "ev_hgt",
-    "rng_hgt",
-    "optical_flow",
-)
+_SOURCES = tuple(source.name for source in REPORTED_SOURCES)
 _MOST_SETS = 8
 _DRAWN = ("scored", "excluded", "not_scored")
 """States of a set whose replay ran to the end; others may hold no rows at all."""
@@ -257,7 +247,8 @@ def _breaks(axes: Axes, data: _FlightData, colours: dict[str, str]) -> None:
 def _reset_times(data: _FlightData, name: str) -> Array:
     if name != data.present:
         return np.zeros(0)
-    return np.array([(cut["start_us"] - data.start) * 1e-6 for cut in data.summary["cuts"]])
+    starts = [cut.start_us for cut in from_documents(data.summary["cuts"]) if cut.start_us is not None]
+    return np.array([(start - data.start) * 1e-6 for start in starts])
 
 
 def _shade_unscored(axes: Axes, data: _FlightData) -> None:

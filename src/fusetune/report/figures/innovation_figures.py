@@ -9,26 +9,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
+from fusetune.analyze.metrics import break_rate
 from fusetune.analyze.metrics.break_rate import clopper_pearson
-from fusetune.analyze.sources import AID_SOURCES
 from fusetune.apply.paper.paper_mode import PAPER_VARIABLES
+from fusetune.px4.aid_sources import AID_SOURCES, AXES, REPORTED_SOURCES
 from fusetune.report.figures.figures import PRESENT_COLOUR, empty_figure, label_sets, new_figure, panel_grid
 from fusetune.report.figures.set_styles import status_colour
 from fusetune.report.results import PooledSamples, Results, figure_values
 
-_CONSISTENCY_GROUPS = (
-    ("gnss_vel", "all"),
-    ("gnss_pos", "horizontal"),
-    ("gnss_hgt", "vertical"),
-    ("baro_hgt", "vertical"),
-    ("mag", "all"),
-    ("ev_pos", "horizontal"),
-    ("ev_vel", "all"),
-    ("ev_hgt", "vertical"),
-    ("rng_hgt", "vertical"),
-    ("optical_flow", "all"),
-)
-_BREAK_METRICS = {"break_rate_3sd": "3 σ", "break_rate_5sd": "5 σ", "break_rate_gate": "gate"}
+_CONSISTENCY_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
+_BREAK_METRICS = {metric.name: metric.label for metric in break_rate.METRICS}
+_BREAK_STYLES = (("#56B4E9", -0.22), ("#E69F00", 0.0), ("#D55E00", 0.22))
 _WHISKERS = (5.0, 25.0, 50.0, 75.0, 95.0)
 
 
@@ -176,13 +167,7 @@ def breaks(results: Results) -> Figure:
 
 def _break_panel(axes: Axes, results: Results, source: str) -> None:
     confidence = results.decision["rule"]["confidence"]
-    styles = {
-        "break_rate_3sd": ("#56B4E9", -0.22),
-        "break_rate_5sd": ("#E69F00", 0.0),
-        "break_rate_gate": ("#D55E00", 0.22),
-    }
-    for metric, label in _BREAK_METRICS.items():
-        colour, offset = styles[metric]
+    for (metric, label), (colour, offset) in zip(_BREAK_METRICS.items(), _BREAK_STYLES, strict=True):
         pooled = _pooled_breaks(results, source, metric)
         for row, name in enumerate(results.shown):
             if name not in pooled:
@@ -202,7 +187,7 @@ def _break_panel(axes: Axes, results: Results, source: str) -> None:
 
 def _pooled_breaks(results: Results, source: str, metric: str) -> dict[str, tuple[int, int]]:
     """Breaks and samples by set over all axes and flights."""
-    axes = ("x", "y", "z")[: AID_SOURCES[source].axes]
+    axes = AXES[: AID_SOURCES[source].axes]
     rows = pd.concat([figure_values(results, source, axis, metric) for axis in axes])
     counts = (rows["value"] * rows["n"]).groupby(rows["set"], observed=True).sum()
     samples = rows["n"].groupby(rows["set"], observed=True).sum()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Mapping
 from typing import Any
 
+from fusetune.finding import from_documents
 from fusetune.report.markup import number, table
 
 NAMED_FLIGHTS = 3
@@ -21,10 +22,9 @@ def advice_table(verdicts: Iterable[Mapping[Hashable, Any]]) -> str:
     reasons: dict[str, str] = {}
     flights: dict[str, list[str]] = {}
     for verdict in verdicts:
-        advice = verdict.get("advice")
-        for one in advice if advice is not None else ():
-            reasons.setdefault(one["remedy"], one["reason"])
-            named = flights.setdefault(one["remedy"], [])
+        for finding in from_documents(verdict.get("advice")):
+            reasons.setdefault(finding.remedy, finding.found)
+            named = flights.setdefault(finding.remedy, [])
             if verdict["flight"] not in named:
                 named.append(str(verdict["flight"]))
     rows = [

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from fusetune.analyze.sources import AID_SOURCES
 from fusetune.apply.evidence import AIDED, UNAIDED
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, signed, table
 from fusetune.report.results import Results
@@ -116,7 +116,7 @@ def _drift_note(results: Results) -> str:
 
 
 def _sensed(withheld: Withheld) -> str:
-    return {"gnss_pos": "position", "gnss_vel": "velocity", "baro_hgt": "height", "mag": "field"}[withheld.source]
+    return AID_SOURCES[withheld.source].quantity
 
 
 def _horizons(summary: pd.DataFrame) -> list[float]:

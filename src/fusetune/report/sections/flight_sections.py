@@ -6,7 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.finding import from_documents
+from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
 from fusetune.report.figures.innovation_figures import rms_table
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
 from fusetune.report.results import Results, as_flown, figure_values
@@ -24,13 +25,7 @@ _TRUE_ERRORS = (
     ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity without GNSS m/s"),
     ("truth_velocity", "all", "nees", "velocity NEES / 3"),
 )
-_AS_FLOWN_GROUPS = (
-    ("gnss_vel", "all"),
-    ("gnss_pos", "horizontal"),
-    ("gnss_hgt", "vertical"),
-    ("baro_hgt", "vertical"),
-    ("mag", "all"),
-)
+_AS_FLOWN_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
 
 
 def flights_section(results: Results, flights_table: AnyPath) -> str:
@@ -183,10 +178,8 @@ def single_flights_section(results: Results, flight_figures: Mapping[str, AnyPat
 
 
 def _cuts(summary: dict[str, Any]) -> str:
-    if not summary["cuts"]:
-        return ""
-    rows = [(f"{(cut['stop_us'] - cut['start_us']) * 1e-6:.1f} s", cut["reason"]) for cut in summary["cuts"]]
-    return table(("cut", "because of"), rows)
+    rows = [(f"{cut.figure:.1f} {cut.unit}", cut.found) for cut in from_documents(summary["cuts"])]
+    return table(("cut", "because of"), rows) if rows else ""
 
 
 def _set_troubles(summary: dict[str, Any]) -> str:

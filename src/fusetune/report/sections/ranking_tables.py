@@ -4,7 +4,7 @@ import math
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
-from fusetune.analyze.sources import AID_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.comparison import AIM_WORDS, flight_changes, percent_change, sign_counts, told_aims
 from fusetune.report.markup import Cell, number, paragraph, signed, table
 from fusetune.report.results import OUT, Results, worse_aims

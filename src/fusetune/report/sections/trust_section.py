@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from fusetune.finding import from_documents
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
@@ -43,7 +44,7 @@ def trust_section(analyze_folders: Sequence[AnyPath]) -> str:
 
 def _row(flight: dict[str, Any]) -> tuple[str | Cell, ...]:
     trust = flight["trust"]
-    repaired = [cause["cause"] for cause in trust["causes"] if cause["repaired"]]
+    repaired = [cause.found for cause in from_documents(trust["causes"]) if cause.evidence["repaired"]]
     return (
         flight["flight"],
         Cell(trust["grade"], GRADE_KINDS[trust["grade"]]),
@@ -65,7 +66,8 @@ def _details(flight: dict[str, Any]) -> str:
             _figures(flight),
         ]
     if flight["reasons"]:
-        parts.append(paragraph(f"As logged: {'; '.join(flight['reasons'])}.", "note"))
+        reasons = "; ".join(reason.in_words for reason in from_documents(flight["reasons"]))
+        parts.append(paragraph(f"As logged: {reasons}.", "note"))
     return "".join(parts)
 
 
@@ -87,12 +89,12 @@ def _grade(trust: dict[str, Any]) -> str:
     ]
     causes = [
         (
-            cause["cause"],
-            "yes" if cause["repaired"] else "no",
-            number(cause["cost"]),
-            "by switching it" if cause["measured"] else "what remains",
+            cause.found,
+            "yes" if cause.evidence["repaired"] else "no",
+            number(cause.figure),
+            "by switching it" if cause.evidence["measured"] else "what remains",
         )
-        for cause in trust["causes"]
+        for cause in from_documents(trust["causes"])
     ]
     head = (f"grade {trust['grade']} (as logged: {trust['as_logged_grade']})", "as logged", "replay in use", "grade")
     parts = [paragraph(trust["words"]), paragraph(f"Start: {trust['start']}."), table(head, rows)]

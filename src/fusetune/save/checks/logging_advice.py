@@ -14,6 +14,8 @@ from fusetune.px4.logger_settings import (
 
 ONE_ESTIMATOR = "EKF2_MULTI_IMU = 0 and EKF2_MULTI_MAG = 0 with SENS_IMU_MODE = 1 and SENS_MAG_MODE = 1"
 FASTER_CARD = "Use a faster SD card, or log fewer topics"
+COPY_AGAIN = "Copy the log from the vehicle again; check the SD card"
+WHOLE_LOG = "Use the log as PX4 wrote it: what made or converted this file kept some fields only"
 _VERBOSE_SINCE = (1, 16, 0)
 _RATE_PARAMETERS = {
     "vehicle_magnetometer": " (SENS_MAG_RATE)",
@@ -46,6 +48,10 @@ def log_from_boot(flight: Flight) -> str:
     if logs_from_boot(flight.parameters.at_end()):
         return "The logger begins at boot already: wait longer on the ground before take-off"
     return f"Set {SET_LOG_FROM_BOOT}, so that the log begins when the autopilot starts"
+
+
+NEXT_FLIGHT_TOPICS = ("estimator_status", "estimator_selector_status")
+"""What `next_flight_settings` reads."""
 
 
 def next_flight_settings(flight: Flight) -> str:

@@ -10,11 +10,13 @@ from itertools import permutations, product
 
 import numpy as np
 
-from fusetune.px4.flight import Flight, TopicTable, stacked
-from fusetune.save.checks.check import Check
-from fusetune.save.thresholds import VerdictThresholds
+from fusetune.check import check
+from fusetune.finding import Finding
+from fusetune.px4.flight import TopicTable, stacked
+from fusetune.save.checks.judged_flight import MAG, JudgedFlight
 
 MIN_SAMPLES, MAX_SAMPLES = 24, 500
+_ATTITUDE = "vehicle_attitude"
 QUARTER_TURNS = tuple(
     matrix
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3))
@@ -25,22 +27,24 @@ QUARTER_TURNS = tuple(
 _REMEDY = "Compare CAL_MAG0_ROT (and SENS_BOARD_ROT) with how the sensor sits; in a simulation, ask its sensor model"
 
 
-def magnetometer_mounting(flight: Flight, limits: VerdictThresholds) -> Check:
+@check(topics=(MAG, _ATTITUDE), thresholds=("max_field_scatter_left",))
+def magnetometer_mounting(judged: JudgedFlight) -> Finding:
     """Whether the field stands still over the ground, or would if the sensor were turned."""
-    name, threshold = "magnetometer_mounting", limits.max_field_scatter_left
-    table, attitude = flight.topic("vehicle_magnetometer"), flight.topic("vehicle_attitude")
+    threshold = judged.limits.max_field_scatter_left
+    table, attitude = judged.flight.topic(MAG), judged.flight.topic(_ATTITUDE)
     if table is None or attitude is None or "q[0]" not in attitude or "magnetometer_ga[0]" not in table:
-        return Check(name, "does-not-apply", "without magnetometer or attitude the two cannot be compared")
+        return magnetometer_mounting.does_not_apply("without magnetometer or attitude the two cannot be compared")
     # damaged numbers may be of the kind of NaN that even a cast complains of; they are left out
     with np.errstate(invalid="ignore"):
         q, measured = _together(table, attitude)
     if len(measured) < MIN_SAMPLES:
-        return Check(name, "does-not-apply", f"only {len(measured)} magnetometer samples with an attitude")
+        found = f"only {len(measured)} magnetometer samples with an attitude"
+        return magnetometer_mounting.does_not_apply(found)
     mounting, left = stillest_mounting(q, measured)
     if left > threshold:
-        return Check(name, "pass", "no other mounting would make the field stand stiller", "", left, threshold)
-    reason = f"the field turns as if the magnetometer sat otherwise, by {described(mounting)}"
-    return Check(name, "warning", reason, _REMEDY, left, threshold)
+        return magnetometer_mounting.passed("no other mounting would make the field stand stiller", left, threshold)
+    found = f"the field turns as if the magnetometer sat otherwise, by {described(mounting)}"
+    return magnetometer_mounting.warned(found, _REMEDY, left, threshold)
 
 
 def stillest_mounting(q: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, float]:

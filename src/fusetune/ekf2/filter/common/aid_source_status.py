@@ -5,6 +5,8 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.px4.aid_sources import AID_SOURCES as SOURCE_ROWS
+from fusetune.px4.aid_sources import REPLAYED_SOURCES
 
 AID_SOURCE = np.dtype(
     [
@@ -23,31 +25,11 @@ AID_SOURCE = np.dtype(
     align=True,
 )
 
-AID_SOURCE_AXES = {
-    "baro_hgt": 1,
-    "rng_hgt": 1,
-    "fake_hgt": 1,
-    "fake_pos": 2,
-    "gnss_hgt": 1,
-    "gnss_pos": 2,
-    "gnss_vel": 3,
-    "gnss_yaw": 1,
-    "ev_hgt": 1,
-    "ev_pos": 2,
-    "ev_vel": 3,
-    "ev_yaw": 1,
-    "airspeed": 1,
-    "sideslip": 1,
-    "mag": 3,
-    "gravity": 3,
-    "optical_flow": 2,
-    "aux_vel": 2,
-    "aux_global_position": 2,
-    "drag": 2,
-}
-"""Number of axes of every aid source, in the order in which their codes count."""
+AID_SOURCE_NAMES = REPLAYED_SOURCES
+"""Names of the aid sources of the replay, in the order of their codes."""
 
-AID_SOURCE_NAMES = tuple(AID_SOURCE_AXES)
+AID_SOURCE_AXES = {name: SOURCE_ROWS[name].axes for name in AID_SOURCE_NAMES}
+"""Number of axes of every aid source."""
 
 AID_SOURCES = np.dtype([(name, AID_SOURCE) for name in AID_SOURCE_NAMES], align=True)
 """The estimator's sub-record `ekf.aid`: one status for each source."""

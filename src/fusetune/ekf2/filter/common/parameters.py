@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, complete
 
 __all__ = ["EKF2_PARAMETERS", "PARAMETER_NAMES", "complete", "parameter_record"]
@@ -17,16 +18,8 @@ EKF2_PARAMETERS = np.dtype([(name, "f8") for name in PARAMETER_NAMES])
 
 OBSOLETE_MAG_TYPE_DEFAULT = 0
 VALID_MAG_TYPES = (0, 1, 5, 6)
-DELAY_PARAMETERS = (
-    "EKF2_AVEL_DELAY",
-    "EKF2_BARO_DELAY",
-    "EKF2_ASP_DELAY",
-    "EKF2_MAG_DELAY",
-    "EKF2_RNG_DELAY",
-    "EKF2_GPS_DELAY",
-    "EKF2_OF_DELAY",
-    "EKF2_EV_DELAY",
-)
+DELAY_PARAMETERS = tuple(sensor.delay_parameter for sensor in SENSORS.values() if sensor.buffered)
+"""Delays that EKF2_DELAY_MAX, which sizes the buffers, must not fall short of."""
 
 
 def taken_value(name: str, value: float) -> float:
