@@ -46,7 +46,10 @@ def test_reasons_name_what_the_log_lacks():
         ("vehicle_land_detected", 0): {"timestamp": np.array([START, START + 2_000_000]), "landed": np.array([1, 0])},
     }
     result = judged(2.0, flight=Flight("f", topics, info={"ver_sw_release": 0x010D03FF}))
-    text = " / ".join(result.reasons)
+    assert [reason.id for reason in result.reasons] == ["imu_coverage", "magnetometer", "log_start", "firmware"]
+    # 1999 intervals of 4.5 ms in 1999 times 5 ms, and messages every half second
+    assert [reason.figure for reason in result.reasons[:3]] == pytest.approx([0.9, 2.0, 2.0])
+    text = " / ".join(reason.in_words for reason in result.reasons)
     assert "10.0%" in text
     assert "magnetometer at only 2.0 Hz" in text
     assert "2 s before take-off" in text
@@ -65,12 +68,12 @@ def test_a_slow_sensor_is_not_put_down_to_the_logger():
         ("ekf2_timestamps", 0): updates,
     }
     flight = Flight("f", topics, ParameterHistory({"SDLOG_PROFILE": 3, "SDLOG_MODE": 2}))
-    text = " / ".join(judged(2.0, flight=flight).reasons)
+    text = " / ".join(reason.in_words for reason in judged(2.0, flight=flight).reasons)
     assert "barometer itself gives only 2.0 Hz" in text
     assert "SDLOG" not in text
     flight.parameters.initial |= {"SDLOG_PROFILE": 1, "SDLOG_MODE": 0}
     del topics["ekf2_timestamps", 0]
-    text = " / ".join(judged(2.0, flight=flight).reasons)
+    text = " / ".join(reason.in_words for reason in judged(2.0, flight=flight).reasons)
     assert "SDLOG_PROFILE = 3" in text
     assert "SDLOG_MODE = 2" in text
 
