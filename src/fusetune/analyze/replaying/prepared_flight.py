@@ -94,8 +94,11 @@ class PreparedFlight:
         return dataclasses.replace(self, inputs=build_inputs(reconstructed.flight), reconstructed=reconstructed)
 
     def with_log(self, logged: Flight) -> PreparedFlight:
-        """The same flight with further topics of its log, canonical, which no replay reads."""
-        return dataclasses.replace(self, flight=self.flight.with_topics(self.flight.topics | logged.topics))
+        """The same flight with further topics of its log, canonical, which no replay reads.
+
+        What it has stays: of fewer topics the canonical form makes some tables that the log holds itself.
+        """
+        return dataclasses.replace(self, flight=self.flight.with_topics(logged.topics | self.flight.topics))
 
     def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the summary of a replay: how it started and what was reconstructed."""
