@@ -26,9 +26,8 @@ from scipy.stats import kendalltau
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import ReconstructionSettings
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
-from fusetune.analyze.replaying.replay_settings import IN_USE
+from fusetune.analyze.replaying.replay_settings import IN_USE, StartSettings
 from fusetune.analyze.replaying.set_input import WRITTEN_BACK, read_set_files
-from fusetune.analyze.replaying.start_choice import StartSettings
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.trust.compared_innovations import replayed_innovations
 from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES

@@ -11,7 +11,7 @@ import numpy as np
 
 from fusetune.apply.criteria import criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AnalyzedFlight, read_flights
-from fusetune.apply.paper.paper_mode import paper_ranking
+from fusetune.apply.paper_mode import paper_ranking
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 

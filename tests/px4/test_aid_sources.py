@@ -117,6 +117,14 @@ def test_codes_are_those_that_replays_were_written_with() -> None:
     assert REPLAYED_SOURCES[-1] == "drag"
 
 
+def test_all_sources_but_those_that_nothing_feeds_are_replayed() -> None:
+    # docs/fidelity.md: all aid sources but the auxiliary global position
+    assert {name for name, source in AID_SOURCES.items() if not source.is_replayed} == {
+        "mag_heading",
+        "aux_global_position",
+    }
+
+
 def test_axes_are_those_that_px4_publishes() -> None:
     # messages estimator_aid_source1d, 2d and 3d of PX4 v1.16, by what its Ekf class declares
     of_one = {"baro_hgt", "rng_hgt", "fake_hgt", "gnss_hgt", "ev_hgt", "gnss_yaw", "ev_yaw", "airspeed", "sideslip"}

@@ -255,7 +255,7 @@ def test_remedies_of_what_did_not_pass_are_in_the_table(tmp_path: Path, log: Pat
 
 
 def test_thresholds_decide(tmp_path: Path, log: Path) -> None:
-    strict = VerdictThresholds.from_mapping({"min_imu_duration_s": 60})
+    strict = VerdictThresholds(min_imu_duration_s=60.0)
     assert "at least 60 s" in save_log(log, tmp_path / "made", strict).reasons[0]
 
 

@@ -1,11 +1,12 @@
-"""Schema, shipped configuration, its manual and the locked versions say the same."""
+"""The configuration, what is made of it, what is said of mistakes in it; and the locked versions say the same."""
 
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
-from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
@@ -13,79 +14,111 @@ import jsonschema
 import pytest
 import yaml
 from packaging.requirements import Requirement
+from tests.made_text import UpToDate
+from tests.settings.configuration_texts import configuration_text, faults_text, leaves, manual_text, schema_text
+
+from fusetune.analyze.replaying.replay_settings import IN_USE
+from fusetune.configuration import Configuration, read_configuration
+from fusetune.design.mission import Mission
+from fusetune.errors import UserError
+from fusetune.execute.vehicle import Vehicle
+from fusetune.save.thresholds import VerdictThresholds
+from fusetune.settings.checking import checked
 
 
-@pytest.fixture
-def schema(project_root: Path) -> dict[str, Any]:
-    return yaml.safe_load((project_root / "workflow" / "schemas" / "config.schema.yaml").read_text(encoding="utf-8"))
+def test_schema_file_and_manual_say_what_is_declared(project_root: Path, up_to_date: UpToDate) -> None:
+    up_to_date(project_root / "workflow" / "schemas" / "config.schema.yaml", None, schema_text())
+    up_to_date(project_root / "config" / "config.yaml", None, configuration_text())
+    manual = project_root / "config" / "README.md"
+    up_to_date(manual, "settings", f"\n{manual_text(Configuration)}\n\n")
+    up_to_date(manual, "mission", f"\n{manual_text(Mission)}\n\n")
+    up_to_date(manual, "vehicle", f"\n{manual_text(Vehicle)}\n\n")
+    up_to_date(manual, "faults", f"\n{faults_text()}\n\n")
 
 
-@pytest.fixture
-def shipped(project_root: Path) -> dict[str, Any]:
-    return yaml.safe_load((project_root / "config" / "config.yaml").read_text(encoding="utf-8"))
-
-
-def leaves(schema: dict[str, Any], place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
-    for key, part in schema.get("properties", {}).items():
-        if part.get("properties"):
-            yield from leaves(part, f"{place}{key}.")
-        else:
-            yield f"{place}{key}", part
-
-
-def value_at(document: dict[str, Any], place: str) -> Any:
-    for key in place.split("."):
-        document = document[key]
-    return document
-
-
-def test_the_schema_is_a_schema(schema: dict[str, Any]) -> None:
+def test_the_schema_is_a_schema(project_root: Path) -> None:
+    schema = yaml.safe_load((project_root / "workflow" / "schemas" / "config.schema.yaml").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
 
 
-def test_the_shipped_configuration_is_valid_and_states_every_default(
-    schema: dict[str, Any], shipped: dict[str, Any]
+def test_the_shipped_configuration_is_the_default(project_root: Path) -> None:
+    """`IN_USE`, the thresholds and so on are what a caller of the package gets who says nothing."""
+    shipped = read_configuration([project_root / "config" / "config.yaml"])
+    assert shipped == Configuration()
+    assert shipped.replay == IN_USE
+    assert yaml.safe_load((project_root / "config" / "config.yaml").read_text(encoding="utf-8"))["seed"] == shipped.seed
+
+
+def test_every_setting_has_a_meaning_and_a_default_that_may_be_given(tmp_path: Path) -> None:
+    for place, one in leaves(Configuration):
+        assert one.meaning, place
+        assert one.default is not MISSING, place
+        *sections, key = place.split(".")
+        document: dict[str, Any] = {key: list(one.default) if isinstance(one.default, tuple) else one.default}
+        for name in reversed(sections):
+            document = {name: document}
+        assert checked(Configuration, document, "config.yaml") == Configuration()
+
+
+def test_all_files_and_the_command_line_make_one_configuration(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
+    first.write_text("seed: 3\nscoring: {settle_s: 2, block_s: 4.0}\ndecision: {sources: {mag: 2}}\n", encoding="utf-8")
+    second.write_text("scoring: {settle_s: 1e1}\n", encoding="utf-8")
+    settings = read_configuration([first, second], {"decision": {"sources": {"mag": 0.5, "baro_hgt": 1}}})
+    assert settings.seed == 3
+    assert (settings.scoring.settle_s, settings.scoring.block_s, settings.scoring.window_s) == (10.0, 4.0, 30.0)
+    assert settings.decision.sources == {"mag": 0.5, "baro_hgt": 1.0}
+    assert settings.verdict == VerdictThresholds()
+
+
+@pytest.mark.parametrize(
+    ("given", "parts"),
+    [
+        ({"verdict": {"low_imu": 3}}, ("verdict: unknown key 'low_imu'", "did you mean 'low_imu_rate_hz'?")),
+        (
+            {"verdict": {"low_imu_rate_hz": "fast"}},
+            ("verdict.low_imu_rate_hz is 'fast'; expected a number between 1 and 1000", "warning [Hz]"),
+        ),
+        ({"reading": {"max_tables": -1}}, ("reading.max_tables is -1; expected a whole number between 50 and 100000",)),
+        ({"reading": {"max_columns": True}}, ("reading.max_columns is true; expected a whole number",)),
+        ({"start": {"mode": "lukewarm"}}, ("start.mode is 'lukewarm'; expected one of 'auto', 'warm', 'cold'",)),
+        ({"withheld": {"gnss_s": -1.0}}, ("withheld.gnss_s is -1.0; expected a number between 0 and 60",)),
+        ({"reconstruction": {"imu": 1}}, ("reconstruction.imu is 1; expected true or false",)),
+        ({"trust": {"heading_deg": [4, 2, 10]}}, ("trust.heading_deg is [4.0, 2.0, 10.0]; expected three rising",)),
+        ({"trust": {"flags_equal": [0.7, 0.8, 0.9]}}, ("trust.flags_equal is", "three falling numbers")),
+        ({"trust": {"heading_deg": [4, 5]}}, ("trust.heading_deg is a list of 2; expected a list of length 3 –",)),
+        ({"trust": {"needed_for_b": ["speed"]}}, ("trust.needed_for_b[0] is 'speed'; expected one of", "'height_m'")),
+        ({"decision": {"sources": {"sonar": 1.0}}}, ("decision.sources: the key 'sonar'", "'gnss_vel'")),
+        ({"decision": {"sources": {}}}, ("decision.sources is an empty mapping", "of size at least 1")),
+        ({"decision": {"sources": {"gnss_vel": -1}}}, ("decision.sources.gnss_vel is -1; expected a number between",)),
+        ({"decision": {"withheld_sources": {"gnss_pos.z": 1}}}, ("the key 'gnss_pos.z'", "'gnss_pos.y'")),
+        ({"decision": {"lowest_grade": "E"}}, ("decision.lowest_grade is 'E'; expected one of 'A', 'B', 'C', 'D'",)),
+        ({"decision": {"seed": 2}}, ("decision: unknown key 'seed'",)),
+        (
+            {"demonstration": {"faults": {"flight_1": {}}}},
+            ("demonstration.faults.flight_1 is an empty mapping; expected a list",),
+        ),
+    ],
+)
+def test_what_cannot_be_meant_is_told_with_file_key_and_expectation(
+    given: dict[str, Any], parts: tuple[str, ...]
 ) -> None:
-    jsonschema.validate(shipped, schema)
-    for place, part in leaves(schema):
-        assert value_at(shipped, place) == part["default"], place
+    with pytest.raises(UserError) as error:
+        checked(Configuration, given, "config/config.yaml")
+    assert str(error.value).startswith("config/config.yaml: ")
+    assert "config/README.md" in error.value.remedy
+    for part in parts:
+        assert part in str(error.value)
 
 
-def test_every_key_is_described_and_in_the_manual(schema: dict[str, Any], project_root: Path) -> None:
-    manual = (project_root / "config" / "README.md").read_text(encoding="utf-8")
-    for place, part in leaves(schema):
-        assert part["description"], place
-        assert f"`{place}`" in manual, f"config/README.md does not explain {place}"
-
-
-def test_the_defaults_are_those_of_the_rooms(shipped: dict[str, Any]) -> None:
-    from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings
-    from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-    from fusetune.analyze.trust.trust_settings import TrustSettings
-    from fusetune.apply.settings import DecisionSettings
-    from fusetune.px4.ulog.reading_limits import ReadingLimits
-    from fusetune.save import VerdictThresholds
-
-    assert ReadingLimits.from_mapping(shipped["reading"]) == ReadingLimits()
-    assert shipped["reading"].keys() == asdict(ReadingLimits()).keys()
-    assert ScoringSettings.from_mapping(shipped["scoring"]) == ScoringSettings()
-    assert TrustSettings.from_mapping(shipped["trust"]) == TrustSettings()
-    assert DecisionSettings.from_mapping(shipped["decision"], seed=0) == DecisionSettings()
-    assert VerdictThresholds.from_mapping(shipped["verdict"]) == VerdictThresholds()
-    assert shipped["verdict"].keys() == asdict(VerdictThresholds()).keys()
-    assert WithholdingSettings.from_mapping(shipped["withheld"]) == WithholdingSettings()
-
-
-def test_the_sources_that_may_rank_the_sets_are_those_that_are_scored(schema: dict[str, Any]) -> None:
-    from fusetune.px4.aid_sources import MEASURED_SOURCES, WITHHOLDABLE
-
-    decision = schema["properties"]["decision"]["properties"]
-    assert decision["sources"]["propertyNames"]["enum"] == sorted(MEASURED_SOURCES)
-    pattern = re.compile(decision["withheld_sources"]["propertyNames"]["pattern"])
-    for source in (source for sources in WITHHOLDABLE.values() for source in sources):
-        axes = "xyz"[: MEASURED_SOURCES[source].axes]
-        assert pattern.match(source)
-        assert [axis for axis in "xyz" if pattern.match(f"{source}.{axis}")] == list(axes)
+def test_the_configuration_is_read_without_the_numerics() -> None:
+    """The workflow reads it whenever it starts; so does a job that has only values to take over."""
+    for module, absent in (
+        ("fusetune.inputs", {"numpy", "numba", "pyarrow", "scipy", "pydantic"}),
+        ("fusetune.save.thresholds", {"jsonschema", "yaml", "pydantic"}),
+    ):
+        loaded = f"import sys, {module}; print(sorted({absent!r} & set(sys.modules)))"
+        assert subprocess.check_output([sys.executable, "-c", loaded], text=True) == "[]\n", module
 
 
 LOCK_FILES = {"requirements.lock": ("test", "dev"), "requirements-slurm.lock": ("slurm",)}

@@ -1,6 +1,5 @@
 REPLAY_CHUNKS = [
-    SETS.replayed[first : first + SETTINGS["sets_per_job"]]
-    for first in range(0, len(SETS.replayed), SETTINGS["sets_per_job"])
+    SETS.replayed[first : first + SETTINGS.sets_per_job] for first in range(0, len(SETS.replayed), SETTINGS.sets_per_job)
 ]
 
 
@@ -28,7 +27,7 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
             **replay_resources(len(chunk)),
         params:
             sets=overrides_of(chunk),
-            replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},
+            replay=asdict(SETTINGS.replay),
             code=DIGEST["replay"],
         message:
             f"Analyze: replay {{wildcards.flight}} with {', '.join(chunk)}"
@@ -58,12 +57,12 @@ rule analyze_flight:
         **replay_resources(len(REPLAY_CHUNKS[-1]), len(SETS.scored)),
     params:
         sets=overrides_of(REPLAY_CHUNKS[-1]),
-        replay={section: SETTINGS[section] for section in REPLAY_SECTIONS},
+        replay=asdict(SETTINGS.replay),
         code=DIGEST["replay"],
         scored=SETS.scored,
         present=PRESENT,
-        scoring=SETTINGS["scoring"],
-        trust=SETTINGS["trust"],
+        scoring=asdict(SETTINGS.scoring),
+        trust=asdict(SETTINGS.trust),
         score_code=DIGEST["score"],
     message:
         "Analyze: replay and score {wildcards.flight}"

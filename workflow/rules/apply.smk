@@ -40,9 +40,8 @@ rule decide:
     params:
         sets=SETS.scored,
         present=PRESENT,
-        descriptions={pset.name: pset.description for pset in STUDY.sets},
-        decision=SETTINGS["decision"],
-        seed=SETTINGS["seed"],
+        descriptions={pset.name: pset.description for pset in INPUTS.study.sets},
+        decision=asdict(SETTINGS.decision) | {"seed": SETTINGS.seed},
         contents=contents(*CONFIGURATION_FILES),
         code=DIGEST["apply"],
     message:

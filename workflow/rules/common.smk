@@ -10,7 +10,6 @@ from fusetune.errors import RUN_AGAIN
 from fusetune.save import read_present
 from fusetune.save.discovery import printable
 
-REPLAY_SECTIONS = ("withheld", "reconstruction", "start")
 ANALYZED_FILES = [
     *(f"results/analyze/{{flight}}/{pset}.{part}" for pset in SETS.replayed for part in PARTS),
     *(f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES),

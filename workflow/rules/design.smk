@@ -1,9 +1,9 @@
 rule design:
     input:
-        study=SETTINGS["study"],
-        mission=SETTINGS["mission"],
+        study=SETTINGS.study,
+        mission=SETTINGS.mission,
     output:
-        plan=f"results/design/{MISSION.name}.plan",
+        plan=f"results/design/{INPUTS.mission.name}.plan",
         sets=report(
             "results/design/sets.parquet",
             caption="../report/sets.rst",
@@ -19,9 +19,9 @@ rule design:
         mem_mb=of_its_logs(LIBRARIES_MB),
         runtime=of_its_logs(5),
     params:
-        contents=contents(SETTINGS["study"], SETTINGS["mission"]),
+        contents=contents(SETTINGS.study, SETTINGS.mission),
         code=DIGEST["design"],
     message:
-        "Design: write the mission plan and {STUDY.name}'s parameter sets"
+        "Design: write the mission plan and {INPUTS.study.name}'s parameter sets"
     script:
         "../scripts/design.py"

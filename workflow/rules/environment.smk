@@ -90,7 +90,7 @@ def recover_from_interruption(claim):
     remove_stale_locks(STATE, claim)
     remove_unfinished(unfinished_files(STATE, PRODUCTS))
     if not belong_together(STATE, RESULTS):
-        flights = Path(SETTINGS["flights_dir"]).resolve()
+        flights = Path(SETTINGS.flights_dir).resolve()
         for part in BELIEVED:
             if part.resolve() not in (flights, *flights.parents):
                 remove(part)
@@ -121,7 +121,7 @@ def take_the_folder():
             print("No locks in this file system: after a killed run use snakemake --unlock.", file=sys.stderr)
         elif not workflow.touch:
             recover_from_interruption(claim)
-            for log in FOUND.logs:
+            for log in INPUTS.found.logs:
                 CONTENT.of(log.path)
             CONTENT.save()
     except UserError as error:

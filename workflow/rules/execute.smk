@@ -18,8 +18,8 @@ rule compile_kernels:
 
 rule simulate_flight:
     input:
-        mission=SETTINGS["mission"],
-        vehicle=SETTINGS["demonstration"]["vehicle"],
+        mission=SETTINGS.mission,
+        vehicle=SETTINGS.demonstration.vehicle,
         kernels=KERNELS_READY,
     output:
         "results/execute/{flight}.ulg",
@@ -31,12 +31,10 @@ rule simulate_flight:
         mem_mb=of_its_logs(KERNELS_MB, 15.0),
         runtime=of_its_logs(10, 0.5),
     params:
-        overrides=lambda wildcards: SETS.study[DEMONSTRATION[wildcards.flight]],
-        faults=lambda wildcards: FAULTS.get(wildcards.flight, []),
-        seed=lambda wildcards: 1000 * SETTINGS["demonstration"]["seed"]
-        + list(DEMONSTRATION).index(wildcards.flight)
-        + 1,
-        contents=contents(SETTINGS["mission"], SETTINGS["demonstration"]["vehicle"]),
+        overrides=lambda wildcards: SETS.study[INPUTS.simulated[wildcards.flight]],
+        faults=lambda wildcards: SETTINGS.demonstration.faults.get(wildcards.flight, ()),
+        seed=lambda wildcards: 1000 * SETTINGS.demonstration.seed + list(INPUTS.simulated).index(wildcards.flight) + 1,
+        contents=contents(SETTINGS.mission, SETTINGS.demonstration.vehicle),
         code=DIGEST["execute"],
     message:
         "Execute: simulate {wildcards.flight}"

@@ -16,8 +16,8 @@ rule save_flight:
         flown=lambda wildcards, input: None if DEMONSTRATED else vars(FLOWN_LOGS[wildcards.flight]),
         checksum=lambda wildcards: None if DEMONSTRATED else CONTENT.of(FLOWN_LOGS[wildcards.flight].path),
         code=DIGEST["save"],
-        thresholds=SETTINGS["verdict"],
-        limits=SETTINGS["reading"],
+        thresholds=asdict(SETTINGS.verdict),
+        limits=asdict(SETTINGS.reading),
     message:
         "Save: read {wildcards.flight}"
     script:
@@ -45,10 +45,10 @@ checkpoint list_flights:
         mem_mb=of_its_logs(LIBRARIES_MB),
         runtime=of_its_logs(5),
     params:
-        refused=[list(astuple(entry)) for entry in FOUND.refused],
+        refused=[list(astuple(entry)) for entry in INPUTS.found.refused],
         code=DIGEST["save"],
         varied=SETS.varied,
-        present_flight=SETTINGS["present_flight"],
+        present_flight=SETTINGS.present_flight,
     message:
         "Save: list which flights can be replayed"
     script:

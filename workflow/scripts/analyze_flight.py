@@ -8,6 +8,7 @@ from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.replaying.store.ledger import ReplayLedger
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.settings.declaration import built
 
 from job import keep_out, logged_job
 
@@ -21,9 +22,9 @@ with logged_job(snakemake.log[0]):
     ledger = ReplayLedger(flight, folder, [params.code, dict(params.replay)])
     outdated = ledger.outdated(params.sets)
     settings = AnalysisSettings(
-        ReplaySettings.from_mapping(params.replay),
-        ScoringSettings.from_mapping(params.scoring),
-        TrustSettings.from_mapping(params.trust),
+        built(ReplaySettings, params.replay),
+        ScoringSettings(**params.scoring),
+        TrustSettings(**params.trust),
     )
     analyze_flight(flight, folder, outdated, params.scored, present=params.present, settings=settings)
     ledger.record(outdated)

@@ -23,5 +23,5 @@ with logged_job(snakemake.log[0]):
         newest_flight=read_present(snakemake.input.present).flight,
         descriptions=snakemake.params.descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
-        settings=DecisionSettings.from_mapping(snakemake.params.decision, seed=snakemake.params.seed),
+        settings=DecisionSettings(**snakemake.params.decision),
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from fusetune.analyze.replaying.replay_flight import replay_saved_flight
 from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.replaying.store.ledger import ReplayLedger
+from fusetune.settings.declaration import built
 
 from job import keep_out, logged_job
 
@@ -18,6 +19,6 @@ with logged_job(snakemake.log[0]):
     flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
     ledger = ReplayLedger(flight, folder, [params.code, dict(params.replay)])
     outdated = ledger.outdated(params.sets)
-    replay_saved_flight(flight, outdated, folder, ReplaySettings.from_mapping(params.replay))
+    replay_saved_flight(flight, outdated, folder, built(ReplaySettings, params.replay))
     ledger.record(outdated)
     print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(params.sets) - len(outdated)}")

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    thresholds = VerdictThresholds.from_mapping(snakemake.params.thresholds)
-    limits = ReadingLimits.from_mapping(snakemake.params.limits)
+    thresholds = VerdictThresholds(**snakemake.params.thresholds)
+    limits = ReadingLimits(**snakemake.params.limits)
     flown, folder = snakemake.params.flown, snakemake.output[0]
     if flown is None:
         check_checksum(snakemake.input.log, RUN_AGAIN)

@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
-from fusetune.apply.paper.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
+from fusetune.apply.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
 
 Criteria = dict[str, float]

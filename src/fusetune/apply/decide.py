@@ -11,8 +11,8 @@ import pyarrow as pa
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
-from fusetune.apply.paper.paper_disagreement import is_same_set, why
-from fusetune.apply.paper.paper_mode import PaperEntry, paper_ranking
+from fusetune.apply.paper_disagreement import is_same_set, why
+from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
 from fusetune.apply.provenance import file_hash, flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank

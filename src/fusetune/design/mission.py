@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from fusetune.design.config_file import load_schema, raise_problems, validate
-from fusetune.design.names import name_problem, one_line
-from fusetune.design.yaml_reader import read_yaml
+from fusetune.design.names import NAME_PATTERN, name_problem, one_line
+from fusetune.settings.checking import raise_problems, validate
+from fusetune.settings.declaration import built, required, setting
+from fusetune.settings.schema import schema_of
+from fusetune.settings.yaml_reader import read_yaml
 
 Turn = Literal["fly_by", "fly_over"]
 LandingMode = Literal["land", "return"]
@@ -27,63 +29,73 @@ MEAN_EARTH_RADIUS_M = 6_371_008.8
 
 @dataclass(frozen=True)
 class Home:
-    """Place of take-off."""
+    """The place of take-off."""
 
-    lat: float
-    lon: float
-    alt: float
-    """Above mean sea level, m."""
-    geoid_undulation_m: float = 0.0
-    heading_deg: float = 0.0
+    lat: float = required("latitude, WGS-84", unit="degrees", low=-89.0, high=89.0)
+    lon: float = required("longitude, WGS-84", unit="degrees", low=-180, high=180)
+    alt: float = required("altitude above mean sea level", unit="m", low=-500, high=9000)
+    geoid_undulation_m: float = setting(
+        0.0, "height of mean sea level above the WGS-84 ellipsoid", unit="m", low=-110, high=90
+    )
+    heading_deg: float = setting(
+        0.0, "heading on the ground, from true north, clockwise", unit="degrees", low=-360, high=360
+    )
 
 
 @dataclass(frozen=True)
 class Takeoff:
-    """Vertical climb from home."""
+    """The vertical climb from home."""
 
-    altitude_m: float
-    climb_speed_m_s: float = 1.5
-    ground_s: float = 15.0
-    """Time on the ground before take-off."""
+    altitude_m: float = required("height of the climb above home", unit="m", low=2, high=500)
+    climb_speed_m_s: float = setting(1.5, "speed of the climb", unit="m/s", above=0, high=10)
+    ground_s: float = setting(15.0, "time on the ground before take-off", unit="s", low=5, high=600)
 
 
 @dataclass(frozen=True)
 class Waypoint:
     """A place to fly to."""
 
-    lat: float
-    lon: float
-    alt: float
-    """Above home, m."""
-    speed_m_s: float
-    """Horizontal speed on the way to the waypoint."""
-    turn: Turn = "fly_by"
-    hold_s: float = 0.0
-    heading_deg: float | None = None
-    """Heading on the way to the waypoint; `None` is the course."""
+    lat: float = required("latitude, WGS-84", unit="degrees", low=-89.0, high=89.0)
+    lon: float = required("longitude, WGS-84", unit="degrees", low=-180, high=180)
+    alt: float = required("altitude above home", unit="m", low=1, high=500)
+    speed_m_s: float = required(
+        "horizontal speed on the way to this waypoint; without it that of the mission",
+        unit="m/s",
+        above=0,
+        high=30,
+        filled_in=True,
+    )
+    turn: Turn = setting("fly_by", "fly_by cuts the corner, fly_over crosses the waypoint")
+    hold_s: float = setting(0.0, "time to hover at the waypoint", unit="s", low=0, high=600)
+    heading_deg: float | None = setting(
+        None,
+        "heading on the way to this waypoint, from true north; without it the course",
+        unit="degrees",
+        low=-360,
+        high=360,
+    )
 
 
 @dataclass(frozen=True)
 class Landing:
-    """End of the mission."""
+    """How the mission ends."""
 
-    mode: LandingMode
-    descent_speed_m_s: float = 0.8
-    ground_s: float = 5.0
-    """Time on the ground after touch-down."""
+    mode: LandingMode = required("land under the last waypoint, or return to home and land there")
+    descent_speed_m_s: float = setting(0.8, "speed of the descent", unit="m/s", above=0, high=5)
+    ground_s: float = setting(5.0, "time on the ground after touch-down", unit="s", low=3, high=600)
 
 
 @dataclass(frozen=True)
 class Mission:
     """A mission."""
 
-    name: str
-    home: Home
-    takeoff: Takeoff
-    waypoints: tuple[Waypoint, ...]
-    landing: Landing
-    speed_m_s: float = 5.0
-    description: str = ""
+    name: str = required("name of the mission; becomes a file name", pattern=NAME_PATTERN)
+    home: Home = required()
+    takeoff: Takeoff = required()
+    waypoints: tuple[Waypoint, ...] = required("places to fly to, in order", at_least=1)
+    landing: Landing = required()
+    speed_m_s: float = setting(5.0, "horizontal speed between waypoints", unit="m/s", above=0, high=30)
+    description: str = setting("", "what the mission is for, in a sentence")
 
 
 def load_mission(path: str | os.PathLike[str]) -> Mission:
@@ -95,7 +107,7 @@ def load_mission(path: str | os.PathLike[str]) -> Mission:
         The file is broken; the message names every key at fault and what was expected.
     """
     document = read_yaml(path)
-    validate(document, load_schema("fusetune.design", "mission"), path)
+    validate(document, schema_of(Mission), path)
     mission = _mission_of(document)
     problem = name_problem(mission.name)
     raise_problems(path, [f"name: {problem}"] if problem else [], "Choose another name")
@@ -104,16 +116,9 @@ def load_mission(path: str | os.PathLike[str]) -> Mission:
 
 
 def _mission_of(document: Mapping[str, Any]) -> Mission:
-    speed = float(document.get("speed_m_s", 5.0))
-    return Mission(
-        name=document["name"],
-        home=Home(**document["home"]),
-        takeoff=Takeoff(**document["takeoff"]),
-        waypoints=tuple(Waypoint(**{"speed_m_s": speed, **entry}) for entry in document["waypoints"]),
-        landing=Landing(**document["landing"]),
-        speed_m_s=speed,
-        description=one_line(document.get("description", "")),
-    )
+    speed = {"speed_m_s": document.get("speed_m_s", Mission.speed_m_s)}
+    mission = built(Mission, {**document, "waypoints": [speed | entry for entry in document["waypoints"]]})
+    return replace(mission, description=one_line(mission.description))
 
 
 def _place_problems(mission: Mission) -> Iterable[str]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fusetune.storage.files import DEVICES
 
+NAME_PATTERN = "^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
+
 
 def name_problem(name: str) -> str | None:
     """Why a name of letters, digits, ``_`` and ``-`` cannot be that of a file; `None` where it can."""

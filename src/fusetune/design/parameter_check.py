@@ -6,6 +6,9 @@ from collections.abc import Mapping
 
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_value
 
+PARAMETER_PATTERN = "^[A-Z0-9_]{1,16}$"
+"""Of names of PX4 parameters."""
+
 
 def parameter_problem(name: str, value: float) -> str | None:
     """What is wrong with a parameter and its value and what was expected, in words; `None` where nothing is."""

@@ -13,19 +13,61 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
-from fusetune.design.config_file import load_schema, raise_problems, validate
-from fusetune.design.names import name_problem, one_line
-from fusetune.design.parameter_check import parameter_problem, typed_values
-from fusetune.design.yaml_reader import read_yaml
+from fusetune.design.names import NAME_PATTERN, name_problem, one_line
+from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
 from fusetune.set_names import RESERVED_SET_NAMES
+from fusetune.settings.checking import raise_problems, validate
+from fusetune.settings.declaration import required, setting
+from fusetune.settings.schema import schema_of
+from fusetune.settings.yaml_reader import read_yaml
 
 MOST_SETS = 2000
 """More sets than this are a slip of the pen: each is replayed on every flight."""
 
 LONGEST_SET_NAME = 120
 REMEDY = "Mend the named keys; the examples in config/studies/ show studies of every kind"
+
+
+@dataclass(frozen=True)
+class _StudyKind:
+    kind: Literal["list", "one_at_a_time", "grid"] = required(
+        "explicit sets, one parameter changed at a time, or all combinations"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _StudyFile(_StudyKind):
+    """What every study file may hold."""
+
+    name: str = required("name of the study", pattern=NAME_PATTERN)
+    description: str = setting("", "what the study asks, in a sentence")
+    fixed: Mapping[str, float] = setting({}, "parameters that every set of the study has", pattern=PARAMETER_PATTERN)
+
+
+@dataclass(frozen=True)
+class _SetEntry:
+    """A set of a study of kind list."""
+
+    name: str = required("name of the set; letters, digits, _ and -; becomes a file name", pattern=NAME_PATTERN)
+    parameters: Mapping[str, float] = required("parameter names and values", pattern=PARAMETER_PATTERN, at_least=1)
+    description: str = setting("", "what the set stands for")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ListFile(_StudyFile):
+    sets: tuple[_SetEntry, ...] = required("the sets, each with name and parameters", at_least=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _VariedFile(_StudyFile):
+    vary: Mapping[str, tuple[float, ...]] = required(
+        "parameters and the values each is given", pattern=PARAMETER_PATTERN, at_least=1
+    )
+
+
+_FILE_OF_KIND = {"list": _ListFile, "one_at_a_time": _VariedFile, "grid": _VariedFile}
 
 
 @dataclass(frozen=True)
@@ -64,7 +106,8 @@ def load_study(path: str | os.PathLike[str]) -> Study:
         The file is broken; the message names every key at fault and what was expected.
     """
     document = read_yaml(path)
-    validate(document, load_schema("fusetune.design", "study"), path)
+    validate({key: document[key] for key in document if key == "kind"}, schema_of(_StudyKind), path)
+    validate(document, schema_of(_FILE_OF_KIND[document["kind"]]), path)
     raise_problems(path, _size_problems(document), "Vary fewer parameters, or give them fewer values")
     raise_problems(path, _parameter_problems(document), REMEDY)
     sets = tuple(_SETS_OF_KIND[document["kind"]](document))

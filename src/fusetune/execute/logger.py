@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fusetune.execute.noise import random_stream
 from fusetune.execute.sensors.faults import DefaultProfile, Fault, LoggerDropout, of_kind
-from fusetune.execute.sensors.noise import random_stream
 from fusetune.execute.world.flight_plan import FlightEvents
 from fusetune.px4.estimator_samples import RELATIVE_FIELDS, RELATIVE_TICK_US, RELATIVE_TIMESTAMP_INVALID
 from fusetune.px4.flight import Dropout, TopicKey, TopicTable, select_rows

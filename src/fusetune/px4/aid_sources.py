@@ -155,6 +155,11 @@ class AidSource:
         """By which the estimator shifts the time of its measurements, ms."""
         return SENSORS[self.sensor].delay_parameter if self.sensor else None
 
+    @property
+    def is_replayed(self) -> bool:
+        """Whether the replay has it: it has a code, and its sensor, where it has one, is fed."""
+        return self.code is not None and (not self.sensor or SENSORS[self.sensor].buffered)
+
 
 AID_SOURCE_TOPIC = "estimator_aid_src_"
 

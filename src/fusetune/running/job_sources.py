@@ -8,17 +8,7 @@ from __future__ import annotations
 
 from fusetune.storage.digest import source_digest
 
-BASE = (
-    "check.py",
-    "errors.py",
-    "finding.py",
-    "number_settings.py",
-    "px4",
-    "set_names.py",
-    "settings.py",
-    "storage",
-    "time_limit.py",
-)
+BASE = ("check.py", "errors.py", "finding.py", "px4", "set_names.py", "settings", "storage", "time_limit.py")
 
 JOB_SOURCES = {
     "design": (*BASE, "design"),

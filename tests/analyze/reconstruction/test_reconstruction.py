@@ -20,7 +20,6 @@ from fusetune.analyze.replaying.replay_flight import write_replay
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.trust.fidelity import load_innovations
 from fusetune.ekf2.filter.common.parameters import complete
-from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, select_rows
 
 EARTH = np.array([0.21, 0.03, 0.43])
@@ -230,11 +229,6 @@ def test_reconstruction_brings_the_replay_back(flight, small, mended):
 
     assert difference(near) < 0.1
     assert difference(raw) > 10 * difference(near)
-
-
-def test_wrong_settings_are_told():
-    with pytest.raises(UserError, match=r"reconstruction\.imu_max_gap_s is 7"):
-        ReconstructionSettings.from_mapping({"imu_max_gap_s": 7})
 
 
 def test_rows_without_reconstruction_are_all_measured(flight):

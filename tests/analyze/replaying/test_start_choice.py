@@ -1,12 +1,9 @@
 """Warm or cold: by the log's time on the ground and by what it holds."""
 
-import dataclasses
-
 import numpy as np
-import pytest
 
-from fusetune.analyze.replaying.start_choice import StartSettings, choose_start
-from fusetune.errors import UserError
+from fusetune.analyze.replaying.replay_settings import StartSettings
+from fusetune.analyze.replaying.start_choice import choose_start
 from fusetune.px4.flight import Flight, ParameterHistory
 
 BEGIN = 1_000_000
@@ -72,15 +69,6 @@ def test_log_without_states_starts_cold_and_says_so():
 
 def test_cold_is_cold():
     assert choose_start(made(3, np.arange(0.5, 50)), StartSettings(mode="cold")).state is None
-
-
-def test_wrong_mode_is_told():
-    with pytest.raises(UserError, match="Choose auto, warm or cold"):
-        StartSettings.from_mapping({"mode": "lukewarm"})
-
-
-def test_settings_are_plain_values():
-    assert dataclasses.asdict(StartSettings.from_mapping(None))["mode"] == "auto"
 
 
 def test_states_of_no_layout_and_states_that_are_not_aligned_give_different_reasons():

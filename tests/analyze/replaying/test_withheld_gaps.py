@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from fusetune.analyze.replaying.replay_settings import WithholdingSettings
 from fusetune.analyze.replaying.store.columns import gap_table, prediction_table
-from fusetune.analyze.replaying.withheld_gaps import WithholdingSettings, plan_gaps
+from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import INNOVATION_ROW, LOCAL_POSITION_ROW
 from fusetune.ekf2.replay.results import Gap, GapResult
-from fusetune.errors import UserError
 from fusetune.px4.flight import Flight
 
 SECOND = 1_000_000
@@ -73,8 +73,3 @@ def test_places_at_both_ends_are_kept() -> None:
     table = gap_table([result(np.ones(45))]).to_pydict()
     assert (table["x_begin"], table["x_end"], table["vy_end"]) == ([1.0], [4.0], [-0.5])
     assert table["timestamp_end"] == [19 * SECOND]
-
-
-def test_settings_name_what_is_wrong() -> None:
-    with pytest.raises(UserError, match=r"withheld\.gnss_s is -1\.0"):
-        WithholdingSettings.from_mapping({"gnss_s": -1.0})

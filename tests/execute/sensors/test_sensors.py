@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from fusetune.design.mission import Mission
+from fusetune.execute.noise import gauss_markov, random_stream, random_walk
 from fusetune.execute.sensors.barometer import vehicle_air_data
 from fusetune.execute.sensors.faults import GnssGlitch, GnssOutage, MagneticDisturbance
 from fusetune.execute.sensors.gnss import vehicle_gps_position
 from fusetune.execute.sensors.magnetometer import vehicle_magnetometer
-from fusetune.execute.sensors.noise import gauss_markov, random_stream, random_walk
 from fusetune.execute.vehicle import GnssError, Vehicle
 from fusetune.execute.world.earth import magnetic_field_ned
 from fusetune.execute.world.truth import Truth

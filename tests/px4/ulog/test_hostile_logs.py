@@ -12,7 +12,8 @@ from fusetune.errors import UserError
 from fusetune.px4.flight import Flight
 from fusetune.px4.ulog.definitions import Definitions
 from fusetune.px4.ulog.reader import read_ulog
-from fusetune.px4.ulog.reading_limits import ReadingLimits, is_used
+from fusetune.px4.ulog.reading_limits import ReadingLimits
+from fusetune.px4.ulog.used_topics import is_used
 from fusetune.save import save_log
 from fusetune.time_limit import Deadline, TimeLimitError
 
@@ -200,14 +201,6 @@ def test_time_that_ends_while_tables_are_written(tmp_path: Path, monkeypatch: py
 def test_no_limit_is_no_limit() -> None:
     Deadline(0).check()
     Deadline().check()
-
-
-@pytest.mark.parametrize(
-    "values", [{"time_limit": 3}, {"max_tables": -1}, {"time_limit_s": float("nan")}, {"max_columns": True}]
-)
-def test_limits_are_checked(values: dict[str, float]) -> None:
-    with pytest.raises(UserError, match="reading"):
-        ReadingLimits.from_mapping(values)
 
 
 def test_what_later_rooms_read_is_kept() -> None:

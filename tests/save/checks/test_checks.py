@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from tests.save.made_flight import SLOW_HZ, check_of, judged, made_flight
 
-from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, LeftOut, ParameterChange
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.times import ANOTHER_CLOCK
 from fusetune.save.log_facts import is_airborne
-from fusetune.save.thresholds import VerdictThresholds
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
@@ -270,14 +268,6 @@ def test_damage_that_was_passed_over_is_told() -> None:
     check = check_of(replace(made_flight(), corruption=("12 bytes are no records",)), "readable")
     assert check.severity == "warning"
     assert "12 bytes are no records" in check.found
-
-
-def test_thresholds_are_checked() -> None:
-    with pytest.raises(UserError, match="low_imu is no threshold"):
-        VerdictThresholds.from_mapping({"low_imu": 3})
-    with pytest.raises(UserError, match="expected a number"):
-        VerdictThresholds.from_mapping({"low_imu_rate_hz": "fast"})
-    assert VerdictThresholds.from_mapping({"low_imu_rate_hz": 150}).low_imu_rate_hz == 150.0
 
 
 def without_velocity(version: int) -> Flight:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from fusetune.errors import UserError
+from fusetune.analyze.replaying.replay_settings import StartSettings
 from fusetune.px4.flight import Flight, row_count
 from fusetune.px4.layouts.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states, why_no_state
-from fusetune.settings import setting, settings_from_mapping
-from fusetune.storage.files import AnyPath
 
 AUTO, WARM, COLD = "auto", "warm", "cold"
 START_TOPICS = (*LOGGED_STATE_TOPICS, "sensor_combined", "vehicle_land_detected", "vehicle_gps_position")
@@ -20,23 +16,6 @@ START_TOPICS = (*LOGGED_STATE_TOPICS, "sensor_combined", "vehicle_land_detected"
 
 BUFFER_FILL_US = 20_000
 """The horizon can reach a state once the IMU samples around it have come in."""
-
-
-@dataclass(frozen=True)
-class StartSettings:
-    """The section `start` of the configuration."""
-
-    mode: str = setting(AUTO, None, None, "", "auto, warm or cold")
-    cold_needs_s: float = setting(25.0, 0.0, 300.0, "s", "on ground before take-off, from which on auto starts cold")
-    warm_within_s: float = setting(15.0, 0.0, 300.0, "s", "after log start; auto takes no later state than this")
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, Any] | None, file: AnyPath = "config/config.yaml") -> StartSettings:
-        """Read the section `start`; a missing section or key means the default."""
-        settings = settings_from_mapping(cls, values, "start", file)
-        if settings.mode not in (AUTO, WARM, COLD):
-            raise UserError(file, f"start.mode is {settings.mode!r}", f"Choose {AUTO}, {WARM} or {COLD}")
-        return settings
 
 
 @dataclass(frozen=True)

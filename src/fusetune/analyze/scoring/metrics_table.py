@@ -49,18 +49,14 @@ class MetricsTable:
         for column, item in zip(self._columns.values(), row, strict=True):
             column.append(item)
 
-    def add_each(self, sets: tuple[str, ...], source: str, axis: str, metric: str, values: Array, n: float) -> None:
-        """Append one figure per set, `values` (S,)."""
-        for name, value in zip(sets, values, strict=True):
-            self.add(name, source, axis, metric, value, n)
-
-    def add_bounds(
-        self, sets: tuple[str, ...], source: str, axis: str, metric: str, bounds: Bounds, n: float | Array
+    def add_each(
+        self, sets: tuple[str, ...], source: str, axis: str, metric: str, values: Array | Bounds, n: float | Array
     ) -> None:
-        """Append one figure with bounds per set."""
+        """Append one figure per set, `values` and, where they are not the same for all, `n` (S,)."""
+        bounds = values if isinstance(values, Bounds) else Bounds(values, *[np.full(values.shape, np.nan)] * 2)
         counts = np.broadcast_to(n, bounds.value.shape)
-        for i, name in enumerate(sets):
-            self.add(name, source, axis, metric, bounds.value[i], counts[i], bounds.lower[i], bounds.upper[i])
+        for name, *row in zip(sets, bounds.value, counts, bounds.lower, bounds.upper, strict=True):
+            self.add(name, source, axis, metric, *row)
 
     def add_metric_by_metric(self, tables: Sequence[MetricsTable]) -> None:
         """Append the rows of several tables, the first of each, then the second of each, and so on."""
@@ -108,10 +104,8 @@ def add_innovation_metrics(
     for first, given in innovations_of(members, confidence, of_group=axis not in AXES):
         one = MetricsTable(table.flight)
         for metric in metrics:
-            value = metric.function(given)
-            bounds = value if isinstance(value, Bounds) else Bounds(value, *[np.full(value.shape, np.nan)] * 2)
             samples = given.samples if metric.samples is None else metric.samples(given)
-            one.add_bounds(first.sets, first.source, axis, prefix + metric.name, bounds, samples)
+            one.add_each(first.sets, first.source, axis, prefix + metric.name, metric.function(given), samples)
         tables.append(one)
     table.add_metric_by_metric(tables)
 

@@ -30,7 +30,7 @@ WINDOW_SCHEMA = pa.schema(
 )
 """One row per set, source, axis (or group of axes), window and metric; `n` is the number of samples behind it."""
 
-_METRICS = tuple(metric for metric in INNOVATION_METRICS if metric.window is not None)
+_METRICS = {metric.name: metric.window for metric in INNOVATION_METRICS if metric.window is not None}
 
 _FULL_ENOUGH = 0.5
 """A window with less than this share of the samples of the fullest one cannot be the worst."""
@@ -72,8 +72,7 @@ def window_figures(members: list[PairedSamples], axis: str, edges: npt.NDArray[n
 
     Returns
     -------
-    RMS of the norm, NIS and winsorised NLL summed over the axes, and the rates of samples with any axis beyond
-    3 σ, 5 σ or its gate
+    The metrics of innovations that are declared to have windows
     """
     first = members[0]
     index = np.clip(np.searchsorted(edges, first.time, side="right") - 1, 0, edges.size - 2)
@@ -90,16 +89,15 @@ def _figures(given: Innovations, starts: npt.NDArray[np.int64], counts: npt.NDAr
     def mean(values: npt.NDArray) -> Array:
         return np.add.reduceat(values.astype(np.float64), starts, axis=-1) / counts
 
-    return {one.name: one.window.of_mean(mean(one.window.score(given))) for one in _METRICS if one.window}
+    return {name: window.of_mean(mean(window.score(given))) for name, window in _METRICS.items()}
 
 
 def add_worst_windows(table: MetricsTable, figures: WindowFigures) -> None:
     """Append the largest figure of any window; windows with few samples do not count."""
     full = figures.counts >= _FULL_ENOUGH * figures.counts.max()
-    for metric in _METRICS:
-        worst = figures.values[metric.name][:, full].max(axis=1)
-        name = metric.window.worst if metric.window else ""
-        table.add_each(figures.sets, figures.source, figures.axis, name, worst, figures.counts.sum())
+    for name, window in _METRICS.items():
+        worst = figures.values[name][:, full].max(axis=1)
+        table.add_each(figures.sets, figures.source, figures.axis, window.worst, worst, figures.counts.sum())
 
 
 def window_rows(flight: str, figures: WindowFigures, edges: npt.NDArray[np.int64]) -> pa.Table:

@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 
 def _sources(quantity: str) -> tuple[str, ...]:
     """Sources of the replay that measure a quantity."""
-    return tuple(one.name for one in MEASURED_SOURCES.values() if one.quantity == quantity and one.code is not None)
+    return tuple(one.name for one in MEASURED_SOURCES.values() if one.quantity == quantity and one.is_replayed)
 
 
 VELOCITY_SOURCES, HEADING_SOURCES = _sources("velocity"), _sources("heading")

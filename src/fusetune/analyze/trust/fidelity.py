@@ -21,7 +21,9 @@ from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
 
 NOT_AN_AID = tuple(one.name for one in AID_SOURCES.values() if one.every_update or not one.measures)
-COMPARED_SOURCES = tuple(name for name in REPLAYED_SOURCES if name not in NOT_AN_AID)
+COMPARED_SOURCES = tuple(
+    one.name for one in map(AID_SOURCES.__getitem__, REPLAYED_SOURCES) if one.is_replayed and one.name not in NOT_AN_AID
+)
 NLL_SOURCES = tuple(one.name for one in AID_SOURCES.values() if one.orders_sets)
 MIN_SAMPLES = 10
 NLL_CAP = 50.0

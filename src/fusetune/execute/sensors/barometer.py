@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusetune.execute.sensors.noise import gauss_markov, random_stream
+from fusetune.execute.noise import gauss_markov, random_stream
 from fusetune.execute.sensors.sampling import sample_times
 from fusetune.execute.vehicle import Barometer
 from fusetune.execute.world.truth import Truth

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fusetune.execute.noise import gauss_markov, random_stream
 from fusetune.execute.sensors.faults import Fault, GnssGlitch, GnssOutage, of_kind
-from fusetune.execute.sensors.noise import gauss_markov, random_stream
 from fusetune.execute.sensors.sampling import sample_times
 from fusetune.execute.vehicle import Environment, Gnss, GnssError
 from fusetune.execute.world.truth import Truth

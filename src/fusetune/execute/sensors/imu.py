@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from fusetune.execute.noise import random_stream, random_walk, unit_vectors, white_noise
 from fusetune.execute.sensors.faults import Clipping, Fault, StrongVibration, of_kind
-from fusetune.execute.sensors.noise import random_stream, random_walk, unit_vectors, white_noise
 from fusetune.execute.vehicle import Imu, InertialSensor
 from fusetune.execute.world.truth import Truth
 from fusetune.px4.flight import TopicTable

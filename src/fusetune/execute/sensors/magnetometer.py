@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fusetune.execute.noise import random_stream, unit_vectors
 from fusetune.execute.sensors.faults import Fault, MagneticDisturbance, of_kind
-from fusetune.execute.sensors.noise import random_stream, unit_vectors
 from fusetune.execute.sensors.sampling import sample_times
 from fusetune.execute.vehicle import Environment, Magnetometer
 from fusetune.execute.world.earth import magnetic_field_ned

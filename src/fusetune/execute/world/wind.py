@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import bilinear, lfilter
 
-from fusetune.execute.sensors.noise import gauss_markov, random_stream
+from fusetune.execute.noise import gauss_markov, random_stream
 from fusetune.execute.vehicle import Environment
 
 FEET_PER_M = 1.0 / 0.3048

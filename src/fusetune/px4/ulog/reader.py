@@ -24,9 +24,10 @@ from fusetune.px4.flight import (
 )
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS
 from fusetune.px4.ulog.definitions import MessageLayout, is_padding
-from fusetune.px4.ulog.reading_limits import RAISE_LIMITS, ReadingLimits, is_used, within_limits
+from fusetune.px4.ulog.reading_limits import RAISE_LIMITS, ReadingLimits
 from fusetune.px4.ulog.records import DATA_HEAD_BYTES, HEADER_BYTES, Scan, Scanner
 from fusetune.px4.ulog.times import STORED_TOPICS, ImpossibleRows, clock_of, impossible_rows, newest_before
+from fusetune.px4.ulog.used_topics import is_used, within_limits
 from fusetune.px4.ulog.values import LoggedValues, logged_values
 from fusetune.time_limit import Deadline, TimeLimitError
 

@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 
 from fusetune.apply.criteria import is_inside, is_known
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, white_shares
-from fusetune.apply.paper.paper_mode import (
+from fusetune.apply.paper_mode import (
     PAPER_VARIABLES,
     POSITION_VARIABLES,
     VELOCITY_VARIABLES,

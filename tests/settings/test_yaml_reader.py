@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusetune.design import yaml_reader
-from fusetune.design.yaml_reader import DEEPEST, MOST_BYTES, read_yaml
 from fusetune.errors import UserError
+from fusetune.settings import yaml_reader
+from fusetune.settings.yaml_reader import DEEPEST, MOST_BYTES, read_yaml
 
 
 def message_of(path: Path) -> str:

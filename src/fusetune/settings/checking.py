@@ -10,20 +10,21 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
-from importlib import resources
+from dataclasses import fields, is_dataclass
 from itertools import islice
 from typing import Any
 
 import jsonschema
-import yaml
 
-from fusetune.design.yaml_reader import describe
 from fusetune.errors import UserError
+from fusetune.settings.declaration import Settings, built
+from fusetune.settings.schema import schema_of
+from fusetune.settings.yaml_reader import describe
 
 MOST_PROBLEMS_SHOWN = 8
 MOST_PROBLEMS_SOUGHT = 100
 LONGEST_PROBLEM = 400
+REMEDY = "Mend the named keys; config/README.md and the examples beside it show what may stand there"
 
 _JSON_TYPE_NAMES = {
     "object": "a mapping (keys and values)",
@@ -58,12 +59,30 @@ _Validator = jsonschema.validators.extend(
 )
 
 
-@cache
-def load_schema(package: str, name: str) -> dict[str, Any]:
-    """JSON schema `name` that ships in ``package/schemas/``, e.g. ``("fusetune.design", "study")``."""
-    text = resources.files(package).joinpath("schemas", f"{name}.schema.yaml").read_text(encoding="utf-8")
-    schema: dict[str, Any] = yaml.safe_load(text)
-    return schema
+def checked(kind: type[Settings], document: Mapping[str, Any], path: str | os.PathLike[str]) -> Settings:
+    """Check a document against the settings that a dataclass declares, and build it.
+
+    What no single setting can tell is asked of the method `problems` of the dataclass and of those within it, where
+    they have one: sentences that begin with the key at fault.
+
+    Raises
+    ------
+    UserError
+        As `validate`.
+    """
+    validate(document, schema_of(kind), path)
+    settings = built(kind, document)
+    raise_problems(path, _contradictions(settings, ""), REMEDY)
+    return settings
+
+
+def _contradictions(settings: Any, place: str) -> Iterator[str]:
+    if hasattr(settings, "problems"):
+        yield from (f"{place}{problem}" for problem in settings.problems())
+    for each in fields(settings):
+        part = getattr(settings, each.name)
+        if is_dataclass(part):
+            yield from _contradictions(part, f"{place}{each.name}.")
 
 
 def validate(document: Mapping[str, Any], schema: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
@@ -74,11 +93,10 @@ def validate(document: Mapping[str, Any], schema: Mapping[str, Any], path: str |
     UserError
         Names every key at fault with what was found and what was expected.
     """
-    remedy = "Mend the named keys; config/README.md and the examples beside it show what may stand there"
-    raise_problems(path, islice(_number_problems(document, ()), MOST_PROBLEMS_SOUGHT), remedy)
+    raise_problems(path, islice(_number_problems(document, ()), MOST_PROBLEMS_SOUGHT), REMEDY)
     found = islice(_Validator(schema).iter_errors(document), MOST_PROBLEMS_SOUGHT)
     errors = sorted(found, key=lambda error: [str(part) for part in error.absolute_path])
-    raise_problems(path, (problem for error in errors for problem in _problems(error)), remedy)
+    raise_problems(path, (problem for error in errors for problem in _problems(error)), REMEDY)
 
 
 def raise_problems(path: str | os.PathLike[str], problems: Iterable[str], remedy: str) -> None:
@@ -142,7 +160,7 @@ def _problems(error: jsonschema.ValidationError) -> list[str]:
         return [f"{prefix}the key {key!r} is missing; expected {_expected_of(schema, key)}" for key in missing]
     if error.validator == "not":
         return [f"{prefix}{schema.get('description', 'is not allowed here')}"]
-    if error.validator == "propertyNames":
+    if "propertyNames" in list(error.absolute_schema_path)[-2:]:
         return [f"{prefix}the key {describe(error.instance)} is not a valid name; expected {_expected(schema)}"]
     return [f"{place or 'top level'} is {describe(error.instance)}; expected {_expected(schema)}"]
 
@@ -172,6 +190,8 @@ def _expected(schema: Mapping[str, Any]) -> str:
 def _bounds(schema: Mapping[str, Any]) -> str:
     if "minimum" in schema and "maximum" in schema:
         return f" between {schema['minimum']} and {schema['maximum']}"
+    if "minItems" in schema and schema["minItems"] == schema.get("maxItems"):
+        return f" of length {schema['minItems']}"
     parts = [
         f" {words} {schema[keyword]}"
         for keyword, words in (

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from fusetune.apply.paper.paper_mode import PaperEntry, aggregate_rms, paper_ranking
+from fusetune.apply.paper_mode import PaperEntry, aggregate_rms, paper_ranking
 
 TABLE_11 = {
     "EKF2_ACC_B_NOISE": (0.003, 0.001, 0.003, 0.007, 0.01, 0.003),

@@ -1,0 +1,118 @@
+"""The whole configuration: the sections that the rooms declare, and what stands beside them.
+
+`workflow/schemas/config.schema.yaml`, `config/config.yaml` and the table in `config/README.md` are made from it
+(`pytest tests/workflow/test_configuration.py --update`).
+
+Imports only declarations, no numerics: the workflow reads the configuration whenever it starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fusetune.analyze.reconstruction.settings import ReconstructionSettings
+from fusetune.analyze.replaying.replay_settings import ReplaySettings, StartSettings, WithholdingSettings
+from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.apply.settings import DecisionSettings
+from fusetune.px4.ulog.reading_limits import ReadingLimits
+from fusetune.save.thresholds import VerdictThresholds
+from fusetune.settings.checking import checked, validate
+from fusetune.settings.declaration import section, setting
+from fusetune.settings.schema import schema_of
+from fusetune.settings.yaml_reader import read_yaml
+from fusetune.storage.files import AnyPath
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """What is simulated while there are no logs."""
+
+    vehicle: str = setting("config/vehicles/quadrotor.yaml", "file of the simulated vehicle", at_least=1)
+    seed: int = setting(1, "seed of wind and sensor errors; the same seed gives the same logs", low=0)
+    flights_per_set: int = setting(1, "flights that are simulated with each set of the study", low=1, high=100)
+    faults: Mapping[str, tuple[Mapping[str, Any], ...]] = setting(
+        {}, "faults to switch on: name of a simulated flight → list of faults, see below"
+    )
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Configuration of the pipeline."""
+
+    flights_dir: str = setting(
+        "flights",
+        "folder of the logs; every `.ulg` in it, and in folders below it, is a flight, named by its place: folders and "
+        "file with `_` between them, without the suffix and without a first folder `log`; while there are none, the "
+        "demonstration is simulated",
+        at_least=1,
+    )
+    study: str = setting(
+        "config/studies/paper_table11.yaml", "file of the parameter sets that are compared", at_least=1
+    )
+    mission: str = setting(
+        "config/missions/survey.yaml",
+        "file of the mission that is planned, and flown by the demonstration",
+        at_least=1,
+    )
+    present_flight: str | None = setting(
+        None, "name of the flight whose parameters count as the vehicle's present ones; empty: the newest"
+    )
+    sets_per_job: int = setting(
+        8,
+        "parameter sets that one job replays at the most; files stay one per flight and set; the profile for Slurm has "
+        "its own number",
+        low=1,
+        high=1000,
+    )
+    demonstration: Demonstration = section(Demonstration)
+    reading: ReadingLimits = section(ReadingLimits)
+    verdict: VerdictThresholds = section(VerdictThresholds)
+    reconstruction: ReconstructionSettings = section(ReconstructionSettings)
+    start: StartSettings = section(StartSettings)
+    trust: TrustSettings = section(TrustSettings)
+    scoring: ScoringSettings = section(ScoringSettings)
+    withheld: WithholdingSettings = section(WithholdingSettings)
+    decision: DecisionSettings = section(DecisionSettings)
+    seed: int = setting(1, "seed of the bootstrap of the decision", low=0)
+
+    @property
+    def replay(self) -> ReplaySettings:
+        """What is done about a flight before it is replayed."""
+        return ReplaySettings(self.withheld, self.reconstruction, self.start)
+
+
+def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None = None) -> Configuration:
+    """Read the configuration from files and from the command line.
+
+    Parameters
+    ----------
+    files
+        Of keys that stand in several, the last counts; sections and other mappings are put together key by key.
+    given
+        Keys of the command line, which count before those of the files.
+
+    Raises
+    ------
+    UserError
+        A file cannot be read; a key, a value or what they make together is wrong.
+    """
+    schema = schema_of(Configuration)
+    asked: dict[str, Any] = {}
+    for file in files:
+        values = read_yaml(file)
+        validate(values, schema, file)
+        asked = _joined(asked, values)
+    return checked(Configuration, _joined(asked, given or {}), "--config" if given else files[-1])
+
+
+def _joined(values: Mapping[str, Any], others: Mapping[str, Any]) -> dict[str, Any]:
+    joined = dict(values)
+    for key, value in others.items():
+        below = joined.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            value = _joined(below, value)
+        joined[key] = value
+    return joined

@@ -1,0 +1,1 @@
+"""What people write into YAML files: how settings are declared, files read, and mistakes told."""

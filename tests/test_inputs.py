@@ -1,0 +1,65 @@
+"""What the configuration names is read before anything runs; as a user sees it: tests/workflow/test_messages.py."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fusetune.configuration import Configuration, Demonstration
+from fusetune.errors import UserError
+from fusetune.inputs import check_demonstration, read_inputs
+
+PAPER_SETS = [f"paper{number}" for number in range(1, 7)]
+
+
+@pytest.fixture
+def settings(project_root: Path, tmp_path: Path) -> Configuration:
+    default = Configuration()
+    return replace(
+        default,
+        study=str(project_root / default.study),
+        mission=str(project_root / default.mission),
+        flights_dir=str(tmp_path),
+        demonstration=Demonstration(vehicle=str(project_root / default.demonstration.vehicle)),
+    )
+
+
+def test_the_demonstration_flies_every_set_in_turn(settings: Configuration) -> None:
+    once = read_inputs(settings, "config.yaml")
+    assert once.is_demonstration
+    assert once.flights == [f"flight_{number}_{name}" for number, name in enumerate(PAPER_SETS, 1)]
+    twice = read_inputs(replace(settings, demonstration=Demonstration(flights_per_set=2)), "config.yaml")
+    assert [twice.simulated[flight] for flight in twice.flights] == PAPER_SETS * 2
+    assert twice.flights[0] == "flight_01_paper1"
+    assert twice.flights == sorted(twice.flights)
+
+
+def test_logs_are_the_flights_and_what_cannot_be_flown_is_no_empty_folder(
+    settings: Configuration, tmp_path: Path
+) -> None:
+    (tmp_path / "a.ulg.gz").touch()
+    refused = read_inputs(settings, "config.yaml")
+    assert not refused.is_demonstration
+    assert refused.flights == []
+    (tmp_path / "a.ulg").touch()
+    assert read_inputs(replace(settings, present_flight="a"), "config.yaml").flights == ["a"]
+    with pytest.raises(UserError, match=r"config\.yaml: present_flight is 'b', which is no flight in"):
+        read_inputs(replace(settings, present_flight="b"), "config.yaml")
+
+
+def test_faults_of_the_demonstration_are_checked(settings: Configuration) -> None:
+    def with_fault(flight: str, **fault: object) -> Configuration:
+        return replace(settings, demonstration=replace(settings.demonstration, faults={flight: (fault,)}))
+
+    good = with_fault("flight_1_paper1", kind="gnss_outage", start_s=3, duration_s=4)
+    read_inputs(good, "config.yaml")
+    check_demonstration(good, "config.yaml")
+    with pytest.raises(UserError, match="names the flight 'flight_9'; expected one of flight_1_paper1, "):
+        read_inputs(with_fault("flight_9"), "config.yaml")
+    bad = with_fault("flight_1_paper1", kind="gnss_outage", start_s=3, duration_s=0)
+    with pytest.raises(
+        UserError, match=r"demonstration\.faults\.flight_1_paper1: faults\[0\]\.duration_s is 0; expected"
+    ):
+        check_demonstration(bad, "config.yaml")
