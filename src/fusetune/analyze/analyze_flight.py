@@ -18,7 +18,7 @@ from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.scoring.score_flight import spooled_flight, write_scores
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, ScoredFlight
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.trust.as_flown_comparison import AsFlownReplay
+from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, AsFlownReplay
 from fusetune.analyze.trust.as_flown_figures import compared_rows
 from fusetune.analyze.trust.onboard_fidelity import write_flight_fidelity
 from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, grade_flight
@@ -88,8 +88,11 @@ def _replay_and_grade(
     prepared = prepare_flight(load_flight(flight_folder, topics=REPLAY_TOPICS), settings.replay)
     write_replays(prepared, {name: values for name, values in replayed.items() if name != AS_FLOWN}, output_folder)
     prepared = prepared.with_log(canonical(load_flight(flight_folder, topics=COMPARED_TOPICS)))
-    as_flown = write_as_flown(prepared, output_folder) if AS_FLOWN in replayed else None
-    grade = grade_flight(prepared, settings.replay, settings.trust, as_flown)
+    comparison = AsFlownComparison(prepared.flight, settings.trust)
+    if AS_FLOWN in replayed:
+        # the grade finds these figures made; the replay itself need not stay
+        comparison.figures(prepared, write_as_flown(prepared, output_folder))
+    grade = grade_flight(prepared, settings.replay, settings.trust, comparison)
     write_flight_fidelity(prepared, output_folder, grade)
     return spooled_flight(prepared.flight, output_folder, settings.scoring)
 

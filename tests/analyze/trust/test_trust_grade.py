@@ -13,7 +13,7 @@ from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE, StartSettings
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
-from fusetune.analyze.trust.as_flown_comparison import AsFlownReplay, distance
+from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, AsFlownReplay, distance
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, compared_rows
 from fusetune.analyze.trust.grade_causes import GNSS, cost_of, with_half_the_gnss, without_repair
 from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, grade_flight, grade_of
@@ -144,7 +144,9 @@ def test_what_is_at_hand_or_known_is_not_replayed_again(flight, monkeypatch):
     monkeypatch.setattr(PreparedFlight, "replay", lambda *args, **named: replays.append(1) or replay(*args, **named))
     anew = grade_flight(prepared)
     assert len(replays) == 1
-    assert grade_flight(prepared, as_flown=AsFlownReplay(*kept)) == anew
+    comparison = AsFlownComparison(flight, SETTINGS)
+    comparison.figures(prepared, AsFlownReplay(*kept))
+    assert grade_flight(prepared, comparison=comparison) == anew
     assert len(replays) == 1
     warm = grade_flight(prepare(flight, IN_USE.reconstruction, StartSettings(mode="warm")))
     assert warm.start.startswith("warm")

@@ -21,7 +21,7 @@ from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_sample
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.start_choice import START_TOPICS, Start
-from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, AsFlownReplay, distance
+from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, distance
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
 from fusetune.analyze.trust.compared_innovations import GROUPS, rms
 from fusetune.analyze.trust.grade_causes import causes_of, cost_of
@@ -130,7 +130,7 @@ def grade_flight(
     prepared: PreparedFlight,
     replay: ReplaySettings = IN_USE,
     settings: TrustSettings | None = None,
-    as_flown: AsFlownReplay | None = None,
+    comparison: AsFlownComparison | None = None,
 ) -> TrustGrade:
     """Grade one flight.
 
@@ -138,12 +138,12 @@ def grade_flight(
     ----------
     prepared : with `TRUST_TOPICS`
     replay : as it was prepared
-    as_flown : of the parameters that flew, where they have been replayed already
+    comparison : with this flight, under these settings, where some replay has been compared already
     """
     settings, flight = settings or TrustSettings(), prepared.flight
-    comparison = AsFlownComparison(flight, settings)
+    comparison = comparison or AsFlownComparison(flight, settings)
     prepared = dataclasses.replace(prepared, gaps=())
-    repaired = comparison.figures(prepared, as_flown)
+    repaired = comparison.figures(prepared)
     raw = comparison.figures(_as_logged(flight, prepared, replay))
     graded = grade_of(repaired, settings)
     limits = _limits(graded, repaired, settings)
