@@ -21,7 +21,7 @@ from pathlib import Path
 
 from benchmarks.reference_flights import GOLDEN_LOGS, GOLDEN_REFERENCE, log_of, reference_folders
 
-from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_log import replay_log
 from fusetune.analyze.trust.fidelity import ReplayFidelity, compare_folders, order_agreement
 from fusetune.errors import UserError
 

@@ -30,7 +30,7 @@ from fusetune.save.flight_folder import read_metadata
 # All else is imported where it is needed: what a job does not load must not count as its memory.
 
 STUDY = ROOT / "config/studies/paper_table11.yaml"
-ANALYSIS_STEPS = ("replay_flight", "graded", "score_flight", "write_flight_fidelity")
+ANALYSIS_STEPS = ("write_replays", "write_as_flown", "grade_flight", "write_flight_fidelity", "write_scores")
 
 
 def main() -> None:
@@ -112,7 +112,7 @@ def _measured(job: str, log: Path) -> dict[str, Any]:
 def _analysis(saved: Path, analysis: Path, steps: dict[str, int]) -> Callable[[], object]:
     """The analysis of all sets; its steps enter their peak memory."""
     from fusetune.analyze import analyze_flight as room
-    from fusetune.analyze.replaying.replay_settings import IN_USE
+    from fusetune.save.present import FlightSets
 
     def noting(name: str, step: Callable[..., Any]) -> Callable[..., Any]:
         def noted(*arguments: Any, **options: Any) -> Any:
@@ -125,12 +125,10 @@ def _analysis(saved: Path, analysis: Path, steps: dict[str, int]) -> Callable[[]
     for name in ANALYSIS_STEPS:
         setattr(room, name, noting(name, getattr(room, name)))
     values = read_metadata(saved)["ekf2_parameters"]
-    overrides = {pset.name: dict(pset.overrides) for pset in load_study(STUDY).sets}
-    varied = {name for of_set in overrides.values() for name in of_set}
-    replayed = {"present": {name: values[name] for name in varied & values.keys()}, **overrides, "as_flown": {}}
-    settings = room.AnalysisSettings(replay=IN_USE)
-    scored = [name for name in replayed if name != "as_flown"]
-    return lambda: room.analyze_flight(saved, analysis, replayed, scored, settings=settings)
+    sets = FlightSets({pset.name: pset.overrides for pset in load_study(STUDY).sets})
+    present = {name: values[name] for name in sets.varied if name in values}
+    replayed = sets.overrides(sets.replayed, present)
+    return lambda: room.analyze_flight(saved, analysis, replayed, sets.scored)
 
 
 def _peak_of(work: Callable[[], object]) -> int:

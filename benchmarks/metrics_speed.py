@@ -18,13 +18,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fusetune.analyze.scoring import score_flight as scoring
+from fusetune.analyze.scoring import sample_scores, score_flight, score_sets
+
+MODULES = (score_flight, score_sets, sample_scores)
 
 REPEATS = 5
 
 PARTS = {
     "reading the flight": ("load_flight", "canonical"),
-    "reading the replays": ("read_set", "read_states"),
+    "reading the replays": ("read_set",),
     "scored part of the flight": ("scoring_window", "ground_window"),
     "pairing measurements": ("paired_samples",),
     "figures of axes and groups": ("add_axis_metrics", "add_group_metrics"),
@@ -34,11 +36,11 @@ PARTS = {
     "whiteness of the sources": ("source_whiteness", "add_whiteness"),
     "true errors": ("read_references", "true_errors", "add_true_errors"),
     "gaps": ("paired_gaps", "add_withheld_metrics", "withheld_rows", "add_true_drift"),
-    "events and activity": ("filter_events", "_summary"),
+    "events and activity": ("filter_events", "scoring_summary"),
     "as flown": ("onboard_samples", "write_onboard"),
     "writing": ("_write",),
 }
-"""Part → functions that `score_flight` calls by these names."""
+"""Part → functions that the modules call by these names."""
 
 
 def timed(function: Callable[..., Any], spent: dict[str, float], part: str) -> Callable[..., Any]:
@@ -57,21 +59,26 @@ def timed(function: Callable[..., Any], spent: dict[str, float], part: str) -> C
 def measure(flight: Path, replays: Path, sets: list[str]) -> tuple[float, dict[str, float]]:
     """CPU seconds of one scoring, and of its parts."""
     spent: dict[str, float] = defaultdict(float)
-    originals = {name: getattr(scoring, name) for names in PARTS.values() for name in names}
-    for part, names in PARTS.items():
-        for name in names:
-            setattr(scoring, name, timed(originals[name], spent, part))
+    originals = [
+        (module, name, getattr(module, name), part)
+        for part, names in PARTS.items()
+        for name in names
+        for module in MODULES
+        if hasattr(module, name)
+    ]
+    for module, name, original, part in originals:
+        setattr(module, name, timed(original, spent, part))
     try:
         with tempfile.TemporaryDirectory() as folder:
             for file in replays.iterdir():
                 if file.name.split(".")[0] in sets:
                     (Path(folder) / file.name).symlink_to(file.resolve())
             start = time.process_time()
-            scoring.score_saved_flight(flight, Path(folder), sets, present=sets[0])
+            score_flight.score_saved_flight(flight, Path(folder), sets, present=sets[0])
             return time.process_time() - start, spent
     finally:
-        for name, original in originals.items():
-            setattr(scoring, name, original)
+        for module, name, original, _ in originals:
+            setattr(module, name, original)
 
 
 def main() -> None:

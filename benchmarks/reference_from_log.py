@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from fusetune.analyze.scoring.onboard import onboard_samples, write_onboard
+from fusetune.analyze.replaying.onboard import onboard_samples, write_onboard
 from fusetune.ekf2.replay.recording import LOCAL_POSITION_ROW
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, TopicTable, row_count

@@ -25,11 +25,11 @@ from scipy.stats import kendalltau
 
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import ReconstructionSettings
-from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
-from fusetune.analyze.replaying.replay_settings import StartSettings
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
+from fusetune.analyze.replaying.replay_settings import IN_USE, StartSettings
 from fusetune.analyze.replaying.set_input import WRITTEN_BACK, read_set_files
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.trust.as_flown_figures import replayed_innovations
+from fusetune.analyze.trust.compared_innovations import replayed_innovations
 from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES
 from fusetune.analyze.trust.grade_causes import cost_of
 from fusetune.analyze.trust.trust_grade import grade_flight
@@ -239,7 +239,7 @@ def _print_vehicle(logs: Path) -> None:
     for stem in DEFAULT_PROFILE:
         for log in sorted(logs.glob(f"{stem}*.ulg")):
             flight = canonical(read_ulog(log))
-            grade = grade_flight(flight)
+            grade = grade_flight(prepare(flight, IN_USE.reconstruction, IN_USE.start))
             sizes = [grade.repaired.innovation_ratio.get(name, float("nan")) for name in groups]
             height = (grade.repaired.height_m, grade.repaired.vertical_velocity_m_s)
             sizes += [float("nan") if value is None else value for value in height]

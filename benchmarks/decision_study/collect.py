@@ -20,10 +20,10 @@ from fusetune.design.study import load_study
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import Vehicle, load_vehicle
 from fusetune.save import save_log
+from fusetune.set_names import PRESENT
 from fusetune.storage.digest import source_digest
 
 HERE = Path(__file__).parent
-PRESENT = "present"
 KEPT = ("scoring.json", "scores.parquet", "withheld.parquet", "metrics.parquet")
 FIRST_SEED = 1000
 

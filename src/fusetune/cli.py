@@ -218,7 +218,7 @@ def _add_replay(commands: Commands) -> None:
 
 def _replay(options: argparse.Namespace) -> int:
     from fusetune.analyze.reconstruction import ReconstructionSettings
-    from fusetune.analyze.replaying.replay_flight import replay_log
+    from fusetune.analyze.replaying.replay_log import replay_log
     from fusetune.analyze.replaying.replay_settings import ReplaySettings, StartSettings
 
     reconstruction = ReconstructionSettings() if options.reconstruct else None

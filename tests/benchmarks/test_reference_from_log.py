@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from benchmarks.reference_from_log import main
 
-from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_log import replay_log
 from fusetune.analyze.trust.fidelity import compare_folders
 from fusetune.px4.flight import Flight
 from fusetune.px4.ulog.writer import write_ulog

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from fusetune.errors import UserError
-from fusetune.save import Present, find_present, flight_folder, read_present, write_present
+from fusetune.save import FlightSets, Present, find_present, flight_folder, read_present, write_present
+from fusetune.set_names import AS_FLOWN, PRESENT, RESERVED_SET_NAMES
 from fusetune.storage.documents import write_document
 
 VARIED = ("EKF2_GPS_V_NOISE", "EKF2_ACC_NOISE", "EKF2_NOT_IN_THESE_LOGS")
@@ -69,3 +70,24 @@ def test_a_damaged_file_is_named(tmp_path: Path, text: str) -> None:
     (tmp_path / "present.json").write_text(text, encoding="utf-8")
     with pytest.raises(UserError, match=r"present\.json.*run the pipeline again"):
         read_present(tmp_path / "present.json")
+
+
+STUDY = {"low": {"EKF2_ACC_NOISE": 0.2}, "other": {"EKF2_GPS_V_NOISE": 0.5, "EKF2_ACC_NOISE": 0.3}}
+
+
+def test_every_flight_is_replayed_with_present_study_and_as_flown_of_which_the_last_is_not_scored() -> None:
+    sets = FlightSets(STUDY)
+    assert sets.scored == ["present", "low", "other"]
+    assert sets.replayed == ["present", "low", "other", "as_flown"]
+    assert sets.varied == ["EKF2_ACC_NOISE", "EKF2_GPS_V_NOISE"]
+
+
+def test_present_gives_what_flies_now_and_as_flown_leaves_each_log_as_it_is() -> None:
+    sets, present = FlightSets(STUDY), {"EKF2_ACC_NOISE": 0.35}
+    values = sets.overrides(sets.replayed, present)
+    assert values == {"present": present, **STUDY, "as_flown": {}}
+    assert sets.overrides(["other"], {}) == {"other": STUDY["other"]}
+
+
+def test_no_study_can_name_a_set_as_these_are_called() -> None:
+    assert {PRESENT, AS_FLOWN} <= {*RESERVED_SET_NAMES}

@@ -1,5 +1,5 @@
 REPLAY_CHUNKS = [
-    REPLAYED[first : first + SETTINGS.sets_per_job] for first in range(0, len(REPLAYED), SETTINGS.sets_per_job)
+    SETS.replayed[first : first + SETTINGS.sets_per_job] for first in range(0, len(SETS.replayed), SETTINGS.sets_per_job)
 ]
 
 
@@ -44,7 +44,7 @@ rule analyze_flight:
         replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
     output:
         update(replay_files(REPLAY_CHUNKS[-1])),
-        expand("results/analyze/{{flight}}/{part}", part=SCORE_PARTS),
+        expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
     log:
         "results/logs/analyze/{flight}.log",
     benchmark:
@@ -54,12 +54,12 @@ rule analyze_flight:
     conda:
         "../envs/fusetune.yaml"
     resources:
-        **replay_resources(len(REPLAY_CHUNKS[-1]), len(SETS)),
+        **replay_resources(len(REPLAY_CHUNKS[-1]), len(SETS.scored)),
     params:
         sets=overrides_of(REPLAY_CHUNKS[-1]),
         replay=asdict(SETTINGS.replay),
         code=DIGEST["replay"],
-        scored=SETS,
+        scored=SETS.scored,
         present=PRESENT,
         scoring=asdict(SETTINGS.scoring),
         trust=asdict(SETTINGS.trust),

@@ -38,7 +38,7 @@ rule decide:
         mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
         runtime=of_its_logs(10, 0.01),
     params:
-        sets=SETS,
+        sets=SETS.scored,
         present=PRESENT,
         descriptions={pset.name: pset.description for pset in INPUTS.study.sets},
         decision=asdict(SETTINGS.decision) | {"seed": SETTINGS.seed},

@@ -2,43 +2,24 @@
 import csv
 from dataclasses import astuple
 
+from fusetune.analyze.flight_files import FLIGHT_FILES
+from fusetune.analyze.replaying.store.parts import PARTS
 from fusetune.storage.cells import as_it_was
 from fusetune.storage.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
 from fusetune.save import read_present
 from fusetune.save.discovery import printable
 
-REPLAY_PARTS = (
-    "innovations.parquet",
-    "states.parquet",
-    "local_position.parquet",
-    "status_flags.parquet",
-    "withheld.parquet",
-    "gaps.parquet",
-    "json",
-)
-SCORE_PARTS = (
-    "metrics.parquet",
-    "scores.parquet",
-    "samples.parquet",
-    "withheld.parquet",
-    "windows.parquet",
-    "scoring.json",
-    "onboard.innovations.parquet",
-    "fidelity.json",
-)
-
-
 ANALYZED_FILES = [
-    *(f"results/analyze/{{flight}}/{pset}.{part}" for pset in REPLAYED for part in REPLAY_PARTS),
-    *(f"results/analyze/{{flight}}/{part}" for part in SCORE_PARTS),
+    *(f"results/analyze/{{flight}}/{pset}.{part}" for pset in SETS.replayed for part in PARTS),
+    *(f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES),
 ]
 """What the analysis of a flight leaves, of all sets."""
 
 
 def replay_files(names):
     """Files of the replays of some sets on a flight."""
-    return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=REPLAY_PARTS)
+    return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=PARTS)
 
 
 def read_csv(path):
@@ -58,18 +39,13 @@ def of_replayable_flights(patterns):
     return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
-def overrides_in(name):
-    """Values that a set gives to parameters; as flown means the log's own, without exception."""
-    if name == AS_FLOWN:
-        return {}
-    if name == PRESENT:
-        return told_in_one_line(read_present, checkpoints.list_flights.get().output.present).parameters
-    return OVERRIDES[name]
+def present_values():
+    return told_in_one_line(read_present, checkpoints.list_flights.get().output.present).parameters
 
 
 def overrides_of(names):
     """Params function: the values of some sets, so that only sets whose values change are replayed again."""
-    return lambda wildcards: {name: overrides_in(name) for name in names}
+    return lambda wildcards: SETS.overrides(names, present_values() if PRESENT in names else {})
 
 
 def closing_words():

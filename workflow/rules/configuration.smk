@@ -3,19 +3,14 @@ import re
 from dataclasses import asdict
 
 from fusetune.inputs import check_demonstration, read_inputs
+from fusetune.save.present import PRESENT, FlightSets
 
-PRESENT = "present"
-AS_FLOWN = "as_flown"
 NO_FLIGHT = "(?!)"
 CONFIG_FILE = configuration_files()[-1]
 
 INPUTS = told_in_one_line(read_inputs, SETTINGS, CONFIG_FILE)
 DEMONSTRATED = INPUTS.is_demonstration
-OVERRIDES = {pset.name: pset.overrides for pset in INPUTS.study.sets}
-SETS = [PRESENT, *OVERRIDES]
-VARIED = sorted({name for overrides in OVERRIDES.values() for name in overrides})
-# The log's own parameters are replayed, too, to be compared with what the vehicle logged; they are not ranked.
-REPLAYED = [*SETS, AS_FLOWN]
+SETS = FlightSets({pset.name: pset.overrides for pset in INPUTS.study.sets})
 FLOWN_LOGS = {log.flight: log for log in INPUTS.found.logs}
 LOGS = {flight: log.path for flight, log in FLOWN_LOGS.items()}
 if DEMONSTRATED:

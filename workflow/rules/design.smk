@@ -10,7 +10,7 @@ rule design:
             category="Design",
             labels={"table": "parameter sets"},
         ),
-        params=expand("results/design/{pset}.params", pset=list(OVERRIDES)),
+        params=expand("results/design/{pset}.params", pset=list(SETS.study)),
     log:
         "results/logs/design.log",
     conda:

@@ -31,7 +31,7 @@ rule simulate_flight:
         mem_mb=of_its_logs(KERNELS_MB, 15.0),
         runtime=of_its_logs(10, 0.5),
     params:
-        overrides=lambda wildcards: OVERRIDES[INPUTS.simulated[wildcards.flight]],
+        overrides=lambda wildcards: SETS.study[INPUTS.simulated[wildcards.flight]],
         faults=lambda wildcards: SETTINGS.demonstration.faults.get(wildcards.flight, ()),
         seed=lambda wildcards: 1000 * SETTINGS.demonstration.seed + list(INPUTS.simulated).index(wildcards.flight) + 1,
         contents=contents(SETTINGS.mission, SETTINGS.demonstration.vehicle),

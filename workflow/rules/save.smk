@@ -47,7 +47,7 @@ checkpoint list_flights:
     params:
         refused=[list(astuple(entry)) for entry in INPUTS.found.refused],
         code=DIGEST["save"],
-        varied=VARIED,
+        varied=SETS.varied,
         present_flight=SETTINGS.present_flight,
     message:
         "Save: list which flights can be replayed"

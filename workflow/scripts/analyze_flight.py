@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.analyze_flight import AnalysisSettings, analyze_flight
-from fusetune.analyze.replaying.replay_ledger import ReplayLedger
 from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.store.ledger import ReplayLedger
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.trust.trust_settings import TrustSettings
 from fusetune.settings.declaration import built

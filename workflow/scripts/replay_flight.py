@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.replaying.replay_flight import replay_saved_flight
-from fusetune.analyze.replaying.replay_ledger import ReplayLedger
 from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.store.ledger import ReplayLedger
 from fusetune.settings.declaration import built
 
 from job import keep_out, logged_job

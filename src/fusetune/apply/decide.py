@@ -20,6 +20,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
+from fusetune.set_names import PRESENT
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
@@ -34,7 +35,7 @@ def decide(
     output_folder: AnyPath,
     *,
     sets: Sequence[str],
-    present: str = "present",
+    present: str = PRESENT,
     newest_flight: str | None = None,
     descriptions: Mapping[str, str] | None = None,
     configuration_files: Sequence[AnyPath] = (),

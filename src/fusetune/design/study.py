@@ -17,16 +17,11 @@ from typing import Any, Literal
 
 from fusetune.design.names import NAME_PATTERN, name_problem, one_line
 from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
+from fusetune.set_names import RESERVED_SET_NAMES
 from fusetune.settings.checking import raise_problems, validate
 from fusetune.settings.declaration import required, setting
 from fusetune.settings.schema import schema_of
 from fusetune.settings.yaml_reader import read_yaml
-
-RESERVED_SET_NAMES = ("present", "as_flown", "onboard", "sets", "scoring", "fidelity")
-"""Names the product gives itself, and files of its own that those of a set so called would replace.
-
-The vehicle's present parameters, those as logged, its own estimator; `sets.parquet`, `scoring.json`, `fidelity.json`.
-"""
 
 MOST_SETS = 2000
 """More sets than this are a slip of the pen: each is replayed on every flight."""

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from fusetune.analyze.scoring.onboard import ONBOARD
 from fusetune.apply.evidence import AIMS
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
+from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_pieces, read_table

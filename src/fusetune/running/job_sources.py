@@ -8,7 +8,17 @@ from __future__ import annotations
 
 from fusetune.storage.digest import source_digest
 
-BASE = ("check.py", "errors.py", "finding.py", "px4", "quaternions.py", "settings", "storage", "time_limit.py")
+BASE = (
+    "check.py",
+    "errors.py",
+    "finding.py",
+    "px4",
+    "quaternions.py",
+    "set_names.py",
+    "settings",
+    "storage",
+    "time_limit.py",
+)
 
 JOB_SOURCES = {
     "design": (*BASE, "design"),

@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from fusetune.save.flight_folder import load_flight
     from fusetune.save.flights_table import write_flights_table
     from fusetune.save.log_folder import save_log
-    from fusetune.save.present import Present, find_present, read_present, write_present
+    from fusetune.save.present import FlightSets, Present, find_present, read_present, write_present
     from fusetune.save.thresholds import VerdictThresholds
     from fusetune.save.verdict import Verdict, judge
 
 __all__ = [
+    "FlightSets",
     "Present",
     "Verdict",
     "VerdictThresholds",
@@ -31,6 +32,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "FlightSets": "present",
     "Present": "present",
     "Verdict": "verdict",
     "VerdictThresholds": "thresholds",

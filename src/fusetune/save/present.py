@@ -1,4 +1,13 @@
-"""What the vehicle flies now: its parameters at the end of one flight, the newest unless told otherwise."""
+"""What `present` and `as_flown` mean, and which sets are replayed and scored on a flight.
+
+* `present` is what the vehicle flies now: its parameters at the end of one flight, the newest unless told otherwise.
+  All other sets are compared with it. Of these parameters those count that the study varies; in all others a set
+  leaves each log as it is.
+* `as_flown` is each log's own parameters, without exception. It is replayed to be compared with what the vehicle's own
+  estimator logged, and is not scored.
+
+Rules of the workflow ask this module, too: what needs the saved flights is imported where it is needed.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +17,46 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from fusetune.errors import UserError
-from fusetune.save.flight_folder import read_metadata
+from fusetune.set_names import AS_FLOWN, PRESENT
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import atomic_path
+
+
+@dataclass(frozen=True)
+class FlightSets:
+    """The sets that every flight is replayed with.
+
+    Attributes
+    ----------
+    study : sets of the study, name → values of the parameters that it varies
+    """
+
+    study: Mapping[str, Mapping[str, float]]
+
+    @property
+    def scored(self) -> list[str]:
+        """Names of the sets that are scored and ranked, the present one first."""
+        return [PRESENT, *self.study]
+
+    @property
+    def replayed(self) -> list[str]:
+        """Names of the sets that are replayed."""
+        return [*self.scored, AS_FLOWN]
+
+    @property
+    def varied(self) -> list[str]:
+        """Names of the parameters that the study varies, sorted."""
+        return sorted({name for overrides in self.study.values() for name in overrides})
+
+    def overrides(self, names: Collection[str], present: Mapping[str, float]) -> dict[str, dict[str, float]]:
+        """The values that some of the sets give to parameters, by set.
+
+        Parameters
+        ----------
+        present : those of the present set, `Present.parameters`
+        """
+        known = {**self.study, PRESENT: present, AS_FLOWN: {}}
+        return {name: dict(known[name]) for name in names}
 
 
 @dataclass(frozen=True)
@@ -60,6 +106,8 @@ def find_present(
             f"{wanted!r} is no flight that can be replayed",
             "Name one that results/save/flights.csv calls replayable, or none for the newest",
         )
+    from fusetune.save.flight_folder import read_metadata
+
     metadata = read_metadata(folders[wanted])
     values = metadata["ekf2_parameters"]
     return Present(wanted, metadata["checksum"], {name: values[name] for name in sorted(set(varied) & values.keys())})

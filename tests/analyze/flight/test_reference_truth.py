@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 from fusetune.analyze.flight.reference_truth import odometry_reference, read_references, read_truth, rtk_reference
 from fusetune.analyze.metrics.attitude import interpolate_quaternion
 from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures
-from fusetune.analyze.replaying.filter_states import FilterStates
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import true_errors
 from fusetune.px4.flight import Flight, TopicTable, stacked
@@ -35,10 +34,10 @@ def quaternions(heading: np.ndarray) -> np.ndarray:
     return Rotation.from_euler("Z", heading[:, None]).as_quat(scalar_first=True)
 
 
-def estimate(position: np.ndarray, velocity: np.ndarray, quaternion: np.ndarray) -> tuple[SetRecord, FilterStates]:
+def estimate(position: np.ndarray, velocity: np.ndarray, quaternion: np.ndarray) -> tuple[ReplayedSet, FilterStates]:
     columns = {name: position[:, i] for i, name in enumerate("xyz")}
     columns |= {f"v{name}": velocity[:, i] for i, name in enumerate("xyz")}
-    record = SetRecord("present", {}, {}, {}, {}, {}, {"timestamp": TIME, **columns})
+    record = ReplayedSet("present", {}, {}, {}, {}, {}, {"timestamp": TIME, **columns})
     variance = np.full((TIME.size, 3), 0.01)
     return record, FilterStates(TIME, quaternion, velocity, variance, variance, variance)
 

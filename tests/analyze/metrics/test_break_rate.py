@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fusetune.analyze.metrics.break_rate import beyond_standard_deviations, break_rate, clopper_pearson
+from fusetune.analyze.metrics.break_rate import beyond_gate, beyond_standard_deviations, break_rate, clopper_pearson
 
 
 @pytest.mark.parametrize(("breaks", "samples"), [(0, 50), (1, 50), (7, 131), (50, 50)])
@@ -20,6 +20,11 @@ def test_a_break_is_beyond_the_limit_in_standard_deviations() -> None:
     innovation = np.array([1.4, -1.6, 0.0])
     broken = beyond_standard_deviations(innovation, np.full(3, 0.25), 3.0)
     np.testing.assert_array_equal(broken, [False, True, False])
+
+
+def test_where_the_gate_is_unknown_a_rejected_sample_is_a_break() -> None:
+    broken = beyond_gate(np.array([0.5, 1.5, np.nan, np.nan]), np.array([True, False, True, False]))
+    np.testing.assert_array_equal(broken, [False, True, True, False])
 
 
 def test_rate_counts_along_the_last_axis() -> None:

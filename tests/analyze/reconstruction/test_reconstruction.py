@@ -7,8 +7,9 @@ from fusetune.analyze.reconstruction import ReconstructionSettings, measured_row
 from fusetune.analyze.reconstruction.attitude import attitude_history, steady_history, to_body
 from fusetune.analyze.reconstruction.between_samples import sensor_rate_hz
 from fusetune.analyze.reconstruction.magnetometer import _spline_is_nearer, interpolate_magnetometer
-from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare, write_replay
-from fusetune.analyze.replaying.set_files import read_set
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
+from fusetune.analyze.replaying.replay_flight import write_replay
+from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.trust.fidelity import load_innovations
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.px4.flight import Flight, select_rows
@@ -194,7 +195,7 @@ def test_only_measured_samples_are_scored(small, mended, tmp_path):
         assert logged - 12 <= measured[axis].sum() <= logged
         assert axis.sum() > 3 * logged
     assert measured[result.source_names() == "gnss_vel"].all()
-    write_replay(mended, "s", {}, params, tmp_path)
+    write_replay(mended, "s", {}, tmp_path)
     record = read_set(tmp_path, "s")
     mag = (result.source_names() == "mag") & (result.innovations["axis"] == 0) & measured
     assert len(record.samples["mag", 0].innovation) == mag.sum()

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from fusetune.analyze.replaying.filter_states import read_states
+from fusetune.analyze.replaying.store.columns import state_table
+from fusetune.analyze.replaying.store.reader import read_states
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.replay.recording import STATE_ROW
-from fusetune.ekf2.replay.replay_tables import state_table
 
 
 def test_states_of_several_row_groups(tmp_path: Path) -> None:

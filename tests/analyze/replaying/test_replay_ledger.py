@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from fusetune.analyze.replaying.replay_files import replay_files
-from fusetune.analyze.replaying.replay_ledger import ReplayLedger
+from fusetune.analyze.replaying.store.ledger import ReplayLedger
+from fusetune.analyze.replaying.store.parts import replay_files
 from fusetune.storage.documents import read_document, write_document
 
 SETS = {"low": {"EKF2_ACC_NOISE": 0.2}, "high": {"EKF2_ACC_NOISE": 0.9}}

@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from fusetune.analyze.replaying.replay_files import ReplayIdentity, finish_replay
-from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_log import replay_log
+from fusetune.analyze.replaying.replay_summary import ReplayIdentity
+from fusetune.analyze.replaying.store.writer import finish_replay
 from fusetune.ekf2.replay.results import ReplaySummary
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight

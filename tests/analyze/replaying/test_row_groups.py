@@ -11,10 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fusetune.analyze.replaying import row_groups
-from fusetune.analyze.replaying.row_groups import tables_in_groups, written_in_groups
+from fusetune.analyze.replaying.store import row_groups
+from fusetune.analyze.replaying.store.columns import innovation_table, state_table
+from fusetune.analyze.replaying.store.row_groups import tables_in_groups, written_in_groups
 from fusetune.ekf2.replay.recording import INNOVATION_ROW, STATE_ROW
-from fusetune.ekf2.replay.replay_tables import innovation_table, state_table
 
 GROUP = 7
 

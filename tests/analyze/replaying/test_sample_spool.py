@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fusetune.analyze.replaying.sample_spool import SampleSpool, SpooledRows
-from fusetune.analyze.replaying.set_files import ColumnsOnDisk, read_innovations
+from fusetune.analyze.replaying.samples import SampleSpool, SpooledRows
+from fusetune.analyze.replaying.store.reader import ColumnsOnDisk, read_innovations
 from fusetune.errors import UserError
 
 SOURCES = ("mag", "gnss_vel", "baro_hgt", "no_such_source")

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 from tests.analyze.made_flight import MadeSet, make_flight
 
-from fusetune.analyze.replaying.set_files import SetRecord, read_set
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.activity import inactive_parameters, same_results
 from fusetune.analyze.scoring.parameter_sources import required_sources, switched_off
 from fusetune.save.flight_folder import load_flight
@@ -41,7 +42,7 @@ def test_equal_replays_are_recognised(tmp_path: Path) -> None:
     a, b, c = (read_set(folder, name) for name in "abc")
     assert same_results(a, b)
     assert not same_results(a, c)
-    assert isinstance(a, SetRecord)
+    assert isinstance(a, ReplayedSet)
 
 
 def test_a_vertical_floor_can_act_while_the_horizontal_one_cannot(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from tests.analyze.made_flight import MadeSet, at, make_flight
 
-from fusetune.analyze.replaying.set_files import read_set
+from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.block_scores import block_rows
 from fusetune.analyze.scoring.measurement_alignment import paired_samples
 from fusetune.analyze.scoring.scoring_window import ScoringWindow

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 from tests.analyze.made_flight import MadeSet, at, make_flight
 
-from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord, read_set
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.samples import AxisSamples
+from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.filter_events import filter_events
 
 FLIGHT = ((at(10.0), at(70.0)),)
 
 
-def record(root: Path, made: MadeSet) -> SetRecord:
+def record(root: Path, made: MadeSet) -> ReplayedSet:
     _, folder = make_flight(root, "flight", {"one": made})
     return read_set(folder, "one")
 
@@ -50,7 +52,7 @@ def test_a_counter_that_wraps_or_jumps_counts_every_step(tmp_path: Path) -> None
     assert one.reset_times["horizontal_position"].size == 1 + 3
 
 
-def with_samples(one: SetRecord, samples: AxisSamples) -> SetRecord:
+def with_samples(one: ReplayedSet, samples: AxisSamples) -> ReplayedSet:
     return replace(one, samples={**one.samples, ("gnss_vel", 0): samples})
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from tests.analyze.made_flight import END_S, START_US, MadeSet, at, make_flight
 
-from fusetune.analyze.replaying.set_files import read_set
+from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.ground_metrics import AFTER_LANDING_US, BEFORE_TAKE_OFF_US, ground_window
 from fusetune.analyze.scoring.score_flight import score_saved_flight
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings

@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.analyze.made_flight import MadeSet, at, make_flight
 
-from fusetune.analyze.replaying.sample_spool import SampleSpool
-from fusetune.analyze.replaying.set_files import read_set
-from fusetune.analyze.scoring.measurement_alignment import FIGURES, match, narrowed, paired_samples
+from fusetune.analyze.replaying.measurement_times import match
+from fusetune.analyze.replaying.samples import SampleSpool
+from fusetune.analyze.replaying.store.reader import read_set
+from fusetune.analyze.scoring.measurement_alignment import FIGURES, narrowed, paired_samples
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 
 WINDOW = ScoringWindow(((at(20.0), at(30.0)),), (), {}, at(20.0))

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from fusetune.analyze.replaying.set_files import read_innovations
-from fusetune.analyze.scoring.onboard import onboard_samples, write_onboard
+from fusetune.analyze.replaying.onboard import onboard_samples, write_onboard
+from fusetune.analyze.replaying.store.reader import read_innovations
 from fusetune.px4.flight import Flight
 
 

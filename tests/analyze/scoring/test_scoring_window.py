@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from tests.analyze.made_flight import LANDING_S, MadeSet, at, make_flight
 
 from fusetune.analyze.flight.intervals import Cut, subtract
-from fusetune.analyze.replaying.set_files import SetRecord, read_set
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.scoring.scoring_window import FUSION_DELAY_US, scoring_window
 
@@ -18,7 +19,7 @@ AIRBORNE = ((at(10.0), at(LANDING_S)),)
 SETTINGS = ScoringSettings()
 
 
-def records(root: Path, sets: dict[str, MadeSet]) -> list[SetRecord]:
+def records(root: Path, sets: dict[str, MadeSet]) -> list[ReplayedSet]:
     _, folder = make_flight(root, "flight", sets)
     return [read_set(folder, name) for name in sets]
 

@@ -1,38 +1,37 @@
 """Predictions in gaps, paired between sets and summed up; expectations by hand."""
 
-from pathlib import Path
+import dataclasses
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
-from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import Truth
 from fusetune.analyze.scoring.withheld_scores import add_true_drift, add_withheld_metrics, paired_gaps, withheld_rows
-from fusetune.storage.parquet import write_table
 
 SECOND = 1_000_000
 WINDOW = ScoringWindow(((0, 100 * SECOND),), (), {}, 0)
 
 
-def record(name: str, fused_until_s: int = 200) -> SetRecord:
-    """A set that fuses GNSS velocity once a second, up to some time."""
+def record(name: str, withheld: dict[str, np.ndarray], fused_until_s: int = 200) -> ReplayedSet:
+    """A set that fuses GNSS velocity once a second, up to some time, with what it predicted in gaps."""
     time = np.arange(200) * SECOND
     ones = np.ones(time.size)
     fused = time < fused_until_s * SECOND
     samples = AxisSamples(time, ones, ones, ones, ones, ~fused, fused)
-    return SetRecord(name, {}, {}, {}, {("gnss_vel", 0): samples}, {}, {})
+    return ReplayedSet(name, {}, {}, {}, {("gnss_vel", 0): samples}, {}, {}, withheld=lambda: withheld)
 
 
-def write(folder: Path, name: str, starts_s: list[int], errors: list[float], variance: float = 1.0) -> None:
+def predicted(starts_s: list[int], errors: list[float], variance: float = 1.0) -> dict[str, np.ndarray]:
     """Predictions of GNSS velocity north at the end of gaps of 9 s."""
     count = len(starts_s)
     start = np.array(starts_s, np.int64) * SECOND
-    table = {
-        "sensor": ["gnss"] * count,
-        "source": pa.array(["gnss_vel"] * count).dictionary_encode(),
+    return {
+        "sensor": np.array(["gnss"] * count),
+        "source": np.array(["gnss_vel"] * count),
         "gap": np.arange(count, dtype=np.int32),
         "start": start,
         "stop": start + 9 * SECOND,
@@ -42,30 +41,28 @@ def write(folder: Path, name: str, starts_s: list[int], errors: list[float], var
         "innovation": np.array(errors),
         "innovation_variance": np.full(count, variance),
     }
-    write_table(pa.table(table), folder / f"{name}.withheld.parquet")
 
 
-def test_only_gaps_that_all_sets_have_and_that_lie_in_the_window_are_paired(tmp_path: Path) -> None:
-    write(tmp_path, "present", [10, 20, 30, 95], [1.0, 2.0, 3.0, 4.0])
-    write(tmp_path, "late", [20, 30, 95], [5.0, 6.0, 7.0])
-    (group,) = paired_gaps([record("present"), record("late")], tmp_path, "present", WINDOW)
+def test_only_gaps_that_all_sets_have_and_that_lie_in_the_window_are_paired() -> None:
+    now = record("present", predicted([10, 20, 30, 95], [1.0, 2.0, 3.0, 4.0]))
+    late = record("late", predicted([20, 30, 95], [5.0, 6.0, 7.0]))
+    (group,) = paired_gaps([now, late], "present", WINDOW)
     # The gap at 10 s is missing in one set, the one at 95 s reaches beyond the window.
     np.testing.assert_array_equal(group.start, [20 * SECOND, 30 * SECOND])
     np.testing.assert_array_equal(group.error, [[2.0, 3.0], [5.0, 6.0]])
 
 
-def test_a_gap_counts_only_while_the_present_set_uses_the_sensor(tmp_path: Path) -> None:
-    for name in ("present", "other"):
-        write(tmp_path, name, [10, 20, 30], [1.0, 2.0, 3.0])
-    records = [record("present", fused_until_s=21), record("other")]
-    (group,) = paired_gaps(records, tmp_path, "present", WINDOW)
+def test_a_gap_counts_only_while_the_present_set_uses_the_sensor() -> None:
+    withheld = predicted([10, 20, 30], [1.0, 2.0, 3.0])
+    records = [record("present", withheld, fused_until_s=21), record("other", withheld)]
+    (group,) = paired_gaps(records, "present", WINDOW)
     np.testing.assert_array_equal(group.start, [10 * SECOND, 20 * SECOND])
 
 
-def test_figures_by_hand(tmp_path: Path) -> None:
-    write(tmp_path, "present", [10, 20, 30, 40], [3.0, -3.0, 3.0, -3.0], variance=9.0)
-    write(tmp_path, "other", [10, 20, 30, 40], [1.0, 1.0, 1.0, 1.0], variance=1.0)
-    groups = paired_gaps([record("present"), record("other")], tmp_path, "present", WINDOW)
+def test_figures_by_hand() -> None:
+    now = record("present", predicted([10, 20, 30, 40], [3.0, -3.0, 3.0, -3.0], variance=9.0))
+    other = record("other", predicted([10, 20, 30, 40], [1.0, 1.0, 1.0, 1.0], variance=1.0))
+    groups = paired_gaps([now, other], "present", WINDOW)
     table = MetricsTable("made")
     add_withheld_metrics(table, groups)
     rows = {(row["set"], row["metric"]): row["value"] for row in table.finished().to_pylist()}
@@ -76,10 +73,10 @@ def test_figures_by_hand(tmp_path: Path) -> None:
     assert rows["other", "withheld_nll_9s"] == pytest.approx(0.5 * (1 + np.log(2 * np.pi)))
 
 
-def test_outliers_are_winsorised_at_a_limit_that_no_set_has_to_itself(tmp_path: Path) -> None:
-    write(tmp_path, "present", list(range(0, 80, 5)), [1.0] * 15 + [100.0])
-    write(tmp_path, "other", list(range(0, 80, 5)), [1.0] * 16)
-    groups = paired_gaps([record("present"), record("other")], tmp_path, "present", WINDOW)
+def test_outliers_are_winsorised_at_a_limit_that_no_set_has_to_itself() -> None:
+    now = record("present", predicted(list(range(0, 80, 5)), [1.0] * 15 + [100.0]))
+    other = record("other", predicted(list(range(0, 80, 5)), [1.0] * 16))
+    groups = paired_gaps([now, other], "present", WINDOW)
     rows = withheld_rows("made", groups, np.array([0, 40, 80]) * SECOND).to_pandas()
     # 5 robust standard deviations: 5 · 1.4826 · the median 1.0
     assert rows["error_winsorised"].max() == pytest.approx(5 * 1.4826)
@@ -87,21 +84,21 @@ def test_outliers_are_winsorised_at_a_limit_that_no_set_has_to_itself(tmp_path: 
     assert rows.groupby("block")["start_us"].nunique().tolist() == [8, 8]
 
 
-def test_growth_of_the_true_error_over_a_gap(tmp_path: Path) -> None:
+def test_growth_of_the_true_error_over_a_gap() -> None:
     starts = np.array([10, 20, 30], np.int64) * SECOND
-    columns = {"sensor": ["gnss"] * 3, "start": starts, "stop": starts + 9 * SECOND}
+    columns = {"sensor": np.array(["gnss"] * 3), "start": starts, "stop": starts + 9 * SECOND}
     for moment, time, offset in (("begin", starts, 0.5), ("end", starts + 9 * SECOND, 3.5)):
         columns |= {f"timestamp_{moment}": time, f"x_{moment}": 2.0 * time * 1e-6 + offset}
         columns |= {f"{name}_{moment}": np.zeros(3) for name in ("y", "z", "vy", "vz")} | {
             f"vx_{moment}": np.full(3, 2.0)
         }
-    write_table(pa.table(columns), tmp_path / "present.gaps.parquet")
     time = np.arange(101, dtype=np.int64) * SECOND
     course = np.column_stack([2.0 * time * 1e-6, 0.0 * time, 0.0 * time])
     speed = np.column_stack([np.full(time.size, 2.0), 0.0 * time, 0.0 * time])
     truth = Truth(time, course, speed, time[:0], np.zeros((0, 4)), None)
     table = MetricsTable("made")
-    add_true_drift(table, [record("present")], tmp_path, truth, WINDOW)
+    now = dataclasses.replace(record("present", {}), gaps=lambda: columns)
+    add_true_drift(table, [now], truth, WINDOW)
     rows = {row["source"]: row["value"] for row in table.finished().to_pylist()}
     assert rows["truth_withheld_position"] == pytest.approx(3.0)
     assert rows["truth_withheld_velocity"] == pytest.approx(0.0, abs=1e-9)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fusetune.analyze.replaying.filter_states import FilterStates
-from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
+from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
+from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.sensors.measurement_errors import measurement_errors
 from fusetune.px4.flight import Flight
 
@@ -22,11 +22,11 @@ def samples(time: np.ndarray, observation: np.ndarray, innovation: np.ndarray) -
     return AxisSamples(time, ones, innovation, ones, ones, ~fused, fused, observation)
 
 
-def record_of(source: str, time: np.ndarray, observation: np.ndarray, innovation: np.ndarray) -> SetRecord:
+def record_of(source: str, time: np.ndarray, observation: np.ndarray, innovation: np.ndarray) -> ReplayedSet:
     axes = {
         (source, axis): samples(time, observation[:, axis], innovation[:, axis]) for axis in range(observation.shape[1])
     }
-    return SetRecord("present", {}, {}, {}, axes, {}, {})
+    return ReplayedSet("present", {}, {}, {}, axes, {}, {})
 
 
 def states_of(velocity: np.ndarray, quaternion: np.ndarray | None = None) -> FilterStates:
@@ -118,6 +118,6 @@ def test_a_velocity_in_another_frame_than_the_state_is_not_used() -> None:
 
 
 def test_sources_that_are_not_there_have_no_series() -> None:
-    record = SetRecord("present", {}, {}, {}, {}, {}, {})
+    record = ReplayedSet("present", {}, {}, {}, {}, {}, {})
     assert measurement_errors(record, states_of(np.zeros((UPDATES, 3))), EMPTY, "gnss_vel") is None
     assert measurement_errors(record, states_of(np.zeros((UPDATES, 3))), EMPTY, "drag") is None

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.flight.phases import airborne_intervals
-from fusetune.analyze.replaying.filter_states import read_states
-from fusetune.analyze.replaying.replay_flight import replay_flight
-from fusetune.analyze.replaying.set_files import read_set
+from fusetune.analyze.replaying.prepared_flight import prepare_flight
+from fusetune.analyze.replaying.replay_flight import replay_set
+from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.scoring.scoring_window import ScoringWindow, scoring_window
+from fusetune.analyze.scoring.scoring_window import scoring_window
 from fusetune.analyze.sensors.measurement_errors import ErrorSeries
 from fusetune.analyze.sensors.source_whiteness import (
     Whiteness,
@@ -42,8 +42,7 @@ def made(white: float, correlated: float, tau_s: float, seed: int, samples: int 
 
 def whiteness_of(values: np.ndarray, source: str = "gnss_vel") -> Whiteness:
     time = np.arange(values.shape[0], dtype=np.int64) * STEP_US
-    window = ScoringWindow(((0, int(time[-1]) + 1),), (), {}, 0)
-    found = series_whiteness(source, ErrorSeries(time, values), window)[0]
+    found = series_whiteness(source, ErrorSeries(time, values), [(0, int(time[-1]) + 1)])[0]
     assert found is not None
     return found
 
@@ -110,12 +109,11 @@ def test_lags_reach_the_horizon_but_no_more_than_a_third_of_the_samples() -> Non
 
 def test_few_samples_tell_nothing() -> None:
     time = np.arange(20, dtype=np.int64) * STEP_US
-    window = ScoringWindow(((0, 10_000_000),), (), {}, 0)
-    assert series_whiteness("gnss_vel", ErrorSeries(time, np.ones((20, 2))), window) == [None, None]
+    assert series_whiteness("gnss_vel", ErrorSeries(time, np.ones((20, 2))), [(0, 10_000_000)]) == [None, None]
 
 
 @pytest.mark.parametrize("kind", ["white", "correlated"])
-def test_simulated_receivers_are_told_apart(kind: str, tmp_path: Path) -> None:
+def test_simulated_receivers_are_told_apart(kind: str) -> None:
     root = Path(__file__).parents[3] / "config"
     vehicle = load_vehicle(root / "vehicles" / "quadrotor.yaml")
     velocities = {"white": GnssError(0.1, 0.0, 1.0, 1.4), "correlated": GnssError(0.02, 0.12, 2.0, 1.4)}
@@ -124,11 +122,10 @@ def test_simulated_receivers_are_told_apart(kind: str, tmp_path: Path) -> None:
     flight = fly(
         load_mission(root / "missions" / "survey.yaml"), replace(vehicle, gnss=gnss), {}, 3, with_estimator=False
     )
-    replay_flight(flight, {"present": {}}, tmp_path)
-    record, states = read_set(tmp_path, "present"), read_states(tmp_path, "present")
+    record = replay_set(prepare_flight(flight, ReplaySettings()), "present", {})
     airborne = airborne_intervals(flight, record.flags)
     window = scoring_window([record], "present", airborne, (), ScoringSettings())
-    found = source_whiteness(record, states, flight, window)
+    found = source_whiteness(record, record.states(), flight, window.intervals)
     shares = {
         source: np.mean([found[source, axis].white_share for axis in (0, 1)]) for source in ("gnss_vel", "gnss_pos")
     }

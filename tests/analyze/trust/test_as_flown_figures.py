@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from fusetune.analyze.replaying.set_files import AxisSamples
+from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.trust.as_flown_figures import as_flown_figures
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS, FLAGS_ROW, INNOVATION_ROW, LOCAL_POSITION_ROW, STATE_ROW

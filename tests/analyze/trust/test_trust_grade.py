@@ -7,15 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fusetune.analyze.analyze_flight import COMPARED_TOPICS
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
-from fusetune.analyze.replaying.replay_flight import REPLAY_TOPICS, prepare
-from fusetune.analyze.replaying.replay_settings import IN_USE
-from fusetune.analyze.scoring.score_flight import SCORE_TOPICS
-from fusetune.analyze.trust.as_flown_comparison import distance
-from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
+from fusetune.analyze.replaying.onboard import onboard_samples
+from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare
+from fusetune.analyze.replaying.replay_settings import IN_USE, StartSettings
+from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
+from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, AsFlownReplay, distance
+from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, compared_rows
 from fusetune.analyze.trust.grade_causes import GNSS, cost_of, with_half_the_gnss, without_repair
-from fusetune.analyze.trust.onboard_fidelity import FIDELITY_TOPICS
-from fusetune.analyze.trust.trust_grade import grade_flight, grade_of
+from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, grade_flight, grade_of
 from fusetune.analyze.trust.trust_settings import FIGURES, TrustSettings
 from fusetune.analyze.trust.trust_words import limits_of_grade, not_compared
 from fusetune.px4.flight import Flight, row_count, select_rows
@@ -130,9 +131,30 @@ def flight(survey_flight) -> Flight:
 
 
 def test_whole_log_of_the_same_estimator_is_an_a(flight):
-    grade = grade_flight(flight)
+    grade = grade_flight(prepare(flight, IN_USE.reconstruction, IN_USE.start))
     assert grade.grade == "A", grade
     assert grade.reason == ""
+
+
+def test_what_is_at_hand_or_known_is_not_replayed_again(flight, monkeypatch):
+    """A whole log that is replayed from nothing: as it was logged it is what is in use."""
+    prepared = prepare(flight, IN_USE.reconstruction, StartSettings(mode="cold"))
+    kept = prepared.replay(prepared.parameters({}), keep=compared_rows(onboard_samples(flight)))
+    replays, replay = [], PreparedFlight.replay
+    monkeypatch.setattr(PreparedFlight, "replay", lambda *args, **named: replays.append(1) or replay(*args, **named))
+    anew = grade_flight(prepared)
+    assert len(replays) == 1
+    comparison = AsFlownComparison(flight, SETTINGS)
+    comparison.figures(prepared, AsFlownReplay(*kept))
+    assert grade_flight(prepared, comparison=comparison) == anew
+    assert len(replays) == 1
+    warm = grade_flight(prepare(flight, IN_USE.reconstruction, StartSettings(mode="warm")))
+    assert warm.start.startswith("warm")
+    assert [cost_of(one) for one in warm.causes] == [
+        distance(warm.as_logged, SETTINGS) - distance(warm.repaired, SETTINGS)
+    ]
+    # the one in use, and from nothing as the log is; what the start from nothing costs is known by then
+    assert len(replays) == 3
 
 
 def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
@@ -142,7 +164,7 @@ def test_cause_that_was_put_in_is_the_one_that_is_found(flight):
         {key: table for key, table in flight.topics.items() if key[0] != "ekf2_timestamps"}
         | {("sensor_combined", 0): select_rows(imu, ~lost)}
     )
-    grade = grade_flight(small)
+    grade = grade_flight(prepare(small, IN_USE.reconstruction, IN_USE.start))
     causes = {cause.found: cause for cause in grade.causes if cause.evidence["measured"]}
     assert causes["missing IMU rows"].evidence["repaired"]
     assert causes["missing IMU rows"].id == "imu_coverage"
@@ -251,9 +273,9 @@ def test_replay_scores_and_grade_of_a_flight_see_the_same_sensors_where_instance
     flight = with_two_imus(two_instances())
     shapes = [
         canonical(flight.with_topics({key: one for key, one in flight.topics.items() if key[0] in topics}))
-        for topics in (REPLAY_TOPICS, SCORE_TOPICS, FIDELITY_TOPICS)
+        for topics in (REPLAY_TOPICS, SCORE_TOPICS, TRUST_TOPICS, COMPARED_TOPICS)
     ]
-    for shape in shapes:
+    for shape in shapes[:3]:
         time = shape.topics["sensor_combined", 0]["timestamp"]
         assert len(time) == 2000
         # instance 1, whose IMU is stamped 1 µs later, is primary from 6 s on

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_log import replay_log
 from fusetune.analyze.trust.fidelity import AxisFidelity, ReplayFidelity, compare_folders
 
 

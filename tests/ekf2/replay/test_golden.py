@@ -18,7 +18,7 @@ from tests.ekf2.replay.equal_rows import assert_equal_rows
 from tests.ekf2.replay.px4_agreement import Limits, assert_replay_agrees, departures
 from tests.golden.cut import GOLDEN_FLIGHTS, MADE, cut_all
 
-from fusetune.analyze.replaying.replay_flight import replay_log
+from fusetune.analyze.replaying.replay_log import replay_log
 from fusetune.analyze.trust.fidelity import COMPARED_SOURCES, compare_folders, comparison_start, load_innovations
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.px4.layouts.release_layouts import canonical

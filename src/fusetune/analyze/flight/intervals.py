@@ -3,6 +3,9 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from fusetune.finding import Finding
 
 Interval = tuple[int, int]
@@ -24,6 +27,14 @@ class Cut:
         return Finding(
             NOT_SCORED, "note", self.reason, figure=seconds, unit="s", start_us=self.start, stop_us=self.stop
         )
+
+
+def inside(time: npt.NDArray[np.int64], intervals: Iterable[Interval]) -> npt.NDArray[np.bool_]:
+    """True for the times (N,), µs, that lie in one of the intervals."""
+    found = np.zeros(time.shape, dtype=bool)
+    for start, stop in intervals:
+        found |= (time >= start) & (time < stop)
+    return found
 
 
 def subtract(intervals: Sequence[Interval], cuts: Iterable[Cut]) -> tuple[Interval, ...]:

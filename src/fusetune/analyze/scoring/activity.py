@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.scoring.parameter_sources import observation_noise_of, required_sources, switched_off
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
@@ -17,7 +18,7 @@ from fusetune.px4.flight import Flight
 _NEGLIGIBLE_SHARE = 0.02
 
 
-def inactive_parameters(record: SetRecord, present: SetRecord, flight: Flight) -> dict[str, str]:
+def inactive_parameters(record: ReplayedSet, present: ReplayedSet, flight: Flight) -> dict[str, str]:
     """Overrides of a set that cannot act on this flight, each with the reason in words.
 
     Parameters
@@ -44,7 +45,7 @@ def inactive_parameters(record: SetRecord, present: SetRecord, flight: Flight) -
     return reasons
 
 
-def same_results(record: SetRecord, present: SetRecord) -> bool:
+def same_results(record: ReplayedSet, present: ReplayedSet) -> bool:
     """True where two replays agree in every innovation and variance: the sets are one on this flight."""
     if record.samples.keys() != present.samples.keys():
         return False
@@ -58,14 +59,14 @@ def _same_samples(one: AxisSamples, other: AxisSamples) -> bool:
     )
 
 
-def _same_value(name: str, record: SetRecord, present: SetRecord) -> str:
+def _same_value(name: str, record: ReplayedSet, present: ReplayedSet) -> str:
     value, before = record.parameters.get(name), present.parameters.get(name)
     if value is None or before is None or np.float32(value) != np.float32(before):
         return ""
     return "has the same value in the present set"
 
 
-def _absent_source(name: str, record: SetRecord, present: SetRecord) -> str:
+def _absent_source(name: str, record: ReplayedSet, present: ReplayedSet) -> str:
     sources = required_sources(name)
     if not sources or (record.fused_sources | present.fused_sources).intersection(sources):
         return ""
@@ -76,7 +77,7 @@ def _absent_source(name: str, record: SetRecord, present: SetRecord) -> str:
     return f"no {' or '.join(sources)} was fused on this flight{why}"
 
 
-def _below_receiver_accuracy(name: str, record: SetRecord, present: SetRecord, flight: Flight) -> str:
+def _below_receiver_accuracy(name: str, record: ReplayedSet, present: ReplayedSet, flight: Flight) -> str:
     table = flight.topic("vehicle_gps_position")
     floors = [(one, floor) for one in AID_SOURCES.values() for floor in one.noise_floors if floor.parameter == name]
     if not floors or table is None:
@@ -102,7 +103,7 @@ def _below_receiver_accuracy(name: str, record: SetRecord, present: SetRecord, f
     )
 
 
-def _same_observation_variance(name: str, record: SetRecord, present: SetRecord) -> str:
+def _same_observation_variance(name: str, record: ReplayedSet, present: ReplayedSet) -> str:
     """A noise that is a floor, or that another figure overrides, leaves the observation variances as they were."""
     keys = [key for key in record.samples if key[0] in observation_noise_of(name)]
     keys = [key for key in keys if key in present.first_fused]
@@ -115,7 +116,7 @@ def _same_observation_variance(name: str, record: SetRecord, present: SetRecord)
     return "leaves every observation variance as it is: what the sensor reports is larger"
 
 
-def _idle_gate(name: str, record: SetRecord, present: SetRecord) -> str:
+def _idle_gate(name: str, record: ReplayedSet, present: ReplayedSet) -> str:
     if not name.endswith("_GATE"):
         return ""
     largest = 0.0

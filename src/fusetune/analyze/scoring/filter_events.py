@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.metrics.metric import Metric
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.px4.aid_sources import AID_SOURCES
 
 _FLAGS_OF_SOURCES = tuple(
@@ -88,14 +88,14 @@ SERVICE_METRICS: tuple[Metric[SourceAid], ...] = (
 """How a source served in flight after the warm-up."""
 
 
-def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEvents:
+def filter_events(record: ReplayedSet, flight: tuple[Interval, ...]) -> FilterEvents:
     """Count the events of one replay.
 
     Parameters
     ----------
     flight : flight time after the warm-up, µs: before it every filter resets and switches sources
     """
-    resets = {kind: int(np.count_nonzero(_inside(times, flight))) for kind, times in record.reset_times.items()}
+    resets = {kind: int(np.count_nonzero(inside(times, flight))) for kind, times in record.reset_times.items()}
     time = record.flags.get("timestamp", np.zeros(0)).astype(np.int64)
     columns = {}
     # The magnetometer changes between heading and three axes by itself; only its end is a loss.
@@ -106,7 +106,7 @@ def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEven
     timeouts = {}
     for flag, values in columns.items():
         stopped = time[1:][values[:-1].astype(bool) & ~values[1:].astype(bool)]
-        timeouts[flag.removeprefix("cs_")] = int(np.count_nonzero(_inside(stopped, flight)))
+        timeouts[flag.removeprefix("cs_")] = int(np.count_nonzero(inside(stopped, flight)))
     faults = tuple(sorted(name for name, values in record.flags.items() if name.startswith("fs_") and values.any()))
     return FilterEvents(
         resets=resets,
@@ -118,7 +118,7 @@ def filter_events(record: SetRecord, flight: tuple[Interval, ...]) -> FilterEven
     )
 
 
-def _source_aid(record: SetRecord, intervals: tuple[Interval, ...]) -> dict[str, SourceAid]:
+def _source_aid(record: ReplayedSet, intervals: tuple[Interval, ...]) -> dict[str, SourceAid]:
     """Axis 0 speaks for its source: PX4 fuses or rejects all axes of a sample but for rare faults."""
     found = {}
     for source, axis in record.first_fused:
@@ -126,22 +126,15 @@ def _source_aid(record: SetRecord, intervals: tuple[Interval, ...]) -> dict[str,
             continue
         samples = record.samples[source, axis]
         time = samples.timestamp_sample
-        inside = _inside(time, intervals)
-        if not inside.any():
+        counted = inside(time, intervals)
+        if not counted.any():
             continue
         longest = 0
         for start, stop in intervals:
             fused = time[samples.fused & (time >= start) & (time < stop)]
             longest = max(longest, int(np.max(np.diff(np.r_[start, fused, stop]))))
-        found[source] = SourceAid(int(inside.sum()), float(np.mean(samples.fused[inside])), longest * 1e-6)
+        found[source] = SourceAid(int(counted.sum()), float(np.mean(samples.fused[counted])), longest * 1e-6)
     return found
-
-
-def _inside(times: npt.NDArray[np.int64], intervals: tuple[Interval, ...]) -> npt.NDArray[np.bool_]:
-    inside = np.zeros(times.shape, dtype=bool)
-    for start, stop in intervals:
-        inside |= (times >= start) & (times < stop)
-    return inside
 
 
 def _time_true(

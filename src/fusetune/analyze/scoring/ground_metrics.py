@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from fusetune.analyze.flight.intervals import Cut, Interval, merged, subtract
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.filter_events import ON_GROUND, FilterEvents
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, paired_samples
 from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, add_innovation_metrics, groups_of
@@ -24,7 +24,7 @@ GROUND = "ground_"
 
 
 def ground_window(
-    records: Sequence[SetRecord],
+    records: Sequence[ReplayedSet],
     present: str,
     airborne: Sequence[Interval],
     log: Interval,
@@ -51,7 +51,7 @@ def ground_window(
 
 
 def add_ground_metrics(
-    table: MetricsTable, records: Sequence[SetRecord], present: str, ground: ScoringWindow, confidence: float
+    table: MetricsTable, records: Sequence[ReplayedSet], present: str, ground: ScoringWindow, confidence: float
 ) -> None:
     """Append the metrics that are given of the ground, of every source and axis, named `ground_…`."""
     if not ground.intervals:

@@ -1,8 +1,4 @@
-"""Brings the samples of all parameter sets to the same measurements.
-
-The estimator stamps a sample with the time of the measurement less the source's delay parameter, so a set with
-another delay stamps the same measurement otherwise. Adding the delay back gives a time that names the measurement.
-"""
+"""Brings the samples of all parameter sets to the same measurements."""
 
 from __future__ import annotations
 
@@ -15,10 +11,10 @@ import numpy.typing as npt
 
 from fusetune.analyze.metrics.likelihood import winsor_limit
 from fusetune.analyze.metrics.metric import Innovations
-from fusetune.analyze.replaying.sample_spool import SampleSpool, SpooledRows
-from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord, SourceAxis
+from fusetune.analyze.replaying.measurement_times import match, measurement_time
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.samples import SampleSpool, SourceAxis, SpooledRows
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
-from fusetune.px4.aid_sources import AID_SOURCES
 
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""
@@ -109,28 +105,8 @@ def narrowed(values: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
     return single if np.array_equal(single, values, equal_nan=True) else values
 
 
-def measurement_time(samples: AxisSamples, source: str, parameters: dict[str, float]) -> npt.NDArray[np.int64]:
-    """Time of each measurement, µs: the estimator's sample time plus the source's delay."""
-    name = AID_SOURCES[source].delay_parameter
-    delay_ms = parameters.get(name, 0.0) if name is not None else 0.0
-    return samples.timestamp_sample + round(delay_ms * 1e3)
-
-
-def match(reference: npt.NDArray[np.int64], time: npt.NDArray[np.int64], tolerance_us: float) -> npt.NDArray[np.int64]:
-    """Index into `time` of the sample nearest to each of `reference`, or −1 where none is within the tolerance.
-
-    Both ascending; (N,) and (M,), µs.
-    """
-    if time.size == 0:
-        return np.full(reference.shape, -1, dtype=np.int64)
-    right = np.clip(np.searchsorted(time, reference), 0, time.size - 1)
-    left = np.maximum(right - 1, 0)
-    nearest = np.where(np.abs(time[left] - reference) <= np.abs(time[right] - reference), left, right)
-    return np.where(np.abs(time[nearest] - reference) <= tolerance_us, nearest, -1)
-
-
 def paired_samples(
-    records: Sequence[SetRecord],
+    records: Sequence[ReplayedSet],
     key: SourceAxis,
     present: str,
     window: ScoringWindow,

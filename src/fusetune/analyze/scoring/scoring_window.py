@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.flight.intervals import Cut, Interval, duration, merged, subtract
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.flight.intervals import Cut, Interval, duration, inside, merged, subtract
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.px4.aid_sources import AID_SOURCES, HORIZONTAL_AIDING
 
@@ -34,10 +34,7 @@ class ScoringWindow:
 
     def contains(self, time: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
         """True for the times (N,), µs, that are scored."""
-        inside = np.zeros(time.shape, dtype=bool)
-        for start, stop in self.intervals:
-            inside |= (time >= start) & (time < stop)
-        return inside
+        return inside(time, self.intervals)
 
     def block_edges(self, length_s: float) -> npt.NDArray[np.int64]:
         """Edges of blocks of equal length, as near to `length_s` as the span of the window allows, µs."""
@@ -46,7 +43,7 @@ class ScoringWindow:
         return start + (np.arange(blocks + 1, dtype=np.int64) * (stop - start)) // blocks
 
 
-def aiding_start(record: SetRecord) -> int | None:
+def aiding_start(record: ReplayedSet) -> int | None:
     """Time at which the set first fuses something that stops horizontal drift, else anything at all, µs."""
     anything = {source for source, _ in record.samples if not AID_SOURCES[source].every_update}
     for sources in (HORIZONTAL_AIDING, anything):
@@ -57,7 +54,7 @@ def aiding_start(record: SetRecord) -> int | None:
 
 
 def scoring_window(
-    records: Sequence[SetRecord],
+    records: Sequence[ReplayedSet],
     present: str,
     airborne: Sequence[Interval],
     gaps: Sequence[Interval],
@@ -130,7 +127,7 @@ def _plural(reason: str) -> str:
     return f"{first}s {rest}"
 
 
-def _failure(record: SetRecord) -> str:
+def _failure(record: ReplayedSet) -> str:
     if record.status != "ok":
         return f"{record.status}: {record.summary.get('reason', '')}".rstrip(": ")
     if aiding_start(record) is None:
@@ -139,7 +136,7 @@ def _failure(record: SetRecord) -> str:
 
 
 def cuts_within(
-    records: Sequence[SetRecord],
+    records: Sequence[ReplayedSet],
     excluded: dict[str, str],
     flying: Sequence[Interval],
     present: str,
@@ -165,7 +162,7 @@ def cuts_within(
     return [cut for cut in dict.fromkeys(cuts) if any(cut.stop > start and cut.start < stop for start, stop in flying)]
 
 
-def _around_resets(record: SetRecord, after_us: int) -> list[Cut]:
+def _around_resets(record: ReplayedSet, after_us: int) -> list[Cut]:
     return [
         Cut(int(time) - FUSION_DELAY_US, int(time) + after_us, f"reset of {kind.replace('_', ' ')}")
         for kind, times in record.reset_times.items()

@@ -9,8 +9,7 @@ from fusetune.analyze.flight.reference_truth import EARTH_RADIUS_M, Truth, read_
 from fusetune.analyze.metrics.attitude import error_in_ned as attitude_error
 from fusetune.analyze.metrics.attitude import heading, interpolate, interpolate_quaternion, wrap
 from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures, nees_figures, vector_figures
-from fusetune.analyze.replaying.filter_states import FilterStates
-from fusetune.analyze.replaying.set_files import SetRecord
+from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.quaternions import multiply, rotation_matrix
 
@@ -40,7 +39,7 @@ class _Outputs:
 
 
 def true_errors(
-    record: SetRecord, states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
+    record: ReplayedSet, states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
 ) -> list[ErrorFigure]:
     """All figures of one replay against one reference.
 
@@ -64,7 +63,7 @@ def true_errors(
     return figures + _state_figures(states, truth, window, confidence)
 
 
-def _outputs(record: SetRecord, states: FilterStates, truth: Truth, window: ScoringWindow) -> _Outputs:
+def _outputs(record: ReplayedSet, states: FilterStates, truth: Truth, window: ScoringWindow) -> _Outputs:
     local = record.local_position
     # The output predictor carries the state from the fusion horizon to `timestamp`; that is when it holds.
     time = local["timestamp"].astype(np.int64)
@@ -88,7 +87,7 @@ def _arm(states: FilterStates, truth: Truth, at: npt.NDArray[np.int64]) -> Array
 
 
 def _position_figures(
-    record: SetRecord, states: FilterStates, outputs: _Outputs, truth: Truth, confidence: float
+    record: ReplayedSet, states: FilterStates, outputs: _Outputs, truth: Truth, confidence: float
 ) -> list[ErrorFigure]:
     time = outputs.time
     figures: list[ErrorFigure] = []
@@ -109,7 +108,7 @@ def _position_figures(
     )
 
 
-def _origin_offset(record: SetRecord, truth: Truth) -> Array | None:
+def _origin_offset(record: ReplayedSet, truth: Truth) -> Array | None:
     origin = record.summary.get("origin")
     if not origin or truth.reference is None:
         return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -13,12 +12,11 @@ import pyarrow as pa
 from fusetune.analyze.metrics.innovation_metrics import rms_innovation
 from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, winsorised
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
-from fusetune.analyze.replaying.set_files import SetRecord, read_columns
+from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
 from fusetune.px4.aid_sources import AID_SOURCES, AXES, WITHHOLDABLE
-from fusetune.storage.files import AnyPath
 
 Array = npt.NDArray[np.float64]
 
@@ -83,18 +81,16 @@ DRIFT: Metric[Sequence[PairedGaps]] = Metric(
 )  # fmt: skip
 
 
-def paired_gaps(records: Sequence[SetRecord], folder: AnyPath, present: str, window: ScoringWindow) -> list[PairedGaps]:
+def paired_gaps(records: Sequence[ReplayedSet], present: str, window: ScoringWindow) -> list[PairedGaps]:
     """Predictions in the gaps that lie wholly in the scored part of the flight.
 
     Parameters
     ----------
-    records : sets that are scored on this flight, the present one among them
-    folder : holds `<set>.withheld.parquet`
+    records : sets that are scored on this flight, the present one among them; each with predictions
     present : a gap counts if this set used the sensor when the gap began
     """
-    folder = Path(folder)
     names = [record.name for record in records]
-    tables = [_read(folder / f"{name}.withheld.parquet") for name in names]
+    tables = [_by_key(record.withheld()) for record in records if record.withheld is not None]
     present_record = records[names.index(present)]
     common = tables[0]["key"]
     for table in tables[1:]:
@@ -124,9 +120,8 @@ def paired_gaps(records: Sequence[SetRecord], folder: AnyPath, present: str, win
     return groups
 
 
-def _read(path: Path) -> dict[str, npt.NDArray]:
+def _by_key(table: Columns) -> dict[str, npt.NDArray]:
     """Columns of one set's predictions, in ascending order of a key that names gap, source, axis and horizon."""
-    table = read_columns(path)
     sources = list(AID_SOURCES)
     source = np.array([sources.index(name) if name in AID_SOURCES else -1 for name in table["source"]], np.int64)
     horizon_ds = np.rint(table["horizon_s"] * 10.0).astype(np.int64)
@@ -143,7 +138,7 @@ def _inside(start: npt.NDArray[np.int64], stop: npt.NDArray[np.int64], window: S
     return inside
 
 
-def _in_use(record: SetRecord, source: str, start: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+def _in_use(record: ReplayedSet, source: str, start: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """True where the record fused a source shortly before a time."""
     samples = record.samples.get((source, 0))
     if samples is None or not samples.fused.any():
@@ -202,13 +197,12 @@ def add_withheld_metrics(table: MetricsTable, groups: Sequence[PairedGaps]) -> N
                 table.add_each(members[0].sets, source, name, DRIFT.name, drift, members[0].gap.size)
 
 
-def add_true_drift(
-    table: MetricsTable, records: Sequence[SetRecord], folder: AnyPath, truth: Truth, window: ScoringWindow
-) -> None:
+def add_true_drift(table: MetricsTable, records: Sequence[ReplayedSet], truth: Truth, window: ScoringWindow) -> None:
     """Append by how much the true horizontal error of position and velocity grew over the gaps without GNSS (RMS)."""
-    folder = Path(folder)
     for record in records:
-        gaps = read_columns(folder / f"{record.name}.gaps.parquet")
+        if record.gaps is None:
+            continue
+        gaps = record.gaps()
         rows = (gaps["sensor"] == "gnss") & _inside(gaps["start"], gaps["stop"], window)
         if np.count_nonzero(rows) < FEWEST_GAPS:
             continue

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.replaying.filter_states import FilterStates
-from fusetune.analyze.replaying.set_files import AxisSamples, SetRecord
-from fusetune.analyze.scoring.measurement_alignment import match, measurement_time
+from fusetune.analyze.replaying.measurement_times import match, measurement_time
+from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
+from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
 from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
@@ -44,7 +44,7 @@ class ErrorSeries:
     values: Array
 
 
-def measurement_errors(record: SetRecord, states: FilterStates, flight: Flight, source: str) -> ErrorSeries | None:
+def measurement_errors(record: ReplayedSet, states: FilterStates, flight: Flight, source: str) -> ErrorSeries | None:
     """Series of a source, unit of the source, from the first sample that was fused.
 
     * Velocity: y_k = −ν_k + Σ_{j<k} c_j, where c_j is how much the update at measurement j moved the state. Adding
@@ -79,7 +79,7 @@ def measurement_errors(record: SetRecord, states: FilterStates, flight: Flight, 
 
 
 def _values(
-    record: SetRecord,
+    record: ReplayedSet,
     states: FilterStates,
     flight: Flight,
     source: str,

@@ -33,10 +33,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import nnls
 
+from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
-from fusetune.analyze.replaying.filter_states import FilterStates
-from fusetune.analyze.replaying.set_files import SetRecord
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.sensors.measurement_errors import COVERED, VELOCITY_SOURCES, ErrorSeries, measurement_errors
 from fusetune.px4.flight import Flight
 
@@ -107,7 +106,7 @@ def horizon_s(source: str) -> float:
 
 
 def source_whiteness(
-    record: SetRecord, states: FilterStates, flight: Flight, window: ScoringWindow
+    record: ReplayedSet, states: FilterStates, flight: Flight, intervals: Sequence[Interval]
 ) -> dict[tuple[str, int], Whiteness]:
     """Whiteness of every source that the set fuses, by source and axis.
 
@@ -115,23 +114,23 @@ def source_whiteness(
     ----------
     record, states : replay of this flight
     flight : canonical, for GNSS positions in full resolution
-    window : measurements inside it count; no pair spans a cut
+    intervals : measurements inside them count, µs; no pair spans two of them
     """
     found = {}
     for source in COVERED:
         series = measurement_errors(record, states, flight, source)
         if series is None:
             continue
-        for axis, one in enumerate(series_whiteness(source, series, window)):
+        for axis, one in enumerate(series_whiteness(source, series, intervals)):
             if one is not None:
                 found[source, axis] = one
     return found
 
 
-def series_whiteness(source: str, series: ErrorSeries, window: ScoringWindow) -> list[Whiteness | None]:
+def series_whiteness(source: str, series: ErrorSeries, intervals: Sequence[Interval]) -> list[Whiteness | None]:
     """Whiteness of each axis of a series, None where there are too few samples."""
     interval = np.full(series.time.shape, -1)
-    for number, (start, stop) in enumerate(window.intervals):
+    for number, (start, stop) in enumerate(intervals):
         interval[(series.time >= start) & (series.time < stop)] = number
     rows = interval >= 0
     time, values, interval = series.time[rows], series.values[rows], interval[rows]

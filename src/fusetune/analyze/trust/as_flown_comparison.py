@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from fusetune.analyze.flight.intervals import Cut, subtract
+from fusetune.analyze.flight.intervals import Cut, Interval, subtract
 from fusetune.analyze.flight.phases import airborne_intervals
-from fusetune.analyze.replaying.replay_flight import PreparedFlight
-from fusetune.analyze.scoring.onboard import onboard_samples
-from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, Interval, as_flown_figures, compared_rows
+from fusetune.analyze.replaying.onboard import onboard_samples
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight
+from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, as_flown_figures, compared_rows
 from fusetune.analyze.trust.trust_settings import FALLING, TrustSettings
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import complete
@@ -35,6 +36,14 @@ def distance(figures: AsFlownFigures, settings: TrustSettings) -> float:
     return float(np.mean(shares)) if shares else math.nan
 
 
+class AsFlownReplay(NamedTuple):
+    """A replay of the parameters that flew, of which `as_flown_figures.compared_rows` were kept."""
+
+    result: ReplayResult
+    measured: np.ndarray
+    """Whether the sample of each innovation stands in the log."""
+
+
 class AsFlownComparison:
     """Replays of the parameters that flew against the log, all over the same part of the flight."""
 
@@ -43,13 +52,26 @@ class AsFlownComparison:
         self.params = complete(flight.parameters.initial, {}, flight.release)
         self.onboard = onboard_samples(flight)
         self.intervals: tuple[Interval, ...] | None = None
+        self._done: list[tuple[PreparedFlight, AsFlownFigures]] = []
 
-    def figures(self, prepared: PreparedFlight) -> AsFlownFigures:
-        """Figures of one replay; the first one, which is the one in use, decides which part is compared."""
-        result, measured = prepared.replay(self.params, keep=compared_rows(self.onboard))
+    def figures(self, prepared: PreparedFlight, done: AsFlownReplay | None = None) -> AsFlownFigures:
+        """Figures of one replay; the first one, which is the one in use, decides which part is compared.
+
+        Parameters
+        ----------
+        done : the replay, where it has been made already
+        """
+        for other, figures in self._done:
+            if _is_same_course(prepared, other):
+                return figures
+        result, measured = done or prepared.replay(self.params, keep=compared_rows(self.onboard))
         if self.intervals is None:
             self.intervals = self._compared(result)
-        return as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)
+        figures = as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)
+        # other samples than those in use are not worth their memory
+        if not self._done or prepared.inputs is self._done[0][0].inputs:
+            self._done.append((prepared, figures))
+        return figures
 
     def distance(self, prepared: PreparedFlight) -> float:
         """How far one replay is from the vehicle."""
@@ -66,3 +88,9 @@ class AsFlownComparison:
             times = result.innovations["timestamp_sample"][fused] if fused.any() else result.states["timestamp_sample"]
             begin = int(times.min(initial=2**62)) + settle_us + COLD_WARM_UP_US
         return subtract(airborne_intervals(self.flight, {}), [Cut(-(2**62), begin, "warm-up")])
+
+
+def _is_same_course(one: PreparedFlight, other: PreparedFlight) -> bool:
+    """Whether two prepared flights give the same replay, as where the one in use starts from nothing anyway."""
+    same = ((one.inputs, other.inputs), (one.start.state, other.start.state), (one.handovers, other.handovers))
+    return all(left is right for left, right in same)

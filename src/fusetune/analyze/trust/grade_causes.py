@@ -13,7 +13,7 @@ import numpy as np
 from fusetune.analyze.reconstruction import ReconstructedFlight
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
-from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.replaying.start_choice import Start, choose_start
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, distance

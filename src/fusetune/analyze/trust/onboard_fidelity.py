@@ -12,25 +12,21 @@ from pathlib import Path
 
 import numpy as np
 
-from fusetune.analyze.replaying.replay_flight import PreparedFlight
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
-from fusetune.analyze.replaying.set_files import AxisSamples, SourceAxis, read_innovations
+from fusetune.analyze.flight_files import FIDELITY_FILE
+from fusetune.analyze.replaying.onboard import onboard_samples
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight
+from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
+from fusetune.analyze.replaying.store.parts import table_file
+from fusetune.analyze.replaying.store.reader import read_innovations
 from fusetune.analyze.trust.fidelity import mean_nll
 from fusetune.analyze.trust.log_lacks import log_lacks
-from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, TrustGrade, grade_flight
-from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.analyze.trust.trust_grade import TrustGrade
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
-from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.set_names import AS_FLOWN
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
-
-AS_FLOWN = "as_flown"
-"""Name of the replay with the log's own parameters."""
-
-FIDELITY_TOPICS = (*dict.fromkeys((*TRUST_TOPICS, "sensor_gps")),)
-"""What the comparison and the grade read of a flight."""
 
 JUDGED_SOURCES = tuple(one.name for one in AID_SOURCES.values() if one.judged)
 MATCH_TOLERANCE_US = 30_000
@@ -67,58 +63,38 @@ class OnboardFidelity:
     """What the log lacks for a closer replay, most important first."""
 
 
-def write_flight_fidelity(
-    flight: Flight,
-    analyze_folder: AnyPath,
-    replay: ReplaySettings,
-    trust: TrustSettings | None = None,
-    grade: TrustGrade | None = None,
-) -> None:
-    """Compare the as-flown replay of a flight with its own log, grade it, and write `fidelity.json` beside it.
+def write_flight_fidelity(prepared: PreparedFlight, analyze_folder: AnyPath, grade: TrustGrade) -> None:
+    """Compare the as-flown replay of a flight with its own log, and write `fidelity.json` with it and the grade.
 
-    `grade` is the letter that the decision may weigh a flight by, `trust` what it follows from (see
-    `fusetune.analyze.trust.trust_grade.TrustGrade`).
+    `grade` is the letter that the decision may weigh a flight by, `trust` what it follows from.
 
     Parameters
     ----------
-    flight : Flight
-        With `FIDELITY_TOPICS`, as it was logged.
-    analyze_folder : Path
-        `results/analyze/<flight>`, with `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
-    replay, trust : settings
-        As the replays of the flight are made, and the limits of the grades.
-    grade : TrustGrade, optional
-        Of `graded`, where it has been made already.
+    prepared : with `TRUST_TOPICS`
+    analyze_folder : `results/analyze/<flight>`, with the as-flown replay
+
+    Raises
+    ------
+    UserError
+        If the file of the replay is missing or damaged.
     """
-    analyze_folder = Path(analyze_folder)
-    grade = grade or graded(flight, replay, trust)
-    flight = canonical(flight)
-    result = judge_onboard_fidelity(
-        flight, analyze_folder / f"{AS_FLOWN}.innovations.parquet", analyze_folder / "onboard.innovations.parquet"
-    )
+    replayed = read_innovations(table_file(analyze_folder, AS_FLOWN, "innovations"), {})
+    result = judge_onboard_fidelity(prepared.flight, replayed, onboard_samples(prepared.flight))
     document = asdict(result) | {"grade": grade.grade, "trust": asdict(grade)}
-    with atomic_path(analyze_folder / "fidelity.json") as path:
+    with atomic_path(Path(analyze_folder) / FIDELITY_FILE) as path:
         write_document(path, document)
 
 
-def graded(
-    flight: Flight, replay: ReplaySettings, trust: TrustSettings | None = None, prepared: PreparedFlight | None = None
-) -> TrustGrade:
-    """Grade of a flight as it was logged, with `TRUST_TOPICS`; all else as for `grade_flight`."""
-    return grade_flight(canonical(flight), replay, trust, prepared)
-
-
-def judge_onboard_fidelity(flight: Flight, replayed: AnyPath, onboard: AnyPath) -> OnboardFidelity:
+def judge_onboard_fidelity(
+    flight: Flight, ours: Mapping[SourceAxis, AxisSamples], theirs: Mapping[SourceAxis, AxisSamples]
+) -> OnboardFidelity:
     """Compare the as-flown replay with the vehicle's own innovations.
 
     Parameters
     ----------
-    flight : Flight
-        Canonical flight, for the reasons.
-    replayed, onboard : Path
-        `as_flown.innovations.parquet` and `onboard.innovations.parquet`.
+    flight : canonical, for the reasons
+    ours, theirs : innovations of the replay and of the vehicle, by source and axis
     """
-    ours, theirs = read_innovations(replayed, {}), read_innovations(onboard, {})
     since = _warm(ours)
     axes = tuple(
         axis

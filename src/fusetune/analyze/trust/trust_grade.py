@@ -14,21 +14,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
+from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS
-from fusetune.analyze.replaying.replay_flight import PreparedFlight, prepare
+from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.start_choice import START_TOPICS, Start
-from fusetune.analyze.scoring.onboard import onboard_samples
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, distance
-from fusetune.analyze.trust.as_flown_figures import GROUPS, AsFlownFigures, rms
+from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
+from fusetune.analyze.trust.compared_innovations import GROUPS, rms
 from fusetune.analyze.trust.grade_causes import causes_of, cost_of
 from fusetune.analyze.trust.trust_settings import FALLING, FIGURES, TrustSettings
 from fusetune.analyze.trust.trust_words import GRADES, limits_of_grade, not_compared
 from fusetune.finding import Finding
-from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, MEASURED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCE_TOPIC
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import instance_shares
 
@@ -43,15 +43,12 @@ TRUST_TOPICS = (
         (
             *RECONSTRUCTION_TOPICS,
             *START_TOPICS,
-            "estimator_innovations",
-            "estimator_innovation_variances",
-            "estimator_innovation_test_ratios",
-            "ekf2_innovations",
-            *(source.topic for source in MEASURED_SOURCES.values()),
+            *INNOVATION_TOPICS,
+            "sensor_gps",
         )
     ),
 )
-"""What the grade reads of a flight."""
+"""What the grade, and the comparison with the vehicle, read of a flight."""
 
 NOTHING_COMPARED = "nothing_compared"
 """Id of the finding that limits a flight of which nothing could be compared."""
@@ -130,22 +127,22 @@ def _best_without(missing: tuple[str, ...], settings: TrustSettings) -> str:
 
 
 def grade_flight(
-    flight: Flight,
+    prepared: PreparedFlight,
     replay: ReplaySettings = IN_USE,
     settings: TrustSettings | None = None,
-    prepared: PreparedFlight | None = None,
+    comparison: AsFlownComparison | None = None,
 ) -> TrustGrade:
     """Grade one flight.
 
     Parameters
     ----------
-    flight : in the layout of `fusetune.px4.layouts.release_layouts.canonical`, following the primary instance
-    replay : as its replays are made; they are compared without gaps
-    prepared : what these replays shared, to spare doing it again
+    prepared : with `TRUST_TOPICS`
+    replay : as it was prepared
+    comparison : with this flight, under these settings, where some replay has been compared already
     """
-    settings = settings or TrustSettings()
-    prepared = dataclasses.replace(prepared or prepare(flight, replay.reconstruction, replay.start), gaps=())
-    comparison = AsFlownComparison(flight, settings)
+    settings, flight = settings or TrustSettings(), prepared.flight
+    comparison = comparison or AsFlownComparison(flight, settings)
+    prepared = dataclasses.replace(prepared, gaps=())
     repaired = comparison.figures(prepared)
     raw = comparison.figures(_as_logged(flight, prepared, replay))
     graded = grade_of(repaired, settings)
@@ -211,10 +208,7 @@ def _instances(flight: Flight) -> tuple[InstanceFigures, ...]:
             for key in keys:
                 if key in samples:
                     one = samples[key]
-                    flying = np.zeros(len(one.innovation), np.bool_)
-                    for begin, end in airborne:
-                        flying |= (one.timestamp_sample >= begin) & (one.timestamp_sample < end)
-                    parts.append(one.innovation[flying & one.fused])
+                    parts.append(one.innovation[inside(one.timestamp_sample, airborne) & one.fused])
             if parts and sum(map(len, parts)):
                 sizes[group] = rms(parts)
         figures.append(InstanceFigures(instance, shares.get(instance, 0.0), sizes))

@@ -64,8 +64,13 @@ def replay(
         start=start,
         handovers=handovers,
     )
+    return result_of(summary, kept)
+
+
+def result_of(summary: ReplaySummary, rows: Sequence[RecordArrays]) -> ReplayResult:
+    """A replay and the rows that were kept of its stretches."""
     told = {field.name: getattr(summary, field.name) for field in fields(ReplaySummary)}
-    return ReplayResult(**told, **joined(kept)._asdict())
+    return ReplayResult(**told, **joined(rows)._asdict())
 
 
 def replay_into(

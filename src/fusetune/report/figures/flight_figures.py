@@ -10,13 +10,14 @@ from matplotlib.axes import Axes
 
 from fusetune.analyze.flight.ground_truth import Truth, read_truth
 from fusetune.analyze.metrics.attitude import interpolate
-from fusetune.analyze.replaying.sample_spool import SampleSpool
-from fusetune.analyze.replaying.set_files import AxisSamples, ColumnsOnDisk, SourceAxis, read_innovations
+from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis
+from fusetune.analyze.replaying.store.reader import ColumnsOnDisk, read_innovations
 from fusetune.finding import from_documents
 from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.report.figures.figures import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
+from fusetune.set_names import PRESENT
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
@@ -56,7 +57,7 @@ class _FlightData:
 
 
 def plot_flight(
-    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str], output: AnyPath, *, present: str = "present"
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str], output: AnyPath, *, present: str = PRESENT
 ) -> None:
     """Draw one flight as a PNG.
 

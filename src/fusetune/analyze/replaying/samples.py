@@ -1,22 +1,23 @@
-"""Innovation samples by source and axis, kept on the disk and read one source and axis at a time.
+"""Innovation samples by source and axis, looked up one source and axis at a time.
 
 The innovations of one set on an hour of flight are some 60 MB, and every figure is made of one source and axis. So a
-table is sorted once, a row group at a time, into a file that has no name and goes with its last user, and what is asked
-for is read from there.
+table is sorted once, a row group at a time, into a spool, and what is asked for is read from there. A spool is a file
+that has no name and goes with its last user, or memory.
 """
 
 from __future__ import annotations
 
+import io
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, overload
+from typing import IO, Any, overload
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from fusetune.px4.aid_sources import MEASURED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.storage.files import AnyPath
 
 SourceAxis = tuple[str, int]
@@ -50,10 +51,16 @@ class AxisSamples:
 
 
 class SampleSpool:
-    """A nameless file that rows are put into and read from."""
+    """What rows are put into and read from.
 
-    def __init__(self, folder: AnyPath) -> None:
-        self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - lives as long as the samples in it
+    Parameters
+    ----------
+    folder : of the nameless file that holds them; without it they stay in memory
+    """
+
+    def __init__(self, folder: AnyPath | None = None) -> None:
+        # lives as long as the samples in it
+        self._file: IO[bytes] = io.BytesIO() if folder is None else tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
 
     def put(self, rows: np.ndarray) -> int:
         """Append rows; their place."""
@@ -68,7 +75,7 @@ class SampleSpool:
         content, done = rows.view(np.uint8).data, 0
         for place, count in places:
             self._file.seek(place)
-            done += self._file.readinto(content[done : done + count * dtype.itemsize])
+            done += self._file.readinto(content[done : done + count * dtype.itemsize])  # type: ignore[attr-defined]
         assert done == len(content), "what was put into the spool can be read from it"
         return rows
 
@@ -172,3 +179,10 @@ def _axis_samples(rows: np.ndarray, gate: float) -> AxisSamples:
         fused=column("fused", np.bool_),
         observation=column("observation") if "observation" in present else np.zeros(0),
     )
+
+
+def gate_of(parameters: Mapping[str, float], source: str) -> float:
+    """Gate of a source in standard deviations, NaN where it is not known."""
+    name = AID_SOURCES[source].gate_parameter
+    # PX4 takes no gate below one standard deviation.
+    return max(parameters[name], 1.0) if name is not None and name in parameters else np.nan

@@ -6,15 +6,21 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from fusetune.analyze.replaying.row_groups import tables_in_groups
-from fusetune.analyze.replaying.set_files import AxisSamples, SourceAxis
+from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
+from fusetune.analyze.replaying.store.row_groups import tables_in_groups
 from fusetune.px4.aid_sources import MEASURED_SOURCES
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.storage.files import AnyPath
 
-ONBOARD = "onboard"
-"""Name under which the vehicle's own figures stand beside the sets; it is never ranked."""
+INNOVATION_TOPICS = (
+    "estimator_innovations",
+    "estimator_innovation_variances",
+    "estimator_innovation_test_ratios",
+    "ekf2_innovations",
+    *(source.topic for source in MEASURED_SOURCES.values()),
+)
+"""Topics of any release that the innovations are read from, and those that `canonical` makes of them."""
 
 _FIELDS = ("observation_variance", "innovation", "innovation_variance", "test_ratio")
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from fusetune.analyze.replaying.replay_files import replay_files
+from fusetune.analyze.replaying.store.parts import replay_files
 from fusetune.save.flight_folder import read_metadata
 from fusetune.storage.files import AnyPath
 from fusetune.storage.ledger import Ledger, key_of

@@ -1,0 +1,21 @@
+"""Names of the files that the analysis of a flight leaves beside its replays, whose names stand in `replaying.store`.
+
+Rules of the workflow ask this module, too, so it imports nothing.
+"""
+
+from __future__ import annotations
+
+SCORE_TABLES = {
+    "metrics": "metrics.parquet",
+    "blocks": "scores.parquet",
+    "windows": "windows.parquet",
+    "withheld": "withheld.parquet",
+}
+"""Table of `fusetune.analyze.scoring.score_sets.FlightScores` → its file."""
+
+SAMPLES_FILE = "samples.parquet"
+SCORING_FILE = "scoring.json"
+ONBOARD_FILE = "onboard.innovations.parquet"
+FIDELITY_FILE = "fidelity.json"
+
+FLIGHT_FILES = (*SCORE_TABLES.values(), SAMPLES_FILE, SCORING_FILE, ONBOARD_FILE, FIDELITY_FILE)

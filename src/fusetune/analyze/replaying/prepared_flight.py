@@ -1,0 +1,139 @@
+"""What all replays of a flight share: made once, whatever is replayed, scored or graded."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fusetune.analyze.flight.phases import airborne_intervals
+from fusetune.analyze.reconstruction import (
+    RECONSTRUCTION_TOPICS,
+    ReconstructedFlight,
+    ReconstructionSettings,
+    as_logged,
+    measured_rows,
+    reconstruct,
+)
+from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings, StartSettings
+from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, Start, choose_start
+from fusetune.analyze.replaying.withheld_gaps import plan_gaps
+from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
+from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.replay.recording import RecordArrays
+from fusetune.ekf2.replay.replay import replay, replay_into
+from fusetune.ekf2.replay.results import Gap, ReplayResult, ReplaySummary
+from fusetune.px4.flight import Flight
+from fusetune.px4.layouts.logged_state import Handover, logged_handovers
+from fusetune.px4.layouts.release_layouts import canonical
+
+Summary = TypeVar("Summary", bound=ReplaySummary)
+
+REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
+"""What a replay reads of a saved flight."""
+
+
+@dataclass(frozen=True)
+class PreparedFlight:
+    """What the replays of all sets on one flight share: samples, start, and which samples were measured."""
+
+    flight: Flight
+    """As it was logged, in the layout of `fusetune.px4.layouts.release_layouts.canonical`."""
+    inputs: EstimatorInputs
+    reconstructed: ReconstructedFlight
+    start: Start
+    gaps: tuple[Gap, ...] = ()
+    handovers: tuple[Handover, ...] = ()
+
+    def parameters(self, overrides: Mapping[str, float]) -> dict[str, float]:
+        """A complete set: the log's own parameters, but for some."""
+        return complete(self.flight.parameters.initial, overrides, self.flight.release)
+
+    def replay(
+        self,
+        params: Mapping[str, float],
+        overridden: frozenset[str] = frozenset(),
+        keep: Callable[[RecordArrays], RecordArrays] | None = None,
+    ) -> tuple[ReplayResult, np.ndarray]:
+        """Replay a complete set; the result, and for each innovation whether its sample was measured.
+
+        `keep` as for `fusetune.ekf2.replay.replay`.
+        """
+        result = replay(self.inputs, params, overridden=overridden, keep=keep, **self._shared())
+        return self._with_measured_gaps(result, params), self.measured(result.innovations, params, result)
+
+    def replay_into(
+        self,
+        take: Callable[[RecordArrays], None],
+        params: Mapping[str, float],
+        overridden: frozenset[str] = frozenset(),
+    ) -> ReplaySummary:
+        """Replay a complete set and hand on its rows as they come, see `fusetune.ekf2.replay.replay.replay_into`."""
+        summary = replay_into(take, self.inputs, params, overridden=overridden, **self._shared())
+        return self._with_measured_gaps(summary, params)
+
+    def measured(self, innovations: np.ndarray, params: Mapping[str, float], of: ReplaySummary) -> np.ndarray:
+        """For each innovation row of a replay whether its sample was measured."""
+        return measured_rows(innovations, self.reconstructed, params, of.update_interval_us)
+
+    def _shared(self) -> dict[str, Any]:
+        return {"start": self.start.state, "gaps": self.gaps, "handovers": self.handovers}
+
+    def _with_measured_gaps(self, summary: Summary, params: Mapping[str, float]) -> Summary:
+        gaps = tuple(
+            dataclasses.replace(gap, innovations=gap.innovations[self.measured(gap.innovations, params, summary)])
+            for gap in summary.gaps
+        )
+        return dataclasses.replace(summary, gaps=gaps)
+
+    def with_stream(self, reconstructed: ReconstructedFlight) -> PreparedFlight:
+        """The same flight, started alike, with another sensor stream."""
+        return dataclasses.replace(self, inputs=build_inputs(reconstructed.flight), reconstructed=reconstructed)
+
+    def with_log(self, logged: Flight) -> PreparedFlight:
+        """The same flight with further topics of its log, canonical, which no replay reads.
+
+        What it has stays: of fewer topics the canonical form makes some tables that the log holds itself.
+        """
+        return dataclasses.replace(self, flight=self.flight.with_topics(logged.topics | self.flight.topics))
+
+    def description(self, result: ReplaySummary) -> dict[str, Any]:
+        """For the summary of a replay: how it started and what was reconstructed."""
+        warm = result.warm_start_us is not None
+        return {
+            "start": {"mode": WARM if warm else COLD, "why": self.start.why, "time_us": result.warm_start_us},
+            "reconstruction": [asdict(step) for step in self.reconstructed.steps],
+            "handover_timestamps": [one.time_us for one in self.handovers],
+        }
+
+
+def prepare_flight(flight: Flight, settings: ReplaySettings = IN_USE) -> PreparedFlight:
+    """Prepare a flight as it was logged.
+
+    Parameters
+    ----------
+    flight : with `REPLAY_TOPICS` at least, in the layout of any release
+    settings : what is done about the flight; by default all that the default configuration does
+    """
+    flight = canonical(flight)
+    gaps = plan_gaps(flight, airborne_intervals(flight, {}), settings.withholding) if settings.withholding else ()
+    return prepare(flight, settings.reconstruction, settings.start, gaps)
+
+
+def prepare(
+    flight: Flight,
+    reconstruction: ReconstructionSettings | None = None,
+    start: StartSettings | None = None,
+    gaps: Sequence[Gap] = (),
+) -> PreparedFlight:
+    """Reconstruct the sensor stream of a canonical flight and choose how its replays start.
+
+    `None` leaves the stream as it was logged, and starts cold.
+    """
+    chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
+    reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction, chosen.state)
+    handovers = logged_handovers(flight)
+    return PreparedFlight(flight, build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps), handovers)

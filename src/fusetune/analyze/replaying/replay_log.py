@@ -1,0 +1,58 @@
+"""Replay parameter sets of a folder straight on a log, beside the pipeline."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fusetune.analyze.replaying.prepared_flight import prepare
+from fusetune.analyze.replaying.replay_flight import write_replay
+from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.set_input import read_set_files
+from fusetune.errors import UserError
+from fusetune.px4.layouts.estimator_instances import of_one_instance
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.ulog.reader import read_ulog
+from fusetune.storage.files import AnyPath
+
+
+def replay_log(
+    log: AnyPath,
+    sets_folder: AnyPath,
+    output_folder: AnyPath,
+    settings: ReplaySettings | None = None,
+) -> list[str]:
+    """Replay every set that a folder holds as `SET.json` on one ULog file.
+
+    `params` of each JSON file are the EKF2 parameters used, `overrides` those that differ from the log.
+
+    Parameters
+    ----------
+    settings : ReplaySettings, optional
+        By default the samples are used as they were logged, and the filter starts from nothing. No gaps are made.
+
+    Returns
+    -------
+    list of str
+        Names of the sets replayed.
+
+    Raises
+    ------
+    UserError
+        The log cannot be read, or a set file is not usable.
+    """
+    sets = read_set_files(sets_folder)
+    Path(output_folder).mkdir(parents=True, exist_ok=True)
+    settings = settings or ReplaySettings()
+    flight = read_ulog(log)
+    # as PX4's own replay does where nothing is asked for: one estimator instance, from its sensors
+    flown = flight if settings.reconstruction is not None else of_one_instance(flight)
+    try:
+        prepared = prepare(canonical(flown), settings.reconstruction, settings.start)
+    except (LookupError, ValueError, TypeError, ArithmeticError) as error:
+        # damage, or the logger, can take any topic and any field away
+        reason = f"cannot be replayed ({type(error).__name__}: {error})"
+        raise UserError(log, reason, "See what the command `fusetune save` says of it") from error
+    for name, (params, overrides) in sets.items():
+        values = prepared.parameters(params | overrides)
+        write_replay(prepared, name, overrides, Path(output_folder), params=values)
+    return list(sets)

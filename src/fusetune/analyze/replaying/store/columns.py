@@ -1,0 +1,113 @@
+"""What the tables of a replay hold: rows as the replay records them, as columns named as in PX4's estimator topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from fusetune.analyze.replaying.gap_predictions import PREDICTION_COLUMNS, gap_predictions
+from fusetune.analyze.replaying.store.parts import PREDICTED, RECORDED
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
+from fusetune.ekf2.replay.recording import FLAG_COLUMNS, FLAGS_ROW, INNOVATION_ROW, LOCAL_POSITION_ROW, STATE_ROW
+from fusetune.ekf2.replay.results import GapResult
+
+_ENDS = ("timestamp", "x", "y", "z", "vx", "vy", "vz")
+
+
+class RecordedTable(NamedTuple):
+    """A table that is written while the replay goes on: dtype of its rows, and what makes columns of them."""
+
+    row: np.dtype
+    to_table: Callable[[np.ndarray], pa.Table]
+
+
+def innovation_table(rows: np.ndarray, measured: np.ndarray | None = None) -> pa.Table:
+    """One row per aid-source sample and axis; `innovation_variance` includes the observation's.
+
+    Parameters
+    ----------
+    measured : whether the measurement of each row stands in the log; a column only where some do not
+    """
+    source = pa.DictionaryArray.from_arrays(pa.array(rows["source"]), pa.array(AID_SOURCE_NAMES))
+    names = [name for name in rows.dtype.names or () if name != "source"]
+    table = pa.table({"source": source} | {name: np.ascontiguousarray(rows[name]) for name in names})
+    return table if measured is None else table.append_column("measured", pa.array(measured))
+
+
+def state_table(rows: np.ndarray) -> pa.Table:
+    """One row per filter update: `states_0` … `states_24` and `covariances_0` … `covariances_23` (the variances)."""
+    return _flattened(rows, ("states", "covariances"))
+
+
+def local_position_table(rows: np.ndarray) -> pa.Table:
+    """One row per filter update: what the output predictor publishes at the newest IMU sample."""
+    return _flattened(rows, ("q",))
+
+
+def flags_table(rows: np.ndarray) -> pa.Table:
+    """One row per change of a flag, at least one a second."""
+    flags = rows["flags"].astype(bool)
+    columns = {name: np.ascontiguousarray(flags[:, i]) for i, name in enumerate(FLAG_COLUMNS)}
+    return pa.table({"timestamp": np.ascontiguousarray(rows["timestamp"])} | columns)
+
+
+def prediction_table(results: Sequence[GapResult]) -> pa.Table:
+    """Mean innovation over the last second before each horizon: one row per gap, source, axis and horizon.
+
+    `innovation_variance` is the mean of the variances that the filter claims; `n` counts the averaged samples.
+    """
+    columns: dict[str, list[np.ndarray]] = {name: [] for name in PREDICTION_COLUMNS}
+    for number, result in enumerate(results):
+        for name, values in gap_predictions(number, result).items():
+            columns[name].append(values)
+    sensors = pa.array([result.gap.sensor for result in results], pa.string())
+    table = {name: np.concatenate([np.zeros(0, dtype), *columns[name]]) for name, dtype in PREDICTION_COLUMNS.items()}
+    source = pa.DictionaryArray.from_arrays(pa.array(table.pop("source")), pa.array(AID_SOURCE_NAMES))
+    return pa.table({"sensor": sensors.take(pa.array(table["gap"])), "source": source} | table)
+
+
+def gap_table(results: Sequence[GapResult]) -> pa.Table:
+    """Published position and velocity (NED, m and m/s) at the beginning and the end of every gap."""
+    columns: dict[str, Any] = {
+        "sensor": pa.array([result.gap.sensor for result in results], pa.string()),
+        "start": np.array([result.gap.start for result in results], np.int64),
+        "stop": np.array([result.gap.stop for result in results], np.int64),
+    }
+    for row, moment in enumerate(("begin", "end")):
+        for name in _ENDS:
+            values = [result.local_position[name][row] for result in results]
+            columns[f"{name}_{moment}"] = np.array(values, np.int64 if name == "timestamp" else np.float64)
+    return pa.table(columns)
+
+
+def _flattened(rows: np.ndarray, arrays: tuple[str, ...]) -> pa.Table:
+    columns: dict[str, np.ndarray] = {}
+    for name in rows.dtype.names or ():
+        if name not in arrays:
+            columns[name] = np.ascontiguousarray(rows[name])
+            continue
+        for i in range(rows[name].shape[1]):
+            columns[f"{name}_{i}"] = np.ascontiguousarray(rows[name][:, i])
+    return pa.table(columns)
+
+
+RECORDED_TABLES: Mapping[str, RecordedTable] = dict(
+    zip(
+        RECORDED,
+        (
+            RecordedTable(INNOVATION_ROW, innovation_table),
+            RecordedTable(STATE_ROW, state_table),
+            RecordedTable(LOCAL_POSITION_ROW, local_position_table),
+            RecordedTable(FLAGS_ROW, flags_table),
+        ),
+        strict=True,
+    )
+)
+"""In the order of `fusetune.ekf2.replay.recording.RecordArrays`."""
+
+PREDICTED_TABLES: Mapping[str, Callable[[Sequence[GapResult]], pa.Table]] = dict(
+    zip(PREDICTED, (prediction_table, gap_table), strict=True)
+)

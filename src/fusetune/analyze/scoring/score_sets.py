@@ -1,0 +1,206 @@
+"""The scores of the parameter sets of one flight, all on the same samples; nothing here is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pyarrow as pa
+
+from fusetune.analyze.flight.intervals import Cut, Interval, subtract
+from fusetune.analyze.flight.phases import IMU_TOPICS, airborne_intervals, imu_gaps
+from fusetune.analyze.flight.reference_truth import TRUTH_TOPICS, Truth, read_references
+from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
+from fusetune.analyze.scoring.filter_events import filter_events
+from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_ground_metrics, ground_window
+from fusetune.analyze.scoring.metrics_table import MetricsTable, add_events, add_true_errors, add_whiteness
+from fusetune.analyze.scoring.sample_scores import NO_SAMPLE_SCORES, add_onboard, score_samples
+from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.scoring.scoring_summary import scoring_summary
+from fusetune.analyze.scoring.scoring_window import ScoringWindow, scoring_window
+from fusetune.analyze.scoring.true_errors import true_errors
+from fusetune.analyze.scoring.withheld_scores import (
+    WITHHELD_SCHEMA,
+    add_true_drift,
+    add_withheld_metrics,
+    paired_gaps,
+    withheld_rows,
+)
+from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
+from fusetune.px4.flight import Flight
+from fusetune.set_names import PRESENT
+from fusetune.storage.files import AnyPath
+
+SCORE_TOPICS = (
+    *dict.fromkeys(
+        (
+            "vehicle_land_detected",
+            *IMU_TOPICS,
+            *TRUTH_TOPICS,
+            "estimator_selector_status",
+            "estimator_status",
+            *INNOVATION_TOPICS,
+        )
+    ),
+)
+"""What the metrics need of a saved flight."""
+
+
+@dataclass(frozen=True)
+class ScoredFlight:
+    """What scores need of the flight itself, beside the replays.
+
+    Attributes
+    ----------
+    flight : canonical; of its topics only what nothing else stands for here
+    log_gaps : gaps in the IMU samples of the log, µs
+    onboard : innovations that the vehicle logged, by source and axis
+    """
+
+    flight: Flight
+    log_gaps: tuple[Interval, ...]
+    onboard: Mapping[SourceAxis, AxisSamples]
+
+
+@dataclass(frozen=True)
+class FlightScores:
+    """Scores of all sets on one flight.
+
+    Attributes
+    ----------
+    metrics : all figures, see `fusetune.analyze.scoring.metrics_schema`
+    blocks : sums over blocks of about 10 s, which the decision draws from, see `block_scores`
+    windows : figures in windows of about 30 s, see `window_scores`
+    withheld : predictions without a sensor, see `withheld_scores`
+    summary : what was scored of the flight, and how each set fared
+    """
+
+    metrics: pa.Table
+    blocks: pa.Table
+    windows: pa.Table
+    withheld: pa.Table
+    summary: dict[str, Any]
+
+    def figure(self, set_name: str, source: str, axis: str, metric: str) -> float:
+        """One figure of a set (docs/metrics.md names them).
+
+        Raises
+        ------
+        KeyError
+            There is none: `summary` says why a set or the flight is not scored.
+        """
+        wanted = {"set": set_name, "source": source, "axis": axis, "metric": metric}
+        columns = {name: self.metrics[name].to_pylist() for name in wanted}
+        for row, names in enumerate(zip(*columns.values(), strict=True)):
+            if names == tuple(wanted.values()):
+                return float(self.metrics["value"][row].as_py())
+        raise KeyError(tuple(wanted.values()))
+
+
+def scored_flight(
+    flight: Flight, settings: ScoringSettings | None = None, onboard: Mapping[SourceAxis, AxisSamples] | None = None
+) -> ScoredFlight:
+    """What scores need of a flight.
+
+    Parameters
+    ----------
+    flight : canonical, with `SCORE_TOPICS`
+    onboard : innovations that the vehicle logged; by default they are looked up in the log, which keeps it in memory
+    """
+    settings = settings or ScoringSettings()
+    log_gaps = imu_gaps(flight, settings.log_gap_s)
+    asked = {*SCORE_TOPICS} - {*IMU_TOPICS, *INNOVATION_TOPICS}
+    rest = {key: table for key, table in flight.topics.items() if key[0] in asked}
+    return ScoredFlight(flight.with_topics(rest), log_gaps, onboard_samples(flight) if onboard is None else onboard)
+
+
+def score_sets(
+    scored: ScoredFlight,
+    replays: Iterable[ReplayedSet],
+    *,
+    present: str = PRESENT,
+    settings: ScoringSettings | None = None,
+    take_samples: Callable[[pa.Table], None] | None = None,
+    spool_folder: AnyPath | None = None,
+) -> FlightScores:
+    """Score every parameter set of one flight.
+
+    The window and the samples are those that all sets have in common, so a score depends on the other sets. Of samples
+    one source and axis is looked up at a time, of states one set.
+
+    Parameters
+    ----------
+    replays : of all sets, the present one among them
+    present : the set that flies now; the others are compared with it
+    take_samples : is given the scored samples, rows of `sample_scores.SAMPLES_SCHEMA`
+    spool_folder : takes nameless files of paired samples; by default they stay in memory
+    """
+    settings, flight = settings or ScoringSettings(), scored.flight
+    records = sorted(replays, key=lambda record: record.name != present)
+    airborne = airborne_intervals(flight, records[0].flags)
+    window = scoring_window(records, present, airborne, scored.log_gaps, settings)
+    phase = _flight_after_warm_up(airborne, window)
+    events = {record.name: filter_events(record, phase) for record in records}
+
+    table = MetricsTable(flight.name)
+    flight_s = sum(stop - start for start, stop in phase) * 1e-6
+    for name, event in events.items():
+        add_events(table, name, event, flight_s)
+    log = flight.start_timestamp, flight.last_timestamp
+    ground = ground_window(records, present, airborne, log, scored.log_gaps, window, settings)
+    add_ground_metrics(table, records, present, ground, settings.confidence)
+    for record in records:
+        add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
+    samples, withheld, whiteness = NO_SAMPLE_SCORES, WITHHELD_SCHEMA.empty_table(), {}
+    if window.intervals:
+        kept = [record for record in records if record.name not in window.excluded]
+        samples = score_samples(table, kept, present, window, settings, take_samples, spool_folder)
+        # Replays from elsewhere, such as PX4's own estimator, come without gaps.
+        has_gaps = all(record.withheld is not None for record in kept)
+        gaps = paired_gaps(kept, present, window) if has_gaps else []
+        add_withheld_metrics(table, gaps)
+        withheld = withheld_rows(flight.name, gaps, window.block_edges(settings.block_s))
+        add_onboard(table, scored.onboard, window, settings, records[0].parameters)
+        fused = {source for record in records for source in record.fused_sources}
+        references = read_references(flight, fused, records[0].parameters)
+        whiteness = _add_state_figures(table, kept, flight, references, window, settings)
+        for truth in references:
+            if truth.kind == "truth" and has_gaps:
+                add_true_drift(table, kept, truth, window)
+    summary = scoring_summary(flight, records, present, window, events, whiteness, settings)
+    return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, summary)
+
+
+def _flight_after_warm_up(airborne: Sequence[Interval], window: ScoringWindow) -> tuple[Interval, ...]:
+    if window.warm_up_end is None:
+        return tuple(airborne)
+    return subtract(airborne, [Cut(-(2**62), window.warm_up_end, "warm-up")])
+
+
+def _add_state_figures(
+    table: MetricsTable,
+    records: Sequence[ReplayedSet],
+    flight: Flight,
+    references: Sequence[Truth],
+    window: ScoringWindow,
+    settings: ScoringSettings,
+) -> dict[SourceAxis, Whiteness]:
+    """Append what takes the states of each replay: whiteness of the sources, errors against the references.
+
+    Returns
+    -------
+    The whiteness as the first of the records, the present set, sees it
+    """
+    present: dict[SourceAxis, Whiteness] = {}
+    for number, record in enumerate(records):
+        states = record.states()
+        found = source_whiteness(record, states, flight, window.intervals)
+        add_whiteness(table, record.name, found)
+        present = present if number else found
+        for truth in references:
+            figures = true_errors(record, states, truth, window, settings.confidence)
+            add_true_errors(table, record.name, figures, truth.kind)
+    return present

@@ -1,0 +1,80 @@
+"""What `scoring.json` says of a flight: what was scored of it, and how each set fared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.scoring.activity import inactive_parameters, same_results
+from fusetune.analyze.scoring.filter_events import FilterEvents
+from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.sensors.source_whiteness import Whiteness
+from fusetune.finding import documents
+from fusetune.px4.aid_sources import AXES
+from fusetune.px4.flight import Flight
+
+
+def scoring_summary(
+    flight: Flight,
+    records: Sequence[ReplayedSet],
+    present: str,
+    window: ScoringWindow,
+    events: Mapping[str, FilterEvents],
+    whiteness: Mapping[tuple[str, int], Whiteness],
+    settings: ScoringSettings,
+) -> dict[str, Any]:
+    """The summary of a flight, as JSON can hold it.
+
+    Parameters
+    ----------
+    events : of every set, in the flight after the warm-up
+    whiteness : of the sources, as the present set sees it
+    """
+    by_name = {record.name: record for record in records}
+    return {
+        "flight": flight.name,
+        "status": "scored" if window.intervals else "not_scored",
+        "reason": window.reason,
+        "checksum": flight.checksum,
+        "firmware": flight.release_name,
+        "present": present,
+        "scored_s": round(window.duration_s, 3),
+        "warm_up_end_us": window.warm_up_end,
+        "intervals_us": [list(interval) for interval in window.intervals],
+        "block_edges_us": window.block_edges(settings.block_s).tolist() if window.intervals else [],
+        "cuts": documents(cut.finding for cut in window.cuts),
+        "sets": {
+            name: _set_summary(record, by_name[present], window, events[name], flight)
+            for name, record in by_name.items()
+        },
+        "white_share": {
+            f"{source}.{AXES[axis]}": round(one.white_share, 4)
+            for (source, axis), one in whiteness.items()
+            if np.isfinite(one.white_share)
+        },
+    }
+
+
+def _set_summary(
+    record: ReplayedSet, present: ReplayedSet, window: ScoringWindow, events: FilterEvents, flight: Flight
+) -> dict[str, Any]:
+    excluded = window.excluded.get(record.name, "")
+    ok = record.status == "ok"
+    outcome = "excluded" if excluded else "scored" if window.intervals else "not_scored"
+    return {
+        "status": outcome if ok else record.status,
+        "reason": excluded,
+        "overrides": record.overrides,
+        "parameters": record.parameters,
+        "resets": events.resets,
+        "timeouts": {name: count for name, count in events.timeouts.items() if count},
+        "faults": list(events.faults),
+        "fault_flags": events.fault_flags,
+        "dead_reckoning_s": round(events.dead_reckoning_s, 3),
+        "same_results_as_present": record is not present and ok and same_results(record, present),
+        "inactive": inactive_parameters(record, present, flight) if ok and record is not present else {},
+    }
