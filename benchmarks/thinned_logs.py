@@ -26,13 +26,13 @@ from scipy.stats import kendalltau
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import ReconstructionSettings
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
-from fusetune.analyze.replaying.replay_settings import IN_USE, StartSettings
 from fusetune.analyze.replaying.set_input import WRITTEN_BACK, read_set_files
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.replaying.settings import IN_USE, StartSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.compared_innovations import replayed_innovations
 from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES
+from fusetune.analyze.trust.grade import grade_flight
 from fusetune.analyze.trust.grade_causes import cost_of
-from fusetune.analyze.trust.trust_grade import grade_flight
 from fusetune.design.mission import load_mission
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import complete

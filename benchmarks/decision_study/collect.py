@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from fusetune.analyze.replaying.replay_flight import replay_saved_flight
-from fusetune.analyze.replaying.replay_settings import ReplaySettings, WithholdingSettings
+from fusetune.analyze.replaying.settings import ReplaySettings, WithholdingSettings
 from fusetune.analyze.scoring.score_flight import score_saved_flight
 from fusetune.design.mission import load_mission
 from fusetune.design.study import load_study

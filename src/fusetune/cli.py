@@ -219,7 +219,7 @@ def _add_replay(commands: Commands) -> None:
 def _replay(options: argparse.Namespace) -> int:
     from fusetune.analyze.reconstruction import ReconstructionSettings
     from fusetune.analyze.replaying.replay_log import replay_log
-    from fusetune.analyze.replaying.replay_settings import ReplaySettings, StartSettings
+    from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
 
     reconstruction = ReconstructionSettings() if options.reconstruct else None
     settings = ReplaySettings(reconstruction=reconstruction, start=StartSettings(mode=options.start))

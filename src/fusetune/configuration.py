@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
-from fusetune.analyze.replaying.replay_settings import ReplaySettings, StartSettings, WithholdingSettings
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings, WithholdingSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.save.thresholds import VerdictThresholds

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from fusetune.apply.ranking import ELIGIBLE, NOT_ELIGIBLE, PRESENT
-from fusetune.report.figures.figures import figure_style
+from fusetune.report.figures.drawing import figure_style
 from fusetune.report.figures.unaided_figures import drift_figure
 from fusetune.report.results import Results
 from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY, drift, drift_summary

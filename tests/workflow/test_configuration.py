@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 from tests.made_text import UpToDate
 from tests.settings.configuration_texts import configuration_text, faults_text, leaves, manual_text, schema_text
 
-from fusetune.analyze.replaying.replay_settings import IN_USE
+from fusetune.analyze.replaying.settings import IN_USE
 from fusetune.configuration import Configuration, read_configuration
 from fusetune.design.mission import Mission
 from fusetune.errors import UserError

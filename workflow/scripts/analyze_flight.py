@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.analyze_flight import AnalysisSettings, analyze_flight
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.replaying.store.ledger import ReplayLedger
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.settings.declaration import built
 
 from job import keep_out, logged_job

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.replaying.replay_flight import replay_saved_flight
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.replaying.store.ledger import ReplayLedger
 from fusetune.settings.declaration import built
 

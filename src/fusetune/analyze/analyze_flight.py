@@ -14,15 +14,15 @@ from dataclasses import dataclass, field
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare_flight
 from fusetune.analyze.replaying.replay_flight import write_replay
-from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
+from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.analyze.scoring.score_flight import spooled_flight, write_scores
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, ScoredFlight
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, AsFlownReplay
 from fusetune.analyze.trust.as_flown_figures import compared_rows
+from fusetune.analyze.trust.grade import TRUST_TOPICS, grade_flight
 from fusetune.analyze.trust.onboard_fidelity import write_flight_fidelity
-from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, grade_flight
-from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.ekf2.replay.recording import RecordArrays
 from fusetune.ekf2.replay.replay import result_of
 from fusetune.px4.layouts.release_layouts import canonical

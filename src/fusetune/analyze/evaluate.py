@@ -11,7 +11,7 @@ from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.score_sets import FlightScores, score_sets, scored_flight
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.set_names import PRESENT
 
 

@@ -10,8 +10,8 @@ from fusetune.analyze.flight.reference_truth import odometry_reference, read_ref
 from fusetune.analyze.metrics.attitude import interpolate_quaternion
 from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import true_errors
+from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog

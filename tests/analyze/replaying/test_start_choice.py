@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fusetune.analyze.replaying.replay_settings import StartSettings
+from fusetune.analyze.replaying.settings import StartSettings
 from fusetune.analyze.replaying.start_choice import choose_start
 from fusetune.px4.flight import Flight, ParameterHistory
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fusetune.analyze.replaying.replay_settings import WithholdingSettings
+from fusetune.analyze.replaying.settings import WithholdingSettings
 from fusetune.analyze.replaying.store.columns import gap_table, prediction_table
 from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES

@@ -8,7 +8,7 @@ from tests.analyze.made_flight import MadeSet, at, make_flight
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.block_scores import block_rows
 from fusetune.analyze.scoring.measurement_alignment import paired_samples
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.window import ScoringWindow
 
 
 def test_blocks_add_up_and_are_paired(tmp_path: Path) -> None:

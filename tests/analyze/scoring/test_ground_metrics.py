@@ -10,8 +10,8 @@ from tests.analyze.made_flight import END_S, START_US, MadeSet, at, make_flight
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.ground_metrics import AFTER_LANDING_US, BEFORE_TAKE_OFF_US, ground_window
 from fusetune.analyze.scoring.score_flight import score_saved_flight
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.scoring.window import ScoringWindow
 
 
 def test_ground_time_is_what_is_left_before_take_off_and_after_landing(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from fusetune.analyze.replaying.measurement_times import match
 from fusetune.analyze.replaying.samples import SampleSpool
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.measurement_alignment import FIGURES, narrowed, paired_samples
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.window import ScoringWindow
 
 WINDOW = ScoringWindow(((at(20.0), at(30.0)),), (), {}, at(20.0))
 

@@ -6,7 +6,7 @@ import pytest
 from fusetune.analyze.metrics.likelihood import gaussian_nll
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, paired_rows
 from fusetune.analyze.scoring.metrics_table import MetricsTable
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.window_scores import add_worst_windows, window_edges, window_figures, window_rows
 
 SECOND = 1_000_000

@@ -8,8 +8,8 @@ import pytest
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.scoring.metrics_table import MetricsTable
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import Truth
+from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.withheld_scores import add_true_drift, add_withheld_metrics, paired_gaps, withheld_rows
 
 SECOND = 1_000_000

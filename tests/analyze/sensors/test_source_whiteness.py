@@ -9,9 +9,9 @@ import pytest
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.replaying.prepared_flight import prepare_flight
 from fusetune.analyze.replaying.replay_flight import replay_set
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.scoring.scoring_window import scoring_window
+from fusetune.analyze.replaying.settings import ReplaySettings
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.scoring.window import scoring_window
 from fusetune.analyze.sensors.measurement_errors import ErrorSeries
 from fusetune.analyze.sensors.source_whiteness import (
     Whiteness,

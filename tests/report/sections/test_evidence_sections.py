@@ -11,7 +11,7 @@ from tests.report.made_report import make_report
 
 from fusetune.report.comparison import AIM_LABELS, aim_changes, flight_changes
 from fusetune.report.figures.difference_figures import differences, flights_by_sets, pareto
-from fusetune.report.figures.figures import figure_style
+from fusetune.report.figures.drawing import figure_style
 from fusetune.report.results import Results, read_results
 from fusetune.report.sections.evidence_sections import holds_section, paper_section, weights_section, withheld_section
 from fusetune.report.sections.ranking_tables import objections_table, ranking_table, sign_table

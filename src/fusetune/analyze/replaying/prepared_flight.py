@@ -18,7 +18,7 @@ from fusetune.analyze.reconstruction import (
     measured_rows,
     reconstruct,
 )
-from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings, StartSettings
+from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings, StartSettings
 from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, Start, choose_start
 from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare_flight
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.replaying.replay_summary import ReplayIdentity, summary_document
 from fusetune.analyze.replaying.replayed_set import STATE_BLOCKS, Columns, ReplayedSet, joined_states, values_of
 from fusetune.analyze.replaying.samples import SampleSpool, SpooledSamples, gate_of
+from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.replaying.store.columns import (
     PREDICTED_TABLES,
     flags_table,

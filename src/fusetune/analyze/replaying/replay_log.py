@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fusetune.analyze.replaying.prepared_flight import prepare
 from fusetune.analyze.replaying.replay_flight import write_replay
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
 from fusetune.analyze.replaying.set_input import read_set_files
+from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.errors import UserError
 from fusetune.px4.layouts.estimator_instances import of_one_instance
 from fusetune.px4.layouts.release_layouts import canonical

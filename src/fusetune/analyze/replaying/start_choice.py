@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusetune.analyze.replaying.replay_settings import StartSettings
+from fusetune.analyze.replaying.settings import StartSettings
 from fusetune.px4.flight import Flight, row_count
 from fusetune.px4.layouts.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states, why_no_state
 

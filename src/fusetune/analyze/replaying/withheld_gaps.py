@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fusetune.analyze.flight.intervals import Interval
-from fusetune.analyze.replaying.replay_settings import WithholdingSettings
+from fusetune.analyze.replaying.settings import WithholdingSettings
 from fusetune.ekf2.replay.results import Gap
 from fusetune.px4.aid_sources import SENSORS, WITHHOLDABLE
 from fusetune.px4.flight import Flight

@@ -12,8 +12,8 @@ from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.filter_events import ON_GROUND, FilterEvents
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, paired_samples
 from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, add_innovation_metrics, groups_of
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.scoring.scoring_window import ScoringWindow, cuts_within
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.scoring.window import ScoringWindow, cuts_within
 from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 
 BEFORE_TAKE_OFF_US = 2_000_000

@@ -14,7 +14,7 @@ from fusetune.analyze.metrics.metric import Innovations
 from fusetune.analyze.replaying.measurement_times import match, measurement_time
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import SampleSpool, SourceAxis, SpooledRows
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.window import ScoringWindow
 
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""

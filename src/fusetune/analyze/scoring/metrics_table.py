@@ -16,7 +16,7 @@ from fusetune.analyze.metrics.metric import Bounds, InnovationMetric
 from fusetune.analyze.scoring.filter_events import EVENT_METRICS, SERVICE_METRICS, FilterEvents
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, innovations_of
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.sensors.source_whiteness import WHITE_SHARE, WHITENESS_METRICS, Whiteness, joint_white_share
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
 

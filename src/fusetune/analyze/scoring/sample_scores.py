@@ -19,8 +19,8 @@ from fusetune.analyze.scoring.metrics_table import (
     add_group_metrics,
     groups_of,
 )
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.window_scores import (
     WINDOW_SCHEMA,
     add_worst_windows,

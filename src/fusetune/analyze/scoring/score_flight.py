@@ -12,7 +12,7 @@ from fusetune.analyze.replaying.store.reader import read_innovations, read_set
 from fusetune.analyze.replaying.store.row_groups import tables_in_groups
 from fusetune.analyze.scoring.sample_scores import SAMPLES_SCHEMA
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, FlightScores, ScoredFlight, score_sets, scored_flight
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight

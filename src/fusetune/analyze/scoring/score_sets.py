@@ -18,10 +18,10 @@ from fusetune.analyze.scoring.filter_events import filter_events
 from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_ground_metrics, ground_window
 from fusetune.analyze.scoring.metrics_table import MetricsTable, add_events, add_true_errors, add_whiteness
 from fusetune.analyze.scoring.sample_scores import NO_SAMPLE_SCORES, add_onboard, score_samples
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
 from fusetune.analyze.scoring.scoring_summary import scoring_summary
-from fusetune.analyze.scoring.scoring_window import ScoringWindow, scoring_window
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.true_errors import true_errors
+from fusetune.analyze.scoring.window import ScoringWindow, scoring_window
 from fusetune.analyze.scoring.withheld_scores import (
     WITHHELD_SCHEMA,
     add_true_drift,

@@ -10,8 +10,8 @@ import numpy as np
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.scoring.activity import inactive_parameters, same_results
 from fusetune.analyze.scoring.filter_events import FilterEvents
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.sensors.source_whiteness import Whiteness
 from fusetune.finding import documents
 from fusetune.px4.aid_sources import AXES

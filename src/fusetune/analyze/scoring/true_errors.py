@@ -10,7 +10,7 @@ from fusetune.analyze.metrics.attitude import error_in_ned as attitude_error
 from fusetune.analyze.metrics.attitude import heading, interpolate, interpolate_quaternion, wrap
 from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures, nees_figures, vector_figures
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.quaternions import multiply, rotation_matrix
 
 __all__ = [

@@ -10,7 +10,7 @@ from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.metrics.metric import Innovations
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, innovations_of
 from fusetune.analyze.scoring.metrics_table import MetricsTable
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
+from fusetune.analyze.scoring.window import ScoringWindow
 
 Array = npt.NDArray[np.float64]
 

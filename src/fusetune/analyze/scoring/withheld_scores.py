@@ -14,8 +14,8 @@ from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, wins
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
 from fusetune.analyze.scoring.metrics_table import MetricsTable
-from fusetune.analyze.scoring.scoring_window import ScoringWindow
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
+from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.px4.aid_sources import AID_SOURCES, AXES, WITHHOLDABLE
 
 Array = npt.NDArray[np.float64]

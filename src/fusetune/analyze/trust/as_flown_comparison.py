@@ -12,7 +12,7 @@ from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, as_flown_figures, compared_rows
-from fusetune.analyze.trust.trust_settings import FALLING, TrustSettings
+from fusetune.analyze.trust.settings import FALLING, TrustSettings
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.results import ReplayResult

@@ -14,12 +14,12 @@ from fusetune.analyze.reconstruction import ReconstructedFlight
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
-from fusetune.analyze.replaying.replay_settings import ReplaySettings
+from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.replaying.start_choice import Start, choose_start
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, distance
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
 from fusetune.analyze.trust.log_lacks import FULL_GNSS_RATE_HZ
-from fusetune.analyze.trust.trust_words import other_release
+from fusetune.analyze.trust.words import other_release
 from fusetune.check import Check
 from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable, row_count, select_rows

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fusetune.analyze.reconstruction.between_samples import logged_rate_hz
-from fusetune.analyze.trust.trust_words import other_release
+from fusetune.analyze.trust.words import other_release
 from fusetune.check import Check
 from fusetune.finding import Finding
 from fusetune.px4.estimator_samples import is_complete, logged_share

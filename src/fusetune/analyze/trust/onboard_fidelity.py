@@ -19,8 +19,8 @@ from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.replaying.store.parts import table_file
 from fusetune.analyze.replaying.store.reader import read_innovations
 from fusetune.analyze.trust.fidelity import mean_nll
+from fusetune.analyze.trust.grade import TrustGrade
 from fusetune.analyze.trust.log_lacks import log_lacks
-from fusetune.analyze.trust.trust_grade import TrustGrade
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight

@@ -19,7 +19,7 @@ from fusetune.report.comparison import (
     robust_reach,
     told_aims,
 )
-from fusetune.report.figures.figures import PRESENT_COLOUR, empty_figure, label_sets, new_figure
+from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, label_sets, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles, status_colour
 from fusetune.report.results import OUT, Results
 

@@ -15,7 +15,7 @@ from fusetune.analyze.replaying.store.reader import ColumnsOnDisk, read_innovati
 from fusetune.finding import from_documents
 from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
 from fusetune.px4.flight import Flight
-from fusetune.report.figures.figures import empty_figure, figure_style, new_figure, save_png, set_colours
+from fusetune.report.figures.drawing import empty_figure, figure_style, new_figure, save_png, set_colours
 from fusetune.save.flight_folder import load_flight
 from fusetune.set_names import PRESENT
 from fusetune.storage.documents import read_document

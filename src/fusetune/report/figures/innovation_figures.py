@@ -13,7 +13,7 @@ from fusetune.analyze.metrics import break_rate
 from fusetune.analyze.metrics.break_rate import clopper_pearson
 from fusetune.apply.paper_mode import PAPER_VARIABLES
 from fusetune.px4.aid_sources import AID_SOURCES, AXES, REPORTED_SOURCES
-from fusetune.report.figures.figures import PRESENT_COLOUR, empty_figure, label_sets, new_figure, panel_grid
+from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, label_sets, new_figure, panel_grid
 from fusetune.report.figures.set_styles import status_colour
 from fusetune.report.results import PooledSamples, Results, figure_values
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fusetune.report.figures.figures import CANDIDATE_COLOUR, CHOSEN_COLOUR, PRESENT_COLOUR, VETOED_COLOUR, set_colours
+from fusetune.report.figures.drawing import CANDIDATE_COLOUR, CHOSEN_COLOUR, PRESENT_COLOUR, VETOED_COLOUR, set_colours
 from fusetune.report.results import Results
 
 _MARKERS = "osD^vP*X"

@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from fusetune.report.figures.difference_figures import differences, flights_by_sets, pareto
-from fusetune.report.figures.figures import empty_figure, figure_style, save_svg
+from fusetune.report.figures.drawing import empty_figure, figure_style, save_svg
 from fusetune.report.figures.innovation_figures import boxes, breaks, consistency, rms_by_variable
 from fusetune.report.figures.unaided_figures import drift_figure
 from fusetune.report.results import pooled_samples, read_results

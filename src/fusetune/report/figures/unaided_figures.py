@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from fusetune.report.comparison import robust_reach
 from fusetune.report.figures.difference_figures import minus
-from fusetune.report.figures.figures import PRESENT_COLOUR, empty_figure, new_figure
+from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles
 from fusetune.report.results import Results
 from fusetune.report.withheld import POSITION, VELOCITY, Withheld, drift_summary

@@ -19,14 +19,14 @@ from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.reconstruction import RECONSTRUCTION_TOPICS
 from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
-from fusetune.analyze.replaying.replay_settings import IN_USE, ReplaySettings
+from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.start_choice import START_TOPICS, Start
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, distance
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
 from fusetune.analyze.trust.compared_innovations import GROUPS, rms
 from fusetune.analyze.trust.grade_causes import causes_of, cost_of
-from fusetune.analyze.trust.trust_settings import FALLING, FIGURES, TrustSettings
-from fusetune.analyze.trust.trust_words import GRADES, limits_of_grade, not_compared
+from fusetune.analyze.trust.settings import FALLING, FIGURES, TrustSettings
+from fusetune.analyze.trust.words import GRADES, limits_of_grade, not_compared
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import AID_SOURCE_TOPIC
 from fusetune.px4.flight import Flight

@@ -11,14 +11,14 @@ from fusetune.analyze.analyze_flight import COMPARED_TOPICS
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare
-from fusetune.analyze.replaying.replay_settings import IN_USE, StartSettings
+from fusetune.analyze.replaying.settings import IN_USE, StartSettings
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, AsFlownReplay, distance
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, compared_rows
+from fusetune.analyze.trust.grade import TRUST_TOPICS, grade_flight, grade_of
 from fusetune.analyze.trust.grade_causes import GNSS, cost_of, with_half_the_gnss, without_repair
-from fusetune.analyze.trust.trust_grade import TRUST_TOPICS, grade_flight, grade_of
-from fusetune.analyze.trust.trust_settings import FIGURES, TrustSettings
-from fusetune.analyze.trust.trust_words import limits_of_grade, not_compared
+from fusetune.analyze.trust.settings import FIGURES, TrustSettings
+from fusetune.analyze.trust.words import limits_of_grade, not_compared
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.layouts.estimator_instances import (
     instance_shares,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
-from fusetune.analyze.trust.trust_settings import TrustSettings
+from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.finding import Finding, Severity
 from fusetune.px4.flight import Flight
 from fusetune.px4.parameters.ekf2_parameters import BASELINE_RELEASE

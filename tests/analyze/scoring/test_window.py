@@ -12,8 +12,8 @@ from tests.analyze.made_flight import LANDING_S, MadeSet, at, make_flight
 from fusetune.analyze.flight.intervals import Cut, subtract
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.store.reader import read_set
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
-from fusetune.analyze.scoring.scoring_window import FUSION_DELAY_US, scoring_window
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.scoring.window import FUSION_DELAY_US, scoring_window
 
 AIRBORNE = ((at(10.0), at(LANDING_S)),)
 SETTINGS = ScoringSettings()

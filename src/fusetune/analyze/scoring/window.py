@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Cut, Interval, duration, inside, merged, subtract
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
-from fusetune.analyze.scoring.scoring_settings import ScoringSettings
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.px4.aid_sources import AID_SOURCES, HORIZONTAL_AIDING
 
 FUSION_DELAY_US = 500_000
