@@ -125,6 +125,13 @@ class Flight:
         """The same flight with other topics."""
         return replace(self, topics=topics)
 
+    def with_more(self, other: Flight) -> Flight:
+        """The same flight with further topics of its log; what it has stays.
+
+        Of fewer topics the canonical form makes some tables that the log holds itself.
+        """
+        return self.with_topics(other.topics | self.topics)
+
     @property
     def release(self) -> tuple[int, int, int] | None:
         """Firmware release (major, minor, patch), or `None` where the log does not say."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusetune.analyze.analyze_flight import COMPARED_TOPICS
+from fusetune.analyze.analyze_flight import COMPARED_TOPICS, REFERENCE_TOPICS
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, prepare_flight
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
@@ -14,7 +14,7 @@ def with_topics(flight: Flight, topics: tuple[str, ...]) -> Flight:
     return flight.with_topics({key: table for key, table in flight.topics.items() if key[0] in topics})
 
 
-def test_a_flight_read_in_two_parts_is_the_one_read_at_once(survey_flight: Flight) -> None:
+def test_a_flight_read_in_parts_is_the_one_read_at_once(survey_flight: Flight) -> None:
     """`estimator_status` alone would make other `estimator_status_flags` than the log holds."""
     status = {
         "timestamp": survey_flight.topics["estimator_status_flags", 0]["timestamp"][::2],
@@ -25,8 +25,11 @@ def test_a_flight_read_in_two_parts_is_the_one_read_at_once(survey_flight: Fligh
     flight = survey_flight.with_topics(survey_flight.topics | {("estimator_status", 0): status})
     logged = canonical(with_topics(flight, COMPARED_TOPICS))
     assert ("estimator_status_flags", 0) in logged.topics
-    found = prepare_flight(with_topics(flight, REPLAY_TOPICS)).with_log(logged).flight.topics
-    whole = canonical(with_topics(flight, (*REPLAY_TOPICS, *COMPARED_TOPICS))).topics
+    references = canonical(with_topics(flight, REFERENCE_TOPICS))
+    assert ("vehicle_attitude_groundtruth", 0) in references.topics
+    replayed = prepare_flight(with_topics(flight, REPLAY_TOPICS)).flight
+    found = replayed.with_more(logged).with_more(references).topics
+    whole = canonical(with_topics(flight, (*REPLAY_TOPICS, *COMPARED_TOPICS, *REFERENCE_TOPICS))).topics
     assert found.keys() == whole.keys()
     for key, table in whole.items():
         assert found[key].keys() == table.keys()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fusetune.ekf2.feed.given_samples import given_samples
-from fusetune.ekf2.feed.inputs import build_inputs
+from fusetune.ekf2.feed.inputs import arrivals_of, build_inputs
 from fusetune.px4.flight import Flight, ParameterHistory
 from fusetune.px4.layouts.release_layouts import canonical
 
@@ -133,7 +133,7 @@ def test_of_sound_sensors_every_message_is_given():
 
 def test_the_count_is_what_the_inputs_hold():
     flight = canonical(made_flight(1, 16, 0))
-    arrivals = build_inputs(flight).arrays.arrivals
+    arrivals = _wide_arrivals(build_inputs(flight).arrays)
     found = given_samples(flight)
     for name in ("gnss", "mag", "baro", "range", "flow", "airspeed", "auxvel"):
         assert found[name].given == np.sum(arrivals[name] >= 0)
@@ -261,8 +261,14 @@ def test_a_topic_without_messages_gives_nothing_and_stops_nothing(topic):
     assert all(one.topic != topic for one in given_samples(flight).values())
 
 
+def _wide_arrivals(arrays):
+    return arrivals_of(arrays.arrivals, 0, len(arrays.imu))
+
+
 def _arrivals(arrays):
-    return [(name, arrays.arrivals[name]) for name in ("gnss", "mag", "baro", "range", "flow", "airspeed", "auxvel")]
+    return [
+        (name, _wide_arrivals(arrays)[name]) for name in ("gnss", "mag", "baro", "range", "flow", "airspeed", "auxvel")
+    ]
 
 
 @pytest.mark.parametrize(

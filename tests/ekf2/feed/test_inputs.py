@@ -3,7 +3,15 @@
 import numpy as np
 
 from fusetune.ekf2.feed import inputs as estimator_inputs
-from fusetune.ekf2.feed.inputs import ARRIVALS, IMU_ROW, build_inputs, imu_samples
+from fusetune.ekf2.feed.inputs import (
+    ARRIVAL,
+    ARRIVALS,
+    IMU_ROW,
+    arrivals_of,
+    build_inputs,
+    imu_samples,
+    without_arrivals,
+)
 from fusetune.ekf2.feed.message_samples import imu_samples as wide_samples
 from fusetune.px4.flight import Flight
 
@@ -18,8 +26,31 @@ def test_imu_rows_hold_the_samples_exactly_at_half_their_size(survey_flight: Fli
     for name in wide.dtype.names or ():
         np.testing.assert_array_equal(found[name], wide[name][rows])
     assert IMU_ROW.itemsize * 2 <= wide.dtype.itemsize
-    # 250 samples a second for an hour: 83 MB
-    assert (IMU_ROW.itemsize + ARRIVALS.itemsize) * 250 * 3600 <= 85e6
+    # 250 samples a second for an hour: 43 MB
+    assert IMU_ROW.itemsize * 250 * 3600 <= 44e6
+
+
+def test_arrivals_of_a_flight_are_small(survey_flight: Flight) -> None:
+    """Magnetometer 50, barometer 20, GNSS 5 and states of the vehicle a few times a second: 3 MB for an hour."""
+    arrays = build_inputs(survey_flight).arrays
+    seconds = float(np.ptp(arrays.imu["time_us"])) * 1e-6
+    assert arrays.arrivals.nbytes / seconds < 1000
+    assert np.all(np.diff(arrays.arrivals["run"]) >= 0)
+
+
+def test_arrivals_of_a_stretch_are_those_of_each_run() -> None:
+    names = ARRIVALS.names
+    told = [(2, "mag", 0), (2, "gnss", 5), (3, "reset_gyro_bias", 1), (4, "mag", 1), (7, "command", 3)]
+    arrivals = np.array([(run, names.index(name), position) for run, name, position in told], ARRIVAL)
+    stretch = arrivals_of(arrivals, 2, 7)
+    assert stretch["mag"].tolist() == [0, -1, 1, -1, -1]
+    assert stretch["gnss"].tolist() == [5, -1, -1, -1, -1]
+    assert stretch["command"].tolist() == stretch["baro"].tolist() == [-1] * 5
+    assert stretch["reset_gyro_bias"].tolist() == [False, True, False, False, False]
+    assert not stretch["reset_accel_bias"].any()
+    left = without_arrivals(arrivals, ("mag", "reset_gyro_bias"), np.arange(8) < 4)
+    assert [(run, names[field]) for run, field, _ in left.tolist()] == [(2, "gnss"), (4, "mag"), (7, "command")]
+    assert len(arrivals_of(arrivals, 5, 5)) == 0
 
 
 def test_a_stretch_has_the_samples_of_its_runs(survey_flight: Flight) -> None:
@@ -28,5 +59,5 @@ def test_a_stretch_has_the_samples_of_its_runs(survey_flight: Flight) -> None:
     assert len(stretch.imu) == len(stretch.arrivals) == 200
     np.testing.assert_array_equal(stretch.imu["time_us"], arrays.imu["time_us"][300:500])
     # positions in the other arrays hold in every stretch
-    np.testing.assert_array_equal(stretch.arrivals["baro"], arrays.arrivals["baro"][300:500])
+    np.testing.assert_array_equal(stretch.arrivals["baro"], arrivals_of(arrays.arrivals, 0, 600)["baro"][300:500])
     assert stretch.baro is arrays.baro

@@ -204,10 +204,10 @@ def test_no_limit_is_no_limit() -> None:
 
 
 def test_what_later_rooms_read_is_kept() -> None:
-    from fusetune.analyze.analyze_flight import COMPARED_TOPICS
+    from fusetune.analyze.analyze_flight import COMPARED_TOPICS, REFERENCE_TOPICS
     from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
 
-    for topic in (*REPLAY_TOPICS, *COMPARED_TOPICS):
+    for topic in (*REPLAY_TOPICS, *COMPARED_TOPICS, *REFERENCE_TOPICS):
         assert is_used(topic), topic
     assert not is_used("actuator_outputs")
 

@@ -1,6 +1,6 @@
 """As flown: the innovations that the vehicle's own estimator logged, brought to the layout of a replay."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.replaying.store.row_groups import tables_in_groups
-from fusetune.px4.aid_sources import MEASURED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, MEASURED_SOURCES
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.storage.files import AnyPath
@@ -23,6 +23,8 @@ INNOVATION_TOPICS = (
 """Topics of any release that the innovations are read from, and those that `canonical` makes of them."""
 
 _FIELDS = ("observation_variance", "innovation", "innovation_variance", "test_ratio")
+_TIMES = ("timestamp", "timestamp_sample")
+_READ = (*_TIMES, *_FIELDS, "innovation_rejected", "fused")
 
 ONBOARD_SCHEMA = pa.schema(
     [
@@ -78,6 +80,19 @@ def onboard_samples(flight: Flight, instance: int | None = None) -> OnboardSampl
     Samples by source and axis; empty where the log holds none.
     """
     return OnboardSamples(flight, instance)
+
+
+def with_onboard_columns(flight: Flight, sources: Collection[str]) -> Flight:
+    """The flight with what `onboard_samples` reads of some sources, and the times alone of the others' samples."""
+    named = {MEASURED_SOURCES[name].topic for name in sources}
+    topics = {}
+    for (name, instance), table in flight.topics.items():
+        if name.startswith(AID_SOURCE_TOPIC):
+            read = _READ if name in named else _TIMES
+            table = {column: values for column, values in table.items() if column.partition("[")[0] in read}
+        if name.startswith(AID_SOURCE_TOPIC) or name not in INNOVATION_TOPICS:
+            topics[name, instance] = table
+    return flight.with_topics(topics)
 
 
 def _axis_samples(table: TopicTable, column: str) -> AxisSamples:

@@ -93,12 +93,9 @@ class PreparedFlight:
         """The same flight, started alike, with another sensor stream."""
         return dataclasses.replace(self, inputs=build_inputs(reconstructed.flight), reconstructed=reconstructed)
 
-    def with_log(self, logged: Flight) -> PreparedFlight:
-        """The same flight with further topics of its log, canonical, which no replay reads.
-
-        What it has stays: of fewer topics the canonical form makes some tables that the log holds itself.
-        """
-        return dataclasses.replace(self, flight=self.flight.with_topics(logged.topics | self.flight.topics))
+    def with_flight(self, flight: Flight) -> PreparedFlight:
+        """The same flight with other topics of its log which no replay reads."""
+        return dataclasses.replace(self, flight=flight)
 
     def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the summary of a replay: how it started and what was reconstructed."""

@@ -65,7 +65,8 @@ def joined_states(pieces: Iterable[Columns]) -> FilterStates:
     for piece in pieces:
         for name, values in piece.items():
             parts[name].append(values.astype(np.int64 if name == "time" else np.float64))
-    return FilterStates(**{name: np.concatenate(values) for name, values in parts.items()})
+    # one after the other, so that no two are in memory in both forms
+    return FilterStates(**{name: np.concatenate(parts.pop(name)) for name in (*parts,)})
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from fusetune.analyze.scoring.window_scores import (
 from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 from fusetune.set_names import ONBOARD
 from fusetune.storage.files import AnyPath
+from fusetune.storage.freed_memory import give_back_freed_memory
 
 SAMPLES_SCHEMA = pa.schema(
     [
@@ -94,6 +95,7 @@ def score_samples(
             figures = window_figures(members, axis_name, wide_edges)
             add_worst_windows(table, figures)
             windows.append(window_rows(table.flight, figures, wide_edges))
+        give_back_freed_memory()
     return SampleScores(
         pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
         pa.concat_tables(windows) if windows else WINDOW_SCHEMA.empty_table(),

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fusetune.analyze.flight_files import ONBOARD_FILE, SAMPLES_FILE, SCORE_TABLES, SCORING_FILE
 from fusetune.analyze.replaying.onboard import onboard_samples, write_onboard
-from fusetune.analyze.replaying.samples import SampleSpool
+from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis
 from fusetune.analyze.replaying.store.reader import read_innovations, read_set
 from fusetune.analyze.replaying.store.row_groups import tables_in_groups
 from fusetune.analyze.scoring.sample_scores import SAMPLES_SCHEMA
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, FlightScores, ScoredFlight, score_sets, scored_flight
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
 from fusetune.set_names import PRESENT
@@ -38,19 +37,15 @@ def score_saved_flight(
         If a file of a replay is missing or damaged. A flight that cannot be scored is no error: its files say why.
     """
     flight = canonical(load_flight(flight_folder, topics=SCORE_TOPICS))
-    scored = spooled_flight(flight, analyze_folder, settings)
+    write_onboard(Path(analyze_folder) / ONBOARD_FILE, onboard_samples(flight))
+    scored = scored_flight(flight, settings, read_onboard(analyze_folder))
     del flight
     write_scores(scored, analyze_folder, sets, present=present, settings=settings)
 
 
-def spooled_flight(flight: Flight, analyze_folder: AnyPath, settings: ScoringSettings | None = None) -> ScoredFlight:
-    """What scores need of a canonical flight, with the vehicle's innovations in `onboard.innovations.parquet`.
-
-    They are read from there into a nameless file, so that the log need not stay in memory.
-    """
-    file = Path(analyze_folder) / ONBOARD_FILE
-    write_onboard(file, onboard_samples(flight))
-    return scored_flight(flight, settings, read_innovations(file, {}))
+def read_onboard(analyze_folder: AnyPath) -> Mapping[SourceAxis, AxisSamples]:
+    """The vehicle's innovations from `onboard.innovations.parquet`, so that the log need not stay in memory."""
+    return read_innovations(Path(analyze_folder) / ONBOARD_FILE, {})
 
 
 def write_scores(

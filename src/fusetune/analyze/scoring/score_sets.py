@@ -33,6 +33,7 @@ from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whitenes
 from fusetune.px4.flight import Flight
 from fusetune.set_names import PRESENT
 from fusetune.storage.files import AnyPath
+from fusetune.storage.freed_memory import give_back_freed_memory
 
 SCORE_TOPICS = (
     *dict.fromkeys(
@@ -203,4 +204,5 @@ def _add_state_figures(
         for truth in references:
             figures = true_errors(record, states, truth, window, settings.confidence)
             add_true_errors(table, record.name, figures, truth.kind)
+        give_back_freed_memory()
     return present

@@ -18,6 +18,7 @@ from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 from fusetune.px4.flight import Flight
+from fusetune.storage.freed_memory import give_back_freed_memory
 
 COLD_WARM_UP_US = 10_000_000
 
@@ -64,6 +65,7 @@ class AsFlownComparison:
         for other, figures in self._done:
             if _is_same_course(prepared, other):
                 return figures
+        give_back_freed_memory()
         result, measured = done or prepared.replay(self.params, keep=compared_rows(self.onboard))
         if self.intervals is None:
             self.intervals = self._compared(result)

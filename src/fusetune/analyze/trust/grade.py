@@ -28,7 +28,7 @@ from fusetune.analyze.trust.grade_causes import causes_of, cost_of
 from fusetune.analyze.trust.settings import FALLING, FIGURES, TrustSettings
 from fusetune.analyze.trust.words import GRADES, limits_of_grade, not_compared
 from fusetune.finding import Finding
-from fusetune.px4.aid_sources import AID_SOURCE_TOPIC
+from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import instance_shares
 
@@ -49,6 +49,9 @@ TRUST_TOPICS = (
     ),
 )
 """What the grade, and the comparison with the vehicle, read of a flight."""
+
+COMPARED_SOURCES = tuple(name for name, source in MEASURED_SOURCES.items() if source.judged or source.size_figure)
+"""Of which they read more than when they had samples."""
 
 NOTHING_COMPARED = "nothing_compared"
 """Id of the finding that limits a flight of which nothing could be compared."""

@@ -5,6 +5,7 @@ Built once per flight, since no parameter of the estimator enters: parameter set
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,10 +33,13 @@ ESTIMATOR_COMMANDS = (
 
 ARRIVAL_TOPICS = (*sorted(AIDING), "system_flags", "command")
 
-ARRIVALS = np.dtype(
-    [(name, "i4") for name in ARRIVAL_TOPICS] + [("reset_accel_bias", "?"), ("reset_gyro_bias", "?")], align=True
-)
+BIAS_RESETS = ("reset_accel_bias", "reset_gyro_bias")
+
+ARRIVALS = np.dtype([(name, "i4") for name in ARRIVAL_TOPICS] + [(name, "?") for name in BIAS_RESETS], align=True)
 """What arrives with one IMU sample: a position in each sample array, -1 for nothing."""
+
+ARRIVAL = np.dtype([("run", "i4"), ("field", "i4"), ("position", "i4")])
+"""One entry of ARRIVALS, by the number of its field, for most IMU samples come alone; of a reset the position is 1."""
 
 IMU_ROW = np.dtype(
     [
@@ -56,7 +60,8 @@ COMMAND = np.dtype([("timestamp", "i8"), ("command", "i8"), ("param", "f8", (7,)
 
 
 class SampleArrays(NamedTuple):
-    """The arrays that the compiled replay reads, and of a whole flight `imu` as IMU_ROW, see `of_runs`."""
+    """The arrays that the compiled replay reads; of a whole flight `imu` are IMU_ROW and `arrivals` ARRIVAL in order of
+    their runs, see `of_runs`."""
 
     imu: np.ndarray
     arrivals: np.ndarray
@@ -75,8 +80,8 @@ class SampleArrays(NamedTuple):
     command: np.ndarray
 
     def of_runs(self, start: int, stop: int) -> SampleArrays:
-        """The same for the estimator's runs from `start` to before `stop` alone, `imu` as IMU_SAMPLE."""
-        return self._replace(imu=imu_samples(self.imu[start:stop]), arrivals=self.arrivals[start:stop])
+        """The same for the estimator's runs from `start` to before `stop` alone, as IMU_SAMPLE and ARRIVALS."""
+        return self._replace(imu=imu_samples(self.imu[start:stop]), arrivals=arrivals_of(self.arrivals, start, stop))
 
 
 def imu_samples(rows: np.ndarray) -> np.ndarray:
@@ -85,6 +90,34 @@ def imu_samples(rows: np.ndarray) -> np.ndarray:
     for name in rows.dtype.names or ():
         samples[name] = rows[name]
     return samples
+
+
+def arrivals_of(arrivals: np.ndarray, start: int, stop: int) -> np.ndarray:
+    """ARRIVAL of a flight → ARRIVALS of the runs from `start` to before `stop`."""
+    first, last = np.searchsorted(arrivals["run"], (start, stop))
+    part = arrivals[first:last]
+    wide = np.zeros(max(stop - start, 0), ARRIVALS)
+    for number, name in enumerate(ARRIVALS.names or ()):
+        if name in ARRIVAL_TOPICS:
+            wide[name] = -1
+        here = part[part["field"] == number]
+        wide[name][here["run"] - start] = here["position"]
+    return wide
+
+
+def without_arrivals(arrivals: np.ndarray, names: Collection[str], runs: np.ndarray) -> np.ndarray:
+    """ARRIVAL of a flight without those of some fields at some runs; `runs` (N,) is true for these."""
+    fields = [number for number, name in enumerate(ARRIVALS.names or ()) if name in names]
+    return arrivals[~(np.isin(arrivals["field"], fields) & runs[arrivals["run"]])]
+
+
+def _arrivals(name: str, position: np.ndarray) -> np.ndarray:
+    """One field of ARRIVALS, given for every run, as ARRIVAL."""
+    run = np.flatnonzero(position >= 0 if name in ARRIVAL_TOPICS else position)
+    found = np.zeros(len(run), ARRIVAL)
+    found["run"], found["position"] = run, position[run]
+    found["field"] = (ARRIVALS.names or ()).index(name)
+    return found
 
 
 @dataclass(frozen=True)
@@ -113,22 +146,25 @@ def build_inputs(flight: Flight) -> EstimatorInputs:
         The flight has no `sensor_combined`.
     """
     runs = schedule_runs(flight)
-    arrivals = np.full(len(runs.timestamp), -1, ARRIVALS)
-    arrivals["reset_accel_bias"], arrivals["reset_gyro_bias"] = _bias_resets(flight, runs)
-    aiding = {name: take(flight, runs) for name, take in AIDING.items()}
-    for name, one in aiding.items():
-        arrivals[name] = one.arrival
-    system_flags = _system_flags(flight, runs, arrivals)
-    command = _commands(flight, runs, arrivals)
+    arrived, samples, beside = [], {}, {}
+    for name, take in AIDING.items():
+        one = take(flight, runs)
+        arrived.append(_arrivals(name, one.arrival))
+        samples[name], beside[name] = one.samples, one.beside
+    for name, (samples[name], position) in (
+        ("system_flags", _system_flags(flight, runs)),
+        ("command", _commands(flight, runs)),
+    ):
+        arrived.append(_arrivals(name, position))
+    arrived += [_arrivals(f"reset_{sensor}_bias", _bias_resets(flight, runs, sensor)) for sensor in ("accel", "gyro")]
+    arrivals = np.concatenate(arrived)
     arrays = SampleArrays(
         imu=_imu_rows(flight.topics["sensor_combined", 0], runs.imu_rows),
-        arrivals=arrivals,
-        **{name: one.samples for name, one in aiding.items()},
-        air_density=aiding["baro"].beside,
-        range_limits=aiding["range"].beside,
-        flow_limits=aiding["flow"].beside,
-        system_flags=system_flags,
-        command=command,
+        arrivals=arrivals[np.argsort(arrivals["run"], kind="stable")],
+        air_density=beside["baro"],
+        range_limits=beside["range"],
+        flow_limits=beside["flow"],
+        **samples,
     )
     changes = tuple(
         (int(np.searchsorted(runs.timestamp, change.timestamp)), change) for change in flight.parameters.changed
@@ -147,21 +183,18 @@ def _imu_rows(table: TopicTable, chosen: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _bias_resets(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndarray]:
-    """Runs at which the accelerometer or gyro in use, or its calibration, changes."""
+def _bias_resets(flight: Flight, runs: RunSchedule, sensor: str) -> np.ndarray:
+    """Runs at which the accelerometer or gyro in use (`accel`, `gyro`), or its calibration, changes, (N,) bool."""
     imu = flight.topics["sensor_combined", 0]
     selection = flight.topic("sensor_selection")
-    resets = []
-    for sensor in ("accel", "gyro"):
-        count = convert.column(imu, f"{sensor}_calibration_count", 0.0)[runs.imu_rows]
-        reset = convert.changed_since_previous(count, 0.0)
-        if selection is not None and f"{sensor}_device_id" in selection:
-            newest = runs.newest_message("sensor_selection", selection["timestamp"])
-            device = selection[f"{sensor}_device_id"].astype(np.int64)
-            seen = np.flatnonzero(newest >= 0)
-            reset[seen] |= convert.changed_since_previous(device[newest[seen]], 0.0)
-        resets.append(reset)
-    return resets[0], resets[1]
+    count = convert.column(imu, f"{sensor}_calibration_count", 0.0)[runs.imu_rows]
+    reset = convert.changed_since_previous(count, 0.0)
+    if selection is not None and f"{sensor}_device_id" in selection:
+        newest = runs.newest_message("sensor_selection", selection["timestamp"])
+        device = selection[f"{sensor}_device_id"].astype(np.int64)
+        seen = np.flatnonzero(newest >= 0)
+        reset[seen] |= convert.changed_since_previous(device[newest[seen]], 0.0)
+    return reset
 
 
 def _carried(flight: Flight, runs: RunSchedule, topic: str) -> tuple[np.ndarray, np.ndarray]:
@@ -174,13 +207,17 @@ def _carried(flight: Flight, runs: RunSchedule, topic: str) -> tuple[np.ndarray,
     return np.maximum.accumulate(newest), newest >= 0
 
 
-def _system_flags(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
-    """One sample whenever `vehicle_status` or `vehicle_land_detected` is new; messages over 3 s old are ignored."""
+def _system_flags(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndarray]:
+    """One sample whenever `vehicle_status` or `vehicle_land_detected` is new; messages over 3 s old are ignored.
+
+    With it the position of the sample that arrives at each run, -1 for none.
+    """
     status_row, status_new = _carried(flight, runs, "vehicle_status")
     land_row, land_new = _carried(flight, runs, "vehicle_land_detected")
     launch_row, _ = _carried(flight, runs, "launch_detection_status")
     at = np.flatnonzero(status_new | land_new)
-    arrivals["system_flags"][at] = np.arange(len(at))
+    position = np.full(len(runs.timestamp), -1)
+    position[at] = np.arange(len(at))
     samples = np.zeros(len(at), SYSTEM_FLAGS_SAMPLE)
     samples["time_us"] = runs.timestamp[at]
     status = _fresh(flight, "vehicle_status", status_row[at], runs.timestamp[at])
@@ -198,7 +235,7 @@ def _system_flags(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np
     if launch is not None:
         rows, table = launch
         samples["constant_pos"][rows] = table["launch_detection_state"] == LAUNCH_STATE_WAITING
-    return samples
+    return samples, position
 
 
 def convert_vehicle_type(table):  # type: ignore[no-untyped-def]
@@ -217,16 +254,15 @@ def _fresh(flight: Flight, topic: str, rows: np.ndarray, now: np.ndarray):  # ty
     return np.flatnonzero(fresh), {name: values[rows[fresh]] for name, values in table.items()}
 
 
-def _commands(flight: Flight, runs: RunSchedule, arrivals: np.ndarray) -> np.ndarray:
-    """Commands that move the estimator's origin, position or wind."""
+def _commands(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.ndarray]:
+    """Commands that move the estimator's origin, position or wind, and which of them arrives at each run."""
     table = flight.topic("vehicle_command")
     if table is None:
-        return np.zeros(0, COMMAND)
+        return np.zeros(0, COMMAND), np.full(len(runs.timestamp), -1)
     commands = np.zeros(len(table["timestamp"]), COMMAND)
     commands["timestamp"] = table["timestamp"]
     commands["command"] = table["command"]
     for i in range(7):
         commands["param"][:, i] = convert.column(table, f"param{i + 1}")
     relevant = np.isin(commands["command"], ESTIMATOR_COMMANDS)
-    arrivals["command"] = only_usable(runs.newest_message("vehicle_command", table["timestamp"]), relevant)
-    return commands
+    return commands, only_usable(runs.newest_message("vehicle_command", table["timestamp"]), relevant)

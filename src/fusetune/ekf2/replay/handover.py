@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fusetune.ekf2.feed.inputs import EstimatorInputs
+from fusetune.ekf2.feed.inputs import BIAS_RESETS, EstimatorInputs, without_arrivals
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, GYRO_BIAS, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.replay.warm_start import MIN_VARIANCES, knows_field
 from fusetune.px4.layouts.logged_state import Handover, LoggedState
@@ -34,12 +34,11 @@ def without_resets_at(inputs: EstimatorInputs, handovers: Sequence[Handover]) ->
     if not handovers:
         return inputs
     arrays = inputs.arrays
-    mag, arrivals = arrays.mag.copy(), arrays.arrivals.copy()
+    mag, arrivals = arrays.mag.copy(), arrays.arrivals
     for one in handovers:
         mag["reset"][np.abs(mag["time_us"] - one.time_us) < SAME_CHANGE_US] = False
         near = np.abs(arrays.imu["time_us"] - one.time_us) < SAME_CHANGE_US
-        for name in ("reset_accel_bias", "reset_gyro_bias"):
-            arrivals[name][near] = False
+        arrivals = without_arrivals(arrivals, BIAS_RESETS, near)
     return replace(inputs, arrays=arrays._replace(mag=mag, arrivals=arrivals))
 
 

@@ -18,6 +18,7 @@ from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import PARAMETER_NAMES, parameter_record
 from fusetune.ekf2.replay.course import Course
 from fusetune.ekf2.replay.handover import handover_runs, without_resets_at
+from fusetune.ekf2.replay.kept_rows import KeptRows
 from fusetune.ekf2.replay.recording import (
     FLAG_COLUMNS,
     LOCAL_POSITION_ROW,
@@ -54,9 +55,9 @@ def replay(
     ReplayResult
         The same inputs and parameters give the same bytes.
     """
-    kept: list[RecordArrays] = []
+    kept = KeptRows(keep)
     summary = replay_into(
-        lambda rows: kept.append(rows if keep is None else keep(rows)),
+        kept.take,
         inputs,
         parameters,
         overridden=overridden,
@@ -64,13 +65,13 @@ def replay(
         start=start,
         handovers=handovers,
     )
-    return result_of(summary, kept)
+    return result_of(summary, kept.rows())
 
 
-def result_of(summary: ReplaySummary, rows: Sequence[RecordArrays]) -> ReplayResult:
-    """A replay and the rows that were kept of its stretches."""
+def result_of(summary: ReplaySummary, rows: RecordArrays) -> ReplayResult:
+    """A replay and the rows that were kept of it."""
     told = {field.name: getattr(summary, field.name) for field in fields(ReplaySummary)}
-    return ReplayResult(**told, **joined(rows)._asdict())
+    return ReplayResult(**told, **rows._asdict())
 
 
 def replay_into(

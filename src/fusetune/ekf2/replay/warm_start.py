@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fusetune.ekf2.feed.inputs import EstimatorInputs, imu_samples
+from fusetune.ekf2.feed.inputs import BIAS_RESETS, EstimatorInputs, imu_samples, without_arrivals
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import earth_field_vector
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
@@ -57,12 +57,11 @@ def without_first_resets(inputs: EstimatorInputs, since_us: int) -> EstimatorInp
     is such a change. Of the IMU that is told by slow topics, so it is no change either shortly after the start.
     """
     arrays = inputs.arrays
-    mag, baro, arrivals = arrays.mag.copy(), arrays.baro.copy(), arrays.arrivals.copy()
+    mag, baro = arrays.mag.copy(), arrays.baro.copy()
     for samples in (mag, baro):
         samples["reset"][:1] = False
     last = int(np.searchsorted(arrays.imu["time_us"], since_us + FIRST_NEWS_US))
-    for name in ("reset_accel_bias", "reset_gyro_bias"):
-        arrivals[name][:last] = False
+    arrivals = without_arrivals(arrays.arrivals, BIAS_RESETS, np.arange(len(arrays.imu)) < last)
     return replace(inputs, arrays=arrays._replace(mag=mag, baro=baro, arrivals=arrivals))
 
 
