@@ -11,11 +11,12 @@ from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.bootstrap import (
     FEWEST_REDRAWN,
+    MeanDifference,
     Redrawn,
     bootstrap_scores,
     expanded_interval,
     holm,
-    interval_over_flights,
+    mean_difference,
     p_value,
     probability_best,
     spread_of_flights,
@@ -30,24 +31,6 @@ Array = npt.NDArray[np.float64]
 
 PRESENT, ELIGIBLE, SAME, NOT_ELIGIBLE, NOT_SCORED = "flies now", "eligible", "same as now", "not eligible", "not scored"
 """Parts that a set can have in the decision, as the tables, the page and the files name them."""
-
-
-@dataclass(frozen=True)
-class AimComparison:
-    """A set against the present one in one kind of prediction: mean difference of the score and its interval.
-
-    The interval is None where nothing shows the spread of the difference.
-    """
-
-    difference: float
-    lower: float | None
-    upper: float | None
-    flights: int
-
-    @property
-    def is_worse(self) -> bool:
-        """Worse than the present set beyond doubt."""
-        return self.lower is not None and self.lower > 0.0
 
 
 @dataclass(frozen=True)
@@ -69,7 +52,7 @@ class RankedSet:
     improvement_percent : by how much smaller its typical prediction error is than the present set's
     behind_best, behind_best_error : score less that of the best set, and its standard error; best is the lowest of
         those that are proved better than the present set, or where none is, of all that may be flown
-    aims : the comparison in each kind of prediction
+    aims : mean difference of the score to that of the present set in each kind of prediction
     """
 
     name: str
@@ -89,7 +72,7 @@ class RankedSet:
     improvement_percent: float
     behind_best: float
     behind_best_error: float | None
-    aims: dict[str, AimComparison]
+    aims: dict[str, MeanDifference]
 
     @property
     def status(self) -> str:
@@ -214,7 +197,7 @@ def _aims(
     sets: Sequence[str],
     redrawn: Redrawn,
     settings: DecisionSettings,
-) -> dict[str, AimComparison]:
+) -> dict[str, MeanDifference]:
     compared = {}
     for aim in AIMS:
         flights = [(one, part) for one in evidence if (part := one.aim(aim)) is not None]
@@ -224,9 +207,7 @@ def _aims(
             [part.scores[one.sets.index(name)] - part.scores[one.sets.index(present)] for one, part in flights]
         )
         draws = _aim_differences(aim, [one for one, _ in flights], redrawn, sets, name, present, settings)
-        interval = interval_over_flights(draws, found, units_redrawn(evidence, aim), settings.confidence)
-        lower, upper = (interval.lower, interval.upper) if interval else (None, None)
-        compared[aim] = AimComparison(float(np.mean(found)), lower, upper, len(flights))
+        compared[aim] = mean_difference(draws, found, units_redrawn(evidence, aim), settings.confidence)
     return compared
 
 
