@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +35,9 @@ PRESENT, ELIGIBLE, SAME, NOT_ELIGIBLE, NOT_SCORED = "flies now", "eligible", "sa
 
 @dataclass(frozen=True)
 class RankedSet:
-    """One set in the ranking. What nothing shows the spread of is not known: None.
+    """One set in the ranking; by default it was scored on no flight.
+
+    What nothing shows the spread of is not known: None.
 
     Attributes
     ----------
@@ -58,21 +60,21 @@ class RankedSet:
     name: str
     is_present: bool
     reasons: tuple[str, ...]
-    score: float
-    difference: float
-    lower: float | None
-    upper: float | None
-    p_value: float | None
-    p_holm: float | None
-    p_family: float | None
-    p_best: float | None
-    flights: int
-    flights_better: int
-    equal_to_present: bool
-    improvement_percent: float
-    behind_best: float
-    behind_best_error: float | None
-    aims: dict[str, MeanDifference]
+    score: float = math.nan
+    difference: float = math.nan
+    lower: float | None = None
+    upper: float | None = None
+    p_value: float | None = None
+    p_holm: float | None = None
+    p_family: float | None = None
+    p_best: float | None = None
+    flights: int = 0
+    flights_better: int = 0
+    equal_to_present: bool = False
+    improvement_percent: float = math.nan
+    behind_best: float = math.nan
+    behind_best_error: float | None = None
+    aims: dict[str, MeanDifference] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
@@ -180,8 +182,6 @@ def _compared(
         flights_better=int(np.count_nonzero(found < 0.0)),
         equal_to_present=equal,
         improvement_percent=improvement_percent(difference),
-        behind_best=math.nan,
-        behind_best_error=None,
         aims=_aims(name, present, evidence, sets, redrawn, settings),
     )
 
@@ -300,24 +300,4 @@ def _family_p_values(
 
 
 def _never_scored(name: str, present: str, vetoed: Mapping[str, Sequence[str]]) -> RankedSet:
-    nan = math.nan
-    return RankedSet(
-        name=name,
-        is_present=name == present,
-        reasons=tuple(vetoed.get(name, ())) or ("scored on no flight",),
-        score=nan,
-        difference=nan,
-        lower=None,
-        upper=None,
-        p_value=None,
-        p_holm=None,
-        p_family=None,
-        p_best=None,
-        flights=0,
-        flights_better=0,
-        equal_to_present=False,
-        improvement_percent=nan,
-        behind_best=nan,
-        behind_best_error=None,
-        aims={},
-    )
+    return RankedSet(name, name == present, tuple(vetoed.get(name, ())) or ("scored on no flight",))
