@@ -42,7 +42,7 @@ def test_a_better_score_that_may_be_luck_does_not_stand_before_a_proved_one() ->
 
 
 def test_a_set_that_is_worse_in_one_kind_of_prediction_is_not_eligible() -> None:
-    worse = {"aided": MeanDifference(0.02, 0.01, 0.03)}
+    worse = {"aided": MeanDifference(0.02, 0.01, 0.03, 6)}
     assert chosen(one("b", -0.2, -0.1, aims=worse), one("c", -0.1, -0.05)) == "c"
 
 

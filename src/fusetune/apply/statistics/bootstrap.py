@@ -189,6 +189,7 @@ class MeanDifference:
     difference: float
     lower: float | None
     upper: float | None
+    flights: int
 
     @property
     def is_certain(self) -> bool:
@@ -205,7 +206,7 @@ def mean_difference(draws: Array, differences: Array, units: int, confidence: fl
     """Mean of the differences on the flights (F,), and its interval from its redrawn means (D,)."""
     interval = expanded_interval(spread_of_flights(draws, differences), units, confidence)
     lower, upper = (interval.lower, interval.upper) if interval else (None, None)
-    return MeanDifference(float(np.mean(differences)), lower, upper)
+    return MeanDifference(float(np.mean(differences)), lower, upper, differences.size)
 
 
 def p_value(difference: float, draws: Array, units: int) -> float | None:
