@@ -8,7 +8,7 @@ from tests.apply.statistics.test_leave_one_out import flight
 from fusetune.apply.choice import choose, parameter_distance
 from fusetune.apply.ranking import RankedSet, is_proved
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.statistics.bootstrap import MeanDifference
+from fusetune.apply.statistics.mean_difference import MeanDifference
 from fusetune.apply.wording import _for_the_pick
 
 

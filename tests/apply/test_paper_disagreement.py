@@ -12,7 +12,7 @@ from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
 from fusetune.apply.paper_disagreement import Disagreement, PaperView, reasons
-from fusetune.apply.statistics.bootstrap import MeanDifference
+from fusetune.apply.statistics.mean_difference import MeanDifference
 
 FIRST = PaperView("follower", 0.3, 0.4, {"a": 0.5, "b": 0.6, "c": 0.4}, 0.5, 0, 3)
 CHOSEN = PaperView("present", 0.48, 0.36, {"a": 0.6, "b": 0.7, "c": 0.3}, 0.4, 0, 3)

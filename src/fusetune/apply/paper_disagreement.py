@@ -20,7 +20,8 @@ from fusetune.apply.paper_mode import (
 )
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.statistics.bootstrap import MeanDifference, bootstrap_scores, mean_difference, units_redrawn
+from fusetune.apply.statistics.bootstrap import bootstrap_scores, units_redrawn
+from fusetune.apply.statistics.mean_difference import MeanDifference, mean_difference
 from fusetune.apply.statistics.rounding import without_rounding
 
 WANDERING = 0.6

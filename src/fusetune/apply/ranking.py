@@ -11,18 +11,17 @@ from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.bootstrap import (
     FEWEST_REDRAWN,
-    MeanDifference,
     Redrawn,
     bootstrap_scores,
     expanded_interval,
     holm,
-    mean_difference,
     p_value,
     probability_best,
     spread_of_flights,
     standard_error,
     units_redrawn,
 )
+from fusetune.apply.statistics.mean_difference import MeanDifference, mean_difference
 from fusetune.apply.statistics.rounding import EQUAL_WITHIN, without_rounding
 from fusetune.apply.statistics.sign_flips import family_p_values
 

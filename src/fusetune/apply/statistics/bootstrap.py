@@ -182,33 +182,6 @@ def expanded_interval(draws: Array, units: int, confidence: float) -> Interval |
     return Interval(float(lower), float(upper))
 
 
-@dataclass(frozen=True)
-class MeanDifference:
-    """Mean difference of two sets over flights, and its interval, which is None where nothing shows its spread."""
-
-    difference: float
-    lower: float | None
-    upper: float | None
-    flights: int
-
-    @property
-    def is_certain(self) -> bool:
-        """The interval is known and does not hold 0."""
-        return self.lower is not None and self.upper is not None and Interval(self.lower, self.upper).excludes_zero
-
-    @property
-    def is_worse(self) -> bool:
-        """Above 0 beyond doubt: of scores, lower is better."""
-        return self.lower is not None and self.lower > 0.0
-
-
-def mean_difference(draws: Array, differences: Array, units: int, confidence: float) -> MeanDifference:
-    """Mean of the differences on the flights (F,), and its interval from its redrawn means (D,)."""
-    interval = expanded_interval(spread_of_flights(draws, differences), units, confidence)
-    lower, upper = (interval.lower, interval.upper) if interval else (None, None)
-    return MeanDifference(float(np.mean(differences)), lower, upper, differences.size)
-
-
 def p_value(difference: float, draws: Array, units: int) -> float | None:
     """Two-sided p-value of a mean difference against 0: Student's t with the bootstrap's standard error.
 
