@@ -13,7 +13,6 @@ from fusetune.apply.statistics.bootstrap import (
     FEWEST_REDRAWN,
     Redrawn,
     bootstrap_scores,
-    expanded_interval,
     holm,
     p_value,
     probability_best,
@@ -161,26 +160,25 @@ def _compared(
     own = np.array([one.scores[one.sets.index(name)] for one in evidence])
     base = np.array([one.scores[one.sets.index(present)] for one in evidence])
     found = without_rounding(own - base)
-    difference = float(np.mean(found))
-    draws = spread_of_flights(_differences(redrawn.total, sets, name, present), found)
+    draws = _differences(redrawn.total, sets, name, present)
     units = units_redrawn(evidence)
-    interval = expanded_interval(draws, units, settings.confidence)
+    to_present = mean_difference(draws, found, units, settings.confidence)
     return RankedSet(
         name=name,
         is_present=name == present,
         reasons=tuple(vetoed.get(name, ())),
         score=float(np.mean(own)),
-        difference=difference,
-        lower=interval.lower if interval else None,
-        upper=interval.upper if interval else None,
-        p_value=p_value(difference, draws, units),
+        difference=to_present.difference,
+        lower=to_present.lower,
+        upper=to_present.upper,
+        p_value=p_value(to_present.difference, spread_of_flights(draws, found), units),
         p_holm=1.0,
         p_family=1.0,
         p_best=0.0,
         flights=len(evidence),
         flights_better=int(np.count_nonzero(found < 0.0)),
         equal_to_present=equal,
-        improvement_percent=improvement_percent(difference),
+        improvement_percent=improvement_percent(to_present.difference),
         aims=_aims(name, present, evidence, sets, redrawn, settings),
     )
 
