@@ -1,4 +1,8 @@
-"""Logs of PX4 v1.8 to v1.17 in the layout of v1.16: topics and fields mapped by name."""
+"""A log of any release in the layout of v1.16: topics and fields mapped by name.
+
+Here topics take another's place; what each one had otherwise, and until which release, say its function in
+`sensor_layouts`, for the estimator's own topics `estimator_layouts`, `state_layout` and `onboard_innovations`.
+"""
 
 from __future__ import annotations
 

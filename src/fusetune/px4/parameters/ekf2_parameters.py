@@ -16,13 +16,8 @@ from types import MappingProxyType
 from typing import Literal
 
 from fusetune.px4.parameters.parameter_migration import PREDECESSORS, migrate_names
+from fusetune.px4.releases import BASELINE, DEVELOPMENT, Release, name_of
 
-Release = tuple[int, int] | tuple[int, int, int]
-
-BASELINE_RELEASE = (1, 16)
-"""The release whose estimator is replayed; its parameters are the ones that count."""
-
-_DEVELOPMENT_RELEASE = (1, 18)
 _FLOAT = struct.Struct("<f")
 
 
@@ -67,7 +62,7 @@ class ParameterMetadata:
     @property
     def default(self) -> float:
         """Default in the baseline release, or the last one it had."""
-        return self.default_in(BASELINE_RELEASE)
+        return self.default_in(BASELINE)
 
     @property
     def renamed_from(self) -> tuple[str, ...]:
@@ -120,7 +115,7 @@ def metadata_of(name: str) -> ParameterMetadata:
     """
     if name in PARAMETERS:
         return PARAMETERS[name]
-    baseline = "v{}.{}".format(*BASELINE_RELEASE)
+    baseline = name_of(BASELINE)
     old = ALL_PARAMETERS.get(name)
     if old is not None and old.became:
         raise ParameterError(name, f"{baseline} no longer has it", f"Use {' / '.join(old.became)} instead")
@@ -219,7 +214,7 @@ def _range_text(metadata: ParameterMetadata) -> str:
 
 def _release_of(text: str) -> tuple[int, int]:
     if text == "main":
-        return _DEVELOPMENT_RELEASE
+        return DEVELOPMENT
     major, minor = text.removeprefix("v").split(".")
     return int(major), int(minor)
 
@@ -251,10 +246,10 @@ def _read_metadata() -> dict[str, ParameterMetadata]:
 
 
 ALL_PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(_read_metadata())
-"""EKF2 parameters of every release from v1.8 on."""
+"""EKF2 parameters of every release that is read."""
 
 PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
-    {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE_RELEASE)}
+    {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE)}
 )
 """EKF2 parameters of the baseline release, by name in alphabetical order."""
 
