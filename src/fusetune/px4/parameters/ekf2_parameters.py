@@ -15,7 +15,7 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Literal
 
-from fusetune.px4.parameters.parameter_migration import PREDECESSORS, migrate_names
+from fusetune.px4.parameters.parameter_migration import SENSOR_PARAMETERS, migrate_names
 from fusetune.px4.releases import BASELINE, DEVELOPMENT, Release, name_of
 
 _FLOAT = struct.Struct("<f")
@@ -56,7 +56,7 @@ class ParameterMetadata:
     values: Mapping[int, str]
     """Meaning of each value (enum) or bit (bitmask)."""
     became: tuple[str, ...]
-    """Parameters that took over in later releases."""
+    """What stands for it in the baseline release, where that has it under other names."""
     description: str
 
     @property
@@ -141,9 +141,11 @@ def migrate(logged: Mapping[str, float | int], release: Release | None = None) -
     dict
         Only parameters that the log determines; values rounded to float32. Values that are no numbers count as missing.
     """
-    known = (name for name in logged if name in PARAMETERS or name in PREDECESSORS)
+    known = (name for name in logged if name in PARAMETERS or name in _BECAME)
     sound = {name: logged[name] for name in known if math.isfinite(logged[name])}
-    return {name: as_float32(float(value)) for name, value in migrate_names(sound).items() if name in PARAMETERS}
+    return {
+        name: as_float32(float(value)) for name, value in migrate_names(sound, _BECAME).items() if name in PARAMETERS
+    }
 
 
 def complete(
@@ -252,5 +254,10 @@ PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
     {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE)}
 )
 """EKF2 parameters of the baseline release, by name in alphabetical order."""
+
+_BECAME = {name: metadata.became for name, metadata in ALL_PARAMETERS.items() if metadata.became} | dict(
+    SENSOR_PARAMETERS
+)
+"""Parameters of other releases that tell those of the baseline."""
 
 _DEFAULTS = {name: metadata.default for name, metadata in PARAMETERS.items()}
