@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from fusetune.px4.aid_sources import SensorTopic
 from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 from fusetune.px4.releases import BASELINE, DEVELOPMENT, DEVIATIONS, FIRST, NEWEST, READ, deviation_of, name_of
 
@@ -12,6 +13,7 @@ from fusetune.px4.releases import BASELINE, DEVELOPMENT, DEVIATIONS, FIRST, NEWE
 def test_all_releases_between_the_first_and_the_newest_are_read() -> None:
     assert (READ[0], READ[-1]) == (FIRST, NEWEST)
     assert BASELINE in READ
+    assert SensorTopic("of_all_releases").since == FIRST
 
 
 @pytest.mark.parametrize(

@@ -143,9 +143,8 @@ def migrate(logged: Mapping[str, float | int], release: Release | None = None) -
     """
     known = (name for name in logged if name in PARAMETERS or name in _BECAME)
     sound = {name: logged[name] for name in known if math.isfinite(logged[name])}
-    return {
-        name: as_float32(float(value)) for name, value in migrate_names(sound, _BECAME).items() if name in PARAMETERS
-    }
+    migrated = migrate_names(sound, _BECAME)
+    return {name: as_float32(float(value)) for name, value in migrated.items() if name in PARAMETERS}
 
 
 def complete(
@@ -255,9 +254,10 @@ PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
 )
 """EKF2 parameters of the baseline release, by name in alphabetical order."""
 
-_BECAME = {name: metadata.became for name, metadata in ALL_PARAMETERS.items() if metadata.became} | dict(
-    SENSOR_PARAMETERS
-)
+_BECAME: Mapping[str, tuple[str, ...]] = {
+    **{name: metadata.became for name, metadata in ALL_PARAMETERS.items() if metadata.became},
+    **SENSOR_PARAMETERS,
+}
 """Parameters of other releases that tell those of the baseline."""
 
 _DEFAULTS = {name: metadata.default for name, metadata in PARAMETERS.items()}
