@@ -51,11 +51,5 @@ for each in workflow.rules:
     each.set_input(before_any_job)
 
 
-onstart:
-    # The limit to the rate of jobs makes Snakemake look for jobs to start once a second more with every job that ends.
-    if workflow.local_exec:
-        workflow.scheduler.job_rate_limiter = None
-
-
 onsuccess:
     print(closing_words())

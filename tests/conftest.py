@@ -24,11 +24,17 @@ SHARING_FOLDERS = ("tests/workflow", "tests/ekf2", "tests/report")
 """Folders whose files share what takes long to make: a run of the pipeline, compiled functions, a report."""
 
 
-def _shared_part(name: str) -> Path:
-    folder = SHARED / name
-    if not folder.is_dir():
-        pytest.skip(f"needs {name} of real flights in {folder} (or below FUSETUNE_SHARED), which is not there")
-    return folder
+def _shared_folder(name: str, what: str) -> Any:
+    """A fixture: a folder beside the project; the test is skipped where it does not exist."""
+
+    def shared() -> Path:
+        folder = SHARED / name
+        if not folder.is_dir():
+            pytest.skip(f"needs {name} of real flights in {folder} (or below FUSETUNE_SHARED), which is not there")
+        return folder
+
+    shared.__doc__ = f"Folder of {what}; the test is skipped where it does not exist."
+    return pytest.fixture(scope="session", name=f"shared_{name}")(shared)
 
 
 def _shared_scope(nodeid: str) -> str:
@@ -111,25 +117,7 @@ def golden_reference() -> Path:
     return GOLDEN_REFERENCE
 
 
-@pytest.fixture(scope="session")
-def shared_logs() -> Path:
-    """Folder of real flight logs; the test is skipped where it does not exist."""
-    return _shared_part("logs")
-
-
-@pytest.fixture(scope="session")
-def shared_reference() -> Path:
-    """Folder of PX4's own replays of the real logs; the test is skipped where it does not exist."""
-    return _shared_part("reference")
-
-
-@pytest.fixture(scope="session")
-def shared_reference_random() -> Path:
-    """Folder of PX4's own replays with random parameter sets; the test is skipped where it does not exist."""
-    return _shared_part("reference_random")
-
-
-@pytest.fixture(scope="session")
-def shared_data() -> Path:
-    """Folder of fact tables; the test is skipped where it does not exist."""
-    return _shared_part("data")
+shared_logs = _shared_folder("logs", "real flight logs")
+shared_reference = _shared_folder("reference", "PX4's own replays of the real logs")
+shared_reference_random = _shared_folder("reference_random", "PX4's own replays with random parameter sets")
+shared_data = _shared_folder("data", "fact tables")

@@ -19,10 +19,9 @@ from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.save.thresholds import VerdictThresholds
-from fusetune.settings.checking import checked, validate
+from fusetune.settings.checking import checked, read_checked
 from fusetune.settings.declaration import section, setting
 from fusetune.settings.schema import schema_of
-from fusetune.settings.yaml_reader import read_yaml
 from fusetune.storage.files import AnyPath
 
 
@@ -102,9 +101,7 @@ def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None
     schema = schema_of(Configuration)
     asked: dict[str, Any] = {}
     for file in files:
-        values = read_yaml(file)
-        validate(values, schema, file)
-        asked = _joined(asked, values)
+        asked = _joined(asked, read_checked(file, schema))
     return checked(Configuration, _joined(asked, given or {}), "--config" if given else files[-1])
 
 

@@ -6,8 +6,9 @@ import pytest
 from tests.apply.statistics.test_leave_one_out import flight
 
 from fusetune.apply.choice import choose, parameter_distance
-from fusetune.apply.ranking import AimComparison, RankedSet, is_proved
+from fusetune.apply.ranking import RankedSet, is_proved
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.statistics.mean_difference import MeanDifference
 from fusetune.apply.wording import _for_the_pick
 
 
@@ -41,7 +42,7 @@ def test_a_better_score_that_may_be_luck_does_not_stand_before_a_proved_one() ->
 
 
 def test_a_set_that_is_worse_in_one_kind_of_prediction_is_not_eligible() -> None:
-    worse = {"aided": AimComparison(0.02, 0.01, 0.03, 6)}
+    worse = {"aided": MeanDifference(0.02, 0.01, 0.03, 6)}
     assert chosen(one("b", -0.2, -0.1, aims=worse), one("c", -0.1, -0.05)) == "c"
 
 

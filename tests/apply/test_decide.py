@@ -129,6 +129,7 @@ def test_a_set_that_fails_on_one_flight_is_not_eligible_but_shown(tmp_path: Path
     one = ranked(decision, "tempting")
     assert (one["status"], one["flights"], decision["status"]) == ("not eligible", 5, "keep")
     assert "flight_2: starts aiding 28.0 s later" in one["reasons"][0]
+    assert {aim["flights"] for aim in one["aims"].values()} == {5}
 
 
 def test_no_flight_at_all_is_no_evidence_and_a_valid_file(tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
-from fusetune.apply.paper_disagreement import Disagreement, LogRatio, PaperView, reasons
+from fusetune.apply.paper_disagreement import Disagreement, PaperView, reasons
+from fusetune.apply.statistics.mean_difference import MeanDifference
 
 FIRST = PaperView("follower", 0.3, 0.4, {"a": 0.5, "b": 0.6, "c": 0.4}, 0.5, 0, 3)
 CHOSEN = PaperView("present", 0.48, 0.36, {"a": 0.6, "b": 0.7, "c": 0.3}, 0.4, 0, 3)
@@ -19,9 +20,9 @@ CASE = Disagreement(
     first=FIRST,
     chosen=CHOSEN,
     any_consistent=False,
-    aided=LogRatio(math.log(1.02), math.log(0.98), math.log(1.06)),
-    unaided=LogRatio(math.log(1.5), math.log(1.2), math.log(1.8)),
-    score=LogRatio(math.log(1.2), math.log(0.95), math.log(1.4)),
+    aided=MeanDifference(math.log(1.02), math.log(0.98), math.log(1.06), 6),
+    unaided=MeanDifference(math.log(1.5), math.log(1.2), math.log(1.8), 6),
+    score=MeanDifference(math.log(1.2), math.log(0.95), math.log(1.4), 6),
     position_white_share=0.25,
     objections=(),
     confidence=0.95,

@@ -27,7 +27,8 @@ from fusetune.px4.aid_sources import (
     AidSource,
 )
 from fusetune.px4.layouts.estimator_layouts import control_bits
-from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, BASELINE_RELEASE
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
+from fusetune.px4.releases import BASELINE
 
 EVERY = pytest.mark.parametrize("source", AID_SOURCES.values(), ids=list(AID_SOURCES))
 
@@ -42,7 +43,7 @@ def _parameters(source: AidSource) -> set[str]:
 @EVERY
 def test_every_parameter_exists_in_the_release_that_is_replayed(source: AidSource) -> None:
     for name in _parameters(source):
-        assert ALL_PARAMETERS[name].exists_in(BASELINE_RELEASE), name
+        assert ALL_PARAMETERS[name].exists_in(BASELINE), name
 
 
 @EVERY
@@ -60,7 +61,7 @@ def test_parameters_have_the_kind_and_the_unit_of_what_they_are(source: AidSourc
 
 @EVERY
 def test_every_start_of_a_name_begins_a_parameter_of_the_release_that_is_replayed(source: AidSource) -> None:
-    names = [name for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE_RELEASE)]
+    names = [name for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE)]
     for start in source.acts:
         assert any(name.startswith(start) for name in names), start
 

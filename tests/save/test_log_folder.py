@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.px4.same_topics import assert_same_topics
 
 from fusetune.errors import UserError
 from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory
@@ -117,12 +118,7 @@ def test_a_disk_that_takes_only_a_part_of_a_table_is_told_of(log: Path, tmp_path
 def test_flight_comes_back_as_it_was_read(tmp_path: Path, log: Path) -> None:
     assert save_log(log, tmp_path / "saved" / "made").status == "replayable"
     saved, read = load_flight(tmp_path / "saved" / "made"), read_ulog(log)
-    assert saved.topics.keys() == read.topics.keys()
-    for key, table in read.topics.items():
-        assert saved.topics[key].keys() == table.keys()
-        for name, values in table.items():
-            assert saved.topics[key][name].dtype == values.dtype
-            np.testing.assert_array_equal(saved.topics[key][name], values)
+    assert_same_topics(saved, read)
     assert np.isnan(saved.parameters.initial.pop("NAN_PARAMETER"))
     assert np.isnan(read.parameters.initial.pop("NAN_PARAMETER"))
     assert saved.parameters == read.parameters

@@ -20,7 +20,8 @@ from fusetune.apply.paper_mode import (
 )
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.statistics.bootstrap import bootstrap_scores, interval_over_flights, units_redrawn
+from fusetune.apply.statistics.bootstrap import bootstrap_scores, units_redrawn
+from fusetune.apply.statistics.mean_difference import MeanDifference, mean_difference
 from fusetune.apply.statistics.rounding import without_rounding
 
 WANDERING = 0.6
@@ -146,29 +147,14 @@ def _by_flight(
 
 
 @dataclass(frozen=True)
-class LogRatio:
-    """By how much the logarithm of a prediction error of the paper's set exceeds that of the decision's set.
-
-    The interval is None where nothing shows the spread of the difference.
-    """
-
-    difference: float
-    lower: float | None
-    upper: float | None
-
-    @property
-    def is_certain(self) -> bool:
-        return self.lower is not None and self.upper is not None and (self.lower > 0.0 or self.upper < 0.0)
-
-
-@dataclass(frozen=True)
 class Disagreement:
     """The paper's first set and the decision's set, and how they differ.
 
     Attributes
     ----------
     any_consistent : whether any set's mean NIS lies inside the paper's bounds on half of the flights at least
-    aided, unaided, score : the paper's set against the decision's; None where no flight tells
+    aided, unaided, score : by how much the logarithm of a prediction error of the paper's set exceeds that of the
+        decision's set; None where no flight tells
     position_white_share : how white the error of GNSS position is; NaN where unknown
     objections : why the decision may not choose the paper's set, in words; empty where it may
     confidence : level of the intervals
@@ -177,9 +163,9 @@ class Disagreement:
     first: PaperView
     chosen: PaperView
     any_consistent: bool
-    aided: LogRatio | None
-    unaided: LogRatio | None
-    score: LogRatio | None
+    aided: MeanDifference | None
+    unaided: MeanDifference | None
+    score: MeanDifference | None
     position_white_share: float
     objections: Sequence[str]
     confidence: float
@@ -187,9 +173,9 @@ class Disagreement:
 
 def _log_ratios(
     one: str, other: str, flights: Sequence[AnalyzedFlight], settings: DecisionSettings
-) -> dict[str, LogRatio | None]:
+) -> dict[str, MeanDifference | None]:
     """One set against another on the flights that have both: in each kind of prediction, and the score."""
-    ratios: dict[str, LogRatio | None] = dict.fromkeys((*AIMS, "score"))
+    ratios: dict[str, MeanDifference | None] = dict.fromkeys((*AIMS, "score"))
     both = [evidence for flight in flights if (evidence := flight.evidence) and {one, other} <= set(evidence.sets)]
     if not both:
         return ratios
@@ -205,9 +191,7 @@ def _log_ratios(
                 [row[flight.sets.index(one)] - row[flight.sets.index(other)] for flight, row in found]
             )
             units = units_redrawn(both, None if name == "score" else name)
-            interval = interval_over_flights(draws[:, 0] - draws[:, 1], each, units, settings.confidence)
-            lower, upper = (interval.lower, interval.upper) if interval else (None, None)
-            ratios[name] = LogRatio(float(each.mean()), lower, upper)
+            ratios[name] = mean_difference(draws[:, 0] - draws[:, 1], each, units, settings.confidence)
     return ratios
 
 
@@ -286,7 +270,7 @@ def _consistency(case: Disagreement) -> list[str]:
     ]
 
 
-def _prediction(where: str, ratio: LogRatio, case: Disagreement) -> str:
+def _prediction(where: str, ratio: MeanDifference, case: Disagreement) -> str:
     change = 100.0 * math.expm1(ratio.difference)
     span = "how far chance could do that is not known"
     if ratio.lower is not None and ratio.upper is not None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,15 +13,14 @@ from fusetune.apply.statistics.bootstrap import (
     FEWEST_REDRAWN,
     Redrawn,
     bootstrap_scores,
-    expanded_interval,
     holm,
-    interval_over_flights,
     p_value,
     probability_best,
     spread_of_flights,
     standard_error,
     units_redrawn,
 )
+from fusetune.apply.statistics.mean_difference import MeanDifference, mean_difference
 from fusetune.apply.statistics.rounding import EQUAL_WITHIN, without_rounding
 from fusetune.apply.statistics.sign_flips import family_p_values
 
@@ -33,26 +32,10 @@ PRESENT, ELIGIBLE, SAME, NOT_ELIGIBLE, NOT_SCORED = "flies now", "eligible", "sa
 
 
 @dataclass(frozen=True)
-class AimComparison:
-    """A set against the present one in one kind of prediction: mean difference of the score and its interval.
-
-    The interval is None where nothing shows the spread of the difference.
-    """
-
-    difference: float
-    lower: float | None
-    upper: float | None
-    flights: int
-
-    @property
-    def is_worse(self) -> bool:
-        """Worse than the present set beyond doubt."""
-        return self.lower is not None and self.lower > 0.0
-
-
-@dataclass(frozen=True)
 class RankedSet:
-    """One set in the ranking. What nothing shows the spread of is not known: None.
+    """One set in the ranking; by default it was scored on no flight.
+
+    What nothing shows the spread of is not known: None.
 
     Attributes
     ----------
@@ -69,27 +52,27 @@ class RankedSet:
     improvement_percent : by how much smaller its typical prediction error is than the present set's
     behind_best, behind_best_error : score less that of the best set, and its standard error; best is the lowest of
         those that are proved better than the present set, or where none is, of all that may be flown
-    aims : the comparison in each kind of prediction
+    aims : mean difference of the score to that of the present set in each kind of prediction
     """
 
     name: str
     is_present: bool
     reasons: tuple[str, ...]
-    score: float
-    difference: float
-    lower: float | None
-    upper: float | None
-    p_value: float | None
-    p_holm: float | None
-    p_family: float | None
-    p_best: float | None
-    flights: int
-    flights_better: int
-    equal_to_present: bool
-    improvement_percent: float
-    behind_best: float
-    behind_best_error: float | None
-    aims: dict[str, AimComparison]
+    score: float = math.nan
+    difference: float = math.nan
+    lower: float | None = None
+    upper: float | None = None
+    p_value: float | None = None
+    p_holm: float | None = None
+    p_family: float | None = None
+    p_best: float | None = None
+    flights: int = 0
+    flights_better: int = 0
+    equal_to_present: bool = False
+    improvement_percent: float = math.nan
+    behind_best: float = math.nan
+    behind_best_error: float | None = None
+    aims: dict[str, MeanDifference] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
@@ -177,28 +160,25 @@ def _compared(
     own = np.array([one.scores[one.sets.index(name)] for one in evidence])
     base = np.array([one.scores[one.sets.index(present)] for one in evidence])
     found = without_rounding(own - base)
-    difference = float(np.mean(found))
-    draws = spread_of_flights(_differences(redrawn.total, sets, name, present), found)
+    draws = _differences(redrawn.total, sets, name, present)
     units = units_redrawn(evidence)
-    interval = expanded_interval(draws, units, settings.confidence)
+    to_present = mean_difference(draws, found, units, settings.confidence)
     return RankedSet(
         name=name,
         is_present=name == present,
         reasons=tuple(vetoed.get(name, ())),
         score=float(np.mean(own)),
-        difference=difference,
-        lower=interval.lower if interval else None,
-        upper=interval.upper if interval else None,
-        p_value=p_value(difference, draws, units),
+        difference=to_present.difference,
+        lower=to_present.lower,
+        upper=to_present.upper,
+        p_value=p_value(to_present.difference, spread_of_flights(draws, found), units),
         p_holm=1.0,
         p_family=1.0,
         p_best=0.0,
         flights=len(evidence),
         flights_better=int(np.count_nonzero(found < 0.0)),
         equal_to_present=equal,
-        improvement_percent=improvement_percent(difference),
-        behind_best=math.nan,
-        behind_best_error=None,
+        improvement_percent=improvement_percent(to_present.difference),
         aims=_aims(name, present, evidence, sets, redrawn, settings),
     )
 
@@ -214,7 +194,7 @@ def _aims(
     sets: Sequence[str],
     redrawn: Redrawn,
     settings: DecisionSettings,
-) -> dict[str, AimComparison]:
+) -> dict[str, MeanDifference]:
     compared = {}
     for aim in AIMS:
         flights = [(one, part) for one in evidence if (part := one.aim(aim)) is not None]
@@ -224,9 +204,7 @@ def _aims(
             [part.scores[one.sets.index(name)] - part.scores[one.sets.index(present)] for one, part in flights]
         )
         draws = _aim_differences(aim, [one for one, _ in flights], redrawn, sets, name, present, settings)
-        interval = interval_over_flights(draws, found, units_redrawn(evidence, aim), settings.confidence)
-        lower, upper = (interval.lower, interval.upper) if interval else (None, None)
-        compared[aim] = AimComparison(float(np.mean(found)), lower, upper, len(flights))
+        compared[aim] = mean_difference(draws, found, units_redrawn(evidence, aim), settings.confidence)
     return compared
 
 
@@ -319,24 +297,4 @@ def _family_p_values(
 
 
 def _never_scored(name: str, present: str, vetoed: Mapping[str, Sequence[str]]) -> RankedSet:
-    nan = math.nan
-    return RankedSet(
-        name=name,
-        is_present=name == present,
-        reasons=tuple(vetoed.get(name, ())) or ("scored on no flight",),
-        score=nan,
-        difference=nan,
-        lower=None,
-        upper=None,
-        p_value=None,
-        p_holm=None,
-        p_family=None,
-        p_best=None,
-        flights=0,
-        flights_better=0,
-        equal_to_present=False,
-        improvement_percent=nan,
-        behind_best=nan,
-        behind_best_error=None,
-        aims={},
-    )
+    return RankedSet(name, name == present, tuple(vetoed.get(name, ())) or ("scored on no flight",))

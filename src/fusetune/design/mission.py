@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from fusetune.design.names import NAME_PATTERN, name_problem, one_line
-from fusetune.settings.checking import raise_problems, validate
+from fusetune.settings.checking import raise_problems, read_checked
 from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
-from fusetune.settings.yaml_reader import read_yaml
 
 Turn = Literal["fly_by", "fly_over"]
 LandingMode = Literal["land", "return"]
@@ -99,15 +98,8 @@ class Mission:
 
 
 def load_mission(path: str | os.PathLike[str]) -> Mission:
-    """Read and check a mission file.
-
-    Raises
-    ------
-    UserError
-        The file is broken; the message names every key at fault and what was expected.
-    """
-    document = read_yaml(path)
-    validate(document, schema_of(Mission), path)
+    """Read and check a mission file; `UserError` as of `read_checked`, and for places that cannot be flown to."""
+    document = read_checked(path, schema_of(Mission))
     mission = _mission_of(document)
     problem = name_problem(mission.name)
     raise_problems(path, [f"name: {problem}"] if problem else [], "Choose another name")

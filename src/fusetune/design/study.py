@@ -98,13 +98,7 @@ class Study:
 
 
 def load_study(path: str | os.PathLike[str]) -> Study:
-    """Read and check a study file.
-
-    Raises
-    ------
-    UserError
-        The file is broken; the message names every key at fault and what was expected.
-    """
+    """Read and check a study file; `UserError` as of `read_checked`, and for sets that cannot be told apart or set."""
     document = read_yaml(path)
     validate({key: document[key] for key in document if key == "kind"}, schema_of(_StudyKind), path)
     validate(document, schema_of(_FILE_OF_KIND[document["kind"]]), path)

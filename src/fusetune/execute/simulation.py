@@ -21,11 +21,12 @@ from fusetune.execute.world.groundtruth import groundtruth_topics
 from fusetune.execute.world.truth import Truth, simulate_truth
 from fusetune.execute.world.vehicle_state import sensor_selection, vehicle_land_detected, vehicle_status
 from fusetune.px4.flight import Flight, LoggedMessage, ParameterHistory, TopicKey, TopicTable
+from fusetune.px4.releases import BASELINE
 from fusetune.px4.ulog.writer import write_ulog
 
 LONGEST_FLIGHT_S = 4500.0
-RELEASE = (1 << 24) | (16 << 16) | 255
-"""v1.16.0 as PX4 encodes it; the last byte marks a release."""
+RELEASE = BASELINE[0] << 24 | BASELINE[1] << 16 | 255
+"""What the vehicle flies, as PX4 encodes it; the last byte marks a release."""
 
 
 def simulate(

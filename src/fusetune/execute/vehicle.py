@@ -10,10 +10,9 @@ from typing import Any
 
 from fusetune.design.names import NAME_PATTERN, one_line
 from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
-from fusetune.settings.checking import raise_problems, validate
+from fusetune.settings.checking import raise_problems, read_checked
 from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
-from fusetune.settings.yaml_reader import read_yaml
 
 
 @dataclass(frozen=True)
@@ -188,15 +187,8 @@ class Vehicle:
 
 
 def load_vehicle(path: str | os.PathLike[str]) -> Vehicle:
-    """Read and check a vehicle file.
-
-    Raises
-    ------
-    UserError
-        The file is broken; the message names every key at fault and what was expected.
-    """
-    document = read_yaml(path)
-    validate(document, schema_of(Vehicle), path)
+    """Read and check a vehicle file; `UserError` as of `read_checked`, and for values that do not go together."""
+    document = read_checked(path, schema_of(Vehicle))
     raise_problems(path, _problems(document), "Mend the named keys; config/vehicles/ holds examples")
     vehicle = built(Vehicle, document)
     return replace(vehicle, parameters=typed_values(vehicle.parameters), description=one_line(vehicle.description))

@@ -34,7 +34,7 @@ class SensorTopic:
     needed : fields without which it says nothing, or which every release has
     limits : by field
     since : first release whose estimator reads it
-    older : topics that it is made from in logs of earlier releases
+    made_of : topics that it is made of in logs of other releases
     stamped_by_sample : whether EKF2 takes its `timestamp_sample`, not its `timestamp`
     relative_field : field of `ekf2_timestamps` that names its messages
     """
@@ -43,7 +43,7 @@ class SensorTopic:
     needed: tuple[str, ...] = ()
     limits: Mapping[str, Limit] = field(default_factory=dict)
     since: Release = (1, 8)
-    older: tuple[str, ...] = ()
+    made_of: tuple[str, ...] = ()
     stamped_by_sample: bool = False
     relative_field: str = ""
 
@@ -207,7 +207,7 @@ SENSORS: Mapping[str, Sensor] = {sensor.name: sensor for sensor in (
         "vehicle_optical_flow",
         needed=(*vector("pixel_flow", 2), *vector("delta_angle"), "integration_timespan_us", "quality"),
         limits=of_vector("pixel_flow", _MAYBE_SPEED, 2) | of_vector("delta_angle", _MAYBE_SPEED),
-        since=(1, 14), older=("optical_flow",),
+        since=(1, 14), made_of=("optical_flow",),
         stamped_by_sample=True, relative_field="optical_flow_timestamp_rel",
     ),)),
     Sensor("ev", "external vision", "EKF2_EV_DELAY", (SensorTopic(
@@ -216,7 +216,7 @@ SENSORS: Mapping[str, Sensor] = {sensor.name: sensor for sensor in (
                 *vector("position_variance"), *vector("velocity_variance"), *vector("orientation_variance")),
         limits=of_vector("position", Limit(-1e7, 1e7, may_be_nan=True)) | of_vector("velocity", _MAYBE_SPEED)
         | of_vector("q", Limit(-1.5, 1.5, may_be_nan=True), 4),
-        since=(1, 9), older=("vehicle_vision_position", "vehicle_vision_attitude"),
+        since=(1, 9), made_of=("vehicle_vision_position", "vehicle_vision_attitude"),
         stamped_by_sample=True, relative_field="visual_odometry_timestamp_rel",
     ),)),
     Sensor("airspeed", "airspeed", "EKF2_ASP_DELAY", (

@@ -1,5 +1,7 @@
 """The save room: every log becomes a folder of tables with a verdict.
 
+Why a flight is refused: `verdict` puts the questions of `checks` to it, from the limits in `thresholds`.
+
 The functions load what they need when they are asked for, so that reading a saved flight costs no more than NumPy and
 pyarrow.
 """

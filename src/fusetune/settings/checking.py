@@ -19,7 +19,7 @@ import jsonschema
 from fusetune.errors import UserError
 from fusetune.settings.declaration import Settings, built
 from fusetune.settings.schema import schema_of
-from fusetune.settings.yaml_reader import describe
+from fusetune.settings.yaml_reader import describe, read_yaml
 
 MOST_PROBLEMS_SHOWN = 8
 MOST_PROBLEMS_SOUGHT = 100
@@ -83,6 +83,19 @@ def _contradictions(settings: Any, place: str) -> Iterator[str]:
         part = getattr(settings, each.name)
         if is_dataclass(part):
             yield from _contradictions(part, f"{place}{each.name}.")
+
+
+def read_checked(path: str | os.PathLike[str], schema: Mapping[str, Any]) -> dict[str, Any]:
+    """Read a YAML file and check it against a JSON schema.
+
+    Raises
+    ------
+    UserError
+        The file cannot be read, or as `validate`.
+    """
+    document = read_yaml(path)
+    validate(document, schema, path)
+    return document
 
 
 def validate(document: Mapping[str, Any], schema: Mapping[str, Any], path: str | os.PathLike[str]) -> None:

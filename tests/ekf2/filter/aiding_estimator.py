@@ -8,8 +8,8 @@ from fusetune.ekf2.filter.common.parameters import complete, parameter_record
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
 from fusetune.ekf2.filter.estimator import EKF, initialise_estimator
 from fusetune.ekf2.numerics.rotations import quat_to_dcm
+from fusetune.px4.releases import BASELINE
 
-BASELINE_RELEASE = (1, 16, 0)
 START_US = 100_000_000
 INTERVAL_US = 10_000
 CONSTANTS_ONE_G = 9.80665
@@ -17,7 +17,7 @@ CONSTANTS_ONE_G = 9.80665
 
 def parameters(**overrides: float) -> np.ndarray:
     """Defaults of the baseline release with some replaced; a one-element record array."""
-    return parameter_record(complete({}, overrides, BASELINE_RELEASE))
+    return parameter_record(complete({}, overrides, BASELINE))
 
 
 def new_estimator(params: np.ndarray | None = None) -> np.ndarray:

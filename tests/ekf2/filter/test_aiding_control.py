@@ -168,13 +168,18 @@ def _offer_airspeed(ekf: np.void, speed: float, time_us: int) -> None:
     ekf["sensors"]["airspeed"]["sample"]["eas2tas"] = 1.0
 
 
+def _fixed_wing(params: np.ndarray, velocity: list[float]) -> np.void:
+    """In level flight to the north, at a velocity (NED, m/s)."""
+    ekf = hovering(params)[0]
+    ekf["cs"]["fixed_wing"] = True
+    ekf["vel"] = velocity
+    return ekf
+
+
 def test_airspeed_starts_with_the_wind_of_level_flight() -> None:
     """North at 20 m/s over ground, heading north, 15 m/s through the air: a tailwind of 5 m/s."""
     params = parameters(EKF2_ARSP_THR=8.0)
-    memory = hovering(params)
-    ekf = memory[0]
-    ekf["cs"]["fixed_wing"] = True
-    ekf["vel"] = [20.0, 0.0, 0.0]
+    ekf = _fixed_wing(params, [20.0, 0.0, 0.0])
     _offer_airspeed(ekf, 15.0, START_US)
     control_air_data_fusion(ekf, params[0])
     assert ekf["cs"]["fuse_aspd"]
@@ -235,10 +240,7 @@ def test_sideslip_runs_every_150_ms_in_fixed_wing_flight() -> None:
 
 def test_wind_is_given_up_ten_seconds_after_the_last_observation() -> None:
     params = parameters(EKF2_FUSE_BETA=1)
-    memory = hovering(params)
-    ekf = memory[0]
-    ekf["cs"]["fixed_wing"] = True
-    ekf["vel"] = [15.0, 1.0, 0.0]
+    ekf = _fixed_wing(params, [15.0, 1.0, 0.0])
     control_beta_fusion(ekf, params[0])
     for elapsed, expected in ((10_000_000, True), (10_000_001, False)):
         set_time(ekf, START_US + elapsed)

@@ -19,6 +19,7 @@ from fusetune.px4.parameters.ekf2_parameters import (
     complete,
     migrate,
 )
+from fusetune.px4.releases import READ, name_of
 
 
 def test_number_of_parameters_of_the_baseline() -> None:
@@ -39,11 +40,11 @@ def test_shipped_facts_agree_with_the_table_of_facts(shared_data: Path) -> None:
     for name, row in rows.items():
         metadata = ALL_PARAMETERS[name]
         assert (metadata.type, metadata.unit) == (row["type"], row["unit"])
-        for minor in range(8, 18):
-            default = row[f"default_v1.{minor}"]
-            assert metadata.exists_in((1, minor)) == (default != ""), (name, minor)
+        for release in READ:
+            default = row[f"default_{name_of(release)}"]
+            assert metadata.exists_in(release) == (default != ""), (name, release)
             if default:
-                assert metadata.default_in((1, minor)) == as_float32(float(default)), (name, minor)
+                assert metadata.default_in(release) == as_float32(float(default)), (name, release)
 
 
 def test_defaults_change_with_the_release() -> None:

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 from pyulog import ULog
+from tests.px4.same_topics import assert_same_topics
 
 from fusetune.px4.flight import Dropout, Flight, LoggedMessage, ParameterChange, ParameterHistory
 from fusetune.px4.ulog.reader import read_ulog
@@ -46,15 +47,6 @@ def flights(draw: st.DrawFn) -> Flight:
     return Flight(
         "made", topics, history, info={"sys_name": "PX4", "ver_sw_release": 0x011000FF}, start_timestamp=10**6
     )
-
-
-def assert_same_topics(read: Flight, written: Flight) -> None:
-    assert read.topics.keys() == written.topics.keys()
-    for key, table in written.topics.items():
-        assert read.topics[key].keys() == table.keys()
-        for name, values in table.items():
-            assert read.topics[key][name].dtype == values.dtype
-            np.testing.assert_array_equal(read.topics[key][name], values)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -4,33 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
-from fusetune.px4.flight import TopicTable, row_count
+from fusetune.analyze.reconstruction.between_samples import NewRows, interpolate, share_of_way
+from fusetune.px4.flight import TopicTable
 
 INTERPOLATED = ("baro_alt_meter", "rho", "baro_temp_celcius", "baro_pressure_pa")
 
 
 def interpolate_barometer(table: TopicTable, rate_hz: float, max_bridge_s: float) -> tuple[TopicTable, np.ndarray]:
-    """Interpolate `vehicle_air_data` to a higher rate.
+    """Canonical `vehicle_air_data` at a higher rate; all else as of `interpolate`."""
 
-    Parameters
-    ----------
-    table : canonical `vehicle_air_data`
-    rate_hz : samples are placed evenly between two measured ones, this many a second at most
-    max_bridge_s : measured samples that are further apart stay as they are
+    def on_the_line(sampled: np.ndarray, time: np.ndarray, place: np.ndarray) -> NewRows:
+        share = share_of_way(sampled, time, place)
+        values = {}
+        for name in INTERPOLATED:
+            if name in table:
+                column = table[name].astype(np.float64)
+                values[name] = column[place - 1] + share * (column[place] - column[place - 1])
+        return time, place, values
 
-    Returns
-    -------
-    The table, and for each of its rows whether it was measured.
-    """
-    time, place = insertion_times(table, rate_hz, max_bridge_s)
-    if not len(time):
-        return table, np.ones(row_count(table), np.bool_)
-    sampled = table["timestamp_sample"].astype(np.int64)
-    share = (time - sampled[place - 1]) / (sampled[place] - sampled[place - 1])
-    values = {}
-    for name in INTERPOLATED:
-        if name in table:
-            column = table[name].astype(np.float64)
-            values[name] = column[place - 1] + share * (column[place] - column[place - 1])
-    return insert_rows(table, time, place, values)
+    return interpolate(table, rate_hz, max_bridge_s, on_the_line)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fusetune.px4.flight import TopicTable, row_count
+
+NewRows = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
+"""Sample times (M,) µs of new rows, the row before which each is to stand (M,), and their values by column."""
 
 RATE_SEARCH, RATE_STEPS = 0.2, 401
 MIN_AGREEMENT, SAME_AGREEMENT, MIN_PHASES, MAX_PHASE_S = 0.9, 0.005, 16, 1.0
@@ -35,6 +40,36 @@ def sensor_rate_hz(table: TopicTable, nominal_hz: float) -> float:
         return nominal_hz
     best = rates[agreement >= agreement.max() - SAME_AGREEMENT]
     return float(best[np.argmin(np.abs(best - nominal_hz))])
+
+
+def interpolate(
+    table: TopicTable,
+    rate_hz: float,
+    max_bridge_s: float,
+    rows_at: Callable[[np.ndarray, np.ndarray, np.ndarray], NewRows],
+) -> tuple[TopicTable, np.ndarray]:
+    """Bring a topic to a higher rate.
+
+    Parameters
+    ----------
+    rate_hz : samples are placed evenly between two measured ones, this many a second at most
+    max_bridge_s : measured samples that are further apart stay as they are
+    rows_at : makes the new rows, or those of them that can be known, of the sample times (N,) µs of the table, and the
+        times and places of the new rows
+
+    Returns
+    -------
+    The table, and for each of its rows whether it was measured.
+    """
+    time, place = insertion_times(table, rate_hz, max_bridge_s)
+    if not len(time):
+        return table, np.ones(row_count(table), np.bool_)
+    return insert_rows(table, *rows_at(table["timestamp_sample"].astype(np.int64), time, place))
+
+
+def share_of_way(sampled: np.ndarray, time: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Where new rows lie (M,) between the measured ones on either side: 0 at the row before, 1 at the row after."""
+    return np.asarray((time - sampled[place - 1]) / (sampled[place] - sampled[place - 1]))
 
 
 def insertion_times(table: TopicTable, rate_hz: float, max_bridge_s: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fusetune.analyze.reconstruction.attitude import AttitudeHistory
-from fusetune.analyze.reconstruction.between_samples import insert_rows, insertion_times
+from fusetune.analyze.reconstruction.between_samples import NewRows, interpolate, share_of_way
 from fusetune.analyze.reconstruction.magnetic_field import magnetic_field
-from fusetune.px4.flight import TopicTable, row_count, stacked
+from fusetune.px4.flight import TopicTable, stacked
 
 MIN_SPLINE_SAMPLES = 16
 
@@ -21,34 +21,27 @@ MIN_SPLINE_SAMPLES = 16
 def interpolate_magnetometer(
     table: TopicTable, attitude: AttitudeHistory, rate_hz: float, max_bridge_s: float
 ) -> tuple[TopicTable, np.ndarray]:
-    """Interpolate `vehicle_magnetometer` to a higher rate.
+    """Interpolate `vehicle_magnetometer` to a higher rate; all else as of `interpolate`.
 
     Parameters
     ----------
     table : canonical `vehicle_magnetometer` of one device
     attitude : of the vehicle, in a frame that hardly moves (`steady_history`)
-    rate_hz : samples are placed evenly between two measured ones, this many a second at most
-    max_bridge_s : measured samples that are further apart stay as they are
-
-    Returns
-    -------
-    The table, and for each of its rows whether it was measured.
     """
-    time, place = insertion_times(table, rate_hz, max_bridge_s)
-    if not len(time):
-        return table, np.ones(row_count(table), np.bool_)
-    sampled = table["timestamp_sample"].astype(np.int64)
-    measured = stacked(table, "magnetometer_ga")
-    q, known = attitude.at(sampled)
-    q_new, known_new = attitude.at(time)
-    usable = known_new & known[place - 1] & known[place]
-    time, place, q_new = time[usable], place[usable], q_new[usable]
-    field = magnetic_field(sampled[known], q[known], measured[known])
-    earth = np.zeros_like(measured)
-    earth[known] = field.earth
-    between = field.seen(_between(sampled, earth, known, time, place), q_new)
-    values = {f"magnetometer_ga[{axis}]": between[:, axis] for axis in range(3)}
-    return insert_rows(table, time, place, values)
+
+    def where_the_attitude_is_known(sampled: np.ndarray, time: np.ndarray, place: np.ndarray) -> NewRows:
+        measured = stacked(table, "magnetometer_ga")
+        q, known = attitude.at(sampled)
+        q_new, known_new = attitude.at(time)
+        usable = known_new & known[place - 1] & known[place]
+        time, place, q_new = time[usable], place[usable], q_new[usable]
+        field = magnetic_field(sampled[known], q[known], measured[known])
+        earth = np.zeros_like(measured)
+        earth[known] = field.earth
+        between = field.seen(_between(sampled, earth, known, time, place), q_new)
+        return time, place, {f"magnetometer_ga[{axis}]": between[:, axis] for axis in range(3)}
+
+    return interpolate(table, rate_hz, max_bridge_s, where_the_attitude_is_known)
 
 
 def _between(
@@ -60,7 +53,7 @@ def _between(
     """
     if _spline_is_nearer(earth[known]):
         return np.asarray(CubicSpline(sampled[known] * 1e-6, earth[known])(time * 1e-6))
-    share = ((time - sampled[place - 1]) / (sampled[place] - sampled[place - 1]))[:, None]
+    share = share_of_way(sampled, time, place)[:, None]
     return earth[place - 1] + share * (earth[place] - earth[place - 1])
 
 

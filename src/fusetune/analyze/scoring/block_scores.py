@@ -5,22 +5,17 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.metrics.likelihood import gaussian_nll, student_t_nll, winsorised
+from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, SamplesOfSet
 
 BLOCK_SCHEMA = pa.schema(
     [
-        pa.field("flight", pa.string()),
-        pa.field("set", pa.string()),
-        pa.field("source", pa.string()),
-        pa.field("axis", pa.int32()),
+        *FLIGHT_AND_SET,
+        *SOURCE_AND_AXIS,
         pa.field("block", pa.int32()),
         pa.field("n", pa.int64()),
-        pa.field("sum_squared_innovation", pa.float64()),
-        pa.field("sum_nis", pa.float64()),
-        pa.field("sum_nis_winsorised", pa.float64()),
-        pa.field("sum_log_variance", pa.float64()),
-        pa.field("sum_nll", pa.float64()),
-        pa.field("sum_nll_student_t", pa.float64()),
+        *columns_of(pa.float64(), "sum_squared_innovation", "sum_nis", "sum_nis_winsorised", "sum_log_variance"),
+        *columns_of(pa.float64(), "sum_nll", "sum_nll_student_t"),
     ]
 )
 """One row per set, source, axis and block; `n` is the same for all sets of a flight."""

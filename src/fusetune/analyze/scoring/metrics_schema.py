@@ -2,17 +2,9 @@
 
 import pyarrow as pa
 
+from fusetune.analyze.scoring.columns import BY_AXIS, columns_of
+
 METRICS_SCHEMA = pa.schema(
-    [
-        pa.field("flight", pa.string()),
-        pa.field("set", pa.string()),
-        pa.field("source", pa.string()),
-        pa.field("axis", pa.string()),
-        pa.field("metric", pa.string()),
-        pa.field("value", pa.float64()),
-        pa.field("lower", pa.float64()),
-        pa.field("upper", pa.float64()),
-        pa.field("n", pa.float64()),
-    ]
+    [*BY_AXIS, pa.field("metric", pa.string()), *columns_of(pa.float64(), "value", "lower", "upper", "n")]
 )
 """`n` is the number of samples behind the figure (N_eff where the figure says so), `lower`, `upper` its bounds."""

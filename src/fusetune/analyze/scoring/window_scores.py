@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.metrics.metric import Innovations
+from fusetune.analyze.scoring.columns import BY_AXIS, columns_of
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, innovations_of
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.window import ScoringWindow
@@ -16,13 +17,9 @@ Array = npt.NDArray[np.float64]
 
 WINDOW_SCHEMA = pa.schema(
     [
-        pa.field("flight", pa.string()),
-        pa.field("set", pa.string()),
-        pa.field("source", pa.string()),
-        pa.field("axis", pa.string()),
+        *BY_AXIS,
         pa.field("window", pa.int32()),
-        pa.field("start_us", pa.int64()),
-        pa.field("stop_us", pa.int64()),
+        *columns_of(pa.int64(), "start_us", "stop_us"),
         pa.field("metric", pa.string()),
         pa.field("value", pa.float64()),
         pa.field("n", pa.int64()),

@@ -13,6 +13,7 @@ from fusetune.analyze.metrics.innovation_metrics import rms_innovation
 from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, winsorised
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
+from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
 from fusetune.analyze.scoring.window import ScoringWindow
@@ -22,19 +23,15 @@ Array = npt.NDArray[np.float64]
 
 WITHHELD_SCHEMA = pa.schema(
     [
-        pa.field("flight", pa.string()),
-        pa.field("set", pa.string()),
+        *FLIGHT_AND_SET,
         pa.field("sensor", pa.string()),
         pa.field("gap", pa.int32()),
         pa.field("start_us", pa.int64()),
         pa.field("block", pa.int32()),
-        pa.field("source", pa.string()),
-        pa.field("axis", pa.int32()),
+        *SOURCE_AND_AXIS,
         pa.field("horizon_s", pa.float64()),
         pa.field("n", pa.int32()),
-        pa.field("error", pa.float64()),
-        pa.field("error_winsorised", pa.float64()),
-        pa.field("variance", pa.float64()),
+        *columns_of(pa.float64(), "error", "error_winsorised", "variance"),
     ]
 )
 """One row per set, gap, source, axis and horizon. `error` (prediction less measurement, in the unit of the source) and

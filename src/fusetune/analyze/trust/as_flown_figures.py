@@ -24,9 +24,7 @@ from fusetune.ekf2.replay.recording import RecordArrays, with_fields
 from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 from fusetune.px4.flight import Flight
-
-ONE_HEIGHT_SOURCE_BEFORE = (1, 14)
-"""Earlier releases take the height from one source at a time, v1.16 from all that are enabled."""
+from fusetune.px4.releases import ALL_HEIGHT_SOURCES
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ def as_flown_figures(
 
 
 def _has_one_height_source(flight: Flight) -> bool:
-    return flight.release is not None and flight.release[:2] < ONE_HEIGHT_SOURCE_BEFORE
+    return flight.release is not None and flight.release < ALL_HEIGHT_SOURCES
 
 
 def compared_rows(onboard: Mapping[SourceAxis, AxisSamples]) -> Callable[[RecordArrays], RecordArrays]:

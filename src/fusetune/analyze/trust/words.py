@@ -8,7 +8,7 @@ from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
 from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.finding import Finding, Severity
 from fusetune.px4.flight import Flight
-from fusetune.px4.parameters.ekf2_parameters import BASELINE_RELEASE
+from fusetune.px4.releases import BASELINE, name_of
 
 FIGURE_NAMES = {
     "innovation_factor": "the size of the innovations",
@@ -89,6 +89,6 @@ def not_compared(names: Sequence[str]) -> Finding:
 
 def other_release(flight: Flight) -> str:
     """That the vehicle flew another release than the one that is replayed; empty where it did not, or is not known."""
-    if flight.release is None or flight.release[:2] == BASELINE_RELEASE:
+    if flight.release is None or flight.release[:2] == BASELINE:
         return ""
-    return f"the vehicle flew {flight.release_name}, the replay behaves like {'v{}.{}'.format(*BASELINE_RELEASE)}"
+    return f"the vehicle flew {flight.release_name}, the replay behaves like {name_of(BASELINE)}"

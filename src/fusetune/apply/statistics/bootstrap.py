@@ -182,11 +182,6 @@ def expanded_interval(draws: Array, units: int, confidence: float) -> Interval |
     return Interval(float(lower), float(upper))
 
 
-def interval_over_flights(draws: Array, differences: Array, units: int, confidence: float) -> Interval | None:
-    """Interval of a mean difference from its redrawn means (D,) and the differences on the flights (F,)."""
-    return expanded_interval(spread_of_flights(draws, differences), units, confidence)
-
-
 def p_value(difference: float, draws: Array, units: int) -> float | None:
     """Two-sided p-value of a mean difference against 0: Student's t with the bootstrap's standard error.
 

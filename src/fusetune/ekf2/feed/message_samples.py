@@ -30,6 +30,7 @@ from fusetune.ekf2.feed.sensor_samples import (
 )
 from fusetune.px4.flight import TopicTable, row_count, stacked
 from fusetune.px4.layouts.sensor_layouts import STANDARD_AIR_DENSITY_KG_M3
+from fusetune.px4.releases import AIRSPEED_SELECTED, GNSS_VELOCITY_VALID, VALIDATED_AIRSPEED, VISION_FRAMES, Release
 from fusetune.px4.sample_times import measurement_time
 
 MICROSECOND_S = np.float32(1e-6)
@@ -38,18 +39,6 @@ QUATERNION_NORM_TOLERANCE = 1e-5
 DOWNWARD_FACING = 25
 MAX_FLOW_TIMESPAN_US = 1e6
 FLOW_QUALITY_MAX = 255.0
-
-Release = tuple[int, int, int]
-
-GNSS_NEEDS_VELOCITY = (1, 14, 0)
-"""Since then (November 2022) GNSS without valid velocity is dropped; before, `vel_ned_valid` decided nothing."""
-
-VISION_NEEDS_FRAMES = (1, 14, 0)
-"""Since then vision of unknown frame is dropped, and quaternions that are no unit; before, any number was used."""
-
-USES_VALIDATED_AIRSPEED, NEEDS_SELECTED_AIRSPEED = (1, 13, 0), (1, 14, 0)
-"""Before the first the raw sensor alone was read; between the two nothing asked whether a sensor was selected."""
-
 
 NO_NUMBER, NOT_DOWN, NOT_STATIC = "no number", "not facing down", "target not static"
 
@@ -126,7 +115,7 @@ def gnss_refusals(table: TopicTable, release: Release | None = None) -> list[Ref
 
     Of a log that does not tell its release, the fields do, nearly: latitude was whole numbers until mid-2023.
     """
-    is_older = "lat" in table if release is None else release < GNSS_NEEDS_VELOCITY
+    is_older = "lat" in table if release is None else release < GNSS_VELOCITY_VALID
     if is_older:
         return []
     return [Refusal("velocity not valid (vel_ned_valid)", ~(column(table, "vel_ned_valid", 1.0) > 0))]
@@ -175,7 +164,7 @@ def airspeed_samples(table: TopicTable, scale: float) -> np.ndarray:
 def validated_airspeed_refusals(table: TopicTable, release: Release | None = None) -> list[Refusal]:
     """Messages of `airspeed_validated` without airspeed, or without a sensor that it comes from."""
     refusals = [Refusal(NO_NUMBER, ~np.isfinite(column(table, "true_airspeed_m_s")))]
-    if release is None or not USES_VALIDATED_AIRSPEED <= release < NEEDS_SELECTED_AIRSPEED:
+    if release is None or not VALIDATED_AIRSPEED <= release < AIRSPEED_SELECTED:
         source = column(table, "airspeed_source" if "airspeed_source" in table else "selected_airspeed_index", 0.0)
         refusals.append(Refusal("no airspeed sensor selected", ~(source > 0)))
     return refusals
@@ -291,7 +280,7 @@ def vision_refusals(table: TopicTable, release: Release | None = None) -> Vision
 
 
 def _takes_any_frame(table: TopicTable, release: Release | None) -> bool:
-    return "local_frame" in table if release is None else release < VISION_NEEDS_FRAMES
+    return "local_frame" in table if release is None else release < VISION_FRAMES
 
 
 def _vision_frames(table: TopicTable, release: Release | None) -> tuple[np.ndarray, np.ndarray]:

@@ -25,6 +25,7 @@ from fusetune.ekf2.feed.sensor_samples import (
 )
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import Flight, TopicTable, row_count
+from fusetune.px4.releases import VALIDATED_AIRSPEED, Release
 
 AIRSPEED_VALIDATED_MAX_AGE_US = 3_000_000
 
@@ -52,7 +53,7 @@ def only_usable(newest: np.ndarray, usable: np.ndarray) -> np.ndarray:
     return np.where((newest >= 0) & usable[newest], newest, -1)
 
 
-_Refusals = Callable[[TopicTable, convert.Release | None], list[convert.Refusal]]
+_Refusals = Callable[[TopicTable, Release | None], list[convert.Refusal]]
 
 
 def _in_every_release(refusals: Callable[[TopicTable], list[convert.Refusal]]) -> _Refusals:
@@ -113,7 +114,7 @@ def _airspeed(flight: Flight, runs: RunSchedule) -> TakenSamples:
     validated, raw = flight.topic("airspeed_validated"), flight.topic("airspeed")
     samples = np.zeros(0, AIRSPEED_SAMPLE)
     arrival = np.full(len(runs.timestamp), -1)
-    reads_validated = flight.release is None or flight.release >= convert.USES_VALIDATED_AIRSPEED
+    reads_validated = flight.release is None or flight.release >= VALIDATED_AIRSPEED
     never = 0 if reads_validated else -AIRSPEED_VALIDATED_MAX_AGE_US
     last_validated = np.full(len(runs.timestamp), never, np.int64)
     is_validated = np.zeros(len(runs.timestamp), dtype=bool)

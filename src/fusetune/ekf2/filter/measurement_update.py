@@ -1,5 +1,7 @@
 """Fusion of one scalar observation: Kalman gain limits, Joseph-form covariance update, state correction.
 
+Whether an innovation passes its gate has been asked before (`common/aid_source_status`).
+
 Innovations are prediction less observation, so the state moves by -K·innovation. For a gain K, of which some entries
 may have been set to zero, the Joseph form (I - K H) P (I - K H)ᵀ + K R Kᵀ multiplies out to
 

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from fusetune.settings.checking import validate
+from fusetune.settings.checking import read_checked, validate
 from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
-from fusetune.settings.yaml_reader import read_yaml
 
 if TYPE_CHECKING:
     import numpy as np
@@ -104,9 +103,7 @@ def load_faults(path: str | os.PathLike[str]) -> tuple[Fault, ...]:
     UserError
         The file is broken; the message names the entry, the key and what was expected.
     """
-    document = read_yaml(path)
-    validate(document, _SCHEMA | {"additionalProperties": False}, path)
-    return parse_faults(document["faults"], path)
+    return parse_faults(read_checked(path, _SCHEMA | {"additionalProperties": False})["faults"], path)
 
 
 def parse_faults(entries: Sequence[Mapping[str, Any]], file: str | os.PathLike[str] = "faults") -> tuple[Fault, ...]:

@@ -1,4 +1,4 @@
-"""Estimator topics of PX4 v1.8 to v1.17 in the v1.16 layout: status flags and states."""
+"""Estimator topics of every release in the v1.16 layout: status flags and states."""
 
 from __future__ import annotations
 

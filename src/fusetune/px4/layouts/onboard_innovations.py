@@ -14,6 +14,7 @@ from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, AID_SOURCES, AidSource
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count, select_rows
 from fusetune.px4.layouts.estimator_layouts import control_bits
 from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.releases import NO_MAG_HEADING
 
 _SAME_PUBLICATION_US = 2000
 """The three topics of v1.11+ are published one after the other; before v1.12 they share no sample time."""
@@ -21,10 +22,6 @@ _SAME_PUBLICATION_US = 2000
 _MAG_3D = control_bits(("cs_mag_3d",))
 _HEADING_FIELDS = (("heading",), ("heading_innov",))
 """Written by the magnetometer's three axes as well, while these are fused; see `_SOURCES`."""
-
-_NO_MAG_HEADING_FROM = (1, 15)
-"""From this release on no heading of the magnetometer is fused: `heading` then holds its largest field innovation."""
-
 
 _SOURCES = {source.name: source for source in AID_SOURCES.values() if source.innovations}
 """Fields that several sources name hold the innovations of whichever of them is in use, and of none of them in between.
@@ -93,7 +90,7 @@ def _modern_series(flight: Flight, instance: int) -> _Series | None:
     time = innovations["timestamp"]
     sampled = innovations.get("timestamp_sample", time)
     flags = _control_flags(flight, instance, time)
-    has_mag_heading = flight.release is None or flight.release[:2] < _NO_MAG_HEADING_FROM
+    has_mag_heading = flight.release is None or flight.release[:2] < NO_MAG_HEADING
     return _Series(time, sampled, innovations, variances, ratio_columns, flags, False, has_mag_heading)
 
 

@@ -1,4 +1,8 @@
-"""Logs of PX4 v1.8 to v1.17 in the layout of v1.16: topics and fields mapped by name."""
+"""A log of any release in the layout of v1.16: topics and fields mapped by name.
+
+Here topics take another's place; what each one had otherwise, and until which release, say its function in
+`sensor_layouts`, for the estimator's own topics `estimator_layouts`, `state_layout` and `onboard_innovations`.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,7 @@ _FIX_3D = 3
 
 ESTIMATOR_TOPICS = (
     "sensor_combined",
-    *(name for topic in SENSOR_TOPICS.values() for name in (topic.name, *topic.older)),
+    *(name for topic in SENSOR_TOPICS.values() for name in (topic.name, *topic.made_of)),
     "vehicle_status",
     "vehicle_land_detected",
     "launch_detection_status",
@@ -49,7 +53,7 @@ def canonical(flight: Flight) -> Flight:
         if name in layouts.CONVERTERS:
             topics[name, instance] = layouts.CONVERTERS[name](table)
     topics |= _from_sensor_combined(flight)
-    topics |= _optical_flow(flight)
+    topics |= _under_other_names(flight)
     topics |= _vision(flight)
     topics, left_out = without_impossible(topics)
     parameters, replaced = checked_history(flight.parameters, flight.release)
@@ -98,12 +102,13 @@ def _from_sensor_combined(flight: Flight) -> dict[TopicKey, TopicTable]:
     return tables
 
 
-def _optical_flow(flight: Flight) -> dict[TopicKey, TopicTable]:
-    if flight.has("vehicle_optical_flow"):
-        return {}
+def _under_other_names(flight: Flight) -> dict[TopicKey, TopicTable]:
+    """Sensor topics that are one topic of the log, under another name."""
     return {
-        ("vehicle_optical_flow", instance): layouts.vehicle_optical_flow(flight.topics["optical_flow", instance])
-        for instance in flight.instances("optical_flow")
+        (topic.name, instance): layouts.CONVERTERS[topic.name](flight.topics[topic.made_of[0], instance])
+        for topic in SENSOR_TOPICS.values()
+        if len(topic.made_of) == 1 and not flight.has(topic.name)
+        for instance in flight.instances(topic.made_of[0])
     }
 
 

@@ -1,4 +1,4 @@
-"""Sensor and vehicle topics of PX4 v1.8 to v1.17 in the v1.16 layout.
+"""Sensor and vehicle topics of every release in the v1.16 layout: what each had otherwise, and until when.
 
 Every function takes the columns of one topic instance and returns them with what v1.16 has beside; columns of the
 log stay. Units are PX4's own of v1.16: degrees and metres for GNSS, µs for integration times.

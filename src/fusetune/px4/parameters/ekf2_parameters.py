@@ -15,14 +15,9 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Literal
 
-from fusetune.px4.parameters.parameter_migration import PREDECESSORS, migrate_names
+from fusetune.px4.parameters.parameter_migration import SENSOR_PARAMETERS, migrate_names
+from fusetune.px4.releases import BASELINE, DEVELOPMENT, Release, name_of
 
-Release = tuple[int, int] | tuple[int, int, int]
-
-BASELINE_RELEASE = (1, 16)
-"""The release whose estimator is replayed; its parameters are the ones that count."""
-
-_DEVELOPMENT_RELEASE = (1, 18)
 _FLOAT = struct.Struct("<f")
 
 
@@ -61,13 +56,13 @@ class ParameterMetadata:
     values: Mapping[int, str]
     """Meaning of each value (enum) or bit (bitmask)."""
     became: tuple[str, ...]
-    """Parameters that took over in later releases."""
+    """What stands for it in the baseline release, where that has it under other names."""
     description: str
 
     @property
     def default(self) -> float:
         """Default in the baseline release, or the last one it had."""
-        return self.default_in(BASELINE_RELEASE)
+        return self.default_in(BASELINE)
 
     @property
     def renamed_from(self) -> tuple[str, ...]:
@@ -120,7 +115,7 @@ def metadata_of(name: str) -> ParameterMetadata:
     """
     if name in PARAMETERS:
         return PARAMETERS[name]
-    baseline = "v{}.{}".format(*BASELINE_RELEASE)
+    baseline = name_of(BASELINE)
     old = ALL_PARAMETERS.get(name)
     if old is not None and old.became:
         raise ParameterError(name, f"{baseline} no longer has it", f"Use {' / '.join(old.became)} instead")
@@ -146,9 +141,10 @@ def migrate(logged: Mapping[str, float | int], release: Release | None = None) -
     dict
         Only parameters that the log determines; values rounded to float32. Values that are no numbers count as missing.
     """
-    known = (name for name in logged if name in PARAMETERS or name in PREDECESSORS)
+    known = (name for name in logged if name in PARAMETERS or name in _BECAME)
     sound = {name: logged[name] for name in known if math.isfinite(logged[name])}
-    return {name: as_float32(float(value)) for name, value in migrate_names(sound).items() if name in PARAMETERS}
+    migrated = migrate_names(sound, _BECAME)
+    return {name: as_float32(float(value)) for name, value in migrated.items() if name in PARAMETERS}
 
 
 def complete(
@@ -219,7 +215,7 @@ def _range_text(metadata: ParameterMetadata) -> str:
 
 def _release_of(text: str) -> tuple[int, int]:
     if text == "main":
-        return _DEVELOPMENT_RELEASE
+        return DEVELOPMENT
     major, minor = text.removeprefix("v").split(".")
     return int(major), int(minor)
 
@@ -251,11 +247,17 @@ def _read_metadata() -> dict[str, ParameterMetadata]:
 
 
 ALL_PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(_read_metadata())
-"""EKF2 parameters of every release from v1.8 on."""
+"""EKF2 parameters of every release that is read."""
 
 PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
-    {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE_RELEASE)}
+    {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE)}
 )
 """EKF2 parameters of the baseline release, by name in alphabetical order."""
+
+_BECAME: Mapping[str, tuple[str, ...]] = {
+    **{name: metadata.became for name, metadata in ALL_PARAMETERS.items() if metadata.became},
+    **SENSOR_PARAMETERS,
+}
+"""Parameters of other releases that tell those of the baseline."""
 
 _DEFAULTS = {name: metadata.default for name, metadata in PARAMETERS.items()}

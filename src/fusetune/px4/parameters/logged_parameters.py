@@ -17,11 +17,10 @@ from typing import NamedTuple
 from fusetune.px4.flight import ParameterChange, ParameterHistory, ParameterValue, ReplacedParameter
 from fusetune.px4.parameters.ekf2_parameters import (
     ALL_PARAMETERS,
-    BASELINE_RELEASE,
     ParameterMetadata,
-    Release,
     as_float32,
 )
+from fusetune.px4.releases import BASELINE, Release
 
 _WIDTHS_BEYOND = 99.0
 """How far, in widths of its range, a value may lie outside: two orders of magnitude, for people do relax checks."""
@@ -169,5 +168,5 @@ def _default(name: str, history: ParameterHistory, release: Release | None) -> P
         default, is_whole = _BESIDE[name].default, _BESIDE[name].is_whole
     else:
         metadata = ALL_PARAMETERS[name]
-        default, is_whole = metadata.default_in(release or BASELINE_RELEASE), metadata.type == "INT32"
+        default, is_whole = metadata.default_in(release or BASELINE), metadata.type == "INT32"
     return int(default) if is_whole else default

@@ -5,7 +5,7 @@ What each replacement means is what PX4 itself does when a vehicle with stored p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 _GPS, _OPTICAL_FLOW, _INHIBIT_ACCEL_BIAS, _VISION_POSITION, _VISION_YAW, _DRAG = (1 << bit for bit in range(6))
 _GPS_YAW, _VISION_VELOCITY = 1 << 7, 1 << 8
@@ -18,37 +18,32 @@ _IMU_CTRL_DEFAULT, _IMU_CTRL_ACCEL_BIAS = 0b111, 0b010
 _HEIGHT_GPS, _HEIGHT_RANGE, _HEIGHT_VISION = 1, 2, 3
 """Values of EKF2_HGT_MODE and EKF2_HGT_REF."""
 
-_RENAMED = {
-    "EKF2_REQ_GDOP": ("EKF2_REQ_PDOP",),
-    "EKF2_EV_GATE": ("EKF2_EVP_GATE",),
-    "EKF2_PCOEF_Y": ("EKF2_PCOEF_YN", "EKF2_PCOEF_YP"),
-    "EKF2_RNG_AID": ("EKF2_RNG_CTRL",),
-    "EKF2_HGT_MODE": ("EKF2_HGT_REF",),
-    "EKF2_AGP0_CTRL": ("EKF2_AGP_CTRL",),
-    "EKF2_AGP0_DELAY": ("EKF2_AGP_DELAY",),
-    "EKF2_AGP0_GATE": ("EKF2_AGP_GATE",),
-    "EKF2_AGP0_NOISE": ("EKF2_AGP_NOISE",),
+SENSOR_PARAMETERS: Mapping[str, tuple[str, ...]] = {
     "SENS_GPS0_DELAY": ("EKF2_GPS_DELAY",),
     "SENS_GPS0_OFFX": ("EKF2_GPS_POS_X",),
     "SENS_GPS0_OFFY": ("EKF2_GPS_POS_Y",),
     "SENS_GPS0_OFFZ": ("EKF2_GPS_POS_Z",),
 }
-"""One parameter that went on under another name (or two) with the same meaning and unit."""
+"""Parameters that are none of EKF2's own and took over from one, in newer releases; with the same meaning and unit."""
 
-PREDECESSORS = frozenset({*_RENAMED, "EKF2_WIND_NOISE", "EKF2_AID_MASK"})
-"""Parameters of other releases that tell those of v1.16."""
+CHANGED = frozenset({"EKF2_WIND_NOISE", "EKF2_AID_MASK"})
+"""Parameters that became others with another meaning, which `migrate_names` knows."""
 
 _MAG_TYPE_AUTOMATIC, _MAG_TYPES_REMOVED = 0, (2, 3, 4)
 
 
-def migrate_names(logged: Mapping[str, float | int]) -> dict[str, float | int]:
+def migrate_names(logged: Mapping[str, float | int], became: Mapping[str, Sequence[str]]) -> dict[str, float | int]:
     """The logged parameters with those of v1.16 added where the log has only their predecessors.
 
     A parameter that the log holds under its v1.16 name is never overridden by a predecessor.
+
+    Parameters
+    ----------
+    became : parameter of another release → those of v1.16 that stand for it
     """
     derived: dict[str, float | int] = {}
-    for old, new_names in _RENAMED.items():
-        if old in logged:
+    for old, new_names in became.items():
+        if old in logged and old not in CHANGED:
             derived.update(dict.fromkeys(new_names, logged[old]))
     if "EKF2_WIND_NOISE" in logged:
         # a standard deviation per step at 100 Hz became a noise density: smaller by the square root of the rate

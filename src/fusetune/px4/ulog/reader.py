@@ -23,6 +23,7 @@ from fusetune.px4.flight import (
     TopicTable,
 )
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS
+from fusetune.px4.releases import FIRST, NEWEST, name_of
 from fusetune.px4.ulog.definitions import MessageLayout, is_padding
 from fusetune.px4.ulog.reading_limits import RAISE_LIMITS, ReadingLimits
 from fusetune.px4.ulog.records import DATA_HEAD_BYTES, HEADER_BYTES, Scan, Scanner
@@ -170,7 +171,9 @@ def _scan_sections(file: Path, content: bytes, scanner: Scanner) -> list[str]:
             begin += 3 + size
             if incompatible[0] & ~_DATA_APPENDED or any(incompatible[1:]):
                 reason = f"says that it needs unknown features of the format (flags {incompatible.hex()})"
-                raise UserError(file, reason, "Use a log of PX4 v1.8 to v1.17, or copy it again")
+                raise UserError(
+                    file, reason, f"Use a log of PX4 {name_of(FIRST)} to {name_of(NEWEST)}, or copy it again"
+                )
             offsets = [offset for offset in appended if offset] if incompatible[0] & _DATA_APPENDED else []
     if any(not begin <= offset <= len(content) for offset in offsets) or offsets != sorted(set(offsets)):
         notes.append("the places of appended data are damaged; they were looked for")

@@ -7,13 +7,13 @@ import numpy as np
 from fusetune.check import check
 from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable, field_names
+from fusetune.px4.releases import CLIPPING_COUNTED, FIRST, name_of
 from fusetune.save.checks.judged_flight import IMU, IS_COMPLETE, JudgedFlight
 from fusetune.save.checks.logging_advice import COPY_AGAIN, FASTER_CARD, log_more
 
 _CHECK_IMU_DRIVER = "Use the IMU driver of a PX4 release; integration times are microseconds, as time stamps are"
 _SHORTEST_INTERVAL_S = 2e-4
 """Half of the interval of PX4's fastest gyroscope."""
-_CLIPPING_SINCE = (1, 11, 0)
 _NEEDED = ("gyro_rad", "accelerometer_m_s2")
 _INTEGRATION_TIMES = ("gyro_integral_dt", "accelerometer_integral_dt")
 
@@ -27,7 +27,9 @@ def imu_present(judged: JudgedFlight) -> Finding:
     missing = [name for name in _NEEDED if len(field_names(imu, name)) != 3]
     missing += [name for name in _INTEGRATION_TIMES if name not in imu]
     if missing:
-        return imu_present.failed(f"the IMU samples lack {', '.join(missing)}", "Use a log of PX4 v1.8 or later")
+        return imu_present.failed(
+            f"the IMU samples lack {', '.join(missing)}", f"Use a log of PX4 {name_of(FIRST)} or later"
+        )
     return imu_present.passed(f"{len(imu['timestamp'])} IMU samples", float(len(imu["timestamp"])))
 
 
@@ -106,7 +108,7 @@ def imu_gaps(judged: JudgedFlight) -> Finding:
 def imu_clipping(judged: JudgedFlight) -> Finding:
     """Share of the IMU samples in which the accelerometer was at the end of its range."""
     flight, imu, threshold = judged.flight, judged.imu, judged.limits.high_clipping_share
-    if flight.release is not None and flight.release < _CLIPPING_SINCE:
+    if flight.release is not None and flight.release < CLIPPING_COUNTED:
         return imu_clipping.does_not_apply(f"{flight.release_name} does not log clipping")
     share = float(np.mean(imu["accelerometer_clipping"] != 0)) if "accelerometer_clipping" in imu else 0.0
     if share > threshold:

@@ -6,7 +6,7 @@ from fusetune.check import Check, check
 from fusetune.finding import Finding
 from fusetune.px4.estimator_samples import is_complete, logged_share
 from fusetune.px4.logger_settings import ESTIMATOR_REPLAY_BIT, MODES, logging_mode_of, logging_profile_of
-from fusetune.px4.parameters.ekf2_parameters import BASELINE_RELEASE
+from fusetune.px4.releases import BASELINE, deviation_of, name_of
 from fusetune.px4.sensor_limits import LACKS_FIELD, NO_ADVANCE
 from fusetune.px4.ulog.reading_limits import RAISE_LIMITS
 from fusetune.px4.ulog.times import ANOTHER_CLOCK, IMPOSSIBLE
@@ -24,12 +24,6 @@ _CHECK_SENSORS = "Check the SD card and the sensors"
 _TIME_REASONS = (IMPOSSIBLE, ANOTHER_CLOCK, NO_ADVANCE)
 _THINNED_TOPICS = {"magnetometer": MAG, "barometer": BARO}
 """What PX4's default profile logs seldom."""
-_DEVIATIONS = (
-    ((1, 13, 99), "its EKF2 took the height from one source at a time and had its own logic for heading and GNSS"),
-    ((1, 14, 99), "its EKF2 had another error state and fused the magnetometer's heading on its own"),
-    ((1, 15, 99), "its EKF2 kept the terrain in a filter of its own and is else nearly the same"),
-)
-"""Last release, and how it differs from the one that is modelled."""
 
 
 @check()
@@ -97,15 +91,13 @@ def _left_out(asked: Check[JudgedFlight], judged: JudgedFlight, what: str, *, is
 @check()
 def firmware(judged: JudgedFlight) -> Finding:
     """Whether the replay behaves like the firmware that flew."""
-    flight, baseline = judged.flight, "v{}.{}".format(*BASELINE_RELEASE)
-    release = flight.release
-    if release is None:
+    flight, baseline = judged.flight, name_of(BASELINE)
+    if flight.release is None:
         found = f"the log does not say which release flew; the replay behaves like {baseline}"
         return firmware.warned(found, "Compare replays with each other, not with what the vehicle estimated")
-    if release[:2] == BASELINE_RELEASE:
+    how = deviation_of(flight.release)
+    if not how:
         return firmware.passed(f"{flight.release_name} flew, which is what the replay behaves like")
-    later = "its EKF2 is newer"
-    how = next((words for last, words in _DEVIATIONS if release <= last), later)
     remedy = f"Parameters chosen here hold for {baseline}: update the firmware, or test them with care"
     return firmware.warned(f"{flight.release_name} flew, the replay behaves like {baseline}: {how}", remedy)
 

@@ -11,12 +11,12 @@ from fusetune.px4.logger_settings import (
     logging_profile_of,
     logs_from_boot,
 )
+from fusetune.px4.releases import VERBOSE_LOG
 
 ONE_ESTIMATOR = "EKF2_MULTI_IMU = 0 and EKF2_MULTI_MAG = 0 with SENS_IMU_MODE = 1 and SENS_MAG_MODE = 1"
 FASTER_CARD = "Use a faster SD card, or log fewer topics"
 COPY_AGAIN = "Copy the log from the vehicle again; check the SD card"
 WHOLE_LOG = "Use the log as PX4 wrote it: what made or converted this file kept some fields only"
-_VERBOSE_SINCE = (1, 16, 0)
 _RATE_PARAMETERS = {
     "vehicle_magnetometer": " (SENS_MAG_RATE)",
     "vehicle_air_data": " (SENS_BARO_RATE)",
@@ -65,6 +65,6 @@ def next_flight_settings(flight: Flight) -> str:
     if len(flight.instances("estimator_status")) > 1 or flight.has("estimator_selector_status"):
         advice.append(f"{ONE_ESTIMATOR} (one estimator on one IMU)")
     is_verbose = settings.get("EKF2_LOG_VERBOSE") == 1
-    if not is_verbose and (flight.release is None or flight.release >= _VERBOSE_SINCE):
+    if not is_verbose and (flight.release is None or flight.release >= VERBOSE_LOG):
         advice.append("EKF2_LOG_VERBOSE = 1")
     return f"For the next flight set {'; '.join(advice)}; then restart" if advice else ""

@@ -83,24 +83,29 @@ def _numerical_jacobian(memory: np.ndarray, predict: Callable[[np.void], float])
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("axis", range(3))
-def test_gravity(seed: int, axis: int) -> None:
+@pytest.mark.parametrize(
+    ("compute", "predict", "states", "atol"),
+    [
+        (compute_gravity_jacobian, lambda ekf, axis: -ekf["R_to_earth"][2, axis], 2, 1e-9),
+        (compute_body_velocity_jacobian, predict_body_velocity, 6, 1e-7),
+    ],
+    ids=["gravity", "body_velocity"],
+)
+def test_vector_in_the_body_frame(
+    compute: Callable[[np.void, np.ndarray], None],
+    predict: Callable[[np.void, int], float],
+    states: int,
+    atol: float,
+    axis: int,
+    seed: int,
+) -> None:
+    """It depends on the first error states alone."""
     memory = _random_state(seed)
-    jacobian = np.zeros((3, 2))
-    compute_gravity_jacobian(memory[0], jacobian)
-    expected = _numerical_jacobian(memory, lambda ekf: -ekf["R_to_earth"][2, axis])
-    np.testing.assert_allclose(jacobian[axis], expected[:2], atol=1e-9)
-    np.testing.assert_allclose(expected[2:], 0.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("axis", range(3))
-def test_body_velocity(seed: int, axis: int) -> None:
-    memory = _random_state(seed)
-    jacobian = np.zeros((3, 6))
-    compute_body_velocity_jacobian(memory[0], jacobian)
-    expected = _numerical_jacobian(memory, lambda ekf: predict_body_velocity(ekf, axis))
-    np.testing.assert_allclose(jacobian[axis], expected[:6], atol=1e-7)
-    np.testing.assert_allclose(expected[6:], 0.0, atol=1e-9)
+    jacobian = np.zeros((3, states))
+    compute(memory[0], jacobian)
+    expected = _numerical_jacobian(memory, lambda ekf: predict(ekf, axis))
+    np.testing.assert_allclose(jacobian[axis], expected[:states], atol=atol)
+    np.testing.assert_allclose(expected[states:], 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))

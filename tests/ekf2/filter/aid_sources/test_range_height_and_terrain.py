@@ -153,11 +153,17 @@ def test_conditional_aid_speed_limit_needs_a_known_speed(speed, aided, aids):
     assert ekf["cs"]["rng_hgt"] == aids
 
 
-def test_as_unconditional_reference_the_ground_becomes_the_datum():
-    ekf, params = _flying(altitude=480.0), make_parameters(EKF2_RNG_CTRL=ENABLED, EKF2_HGT_REF=RANGE)
+def _two_metres_over_a_hill(control):
+    """After two samples at 480 m, with a hill of 478 m known below; range is the height reference."""
+    ekf, params = _flying(altitude=480.0), make_parameters(EKF2_RNG_CTRL=control, EKF2_HGT_REF=RANGE)
     ekf["terrain"] = -478.0
     _feed(ekf, params, 2.0, samples=2)
     assert ekf["height_sensor_ref"] == HEIGHT_REF_RANGE
+    return ekf
+
+
+def test_as_unconditional_reference_the_ground_becomes_the_datum():
+    ekf = _two_metres_over_a_hill(ENABLED)
     assert ekf["gpos_alt"] == pytest.approx(2.0, abs=1e-6)
     assert ekf["cs"]["rng_hgt"]
     assert not ekf["cs"]["rng_terrain"]
@@ -199,10 +205,7 @@ def test_height_that_failed_too_long_is_taken_from_the_distance():
 
 
 def test_conditional_reference_keeps_the_height():
-    ekf, params = _flying(altitude=480.0), make_parameters(EKF2_RNG_CTRL=CONDITIONAL, EKF2_HGT_REF=RANGE)
-    ekf["terrain"] = -478.0
-    _feed(ekf, params, 2.0, samples=2)
-    assert ekf["height_sensor_ref"] == HEIGHT_REF_RANGE
+    ekf = _two_metres_over_a_hill(CONDITIONAL)
     assert ekf["gpos_alt"] == pytest.approx(480.0, abs=1e-3)
     assert not ekf["events"]["reset_hgt_to_rng"]
 

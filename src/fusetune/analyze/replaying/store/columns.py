@@ -1,4 +1,8 @@
-"""What the tables of a replay hold: rows as the replay records them, as columns named as in PX4's estimator topics."""
+"""What the tables of a replay hold: rows as the replay records them, as columns named as in PX4's estimator topics.
+
+The fields of a row are said where it is recorded: `INNOVATION_ROW`, `STATE_ROW`, `LOCAL_POSITION_ROW` and
+`FLAG_COLUMNS` in `fusetune.ekf2.replay.recording`.
+"""
 
 from __future__ import annotations
 

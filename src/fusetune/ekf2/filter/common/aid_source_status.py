@@ -1,4 +1,4 @@
-"""What the estimator knows of one aid source: last observation, innovation, its variance, test ratio, verdict.
+"""What the estimator knows of one aid source: last observation, innovation, its variance; and the gate test of these.
 
 Mirrors `updateAidSourceStatus` of PX4 v1.16 `EKF/ekf_helper.cpp`.
 """

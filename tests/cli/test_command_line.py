@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from fusetune import __version__
 from fusetune.cli import main
+from fusetune.cli.command_line import COMMANDS
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,3 +55,23 @@ def test_simulate_names_the_sets_that_a_study_has(
     options = [part for name, file in files.items() for part in (f"--{name}", str(config / file))]
     assert main(["simulate", *options, "--set", "paper9", "--out", str(tmp_path / "x.ulg")]) == 2
     assert "paper1, paper2" in capsys.readouterr().err
+
+
+def test_the_readme_names_every_command(project_root: Path) -> None:
+    said = " ".join((project_root / "README.md").read_text(encoding="utf-8").split())
+    assert f"single steps: {', '.join(f'`{name}`' for name in COMMANDS)};" in said
+
+
+def test_every_file_of_the_folder_is_a_command_under_its_name(project_root: Path) -> None:
+    files = {file.stem for file in (project_root / "src" / "fusetune" / "cli").glob("*.py")}
+    assert files - {"__init__", "__main__", "command_line", "command"} == COMMANDS.keys()
+
+
+def test_a_command_that_is_not_run_loads_no_room(project_root: Path) -> None:
+    """So `fusetune --version` answers at once; rooms are what loads NumPy, pyarrow, Numba."""
+    code = "import sys, fusetune.cli; print(*sys.modules)"
+    environment = os.environ | {"PYTHONPATH": str(project_root / "src")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True, text=True)
+    loaded = done.stdout.split()
+    assert "numpy" not in loaded
+    assert {name.split(".")[1] for name in loaded if name.startswith("fusetune.")} == {"cli", "errors"}

@@ -240,9 +240,10 @@ def test_an_interrupted_command_says_so() -> None:
     script = """
 import signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
-from fusetune import cli
-cli._design = lambda options: print("at work", flush=True) or time.sleep(60)
-sys.exit(cli.main(["design", "--mission", "m", "--study", "s", "--out", "o"]))
+from fusetune.cli import design
+from fusetune.cli import main
+design.run = lambda options: print("at work", flush=True) or time.sleep(60)
+sys.exit(main(["design", "--mission", "m", "--study", "s", "--out", "o"]))
 """
     at_work = subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

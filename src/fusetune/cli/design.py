@@ -1,0 +1,25 @@
+"""`fusetune design`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from fusetune.cli.command import DONE
+
+HELP = "write a mission plan and the parameter files of a study"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Mission, study, folder."""
+    parser.add_argument("--mission", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--study", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write them; always `DONE`."""
+    from fusetune.design import write_design
+
+    write_design(options.mission, options.study, options.out)
+    return DONE

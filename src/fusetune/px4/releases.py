@@ -1,0 +1,66 @@
+"""Releases of PX4: those that are read, the one that is replayed, and what only the number of a release tells.
+
+Most of what differs between releases a log tells itself, by the topics and fields that it has (`px4/layouts/`); the
+parameters of each stand in `px4/parameters/ekf2_parameters.csv`. Here stands the rest: from which release on PX4 does
+otherwise without its logs showing it.
+"""
+
+from __future__ import annotations
+
+Release = tuple[int, int] | tuple[int, int, int]
+"""Major and minor number, and the patch where it is known; without it, before all patches of its minor number."""
+
+FIRST, NEWEST = (1, 8), (1, 17)
+"""Logs are read of these releases and of all between them."""
+
+READ = tuple((FIRST[0], minor) for minor in range(FIRST[1], NEWEST[1] + 1))
+
+BASELINE = (1, 16)
+"""The release whose estimator is replayed; its topics and parameters are the ones that count."""
+
+DEVELOPMENT = (NEWEST[0], NEWEST[1] + 1)
+"""What `main` counts as."""
+
+CLIPPING_COUNTED = (1, 11)
+"""Since then the IMU samples count clipped ones."""
+
+VALIDATED_AIRSPEED = (1, 13)
+"""Since then EKF2 reads `airspeed_validated`, before the raw sensor alone."""
+
+AIRSPEED_SELECTED = (1, 14)
+"""Since then it asks whether a sensor is selected there."""
+
+GNSS_VELOCITY_VALID = (1, 14)
+"""Since then (November 2022) GNSS without valid velocity is dropped; before, `vel_ned_valid` decided nothing."""
+
+VISION_FRAMES = (1, 14)
+"""Since then vision of unknown frame is dropped, and quaternions that are no unit; before, any number was used."""
+
+ALL_HEIGHT_SOURCES = (1, 14)
+"""Since then EKF2 takes the height from all sources that are enabled, before from one at a time."""
+
+NO_MAG_HEADING = (1, 15)
+"""Since then no heading of the magnetometer is fused: `heading` then holds its largest field innovation."""
+
+VERBOSE_LOG = (1, 16)
+"""Since then EKF2_LOG_VERBOSE asks for what replays are compared with."""
+
+DEVIATIONS = (
+    ((1, 13), "its EKF2 took the height from one source at a time and had its own logic for heading and GNSS"),
+    ((1, 14), "its EKF2 had another error state and fused the magnetometer's heading on its own"),
+    ((1, 15), "its EKF2 kept the terrain in a filter of its own and is else nearly the same"),
+    (DEVELOPMENT, "its EKF2 is newer"),
+)
+"""Last release, and how its estimator differs from the baseline's, for people."""
+
+
+def name_of(release: Release) -> str:
+    """As PX4 writes it, e.g. ``"v1.16"``."""
+    return "v" + ".".join(map(str, release))
+
+
+def deviation_of(release: Release) -> str:
+    """How the estimator of a release differs from the baseline's, in words; empty for the baseline itself."""
+    if release[:2] == BASELINE:
+        return ""
+    return next((words for last, words in DEVIATIONS if release[:2] <= last), DEVIATIONS[-1][1])
