@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fusetune.storage.freed_memory import give_back_freed_memory
+from fusetune.storage import freed_memory
+from fusetune.storage.freed_memory import LARGE_BYTES, give_back_freed_memory
 
 
 def resident_bytes() -> int:
@@ -23,8 +24,23 @@ def test_memory_between_arrays_in_use_is_returned() -> None:
     kept = arrays[1::2]
     before = resident_bytes()
     del arrays
-    give_back_freed_memory(from_bytes=before + 1)
-    assert before - resident_bytes() < 4e6
-    give_back_freed_memory(from_bytes=before // 2)
+    give_back_freed_memory(from_bytes=0)
     assert before - resident_bytes() > 40e6
     assert sum(map(len, kept)) == 800 * 8_000
+
+
+@pytest.mark.parametrize(("resident", "asked"), [(LARGE_BYTES - 1, 0), (LARGE_BYTES, 1), (None, 1)])
+def test_only_a_large_process_is_asked(monkeypatch: pytest.MonkeyPatch, resident: int | None, asked: int) -> None:
+    calls: list[None] = []
+    monkeypatch.setattr(freed_memory, "_resident_bytes", lambda: resident)
+    monkeypatch.setattr(freed_memory.pa, "default_memory_pool", lambda: Pool(calls))
+    give_back_freed_memory()
+    assert len(calls) == asked
+
+
+class Pool:
+    def __init__(self, calls: list[None]) -> None:
+        self.calls = calls
+
+    def release_unused(self) -> None:
+        self.calls.append(None)

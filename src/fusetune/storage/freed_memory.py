@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 
 LARGE_BYTES = 350_000_000
-"""A process that analyses a flight of some minutes stays below; to ask for its pages again costs it time for nothing."""
+"""A process that analyses a flight of some minutes stays below; to ask for its pages again would only cost time."""
 
 
 def give_back_freed_memory(from_bytes: int = LARGE_BYTES) -> None:
