@@ -18,3 +18,13 @@ def test_what_the_rules_import_brings_no_numerics(project_root: Path) -> None:
     code = f"import sys, {', '.join(modules)}; print([name for name in {HEAVY} if name in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_what_jobs_import_brings_no_pandas() -> None:
+    """PyArrow looks for it when the first table is made, so a module that makes one brings it to every process."""
+    modules = (
+        "fusetune.analyze.analyze_flight, fusetune.analyze.evaluate, fusetune.apply.decide, fusetune.save.log_folder"
+    )
+    code = f"import sys, {modules}; print('pandas' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "False"

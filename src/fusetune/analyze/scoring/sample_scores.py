@@ -53,7 +53,9 @@ class SampleScores(NamedTuple):
     windows: pa.Table
 
 
-NO_SAMPLE_SCORES = SampleScores(BLOCK_SCHEMA.empty_table(), WINDOW_SCHEMA.empty_table())
+def no_sample_scores() -> SampleScores:
+    """Of a flight of which nothing is scored; made when asked for, as PyArrow's first table looks for pandas."""
+    return SampleScores(BLOCK_SCHEMA.empty_table(), WINDOW_SCHEMA.empty_table())
 
 
 def score_samples(

@@ -17,7 +17,7 @@ from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.scoring.filter_events import filter_events
 from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_ground_metrics, ground_window
 from fusetune.analyze.scoring.metrics_table import MetricsTable, add_events, add_true_errors, add_whiteness
-from fusetune.analyze.scoring.sample_scores import NO_SAMPLE_SCORES, add_onboard, score_samples
+from fusetune.analyze.scoring.sample_scores import add_onboard, no_sample_scores, score_samples
 from fusetune.analyze.scoring.scoring_summary import scoring_summary
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.true_errors import true_errors
@@ -155,7 +155,7 @@ def score_sets(
     add_ground_metrics(table, records, present, ground, settings.confidence)
     for record in records:
         add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
-    samples, withheld, whiteness = NO_SAMPLE_SCORES, WITHHELD_SCHEMA.empty_table(), {}
+    samples, withheld, whiteness = no_sample_scores(), WITHHELD_SCHEMA.empty_table(), {}
     if window.intervals:
         kept = [record for record in records if record.name not in window.excluded]
         samples = score_samples(table, kept, present, window, settings, take_samples, spool_folder)
