@@ -1,5 +1,6 @@
 REPLAY_CHUNKS = [
-    SETS.replayed[first : first + SETTINGS.sets_per_job] for first in range(0, len(SETS.replayed), SETTINGS.sets_per_job)
+    SETS.replayed[first : first + SETTINGS.sets_per_job]
+    for first in range(0, len(SETS.replayed), SETTINGS.sets_per_job)
 ]
 
 
