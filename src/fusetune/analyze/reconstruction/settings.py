@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 from fusetune.settings.declaration import setting
 
-RAW = {"imu": False, "magnetometer": False, "barometer": False}
-"""Every step switched off."""
-
 
 @dataclass(frozen=True)
 class ReconstructionSettings:
