@@ -4,22 +4,30 @@ The measurement's error is white noise σ_w plus, where the data say so, a Gauss
 of the inertial solution walks with density q. All four scale together: with σ_c/σ_w, q/σ_w and τ given, the scale that
 makes the measurements most probable is s² = cost/n, and what is left to compare is n ln s² + ln det. So three ratios
 are searched, each on a grid of factors of two, from the best of a coarse first look.
+
+A receiver that wanders over seconds and an inertial solution that walks explain the same measurements nearly as well.
+What is known of the latter decides: q is log-normal around what an accelerometer on a vibrating frame has.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from fusetune.analyze.smoothing.linear_smoother import LinearModel, smooth
 
-FIRST_RATIOS = (0.02, 0.08, 0.3)
-"""Of q/σ_w, √Hz: PX4's defaults, 0.35 m/s² at 100 Hz beside 0.3 m/s, stand for 0.1."""
+USUAL_WALK = 0.01
+"""m/s/√s. Accelerometers of autopilots have 0.001 to 0.003, on a vibrating frame 0.01 to 0.06; PX4's default of
+EKF2_ACC_NOISE, 0.35 m/s² at 100 Hz, stands for 0.035."""
+WALK_SPREAD = 0.7
+"""Standard deviation of ln q."""
+FIRST_SHARES = (1.0, 3.0)
+"""Of σ_c/σ_w."""
 CORRELATION_TIMES_S = (0.5, 1.0, 2.0, 4.0, 8.0)
 NEEDED_GAIN = 6.0
 """In −2 ln L, for two more figures: Akaike's criterion asks for 4."""
-_RATIO_LIMITS = (0.005, 2.0)
+_WALK_LIMITS = (0.0005, 1.0)
 _SHARE_LIMITS = (0.125, 16.0)
 _STEPS = 5
 
@@ -70,20 +78,22 @@ def likeliest_errors(build: Builder, first: ErrorModel) -> ErrorModel:
         found = [smooth(model) for model in models]
         count = sum(model.measured.size for model in models)
         scale = sum(one.cost for one in found) / count
+        errors = errors.scaled(math.sqrt(scale))
         score = count * math.log(scale) + sum(one.log_determinant for one in found)
-        return _Found(score, errors.scaled(math.sqrt(scale)))
+        return _Found(score + (math.log(errors.walk / USUAL_WALK) / WALK_SPREAD) ** 2, errors)
 
-    def best(candidates: Iterable[ErrorModel]) -> _Found:
-        return min((scored(one) for one in candidates), key=lambda one: one.score)
-
-    plain = best(replace(first, walk=first.white * ratio) for ratio in FIRST_RATIOS)
-    plain = _climbed(plain, _walk_step, scored)
-    correlated = best(
-        replace(plain.errors, correlated=plain.errors.white, correlation_time_s=time) for time in CORRELATION_TIMES_S
+    plain = _climbed(scored(replace(first, walk=USUAL_WALK)), _walk_step, scored)
+    white = replace(plain.errors, walk=USUAL_WALK)
+    correlated = min(
+        (
+            scored(replace(white, correlated=share * white.white, correlation_time_s=time))
+            for time in CORRELATION_TIMES_S
+            for share in FIRST_SHARES
+        ),
+        key=lambda one: one.score,
     )
-    correlated = _climbed(correlated, _share_step, scored)
-    correlated = _climbed(correlated, _walk_step, scored)
-    correlated = _climbed(correlated, _time_step, scored)
+    for step in (_share_step, _walk_step, _time_step, _share_step, _walk_step):
+        correlated = _climbed(correlated, step, scored)
     return (correlated if correlated.score < plain.score - NEEDED_GAIN else plain).errors
 
 
@@ -106,8 +116,8 @@ def _climbed(start: _Found, step: Step, scored: Callable[[ErrorModel], _Found]) 
 
 
 def _walk_step(errors: ErrorModel, factor: float) -> ErrorModel | None:
-    ratio = errors.walk * factor / errors.white
-    return replace(errors, walk=errors.walk * factor) if _within(ratio, _RATIO_LIMITS) else None
+    walk = errors.walk * factor
+    return replace(errors, walk=walk) if _within(walk, _WALK_LIMITS) else None
 
 
 def _share_step(errors: ErrorModel, factor: float) -> ErrorModel | None:

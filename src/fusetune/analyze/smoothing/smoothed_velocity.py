@@ -15,7 +15,7 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.replaying.replayed_set import ReplayedSet, ReplayedSteps
 from fusetune.analyze.sensors.measurement_errors import VELOCITY_SOURCES
-from fusetune.analyze.smoothing.error_model import ErrorModel, likeliest_errors
+from fusetune.analyze.smoothing.error_model import USUAL_WALK, ErrorModel, likeliest_errors
 from fusetune.analyze.smoothing.inertial_steps import inertial_steps, transitions
 from fusetune.analyze.smoothing.linear_smoother import Smoothed, measurement_residuals, smooth
 from fusetune.analyze.smoothing.velocity_models import ACCEL, GYRO, HorizontalModel, Stretch, VerticalModel
@@ -32,7 +32,6 @@ SEARCHED_STRETCHES = 3
 OUTLIER_SIGMAS = 5.0
 """Measurements whose residuals are larger count as if they were as much less exact (Huber)."""
 SMALLEST_NOISE = 1e-3
-FIRST_WALK = 0.1
 NORMAL_QUARTILE = 0.6745
 _IN_OTHER_FRAME = 10.0
 
@@ -148,7 +147,7 @@ def _fitted(models: Sequence[HorizontalModel] | Sequence[VerticalModel]) -> tupl
     change = np.concatenate([np.diff(one.measured, axis=0) for one in models])
     # of the difference of two
     guess = max(_spread(change) / np.sqrt(2.0), SMALLEST_NOISE)
-    errors = ErrorModel(guess, 0.0, 0.0, FIRST_WALK * guess)
+    errors = ErrorModel(guess, 0.0, 0.0, USUAL_WALK)
     for one in models:
         model = one(errors)
         found = smooth(model)
