@@ -172,7 +172,7 @@ def score_sets(
         add_onboard(table, scored.onboard, window, settings, records[0].parameters)
         fused = {source for record in records for source in record.fused_sources}
         references = read_references(flight, fused, records[0].parameters)
-        differences = SmoothedScores(smoothed_velocity(kept[0], window.intervals, STEP_US))
+        differences = SmoothedScores(smoothed_velocity(kept[0], flight, window.intervals, STEP_US))
         whiteness = _add_state_figures(table, kept, flight, references, window, settings, differences)
         smoothed = differences.rows(flight.name, window.block_edges(settings.block_s))
         for truth in references:

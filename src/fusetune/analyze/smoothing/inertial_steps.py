@@ -39,6 +39,7 @@ class InertialSteps:
     turned_force : (K, 3, 3) Σ [F]× A, m/s · s
     known_rotation : (K, 3) K = part of δθ that follows from the corrections and the changes of the biases, rad
     known_velocity : (K, 3) the same of δv, with Σ K × F, m/s
+    force_time, known_velocity_time : (K, 3) integrals of `force` and `known_velocity` (trapezoids), m
     """
 
     time: npt.NDArray[np.int64]
@@ -49,6 +50,8 @@ class InertialSteps:
     turned_force: Array
     known_rotation: Array
     known_velocity: Array
+    force_time: Array
+    known_velocity_time: Array
 
 
 def inertial_steps(steps: ReplayedSteps) -> InertialSteps:
@@ -72,15 +75,18 @@ def inertial_steps(steps: ReplayedSteps) -> InertialSteps:
     # the correction comes after the velocity was predicted
     known_force = np.cross(known_rotation + corrected_rotation, force)
     known_velocity = np.cumsum(known_force + _turned(turn, accel_change) * dv_dt - corrected_velocity, axis=0)
+    force_sum, known_velocity = _from_zero(np.cumsum(force, axis=0)), _from_zero(known_velocity)
     return InertialSteps(
         time=steps.time,
         velocity=steps.velocity,
         acceleration=_from_zero(gained / dv_dt),
-        force=_from_zero(np.cumsum(force, axis=0)),
+        force=force_sum,
         turned=_from_zero(turned),
         turned_force=_from_zero(np.cumsum(cross_matrix(force) @ turned, axis=0)),
         known_rotation=_from_zero(known_rotation),
-        known_velocity=_from_zero(known_velocity),
+        known_velocity=known_velocity,
+        force_time=_integrated(force_sum, steps.time),
+        known_velocity_time=_integrated(known_velocity, steps.time),
     )
 
 
@@ -90,13 +96,19 @@ class Transitions:
 
     δv' = δv + `velocity_by_rotation` δθ + `velocity_by_gyro` g_g − `turned` g_a + `known_velocity`
     δθ' = δθ − `turned` g_g + `known_rotation`
+
+    and by how much the error of the integrated velocity grew (of the constants, as if evenly): δv T +
+    `position_by_rotation` δθ + ½ T (`velocity_by_gyro` g_g − `turned` g_a) + `known_position`.
     """
 
+    passed_s: Array
     velocity_by_rotation: Array
     velocity_by_gyro: Array
     turned: Array
     known_velocity: Array
     known_rotation: Array
+    position_by_rotation: Array
+    known_position: Array
 
 
 def transitions(sums: InertialSteps, start: npt.NDArray[np.int64], stop: npt.NDArray[np.int64]) -> Transitions:
@@ -104,13 +116,26 @@ def transitions(sums: InertialSteps, start: npt.NDArray[np.int64], stop: npt.NDA
     force = cross_matrix(sums.force[stop] - sums.force[start])
     turned_force = sums.turned_force[stop] - sums.turned_force[start] - force @ sums.turned[start]
     known = sums.known_velocity[stop] - sums.known_velocity[start] + _turned(force, sums.known_rotation[start])
+    passed_s = (sums.time[stop] - sums.time[start]) * 1e-6
+    force_time = cross_matrix(_less_first(sums.force_time, sums.force, start, stop, passed_s))
+    known_time = _less_first(sums.known_velocity_time, sums.known_velocity, start, stop, passed_s)
     return Transitions(
+        passed_s=passed_s,
         velocity_by_rotation=-force,
         velocity_by_gyro=turned_force,
         turned=sums.turned[stop] - sums.turned[start],
         known_velocity=known,
         known_rotation=sums.known_rotation[stop] - sums.known_rotation[start],
+        position_by_rotation=-force_time,
+        known_position=known_time + _turned(force_time, sums.known_rotation[start]),
     )
+
+
+def _less_first(
+    integral: Array, values: Array, start: npt.NDArray[np.int64], stop: npt.NDArray[np.int64], passed_s: Array
+) -> Array:
+    """Integral from `start` to `stop` of what values exceed that at `start` by."""
+    return np.asarray(integral[stop] - integral[start] - passed_s[:, None] * values[start])
 
 
 def cross_matrix(vector: Array) -> Array:
@@ -124,6 +149,11 @@ def cross_matrix(vector: Array) -> Array:
 
 def _turned(matrices: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("kij,kj->ki", matrices, vectors))
+
+
+def _integrated(values: Array, time: npt.NDArray[np.int64]) -> Array:
+    step_s = np.diff(time)[:, None] * 1e-6
+    return _from_zero(np.cumsum(0.5 * (values[1:] + values[:-1]) * step_s, axis=0))
 
 
 def _from_zero(sums: Array) -> Array:

@@ -37,7 +37,7 @@ class LinearModel:
     observation : (p, n) H
     observed_constants : (N, p, m) D
     measured : (N, p) z
-    measurement_variance : (N, p) diagonals of R
+    measurement_variance : (N, p) diagonals of R; infinite where there is no measurement, of which z is anything finite
     first_variance : (n,) of x_0
     constant_variance : (m,) of g
     """
@@ -53,6 +53,11 @@ class LinearModel:
     first_variance: Array
     constant_variance: Array
 
+    @property
+    def measurements(self) -> int:
+        """How many there are, M."""
+        return int(np.count_nonzero(np.isfinite(self.measurement_variance)))
+
 
 @dataclass(frozen=True)
 class Smoothed:
@@ -63,8 +68,7 @@ class Smoothed:
     states : (N, n)
     constants : (m,)
     cost : sum of all squared residuals, each divided by its variance, at the course
-    log_determinant : of the covariance of the measurements (all N p of them), so that
-        −2 ln L = cost + log_determinant + N p ln 2π
+    log_determinant : of the covariance of all M measurements, so that −2 ln L = cost + log_determinant + M ln 2π
     """
 
     states: Array
@@ -108,7 +112,8 @@ def smooth(model: LinearModel) -> Smoothed:
     states = (solved[:, 0] - solved[:, 1:] @ constants).reshape(epochs, size)
 
     information = 2.0 * float(np.sum(np.log(factor[0])) + np.sum(np.log(np.diag(schur[0]))))
-    variances = (model.process_variance, model.measurement_variance, model.first_variance, model.constant_variance)
+    there = model.measurement_variance[np.isfinite(model.measurement_variance)]
+    variances = (model.process_variance, there, model.first_variance, model.constant_variance)
     log_determinant = information + sum(float(np.sum(np.log(one))) for one in variances)
     return Smoothed(states, constants, _cost(model, states, constants), log_determinant)
 

@@ -15,11 +15,20 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.replaying.replayed_set import ReplayedSet, ReplayedSteps
 from fusetune.analyze.sensors.measurement_errors import VELOCITY_SOURCES
-from fusetune.analyze.smoothing.error_model import USUAL_WALK, ErrorModel, likeliest_errors
+from fusetune.analyze.smoothing.error_model import USUAL_WALK, ErrorModel, PositionErrors, likeliest_errors
 from fusetune.analyze.smoothing.inertial_steps import inertial_steps, transitions
 from fusetune.analyze.smoothing.linear_smoother import Smoothed, measurement_residuals, smooth
-from fusetune.analyze.smoothing.velocity_models import ACCEL, GYRO, HorizontalModel, Stretch, VerticalModel
+from fusetune.analyze.smoothing.measured_positions import MeasuredPositions, position_series
+from fusetune.analyze.smoothing.velocity_models import (
+    ACCEL,
+    GYRO,
+    Stretch,
+    VelocityModel,
+    horizontal_model,
+    vertical_model,
+)
 from fusetune.px4.aid_sources import AID_SOURCES
+from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
 
@@ -32,6 +41,8 @@ SEARCHED_STRETCHES = 3
 OUTLIER_SIGMAS = 5.0
 """Measurements whose residuals are larger count as if they were as much less exact (Huber)."""
 SMALLEST_NOISE = 1e-3
+USUAL_POSITION_ERRORS = PositionErrors(white=0.2, walk=0.1)
+"""Of GNSS and barometers, from where the search begins."""
 NORMAL_QUARTILE = 0.6745
 _IN_OTHER_FRAME = 10.0
 
@@ -55,12 +66,15 @@ class SmoothedVelocity:
     vertical: ErrorModel
 
 
-def smoothed_velocity(record: ReplayedSet, intervals: Sequence[Interval], step_us: int) -> SmoothedVelocity | None:
+def smoothed_velocity(
+    record: ReplayedSet, flight: Flight, intervals: Sequence[Interval], step_us: int
+) -> SmoothedVelocity | None:
     """Smooth the velocity of a flight.
 
     Parameters
     ----------
     record : replay of any set
+    flight : canonical; `vehicle_gps_position` gives GNSS positions
     intervals : parts of the flight, µs; the reference is known in them where there are measurements
     step_us : from one time of the reference to the next, about
 
@@ -70,16 +84,16 @@ def smoothed_velocity(record: ReplayedSet, intervals: Sequence[Interval], step_u
     """
     if record.steps is None or not intervals:
         return None
+    source = next((one for one in VELOCITY_SOURCES if _measurements(record, one) is not None), None)
+    measured = _measurements(record, source) if source is not None else None
+    if source is None or measured is None:
+        return None
+    positions = position_series(record, flight, source)
     steps = record.steps()
-    resets = record.reset_times["heading"]
-    for source in VELOCITY_SOURCES:
-        measured = _measurements(record, source)
-        if measured is None:
-            continue
-        parts = [one for rows in _stretches(steps.time, intervals, resets) if (one := _stretch(steps.rows(rows), *measured))]
-        if parts:
-            return _smoothed(source, parts, intervals, step_us)
-    return None
+    rows = _stretches(steps.time, intervals, record.reset_times["heading"])
+    parts = [_stretch(steps.rows(one), *measured, positions) for one in rows]
+    del steps
+    return _smoothed(source, [one for one in parts if one is not None], intervals, step_us)
 
 
 def _measurements(record: ReplayedSet, source: str) -> tuple[npt.NDArray[np.int64], Array] | None:
@@ -111,7 +125,9 @@ def _stretches(
         yield from (slice(int(one), int(other)) for one, other in zip(edges[:-1], edges[1:], strict=True))
 
 
-def _stretch(steps: ReplayedSteps, time: npt.NDArray[np.int64], values: Array) -> Stretch | None:
+def _stretch(
+    steps: ReplayedSteps, time: npt.NDArray[np.int64], values: Array, positions: Sequence[MeasuredPositions]
+) -> Stretch | None:
     rows = (time > steps.time[0]) & (time <= steps.time[-1])
     epoch, first = np.unique(np.searchsorted(steps.time, time[rows]), return_index=True)
     if epoch.size < FEWEST_MEASUREMENTS:
@@ -122,19 +138,18 @@ def _stretch(steps: ReplayedSteps, time: npt.NDArray[np.int64], values: Array) -
     before_s = (sums.time[epoch] - time)[:, None] * 1e-6
     measured = values - (sums.velocity[epoch] - sums.acceleration[epoch] * before_s)
     # an observation in another frame than the state's, such as the body's
-    moving = np.median(np.abs(values))
-    if np.median(np.abs(measured)) > max(_IN_OTHER_FRAME, moving):
+    if np.median(np.abs(measured)) > max(_IN_OTHER_FRAME, float(np.median(np.abs(values)))):
         return None
-    return Stretch(sums, epoch, measured)
+    return Stretch(sums, epoch, measured, tuple(one.at(sums.time[epoch]) for one in positions))
 
 
 def _smoothed(
     source: str, parts: list[Stretch], intervals: Sequence[Interval], step_us: int
-) -> SmoothedVelocity:
-    across = [HorizontalModel(one) for one in parts]
-    horizontal, courses = _fitted(across)
-    down = [VerticalModel(*one) for one in zip(parts, courses, strict=True)]
-    vertical, falls = _fitted(down)
+) -> SmoothedVelocity | None:
+    if not parts:
+        return None
+    horizontal, courses = _fitted([horizontal_model(one) for one in parts])
+    vertical, falls = _fitted([vertical_model(*one) for one in zip(parts, courses, strict=True)])
     pieces = [_reference(*one, step_us) for one in zip(parts, courses, falls, strict=True)]
     time = np.concatenate([one for one, _ in pieces])
     velocity = np.concatenate([one for _, one in pieces])
@@ -142,17 +157,21 @@ def _smoothed(
     return SmoothedVelocity(source, time[rows], velocity[rows], horizontal, vertical)
 
 
-def _fitted(models: Sequence[HorizontalModel] | Sequence[VerticalModel]) -> tuple[ErrorModel, list[Smoothed]]:
+def _fitted(models: Sequence[VelocityModel]) -> tuple[ErrorModel, list[Smoothed]]:
     """The likeliest noises of the stretches together, and the course of each under these."""
-    change = np.concatenate([np.diff(one.measured, axis=0) for one in models])
+    axes = models[0].axes
+    change = np.concatenate([np.diff(one.measured[:, :axes], axis=0) for one in models])
     # of the difference of two
-    guess = max(_spread(change) / np.sqrt(2.0), SMALLEST_NOISE)
-    errors = ErrorModel(guess, 0.0, 0.0, USUAL_WALK)
+    white = max(_spread(change) / np.sqrt(2.0), SMALLEST_NOISE)
+    errors = ErrorModel(white, 0.0, 0.0, USUAL_WALK, (USUAL_POSITION_ERRORS,) * models[0].series)
     for one in models:
         model = one(errors)
         found = smooth(model)
         residual = measurement_residuals(model, found.states, found.constants)
-        one.excess = np.maximum(1.0, np.abs(residual) / (OUTLIER_SIGMAS * max(_spread(residual), SMALLEST_NOISE)))
+        for column in range(residual.shape[1]):
+            there = np.isfinite(one.excess[:, column])
+            off = np.abs(residual[there, column])
+            one.excess[there, column] = np.maximum(1.0, off / (OUTLIER_SIGMAS * max(_spread(off), SMALLEST_NOISE)))
     every = max(1, -(-len(models) // SEARCHED_STRETCHES))
     errors = likeliest_errors(lambda one: [build(one) for build in models[::every]], errors)
     return errors, [smooth(one(errors)) for one in models]
@@ -160,7 +179,7 @@ def _fitted(models: Sequence[HorizontalModel] | Sequence[VerticalModel]) -> tupl
 
 def _spread(values: Array) -> float:
     """Standard deviation of what is normal among values."""
-    return float(np.median(np.abs(values)) / NORMAL_QUARTILE)
+    return float(np.median(np.abs(values)) / NORMAL_QUARTILE) if values.size else 0.0
 
 
 def _reference(stretch: Stretch, course: Smoothed, fall: Smoothed, step_us: int) -> tuple[npt.NDArray[np.int64], Array]:
@@ -180,8 +199,7 @@ def _reference(stretch: Stretch, course: Smoothed, fall: Smoothed, step_us: int)
         error = velocity[start] + by.known_velocity + by.velocity_by_gyro @ course.constants[GYRO]
         error += np.einsum("kij,kj->ki", by.velocity_by_rotation, course.states[start, 2:5])
         error -= by.turned @ course.constants[ACCEL]
-        passed_s = (sums.time[stop] - sums.time[epoch[start]]) * 1e-6
-        error[:, 2] -= passed_s * fall.constants[0]
+        error[:, 2] -= by.passed_s * fall.constants[0]
         return error
 
     missed = velocity[1:] - carried(np.arange(epoch.size - 1), epoch[1:])

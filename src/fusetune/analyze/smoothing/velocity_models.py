@@ -1,12 +1,14 @@
 """Linear models of how the velocity error of a replay moves, as `linear_smoother` takes them.
 
-Horizontal: states δv north and east, δθ, and where the measurement's error is correlated that of both axes; constants
-are the errors of the gyro and accelerometer biases and of the measurement's delay. Vertical: δv down and the
-measurement's correlated error; the tilt is known then, and one constant is left, the accelerometer's.
+Horizontal: states δv north and east, and δθ; constants are the errors of the gyro and accelerometer biases and of the
+measurement's delay. Vertical: δv down; the attitude is known then, and one constant is left, the accelerometer's. With
+each series of positions or heights goes a state per axis, the integral of δv and a walk, as the errors of both wander
+for minutes. Where the error of the velocity measurement is correlated, it is a state, too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +20,11 @@ from fusetune.analyze.smoothing.linear_smoother import LinearModel, Smoothed
 
 Array = npt.NDArray[np.float64]
 
-FIRST_VELOCITY, FIRST_ROTATION = 1.0, (0.1, 0.1, 0.3)
-"""Standard deviations of the errors that a stretch begins with, m/s and rad."""
+PLANE, DOWN = (0, 1), (2,)
+"""Axes that a series of positions or heights has."""
+
+FIRST_VELOCITY, FIRST_ROTATION, FIRST_POSITION = 1.0, (0.1, 0.1, 0.3), 10.0
+"""Standard deviations of the errors that a stretch begins with, m/s, rad and m."""
 GYRO_BIAS, ACCEL_BIAS, DELAY_S = 0.01, 0.3, 0.05
 """Standard deviations of the constants, rad/s, m/s² and s."""
 ROTATION_TO_VELOCITY = 0.015 / 0.35
@@ -31,24 +36,39 @@ CONSTANTS = 7
 
 
 @dataclass(frozen=True)
+class PositionSeries:
+    """Measured positions or heights less the integral of the estimated velocity.
+
+    Attributes
+    ----------
+    source : aid source
+    axes : `PLANE` or `DOWN`
+    values : (N, 2 or 1) at each epoch, NED, m; NaN where there is none
+    is_delayed : whether it comes with the velocity and so shares the error of its delay
+    """
+
+    source: str
+    axes: tuple[int, ...]
+    values: Array
+    is_delayed: bool
+
+
+@dataclass(frozen=True)
 class Stretch:
     """An uninterrupted part of a flight with its measurements.
 
     Attributes
     ----------
     sums : of its updates
-    epoch : (N,) the updates at which there is a measurement
+    epoch : (N,) the updates at which the velocity is measured
     measured : (N, 3) measured less estimated velocity, NED, m/s
+    positions : what else is measured
     """
 
     sums: InertialSteps
     epoch: npt.NDArray[np.int64]
     measured: Array
-
-    @property
-    def step_s(self) -> Array:
-        """(N − 1,) from one measurement to the next."""
-        return np.asarray(np.diff(self.sums.time[self.epoch]) * 1e-6)
+    positions: tuple[PositionSeries, ...] = ()
 
     @property
     def between(self) -> Transitions:
@@ -64,88 +84,152 @@ class Stretch:
         return np.asarray((gained[updates[2:]] - gained[updates[:-2]]) / count)
 
 
-class HorizontalModel:
-    """Models of one stretch for any noises; what does not depend on them is made once.
+@dataclass(frozen=True)
+class _Motion:
+    """What of a model does not depend on the noises: A axes, n states of the inertial solution (δv first), m constants.
 
     Attributes
     ----------
-    measured : (N, 2) measured less estimated velocity
-    excess : (N, 2) factors on the variances of the measurements: 1, or more where one lies far off
+    step_s : (N − 1,)
+    transition, of_constants, known : (N − 1, …) of the states, as in `LinearModel`
+    walk : (n,) of each state for a velocity that walks with 1 m/s/√s
+    position_by_state, position_by_constants, known_position : (N − 1, A, …) growth of the integrated velocity's error
+    delay : (N, 2, A, m) what the constants do to a measured velocity and to a measured position of its source
+    first, constants : standard deviations
     """
 
-    def __init__(self, stretch: Stretch) -> None:
-        self._step_s = stretch.step_s
-        self.measured = stretch.measured[:, :2]
-        self.excess = np.ones_like(self.measured)
-        between, count = stretch.between, stretch.epoch.size
-        self._transition = np.tile(np.eye(5), (count - 1, 1, 1))
-        self._transition[:, :2, 2:] = between.velocity_by_rotation[:, :2]
-        self._of_constants = np.zeros((count - 1, 5, CONSTANTS))
-        self._of_constants[:, :2, GYRO] = between.velocity_by_gyro[:, :2]
-        self._of_constants[:, :2, ACCEL] = -between.turned[:, :2]
-        self._of_constants[:, 2:, GYRO] = -between.turned
-        self._known = np.concatenate([between.known_velocity[:, :2], between.known_rotation], axis=1)
-        self._observed = np.zeros((count, 2, CONSTANTS))
-        self._observed[:, :, DELAY] = stretch.acceleration[:, :2]
+    step_s: Array
+    transition: Array
+    of_constants: Array
+    known: Array
+    walk: Array
+    position_by_state: Array
+    position_by_constants: Array
+    known_position: Array
+    delay: Array
+    first: Array
+    constants: Array
+
+
+class VelocityModel:
+    """Models of some axes of one stretch for any noises.
+
+    Attributes
+    ----------
+    measured : (N, p) the velocity's axes first, then those of each series of positions; 0 where there is none
+    excess : (N, p) factors on the variances of the measurements: 1, more where one lies far off, infinite where there
+        is none
+    axes : number of axes, A
+    series : number of series of positions
+    """
+
+    def __init__(self, motion: _Motion, velocity: Array, positions: Sequence[PositionSeries]) -> None:
+        self._motion, self._delayed = motion, [one.is_delayed for one in positions]
+        self.axes, self.series = velocity.shape[1], len(positions)
+        values = np.hstack([velocity, *(one.values for one in positions)])
+        self.excess = np.where(np.isfinite(values), 1.0, np.inf)
+        self.measured = np.nan_to_num(values)
+        self._parts = self._with_positions()
+
+    def _with_positions(self) -> dict[str, Array]:
+        """Transition, constants and observation with the states of the series behind those of the motion."""
+        motion, axes = self._motion, self.axes
+        steps, size, constants = motion.of_constants.shape
+        total = size + axes * self.series
+        transition = np.zeros((steps, total, total))
+        transition[:, range(total), range(total)] = 1.0
+        transition[:, :size, :size] = motion.transition
+        of_constants, known = np.zeros((steps, total, constants)), np.zeros((steps, total))
+        of_constants[:, :size], known[:, :size] = motion.of_constants, motion.known
+        observation = np.zeros((axes * (1 + self.series), total))
+        observation[:axes, :axes] = np.eye(axes)
+        observed = np.zeros((steps + 1, axes * (1 + self.series), constants))
+        observed[:, :axes] = motion.delay[:, 0]
+        for number, is_delayed in enumerate(self._delayed):
+            state = slice(size + axes * number, size + axes * (number + 1))
+            row = slice(axes * (number + 1), axes * (number + 2))
+            transition[:, state, :size] = motion.position_by_state
+            of_constants[:, state], known[:, state] = motion.position_by_constants, motion.known_position
+            observation[row, state] = np.eye(axes)
+            if is_delayed:
+                observed[:, row] = motion.delay[:, 1]
+        return {
+            "transition": transition, "of_constants": of_constants, "known": known,
+            "observation": observation, "observed_constants": observed,
+        }  # fmt: skip
 
     def __call__(self, errors: ErrorModel) -> LinearModel:
-        walk = np.array([1.0, 1.0, *[ROTATION_TO_VELOCITY] * 3]) * errors.walk
-        return _with_correlated_errors(
-            LinearModel(
-                transition=self._transition,
-                of_constants=self._of_constants,
-                known=self._known,
-                process_variance=np.square(walk) * self._step_s[:, None],
-                observation=np.eye(2, 5),
-                observed_constants=self._observed,
-                measured=self.measured,
-                measurement_variance=self.excess * errors.white**2,
-                first_variance=np.square([FIRST_VELOCITY, FIRST_VELOCITY, *FIRST_ROTATION]),
-                constant_variance=np.square([*[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 3, DELAY_S]),
-            ),
-            errors,
-            self._step_s,
+        """The model under these noises."""
+        motion, axes = self._motion, self.axes
+        walk = np.r_[motion.walk * errors.walk, np.repeat([one.walk for one in errors.positions], axes)]
+        white = np.repeat([errors.white, *(one.white for one in errors.positions)], axes)
+        model = LinearModel(
+            **self._parts,
+            process_variance=np.square(walk) * motion.step_s[:, None],
+            measured=self.measured,
+            measurement_variance=self.excess * np.square(white),
+            first_variance=np.square(np.r_[motion.first, np.full(axes * self.series, FIRST_POSITION)]),
+            constant_variance=np.square(motion.constants),
         )
+        return model if errors.is_white else _with_correlated_errors(model, errors, motion.step_s, axes)
 
 
-class VerticalModel:
-    """The same downwards, with attitude, biases and delay as the horizontal course has them."""
-
-    def __init__(self, stretch: Stretch, horizontal: Smoothed) -> None:
-        self._step_s = stretch.step_s
-        between, constants = stretch.between, horizontal.constants
-        rotation = horizontal.states[:-1, 2:5]
-        known = np.einsum("kj,kj->k", between.velocity_by_rotation[:, 2], rotation)
-        known += between.velocity_by_gyro[:, 2] @ constants[GYRO] + between.known_velocity[:, 2]
-        self._known = (known - between.turned[:, 2] @ constants[ACCEL])[:, None]
-        self.measured = stretch.measured[:, 2:] - stretch.acceleration[:, 2:] * constants[DELAY]
-        self.excess = np.ones_like(self.measured)
-
-    def __call__(self, errors: ErrorModel) -> LinearModel:
-        count = self.measured.shape[0]
-        return _with_correlated_errors(
-            LinearModel(
-                transition=np.ones((count - 1, 1, 1)),
-                of_constants=-self._step_s[:, None, None],
-                known=self._known,
-                process_variance=errors.walk**2 * self._step_s[:, None],
-                observation=np.ones((1, 1)),
-                observed_constants=np.zeros((count, 1, 1)),
-                measured=self.measured,
-                measurement_variance=self.excess * errors.white**2,
-                first_variance=np.array([FIRST_VELOCITY**2]),
-                constant_variance=np.array([ACCEL_BIAS**2]),
-            ),
-            errors,
-            self._step_s,
-        )
+def horizontal_model(stretch: Stretch) -> VelocityModel:
+    """North and east, with the attitude and all constants."""
+    between, steps = stretch.between, stretch.epoch.size - 1
+    passed_s = between.passed_s[:, None, None]
+    transition = np.tile(np.eye(5), (steps, 1, 1))
+    transition[:, :2, 2:] = between.velocity_by_rotation[:, :2]
+    of_constants = np.zeros((steps, 5, CONSTANTS))
+    of_constants[:, :2, GYRO] = between.velocity_by_gyro[:, :2]
+    of_constants[:, :2, ACCEL] = -between.turned[:, :2]
+    of_constants[:, 2:, GYRO] = -between.turned
+    delay = np.zeros((steps + 1, 2, 2, CONSTANTS))
+    delay[:, 0, :, DELAY] = stretch.acceleration[:, :2]
+    delay[:, 1, :, DELAY] = stretch.sums.velocity[stretch.epoch, :2]
+    motion = _Motion(
+        step_s=between.passed_s,
+        transition=transition,
+        of_constants=of_constants,
+        known=np.concatenate([between.known_velocity[:, :2], between.known_rotation], axis=1),
+        walk=np.array([1.0, 1.0, *[ROTATION_TO_VELOCITY] * 3]),
+        position_by_state=np.concatenate([passed_s * np.eye(2), between.position_by_rotation[:, :2]], axis=2),
+        position_by_constants=0.5 * passed_s * of_constants[:, :2],
+        known_position=between.known_position[:, :2],
+        delay=delay,
+        first=np.array([FIRST_VELOCITY, FIRST_VELOCITY, *FIRST_ROTATION]),
+        constants=np.array([*[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 3, DELAY_S]),
+    )
+    return VelocityModel(motion, stretch.measured[:, :2], [one for one in stretch.positions if one.axes == PLANE])
 
 
-def _with_correlated_errors(model: LinearModel, errors: ErrorModel, step_s: Array) -> LinearModel:
-    """The model with a Gauss-Markov state for each measured axis, where the errors have one."""
-    if errors.is_white:
-        return model
-    epochs, axes = model.measured.shape
+def vertical_model(stretch: Stretch, horizontal: Smoothed) -> VelocityModel:
+    """Down, with attitude, biases and delay as the horizontal course has them."""
+    between, constants = stretch.between, horizontal.constants
+    passed_s, rotation = between.passed_s, horizontal.states[:-1, 2:5]
+    by_constants = between.velocity_by_gyro[:, 2] @ constants[GYRO] - between.turned[:, 2] @ constants[ACCEL]
+    known = np.einsum("kj,kj->k", between.velocity_by_rotation[:, 2], rotation)
+    known_position = np.einsum("kj,kj->k", between.position_by_rotation[:, 2], rotation)
+    measured = stretch.measured[:, 2:] - stretch.acceleration[:, 2:] * constants[DELAY]
+    motion = _Motion(
+        step_s=passed_s,
+        transition=np.ones((passed_s.size, 1, 1)),
+        of_constants=-passed_s[:, None, None],
+        known=(known + by_constants + between.known_velocity[:, 2])[:, None],
+        walk=np.ones(1),
+        position_by_state=passed_s[:, None, None],
+        position_by_constants=-0.5 * np.square(passed_s)[:, None, None],
+        known_position=(known_position + 0.5 * passed_s * by_constants + between.known_position[:, 2])[:, None],
+        delay=np.zeros((stretch.epoch.size, 2, 1, 1)),
+        first=np.array([FIRST_VELOCITY]),
+        constants=np.array([ACCEL_BIAS]),
+    )
+    return VelocityModel(motion, measured, [one for one in stretch.positions if one.axes == DOWN])
+
+
+def _with_correlated_errors(model: LinearModel, errors: ErrorModel, step_s: Array, axes: int) -> LinearModel:
+    """The model with a Gauss-Markov state for the error of each measured axis of the velocity."""
+    epochs, rows = model.measured.shape
     size = model.observation.shape[1]
     kept = np.exp(-step_s / errors.correlation_time_s)
     transition = np.zeros((epochs - 1, size + axes, size + axes))
@@ -157,7 +241,7 @@ def _with_correlated_errors(model: LinearModel, errors: ErrorModel, step_s: Arra
         of_constants=np.pad(model.of_constants, ((0, 0), (0, axes), (0, 0))),
         known=np.pad(model.known, ((0, 0), (0, axes))),
         process_variance=np.hstack([model.process_variance, new]),
-        observation=np.hstack([model.observation, np.eye(axes)]),
+        observation=np.hstack([model.observation, np.eye(rows, axes)]),
         observed_constants=model.observed_constants,
         measured=model.measured,
         measurement_variance=model.measurement_variance,
