@@ -153,7 +153,7 @@ class Disagreement:
     Attributes
     ----------
     any_consistent : whether any set's mean NIS lies inside the paper's bounds on half of the flights at least
-    aided, unaided, smoothed, score : by how much the logarithm of a prediction error of the paper's set exceeds that of the
+    aided, unaided, smoothed, score : by how much the logarithm of an error of the paper's set exceeds that of the
         decision's set; None where no flight tells
     position_white_share : how white the error of GNSS position is; NaN where unknown
     objections : why the decision may not choose the paper's set, in words; empty where it may

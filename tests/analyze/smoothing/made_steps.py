@@ -56,9 +56,9 @@ def replayed(
         gyro.append(gyro[-1])
         accel.append(accel[-1])
         if corrections is not None and k % 10 == 0:
-            turned = multiply(from_rotation_vector(1e-3 * corrections.normal(size=3)), turned)
+            turned = multiply(from_rotation_vector(2e-4 * corrections.normal(size=3)), turned)
             moved = moved + 0.05 * corrections.normal(size=3)
-            gyro[-1] = gyro[-1] + 1e-4 * corrections.normal(size=3)
+            gyro[-1] = gyro[-1] + 1e-5 * corrections.normal(size=3)
             accel[-1] = accel[-1] + 3e-3 * corrections.normal(size=3)
         q.append(turned)
         v.append(moved)

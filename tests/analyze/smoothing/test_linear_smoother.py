@@ -14,7 +14,7 @@ from fusetune.analyze.smoothing.linear_smoother import (
 
 def dense_least_squares(model: LinearModel) -> tuple[np.ndarray, np.ndarray]:
     """States and constants as the solution of all weighted equations, written out as one matrix."""
-    epochs, (measured, states) = len(model.measured), model.observation.shape
+    epochs, states = len(model.measured), model.observation.shape[1]
     constants = model.constant_variance.size
     unknowns = epochs * states + constants
     rows, right = [], []

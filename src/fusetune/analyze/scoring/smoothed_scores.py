@@ -23,8 +23,9 @@ SMOOTHED_SCHEMA = pa.schema(
         *columns_of(pa.float64(), "sum_squares", "sum_squares_winsorised"),
     ]
 )
-"""One row per set, axis (north, east, down) and block: sums of squared differences of velocity, m²/s², at `n` times that
-are the same for all sets; `source` is the one that the reference was made of."""
+"""One row per set, axis (north, east, down) and block: sums of squared differences of velocity, m²/s², at `n` times.
+
+These are the same for all sets; `source` is the one that the reference was made of."""
 
 STEP_US = 50_000
 

@@ -4,7 +4,7 @@ The velocity measurement's error is white noise σ_w plus, where the data say so
 of a position or height is white noise and a walk; the velocity of the inertial solution walks with density q. All scale
 together: with their ratios and τ given, the scale that makes the measurements most probable is s² = cost/n, and what is
 left to compare is n ln s² + ln det. So the ratios are searched, each in factors of two, from the best of a coarse first
-look.
+look; the walk, which says over how long measurements are averaged, at last in factors of √2.
 
 A receiver that wanders over seconds and an inertial solution that walks explain the same measurements nearly as well.
 What is known of the latter decides: q is log-normal around what an accelerometer on a vibrating frame has.
@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from fusetune.analyze.smoothing.linear_smoother import LinearModel, smooth
 
@@ -28,6 +29,7 @@ FIRST_SHARES = (1.0, 3.0)
 """Of σ_c/σ_w."""
 NEEDED_GAIN = 6.0
 """In −2 ln L, for two more figures: Akaike's criterion asks for 4."""
+COARSE, FINE = 2.0, math.sqrt(2.0)
 _NOISE_LIMITS = (0.0005, 10.0)
 _SHARE_LIMITS = (0.125, 16.0)
 _STEPS = 5
@@ -110,7 +112,8 @@ def likeliest_errors(build: Builder, first: ErrorModel) -> ErrorModel:
     plain = climbed(scored(first), [*of_positions, _walk_step, *of_positions])
     correlated = min((scored(one) for one in _correlated(plain.errors)), key=lambda one: one.score)
     correlated = climbed(correlated, [_share_step, _walk_step, _time_step, *of_positions, _share_step, _walk_step])
-    return (correlated if correlated.score < plain.score - NEEDED_GAIN else plain).errors
+    best = correlated if correlated.score < plain.score - NEEDED_GAIN else plain
+    return _climbed(best, _walk_step, scored, FINE).errors
 
 
 def _correlated(white: ErrorModel) -> Iterator[ErrorModel]:
@@ -120,10 +123,10 @@ def _correlated(white: ErrorModel) -> Iterator[ErrorModel]:
             yield replace(white, walk=USUAL_WALK, correlated=share * white.white, correlation_time_s=time)
 
 
-def _climbed(start: _Found, step: Step, scored: Callable[[ErrorModel], _Found]) -> _Found:
-    """Follow one noise in factors of two while that makes the measurements more probable."""
+def _climbed(start: _Found, step: Step, scored: Callable[[ErrorModel], _Found], factor: float = COARSE) -> _Found:
+    """Follow one noise up or down by a factor while that makes the measurements more probable."""
     best = start
-    for direction in (2.0, 0.5):
+    for direction in (factor, 1.0 / factor):
         for _ in range(_STEPS):
             candidate = step(best.errors, direction)
             found = scored(candidate) if candidate is not None else None
@@ -153,13 +156,13 @@ def _time_step(errors: ErrorModel, factor: float) -> ErrorModel | None:
 
 def _position_steps(errors: ErrorModel) -> Iterator[Step]:
     for number in range(len(errors.positions)):
-        yield lambda one, factor, number=number: _of_position(one, number, factor, 1.0)
-        yield lambda one, factor, number=number: _of_position(one, number, 1.0, factor)
+        yield partial(_position_step, number, "white")
+        yield partial(_position_step, number, "walk")
 
 
-def _of_position(errors: ErrorModel, number: int, white: float, walk: float) -> ErrorModel | None:
+def _position_step(number: int, noise: str, errors: ErrorModel, factor: float) -> ErrorModel | None:
     old = errors.positions[number]
-    new = PositionErrors(old.white * white, old.walk * walk)
+    new = replace(old, **{noise: getattr(old, noise) * factor})
     if not (_within(new.white, _NOISE_LIMITS) and _within(new.walk, _NOISE_LIMITS)):
         return None
     return replace(errors, positions=(*errors.positions[:number], new, *errors.positions[number + 1 :]))

@@ -116,7 +116,7 @@ def transitions(sums: InertialSteps, start: npt.NDArray[np.int64], stop: npt.NDA
     force = cross_matrix(sums.force[stop] - sums.force[start])
     turned_force = sums.turned_force[stop] - sums.turned_force[start] - force @ sums.turned[start]
     known = sums.known_velocity[stop] - sums.known_velocity[start] + _turned(force, sums.known_rotation[start])
-    passed_s = (sums.time[stop] - sums.time[start]) * 1e-6
+    passed_s: Array = np.asarray((sums.time[stop] - sums.time[start]) * 1e-6, np.float64)
     force_time = cross_matrix(_less_first(sums.force_time, sums.force, start, stop, passed_s))
     known_time = _less_first(sums.known_velocity_time, sums.known_velocity, start, stop, passed_s)
     return Transitions(

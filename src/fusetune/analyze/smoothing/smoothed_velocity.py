@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -117,12 +118,12 @@ def _stretches(
     first, last = np.searchsorted(time, (intervals[0][0], intervals[-1][1]))
     gaps = np.flatnonzero(np.diff(time[first:last]) > LONGEST_STEP_S * 1e6) + first + 1
     ends = np.unique(np.r_[first, gaps, np.clip(np.searchsorted(time, resets), first, last), last])
-    for start, stop in zip(ends[:-1], ends[1:], strict=True):
+    for start, stop in pairwise(ends):
         if stop - start < 2:
             continue
         parts = max(1, int(np.ceil((time[stop - 1] - time[start]) * 1e-6 / LONGEST_STRETCH_S)))
         edges = start + np.arange(parts + 1) * (stop - start) // parts
-        yield from (slice(int(one), int(other)) for one, other in zip(edges[:-1], edges[1:], strict=True))
+        yield from (slice(int(one), int(other)) for one, other in pairwise(edges))
 
 
 def _stretch(

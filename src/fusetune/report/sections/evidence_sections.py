@@ -191,13 +191,20 @@ def weights_section(results: Results) -> str:
         )
         for flight, of_aim in sorted(weights.items())
     ]
-    head = ("flight", *(f"{AID_SOURCES[one].label}, white" for one in sources), "weight aided", "weight unaided", "weight smoothed")
+    head = (
+        "flight",
+        *(f"{AID_SOURCES[one].label}, white" for one in sources),
+        "weight aided",
+        "weight unaided",
+        "weight smoothed",
+    )
     text = (
         "A filter that follows a wandering measurement predicts it well without knowing better, so the predictions one "
         "step ahead count only as far as the error of the measurement is white: fully from "
         f"{100.0 * rule['trust_white_share']:.0f} % on, not at all below {100.0 * rule['distrust_white_share']:.0f} %. "
-        "As far as they do not, the difference of the velocity to one that is smoothed from the whole flight counts, which "
-        "takes the wander for the receiver's. Where a flight has only one of these to tell of, that one decides there."
+        "As far as they do not, the difference of the velocity to one that is smoothed from the whole flight counts, "
+        "which takes the wander for the receiver's. "
+        "Where a flight has only one of these to tell of, that one decides there."
     )
     unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
     note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")
