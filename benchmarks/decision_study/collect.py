@@ -24,7 +24,7 @@ from fusetune.set_names import PRESENT
 from fusetune.storage.digest import source_digest
 
 HERE = Path(__file__).parent
-KEPT = ("scoring.json", "scores.parquet", "withheld.parquet", "metrics.parquet")
+KEPT = ("scoring.json", "scores.parquet", "withheld.parquet", "smoothed.parquet", "metrics.parquet")
 FIRST_SEED = 1000
 
 

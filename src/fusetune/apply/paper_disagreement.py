@@ -151,7 +151,7 @@ class Disagreement:
     Attributes
     ----------
     any_consistent : whether any set's mean NIS lies inside the paper's bounds on half of the flights at least
-    aided, unaided, score : by how much the logarithm of a prediction error of the paper's set exceeds that of the
+    aided, unaided, smoothed, score : by how much the logarithm of an error of the paper's set exceeds that of the
         decision's set; None where no flight tells
     position_white_share : how white the error of GNSS position is; NaN where unknown
     objections : why the decision may not choose the paper's set, in words; empty where it may
@@ -163,6 +163,7 @@ class Disagreement:
     any_consistent: bool
     aided: MeanDifference | None
     unaided: MeanDifference | None
+    smoothed: MeanDifference | None
     score: MeanDifference | None
     position_white_share: float
     objections: Sequence[str]
@@ -195,7 +196,8 @@ def reasons(case: Disagreement) -> list[str]:
     for ratio, where in (
         (case.aided, "One step ahead, with all sensors in use"),
         (case.unaided, "After seconds without GNSS"),
-        (case.score, "Both taken together, as the decision weighs them"),
+        (case.smoothed, "Of the velocity, against the smoothed one"),
+        (case.score, "All taken together, as the decision weighs them"),
     ):
         if ratio is not None:
             found.append(_prediction(where, ratio, case))

@@ -44,6 +44,20 @@ class DecisionSettings:
     )
     aided_weight: float = setting(1.0, "weight of the predictions one step ahead", low=0, high=100)
     unaided_weight: float = setting(1.0, "weight of the predictions without the sensor", low=0, high=100)
+    smoothed_axes: Mapping[str, float] = setting(
+        {"x": 1.0, "y": 1.0, "z": 1.0},
+        "axes of the velocity (north, east, down) that is compared with the smoothed one, with their weights",
+        low=0,
+        high=1_000_000,
+        choices=AXES,
+        at_least=1,
+    )
+    smoothed_weight: float = setting(
+        1.0,
+        "weight of the difference to the smoothed velocity, as far as the predictions one step ahead are not trusted",
+        low=0,
+        high=100,
+    )
     distrust_white_share: float = setting(
         0.6, "a source whose error is less white has no say in the predictions one step ahead", low=0, high=1
     )

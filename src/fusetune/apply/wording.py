@@ -3,7 +3,15 @@
 from collections.abc import Iterator, Sequence
 
 from fusetune.apply.choice import Choice
-from fusetune.apply.evidence import AIDED, DISTRUSTED, NOT_SCORED, UNAIDED, WITHOUT_SAMPLES, AnalyzedFlight
+from fusetune.apply.evidence import (
+    AIDED,
+    DISTRUSTED,
+    NOT_SCORED,
+    SMOOTHED,
+    UNAIDED,
+    WITHOUT_SAMPLES,
+    AnalyzedFlight,
+)
 from fusetune.apply.ranking import RankedSet, gains_enough, improvement_percent
 from fusetune.apply.settings import DecisionSettings
 
@@ -76,7 +84,9 @@ def _basis(flights: Sequence[AnalyzedFlight]) -> str:
         ways.append("how well the estimator predicted each measurement before it saw it")
     if UNAIDED in aims:
         ways.append("how far the estimated velocity and position had drifted after seconds without GNSS")
-    return " and ".join(ways)
+    if SMOOTHED in aims:
+        ways.append("how near its velocity came to the one that the whole flight, before and after, makes likely")
+    return " and ".join(filter(None, (", ".join(ways[:-1]), *ways[-1:])))
 
 
 def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionSettings) -> str:
