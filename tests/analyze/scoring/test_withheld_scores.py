@@ -82,6 +82,17 @@ def test_a_prediction_that_is_no_number_is_lacking(broken: dict[str, float]) -> 
     np.testing.assert_allclose(group.variance[1], 1.0)
 
 
+def test_a_horizon_without_a_measurement_before_it_says_nothing() -> None:
+    """Of the gap at 20 s the other set predicted after 3 s, and no measurement came in the second before 9 s."""
+    long = predicted([10, 20, 30], [1.0, 2.0, 1.0])
+    short = predicted([10, 20, 30], [0.1, 0.1, 0.1]) | {"horizon_s": np.full(3, 3.0)}
+    both = {name: np.concatenate([long[name], short[name]]) for name in long}
+    without = {name: np.delete(values, 1) for name, values in both.items()}
+    without["innovation"] = np.array([0.5, 0.5, 0.1, 0.1, 0.1])
+    (_, after_9_s) = paired_gaps([record("present", both), record("other", without)], "present", WINDOW, LENIENT)
+    np.testing.assert_allclose(after_9_s.error, [[1.0, 2.0, 1.0], [0.5, 2.0, 0.5]])
+
+
 def test_a_gap_after_a_reset_of_its_own_counts_no_better_than_the_present_set() -> None:
     window = dataclasses.replace(WINDOW, own_resets={"other": (Cut(18 * SECOND, 22 * SECOND, "reset"),)})
     now = record("present", predicted([10, 20, 30], [1.0, -2.0, 3.0]))

@@ -5,8 +5,9 @@ cost itself:
 
 * **Lacking**: it has no prediction, or one that is no number, or had not yet fused the source once. It counts with the
   largest error that counts at all, the limit beyond which errors are clipped. One measurement alone that was passed
-  over while the source was in use (another delay makes the estimator skip another one) says nothing: it counts with
-  the present set's error or its own usual one, whichever is larger.
+  over while the source was in use (another delay makes the estimator skip another one) says nothing, nor does a gap
+  with no measurement just before one horizon: it counts with the present set's error or its own usual one, whichever is
+  larger.
 * **After a reset of its own**: a reset sets the state to the measurement and so hides the error that led to it. Until
   `reset_cut_s` after it, its error counts as no smaller than the present set's at the same measurement, and its
   variance as its usual one, for a reset sets that, too.

@@ -42,6 +42,9 @@ WITHHELD_SCHEMA = pa.schema(
 FEWEST_GAPS = 3
 """Fewer gaps than this make no figure."""
 
+_HORIZONS = 1000
+"""Keys of predictions leave room for horizons below 100 s, in tenths."""
+
 _STALE_US = 1_000_000
 """A sensor that the present set has not fused for so long was not there to be withheld."""
 
@@ -134,7 +137,7 @@ def _paired(
     present = matched[0].error
     limit = winsor_limit(np.stack([matched[number].error for number in kept if matched[number].is_complete]))
     counted = [
-        charged(one.error, one.variance, present, one.lacking, one.after_reset, limit)
+        charged(one.error, one.variance, present, one.lacking, one.after_reset, limit, one.alone)
         for one in (matched[number] for number in kept)
     ]
     return PairedGaps(
@@ -147,11 +150,13 @@ def _paired(
 
 @dataclass(frozen=True)
 class _Matched:
-    """A set's predictions in gaps of the present one; where it is lacking its error and variance mean nothing."""
+    """A set's predictions in gaps of the present one; where it is lacking its error and variance mean nothing. `alone`
+    is true where the set predicted in the gap, but no measurement fell into the second before this horizon."""
 
     error: Array
     variance: Array
     lacking: npt.NDArray[np.bool_]
+    alone: npt.NDArray[np.bool_]
     after_reset: npt.NDArray[np.bool_]
 
     @property
@@ -171,14 +176,16 @@ def _matched(
 ) -> _Matched:
     start = mask["start"]
     if not table["key"].size:
-        nothing = np.zeros(start.shape)
-        return _Matched(nothing, nothing + 1.0, np.ones(start.shape, bool), np.zeros(start.shape, bool))
+        nothing, nowhere = np.zeros(start.shape), np.zeros(start.shape, bool)
+        return _Matched(nothing, nothing + 1.0, ~nowhere, nowhere, nowhere)
     row = np.minimum(np.searchsorted(table["key"], mask["key"]), table["key"].size - 1)
     # Before it was fused once a source is predicted from nothing.
     since = record.first_fused.get((str(mask["source"][0]), 0), np.iinfo(np.int64).max)
-    lacking = (table["key"][row] != mask["key"]) | ~_is_usable(table)[row] | (start < since)
+    absent = table["key"][row] != mask["key"]
+    lacking = absent | ~_is_usable(table)[row] | (start < since)
+    alone = absent & (start >= since) & np.isin(mask["key"] // _HORIZONS, table["key"] // _HORIZONS)
     after_reset = window.after_own_reset(record.name, start) & ~lacking
-    return _Matched(table["innovation"][row], table["innovation_variance"][row], lacking, after_reset)
+    return _Matched(table["innovation"][row], table["innovation_variance"][row], lacking, alone, after_reset)
 
 
 def _is_usable(table: Mapping[str, npt.NDArray]) -> npt.NDArray[np.bool_]:
@@ -190,7 +197,7 @@ def _by_key(table: Columns) -> dict[str, npt.NDArray]:
     sources = list(AID_SOURCES)
     source = np.array([sources.index(name) if name in AID_SOURCES else -1 for name in table["source"]], np.int64)
     horizon_ds = np.rint(table["horizon_s"] * 10.0).astype(np.int64)
-    key = ((table["start"] * 64 + source) * 4 + table["axis"]) * 1000 + horizon_ds
+    key = ((table["start"] * 64 + source) * 4 + table["axis"]) * _HORIZONS + horizon_ds
     order = np.argsort(key, kind="stable")
     return {"key": key[order]} | {name: values[order] for name, values in table.items()}
 
