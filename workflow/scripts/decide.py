@@ -23,5 +23,6 @@ with logged_job(snakemake.log[0]):
         newest_flight=read_present(snakemake.input.present).flight,
         descriptions=snakemake.params.descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
+        delays=Path(snakemake.input.delays) if snakemake.input.delays else None,
         settings=DecisionSettings(**snakemake.params.decision),
     )

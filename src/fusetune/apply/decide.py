@@ -8,9 +8,11 @@ from typing import Any
 
 import pyarrow as pa
 
+from fusetune.analyze.delays.wrong_delays import read_joined
 from fusetune.apply.candidates import Candidate, between_vetoed_and_present, candidates_sentence, write_candidates
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
+from fusetune.apply.delays import delay_findings, delay_sentences
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
@@ -21,6 +23,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
+from fusetune.finding import Finding, documents
 from fusetune.set_names import PRESENT
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
@@ -40,6 +43,7 @@ def decide(
     newest_flight: str | None = None,
     descriptions: Mapping[str, str] | None = None,
     configuration_files: Sequence[AnyPath] = (),
+    delays: AnyPath | None = None,
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
@@ -56,6 +60,7 @@ def decide(
     newest_flight : by whose log the vehicle's present parameters are known; the last by name if None
     descriptions : a line about each set, from the study
     configuration_files : hashed into the decision
+    delays : `results/analyze/delays.json`, what the sensors' delays are; None where they were not estimated
 
     Raises
     ------
@@ -76,9 +81,11 @@ def decide(
     better = _vetoed_but_better(ranked)
     proposed = _candidates(better, newest, present)
     text = paragraph(choice, ranked, flights, settings)
-    text = " ".join(filter(None, (text, candidates_sentence(proposed, _gains(better)))))
+    findings = _delay_findings(delays, newest, present)
+    text = " ".join(filter(None, (delay_sentences(findings), text, candidates_sentence(proposed, _gains(better)))))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["candidates"] = [asdict(one) for one in proposed]
+    decision["findings"] = documents(findings)
     decision["present"] = present
     decision["provenance"] = provenance(configuration_files)
     decision["flights"] = flight_rows(flights_table, flights)
@@ -96,6 +103,12 @@ def decide(
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
     with atomic_path(output / "decision.json") as temporary:
         write_document(temporary, _rounded(decision), allow_nan=False)
+
+
+def _delay_findings(delays: AnyPath | None, newest: AnalyzedFlight | None, present: str) -> tuple[Finding, ...]:
+    sets = newest.summary["sets"] if newest is not None else {}
+    joined = read_joined(delays) if delays is not None else ()
+    return delay_findings(joined, sets.get(present, {}).get("parameters", {}))
 
 
 def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: AnyPath) -> AnalyzedFlight | None:

@@ -67,12 +67,14 @@ class Smoothed:
     ----------
     states : (N, n)
     constants : (m,)
+    constant_covariance : (m, m) of their errors, under the variances of the model
     cost : sum of all squared residuals, each divided by its variance, at the course
     log_determinant : of the covariance of all M measurements, so that −2 ln L = cost + log_determinant + M ln 2π
     """
 
     states: Array
     constants: Array
+    constant_covariance: Array
     cost: float
     log_determinant: float
 
@@ -109,13 +111,14 @@ def smooth(model: LinearModel) -> Smoothed:
     solved = cho_solve_banded((factor, True), np.column_stack([right.ravel(), flat]), check_finite=False)
     schur = cho_factor(corner - flat.T @ solved[:, 1:], lower=True, check_finite=False)
     constants = cho_solve(schur, right_constants - flat.T @ solved[:, 0], check_finite=False)
+    covariance = cho_solve(schur, np.eye(constants.size), check_finite=False)
     states = (solved[:, 0] - solved[:, 1:] @ constants).reshape(epochs, size)
 
     information = 2.0 * float(np.sum(np.log(factor[0])) + np.sum(np.log(np.diag(schur[0]))))
     there = model.measurement_variance[np.isfinite(model.measurement_variance)]
     variances = (model.process_variance, there, model.first_variance, model.constant_variance)
     log_determinant = information + sum(float(np.sum(np.log(one))) for one in variances)
-    return Smoothed(states, constants, _cost(model, states, constants), log_determinant)
+    return Smoothed(states, constants, covariance, _cost(model, states, constants), log_determinant)
 
 
 def process_residuals(model: LinearModel, states: Array, constants: Array) -> Array:

@@ -11,21 +11,18 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.sensors.inertial_motion import InertialMotion
-from fusetune.analyze.sensors.lag import LaggedSeries
+from fusetune.analyze.delays.inertial_motion import InertialMotion
+from fusetune.analyze.delays.lag import LaggedSeries
 from fusetune.ekf2.feed.message_samples import (
     airspeed_refusals,
     airspeed_samples,
     flow_refusals,
     flow_samples,
-    gnss_refusals,
-    gnss_samples,
     range_refusals,
     range_samples,
     taken,
     validated_airspeed_refusals,
     validated_airspeed_samples,
-    vision_refusals,
     vision_samples,
 )
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_FRD, EV_FRAME_NED
@@ -34,28 +31,9 @@ from fusetune.px4.flight import Flight
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
-FIX_3D = 3
 _HEADING_OVER_S = 1.0
-
-
-def gnss_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str, float]) -> LaggedSeries | None:
-    """Velocity of the antenna, NED."""
-    table = flight.topic("vehicle_gps_position")
-    if table is None:
-        return None
-    samples = gnss_samples(table)
-    usable = taken(table, gnss_refusals(table, flight.release)) & (samples["fix_type"] >= FIX_3D)
-    usable &= np.isfinite(samples["vel"]).all(axis=1)
-    arm = _arm(parameters, "GPS")
-    swept = np.einsum("nij,njk->nik", motion.rotation, np.cross(motion.body_rate[:, None, :], np.eye(3)).swapaxes(1, 2))
-    velocity = motion.velocity + swept @ arm
-    time, measured = samples["time_us"][usable], samples["vel"][usable]
-    return LaggedSeries(time, measured, motion.time, velocity, turns=True, arms=swept)
-
-
-def _arm(parameters: Mapping[str, float], sensor: str) -> Array:
-    """From the IMU to the sensor, FRD m."""
-    return np.array([parameters[f"EKF2_{sensor}_POS_{axis}"] - parameters[f"EKF2_IMU_POS_{axis}"] for axis in "XYZ"])
+_FEWEST_STEPS = 5
+_LEAST_DISTANCE_M = 0.1
 
 
 def vision_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str, float]) -> LaggedSeries | None:
@@ -66,29 +44,32 @@ def vision_series(flight: Flight, motion: InertialMotion, parameters: Mapping[st
     samples, _ = vision_samples(table, flight.release)
     known = np.isin(samples["pos_frame"], (EV_FRAME_NED, EV_FRAME_FRD)) & np.isfinite(samples["pos"]).all(axis=1)
     if known.any():
-        time, measured, moved, differences = samples["time_us"][known], samples["pos"][known], motion.travelled, 2
+        time, measured = samples["time_us"][known], samples["pos"][known]
+        moved, arms, differences = motion.travelled, motion.rotation, 2
     else:
         known = np.isin(samples["vel_frame"], (EV_FRAME_NED, EV_FRAME_FRD)) & np.isfinite(samples["vel"]).all(axis=1)
-        time, measured, moved, differences = samples["time_us"][known], samples["vel"][known], motion.velocity, 1
-    if np.count_nonzero(known) < 3:
+        time, measured = samples["time_us"][known], samples["vel"][known]
+        moved, arms, differences = motion.velocity, motion.swept, 1
+    if time.size < 3:
         return None
-    return LaggedSeries(time, measured, motion.time, _turned(time, measured, motion.time, moved), differences, True)
+    arm = np.array([parameters[f"EKF2_EV_POS_{axis}"] - parameters[f"EKF2_IMU_POS_{axis}"] for axis in "XYZ"])
+    turn = _heading(time, measured, motion.time, moved)
+    return LaggedSeries(time, measured, motion.time, (moved + arms @ arm) @ turn.T, differences, True, turn @ arms)
 
 
-def _turned(time: Times, measured: Array, motion_time: Times, motion: Array) -> Array:
-    """The motion in the frame of the measurement, whose heading is its own: the one that fits what changed best."""
+def _heading(time: Times, measured: Array, motion_time: Times, motion: Array) -> Array:
+    """Rotation (3, 3) from NED into the frame of the measurement, whose heading is its own: the one that fits best."""
     grid = np.arange(max(time[0], motion_time[0]), min(time[-1], motion_time[-1]), _HEADING_OVER_S * 1e6)
-    if grid.size < 3:
-        return motion
+    if grid.size < _FEWEST_STEPS:
+        return np.eye(3)
+    # second differences, which the drift of the motion does not rule
     one, other = (
         np.diff(np.column_stack([np.interp(grid, when, column) for column in values[:, :2].T]), n=2, axis=0)
         for when, values in ((time, measured), (motion_time, motion))
     )
     angle = np.arctan2(np.sum(other[:, 0] * one[:, 1] - other[:, 1] * one[:, 0]), np.sum(one * other))
-    turned = motion.copy()
-    turned[:, 0] = np.cos(angle) * motion[:, 0] - np.sin(angle) * motion[:, 1]
-    turned[:, 1] = np.sin(angle) * motion[:, 0] + np.cos(angle) * motion[:, 1]
-    return turned
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _range(flight: Flight) -> tuple[Times, Array] | None:
@@ -129,7 +110,7 @@ def flow_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str,
     measured = (samples["flow_rate"] - samples["gyro_rate"][:, :2])[usable]
     body = np.einsum("nji,nj->ni", motion.rotation, motion.bounded_velocity)
     distance = np.interp(motion.time, *ranged)
-    sight = np.column_stack([body[:, 1], -body[:, 0]]) / np.maximum(distance, 0.1)[:, None]
+    sight = np.column_stack([body[:, 1], -body[:, 0]]) / np.maximum(distance, _LEAST_DISTANCE_M)[:, None]
     return LaggedSeries(samples["time_us"][usable], measured, motion.time, sight)
 
 
@@ -137,7 +118,8 @@ def airspeed_series(flight: Flight, motion: InertialMotion, parameters: Mapping[
     """True airspeed, against the speed through the wind that fits best."""
     table = flight.topic("airspeed_validated")
     if table is not None:
-        samples, usable = validated_airspeed_samples(table), taken(table, validated_airspeed_refusals(table, flight.release))
+        samples = validated_airspeed_samples(table)
+        usable = taken(table, validated_airspeed_refusals(table, flight.release))
     else:
         table = flight.topic("airspeed")
         if table is None:

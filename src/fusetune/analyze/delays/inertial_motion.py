@@ -51,6 +51,12 @@ class InertialMotion:
         way = np.cumsum(0.5 * (self.velocity[1:] + self.velocity[:-1]) * step, axis=0)
         return np.vstack([np.zeros(3), way])
 
+    @property
+    def swept(self) -> Array:
+        """(M, 3, 3) velocity, NED m/s, of a point one metre along each axis of the body, by the body's turning."""
+        across = np.cross(self.body_rate[:, None, :], np.eye(3)).swapaxes(1, 2)
+        return np.asarray(self.rotation @ across)
+
 
 def inertial_motion(imu: TopicTable, states: FilterStates) -> InertialMotion | None:
     """Integrate `sensor_combined` with the attitude of a replay; None where the two hardly overlap."""

@@ -26,7 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-
 from scipy.special import stdtrit
 
 Array = npt.NDArray[np.float64]
@@ -38,8 +37,10 @@ FEWEST_BLOCKS = 4
 MEMORY_S = 3.0
 """Of the autoregressive model."""
 LONGEST_MEMORY = 40
+FASTEST_HZ = 20.0
+"""Of a faster series not every sample is taken: motion of vehicles is slower."""
 _FEWEST_ROWS = 40
-_ROUNDS = 40
+_ROUNDS = 15
 _STANDS_S = 2e-4
 _GREATEST_STEP_S = 0.1
 _RATE_OVER_S = 0.04
@@ -124,9 +125,11 @@ class _Regression:
     """The regression at any delay."""
 
     def __init__(self, series: LaggedSeries) -> None:
-        self._series = series
-        self._runs = list(_runs(series.time))
         step_s = float(np.median(np.diff(series.time))) * 1e-6 if series.time.size > 1 else 1.0
+        every = max(1, int(1.0 / (FASTEST_HZ * step_s) + 0.5)) if step_s > 0.0 else 1
+        self._series = series = replace(series, time=series.time[::every], measured=series.measured[::every])
+        step_s *= every
+        self._runs = list(_runs(series.time))
         self._order = int(np.clip(round(MEMORY_S / step_s), 2, LONGEST_MEMORY))
         self._half_s = min(0.5 * step_s, _RATE_OVER_S)
         self._seconds = series.motion_time * 1e-6
@@ -134,7 +137,7 @@ class _Regression:
     def at(self, delay_s: float) -> _Fit | None:
         """The best change of a delay; None where there are too few samples."""
         series = self._series
-        at = series.time * 1e-6 - delay_s
+        at: Array = np.asarray(series.time * 1e-6 - delay_s, np.float64)
         inside = (at - self._half_s >= self._seconds[0]) & (at + self._half_s <= self._seconds[-1])
         left, design = series.measured - self._looked_up(at, series.motion), self._design(at)
         rows = []
@@ -226,11 +229,11 @@ def _generalised(rows: list[_Rows], order: int) -> _Fit:
     for _ in range(2):
         white = [_whitened(rows, solution, axis, order) for axis in range(axes)]
         residual, design, when = (np.concatenate([one[part] for one in white]) for part in range(3))
-        weight = np.ones(residual.size)
+        weight: Array = np.ones(residual.size)
         for _ in range(3):
             solution = np.linalg.lstsq(design * weight[:, None], residual * weight, rcond=None)[0]
             left = np.abs(residual - design @ solution)
-            weight = np.sqrt(np.minimum(1.0, _HUBER / np.maximum(left, 1e-12)))
+            weight = np.asarray(np.sqrt(np.minimum(1.0, _HUBER / np.maximum(left, 1e-12))))
     return _Fit(design, residual, weight, when, solution)
 
 
