@@ -123,6 +123,7 @@ rule analyze_flight:
         present=ancient("results/save/present.json"),
         kernels=KERNELS_READY,
         replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
+        delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
         present_replay=replay_files([PRESENT]) if MENDS_DELAYS else [],
         mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
     output:

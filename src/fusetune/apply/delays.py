@@ -40,7 +40,7 @@ def _wrong(one: JoinedDelay, parameters: Mapping[str, float]) -> Finding:
     remedy = f"Set {one.parameter} to {one.mended_ms:g}"
     longest = parameters.get(BUFFERS)
     if longest is not None and one.mended_ms > longest:
-        remedy += f", and {BUFFERS}, {longest:g} ms, to as much: beyond it EKF2 has no samples of the IMU any more"
+        remedy += f", and {BUFFERS}, now {longest:g}, to as much, as EKF2 reaches no further back"
     return Finding(
         id=WRONG,
         severity="warning",

@@ -76,12 +76,12 @@ class FlightSets:
         present : those of the present set, `Present.parameters`
         delays : delay parameters and the values that mend them
         """
-        return {mended_name(name): values | delays for name, values in self.overrides(names, present).items()}
+        return {mended_name(name): {**values, **delays} for name, values in self.overrides(names, present).items()}
 
     def described(self, descriptions: Mapping[str, str]) -> dict[str, str]:
         """A line about each set, those with mended delays, too."""
-        now = "the configuration that flies now"
-        mended = {mended_name(name): f"{descriptions.get(name) or now}, delays mended" for name in self.mendable}
+        plain = {PRESENT: "the configuration that flies now", **descriptions}
+        mended = {mended_name(name): ", ".join(filter(None, (plain.get(name), "delays mended"))) for name in self.mendable}
         return {**descriptions, **mended}
 
 
