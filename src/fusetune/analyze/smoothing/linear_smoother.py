@@ -107,8 +107,10 @@ def smooth(model: LinearModel) -> Smoothed:
 
     flat = border.reshape(epochs * size, -1)
     solved = cho_solve_banded((factor, True), np.column_stack([right.ravel(), flat]), check_finite=False)
-    schur = cho_factor(corner - flat.T @ solved[:, 1:], lower=True, check_finite=False)
-    constants = cho_solve(schur, right_constants - flat.T @ solved[:, 0], check_finite=False)
+    # not by a matrix product: its order of summation could change with the number of cores
+    through = np.einsum("ki,kj->ij", flat, solved)
+    schur = cho_factor(corner - through[:, 1:], lower=True, check_finite=False)
+    constants = cho_solve(schur, right_constants - through[:, 0], check_finite=False)
     states = (solved[:, 0] - solved[:, 1:] @ constants).reshape(epochs, size)
 
     information = 2.0 * float(np.sum(np.log(factor[0])) + np.sum(np.log(np.diag(schur[0]))))
