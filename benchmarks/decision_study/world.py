@@ -63,7 +63,7 @@ def read_world(
     present = sets[0]
     flights = read_flights(folders, settings, present)
     metrics = metrics_of(flights)
-    reasons = {one: vetoes(one, present, flights, metrics) for one in sets if one != present}
+    reasons = {one: vetoes(one, present, flights, metrics, settings) for one in sets if one != present}
     figures: dict[str, list[list[float]]] = {}
     truth: dict[str, list[list[float]]] = {quantity: [] for quantity in TRUTH}
     for flight in flights:
