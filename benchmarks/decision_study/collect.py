@@ -30,7 +30,7 @@ from .raw_data import write_raw
 from .second_simulator import fly, second_world
 
 HERE = Path(__file__).parent
-KEPT = ("scoring.json", "scores.parquet", "withheld.parquet", "metrics.parquet")
+KEPT = ("scoring.json", "scores.parquet", "withheld.parquet", "smoothed.parquet", "metrics.parquet")
 FIRST_SEED = 1000
 # Only gaps without GNSS decide; the others would cost as much again.
 GNSS_GAPS = WithholdingSettings(baro_s=0.0, mag_s=0.0)
