@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from fusetune.apply.evidence import AimEvidence, FlightEvidence
+from fusetune.apply.settings import DecisionSettings
 
 NAMES = ("present", "one", "two")
 
@@ -27,7 +28,13 @@ def world(errors: dict[str, list[float]], **more):
     from benchmarks.decision_study.world import World
 
     truth = {name: np.array([values]) for name, values in errors.items()}
-    usual = {"overrides": {name: {} for name in NAMES}, "vetoed": {}, "old_vetoed": {}, "figures": {}}
+    usual = {
+        "overrides": {name: {} for name in NAMES},
+        "settings": DecisionSettings(),
+        "vetoed": {},
+        "old_vetoed": {},
+        "figures": {},
+    }
     return World(name="made", sets=NAMES, folders=(), flights=(), old_flights=(), truth=truth, **(usual | more))
 
 
