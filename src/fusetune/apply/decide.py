@@ -10,7 +10,8 @@ import pyarrow as pa
 
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
-from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
+from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out
+from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
@@ -37,6 +38,7 @@ def decide(
     sets: Sequence[str],
     present: str = PRESENT,
     newest_flight: str | None = None,
+    same_present: Sequence[str] = (),
     descriptions: Mapping[str, str] | None = None,
     configuration_files: Sequence[AnyPath] = (),
     settings: DecisionSettings | None = None,
@@ -52,7 +54,9 @@ def decide(
     present : the configuration that the vehicle flies now, replayed on every flight like any other set. Its
         parameters on the newest flight are the "previous values". Given with explicit values it is one
         configuration on all flights; with none it is each flight's own.
-    newest_flight : by whose log the vehicle's present parameters are known; the last by name if None
+    newest_flight : by whose log the vehicle's present parameters are known; the last by name if None. Its vehicle is
+        decided for, flights of others are left out.
+    same_present : flights that have the same values, the newest first; one that counts stands for it where it does not
     descriptions : a line about each set, from the study
     configuration_files : hashed into the decision
 
@@ -63,8 +67,14 @@ def decide(
     """
     settings = settings or DecisionSettings()
     sets = list(dict.fromkeys((present, *sets)))
-    flights = read_flights(analyze_folders, settings, present)
-    newest = _newest(flights, newest_flight, flights_table)
+    folders = {Path(folder).name: Path(folder) for folder in analyze_folders}
+    newest_flight = newest_flight or max(folders, default=None)
+    vehicle = decided_vehicle(flights_table, list(folders), newest_flight)
+    flights = read_flights(
+        [folder for name, folder in folders.items() if name not in vehicle.others], settings, present
+    )
+    others = [read_left_out(folder, why) for name, folder in folders.items() if (why := vehicle.without(name))]
+    newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
     vetoed = {name: vetoes(name, present, flights, metrics) for name in sets if name != present}
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
@@ -72,11 +82,14 @@ def decide(
     choice = choose(ranked, present, evidence, _distances(newest, present), settings)
     values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present)
-    text = paragraph(choice, ranked, flights, settings)
+    text = " ".join(
+        (paragraph(choice, ranked, flights, settings), *vehicle.sentences(), *unsure_of_present(flights, newest))
+    )
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["present"] = present
     decision["provenance"] = provenance(configuration_files)
-    decision["flights"] = flight_rows(flights_table, flights)
+    decision["vehicle"] = vehicle.document(flights, newest.name if newest else None)
+    decision["flights"] = flight_rows(flights_table, [*flights, *others])
     decision["sets"] = _sets(sets, present, newest, descriptions or {}, flights)
     decision["paper_mode"] = _paper_mode(
         paper_entries(sets, flights, metrics, values), choice, ranked, flights, metrics, settings
@@ -93,10 +106,8 @@ def decide(
 
 
 def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: AnyPath) -> AnalyzedFlight | None:
-    if not flights:
-        return None
     if name is None:
-        return flights[-1]
+        return None
     for flight in flights:
         if flight.name == name:
             return flight
@@ -249,6 +260,8 @@ def _reason(choice: Choice) -> str:
 
 def _file_origin(choice: Choice, decision: dict[str, Any], newest: AnalyzedFlight | None) -> tuple[str, ...]:
     lines = [f"written by {decision['provenance']['product']}, decision: {choice.status} ({choice.chosen})"]
+    if decision["vehicle"] is not None:
+        lines.append(f"for the {decision['vehicle']['in_words']}")
     if newest is not None:
         lines.append(f"previous values from flight {newest.name}, firmware {newest.summary['firmware']}")
     if choice.exploratory:

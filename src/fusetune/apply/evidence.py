@@ -82,6 +82,8 @@ class FlightEvidence:
 
 NOT_SCORED, DISTRUSTED, WITHOUT_SAMPLES = "not scored", "distrusted", "without samples"
 """Why a flight has no evidence: it could not be scored, its replay is not trusted, or nothing in it is judged by."""
+OTHER_VEHICLE = "other vehicle"
+"""Why it has none, too: another vehicle is decided for."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class NoEvidence:
 
     Attributes
     ----------
-    kind : `NOT_SCORED`, `DISTRUSTED` or `WITHOUT_SAMPLES`
+    kind : `NOT_SCORED`, `DISTRUSTED`, `WITHOUT_SAMPLES` or `OTHER_VEHICLE`
     reason : in words
     """
 
@@ -130,7 +132,8 @@ class _Sums:
 
 
 def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
-    """Read `results/analyze/<flight>` of all flights, ordered by name so that the order of arguments does not matter.
+    """Read `results/analyze/<flight>` of all flights of a vehicle, ordered by name so that the order of arguments does
+    not matter.
 
     A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
     """
@@ -143,6 +146,15 @@ def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present
     usual = {source: float(np.mean(sorted(found))) for source, found in known.items()}
     flights = (_read_flight(one, table, settings, present, usual | shares[one]) for one, table in metrics.items())
     return sorted(flights, key=lambda one: one.name)
+
+
+def read_left_out(folder: AnyPath, without: NoEvidence) -> AnalyzedFlight:
+    """Read `results/analyze/<flight>` of a flight that is left out, whatever it holds."""
+    folder = Path(folder)
+    summary = read_document(folder / "scoring.json")
+    return AnalyzedFlight(
+        summary["flight"], folder, summary, read_table(folder / "metrics.parquet"), evidence=None, without=without
+    )
 
 
 def _read_flight(
@@ -164,7 +176,7 @@ def _evidence_of(
     if summary["status"] != "scored":
         return NoEvidence(NOT_SCORED, summary["reason"])
     grade, why = trust_grade(folder)
-    if grade is not None and grade > settings.lowest_grade:
+    if not settings.takes_grade(grade):
         because = f" ({why})" if why else ""
         words = (
             f"its replay has trust grade {grade}{because}, and the decision takes none below {settings.lowest_grade}"

@@ -76,6 +76,10 @@ class DecisionSettings:
             return float(white_share >= self.trust_white_share)
         return min(max((white_share - self.distrust_white_share) / span, 0.0), 1.0)
 
+    def takes_grade(self, grade: str | None) -> bool:
+        """Whether a flight counts whose replay has this trust grade; None where there was nothing to compare."""
+        return grade is None or grade <= self.lowest_grade
+
     @property
     def main_source(self) -> str:
         """The source that the figures beside the score are shown of."""
