@@ -61,8 +61,8 @@ class Configuration:
     )
     vehicle: str | None = setting(
         None,
-        "vehicle that is decided for: its name or id in `results/save/flights.csv`, or how either begins; empty: that of "
-        "the newest real flight that counts",
+        "vehicle that is decided for: its name or id in `results/save/flights.csv`, or how either begins; empty: that "
+        "of the newest real flight that counts",
         at_least=1,
     )
     sets_per_job: int = setting(

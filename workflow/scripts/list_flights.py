@@ -4,8 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.replaying.settings import ReplaySettings
-from fusetune.analyze.trust.settings import TrustSettings
-from fusetune.apply.settings import DecisionSettings
+from fusetune.analyze.trust.settings import TrustSettings, reaches
 from fusetune.save import find_present, write_flights_table, write_present
 from fusetune.save.discovery import RefusedEntry
 from fusetune.settings.declaration import built
@@ -23,9 +22,7 @@ def counts(flight: str) -> bool:
 
     replay, trust = built(ReplaySettings, snakemake.params.replay), TrustSettings(**snakemake.params.trust)
     grade = grade_saved_flight(folders[flight], AnalysisSettings(replay=replay, trust=trust))
-    taken = DecisionSettings(lowest_grade=snakemake.params.lowest_grade).takes_grade(
-        grade.grade if grade.is_compared else None
-    )
+    taken = reaches(grade.grade if grade.is_compared else None, snakemake.params.lowest_grade)
     print(f"{flight}: grade {grade.grade}, {'counts' if taken else 'does not count'}")
     return taken
 

@@ -7,8 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
+from fusetune.apply.candidates import without_twins, write_candidates
 from fusetune.apply.choice import Choice, choose, parameter_distance
+from fusetune.apply.consistency import (
+    SourceNoise,
+    consistency_candidates,
+    consistency_findings,
+    sentence_of_largest,
+    source_noises,
+)
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
@@ -21,6 +30,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
+from fusetune.finding import documents
 from fusetune.set_names import PRESENT
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
@@ -44,7 +54,7 @@ def decide(
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
-    `decision.json`, `best_params.params` and `rollback.params` to `output_folder`.
+    `decision.json`, `candidates.yaml`, `best_params.params` and `rollback.params` to `output_folder`.
 
     Parameters
     ----------
@@ -82,11 +92,19 @@ def decide(
     choice = choose(ranked, present, evidence, _distances(newest, present), settings)
     values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present)
-    text = " ".join(
-        (paragraph(choice, ranked, flights, settings), *vehicle.sentences(), *unsure_of_present(flights, newest))
+    noises = _noises(flights, metrics, newest, present, settings)
+    findings = consistency_findings(noises, settings)
+    sentences = (
+        paragraph(choice, ranked, flights, settings),
+        sentence_of_largest(findings),
+        *vehicle.sentences(),
+        *unsure_of_present(flights, newest),
     )
+    text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["present"] = present
+    decision["findings"] = documents(findings)
+    decision["noises"] = [asdict(one) for one in noises]
     decision["provenance"] = provenance(configuration_files)
     decision["vehicle"] = vehicle.document(flights, newest.name if newest else None)
     decision["flights"] = flight_rows(flights_table, [*flights, *others])
@@ -98,6 +116,9 @@ def decide(
     output = Path(output_folder)
     _write_ranking(output, ranked, values)
     _write_per_flight(output, flights)
+    taken = {one["set"]: one["overrides"] for one in decision["sets"]}
+    candidates = consistency_candidates(noises, settings)
+    write_candidates(output / "candidates.yaml", without_twins(candidates, taken))
     firmware = newest.summary["firmware"] if newest else "unknown"
     written = write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
@@ -118,6 +139,19 @@ def _distances(newest: AnalyzedFlight | None, present: str) -> dict[str, float]:
     sets = newest.summary["sets"] if newest is not None else {}
     now = sets.get(present, {}).get("parameters", {})
     return {name: parameter_distance(one["overrides"], now) for name, one in sets.items()}
+
+
+def _noises(
+    flights: Sequence[AnalyzedFlight],
+    metrics: pa.Table,
+    newest: AnalyzedFlight | None,
+    present: str,
+    settings: DecisionSettings,
+) -> list[SourceNoise]:
+    """What PX4 is told of the sources, and what the flights that decide say of them."""
+    deciding = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
+    parameters = newest.summary["sets"].get(present, {}).get("parameters", {}) if newest is not None else {}
+    return source_noises(metrics.filter(pc.is_in(metrics["flight"], deciding)), present, parameters, settings)
 
 
 def _changes(choice: Choice, newest: AnalyzedFlight | None, present: str) -> tuple[ParameterChange, ...]:

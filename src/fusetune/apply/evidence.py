@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.metrics.likelihood import profile_nll
+from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.aid_sources import AXES
 from fusetune.storage.documents import read_document
@@ -176,7 +177,7 @@ def _evidence_of(
     if summary["status"] != "scored":
         return NoEvidence(NOT_SCORED, summary["reason"])
     grade, why = trust_grade(folder)
-    if not settings.takes_grade(grade):
+    if not reaches(grade, settings.lowest_grade):
         because = f" ({why})" if why else ""
         words = (
             f"its replay has trust grade {grade}{because}, and the decision takes none below {settings.lowest_grade}"

@@ -66,6 +66,12 @@ class DecisionSettings:
     confidence: float = setting(0.95, "level of the interval that must exclude zero for a change", low=0.5, high=0.999)
     draws: int = setting(4000, "draws of the paired bootstrap", low=200, high=200_000)
     minimum_flights: int = setting(5, "with fewer flights the decision is called exploratory", low=1, high=1000)
+    noise_factor: float = setting(
+        2.0,
+        "the noise of a source is told of where PX4 is told beyond doubt one so many times too large or too small",
+        above=1,
+        high=100,
+    )
     seed: int = 0
     """Of the bootstrap; the configuration has it beside the sections."""
 
@@ -75,10 +81,6 @@ class DecisionSettings:
         if span <= 0.0:
             return float(white_share >= self.trust_white_share)
         return min(max((white_share - self.distrust_white_share) / span, 0.0), 1.0)
-
-    def takes_grade(self, grade: str | None) -> bool:
-        """Whether a flight counts whose replay has this trust grade; None where there was nothing to compare."""
-        return grade is None or grade <= self.lowest_grade
 
     @property
     def main_source(self) -> str:

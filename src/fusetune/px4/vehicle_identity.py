@@ -118,7 +118,7 @@ def _type(flight: Flight) -> str:
         (_MAV_TYPES, _most_frequent(flight, "system_type")),
         (_VEHICLE_TYPES, _most_frequent(flight, "vehicle_type")),
     ):
-        if number in known:
+        if number is not None and number in known:
             return known[number]
     return ""
 

@@ -41,8 +41,9 @@ SCHEMA = pa.schema(
 )
 """Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused.
 
-`file` is the path of the log below the folder of flights. `vehicle` is the short name of who flew, the columns behind it
-what it is made of (`fusetune.px4.vehicle_identity`), empty where the log could not be read.
+`file` is the path of the log below the folder of flights.
+`vehicle` is the short name of who flew, the columns behind it what it is made of (`fusetune.px4.vehicle_identity`);
+all are empty where the log could not be read.
 `checks` holds id, severity and figure of every check's finding; `advice`, which the CSV leaves out, those that did not
 pass and have a remedy, as findings (`fusetune.finding.from_documents`).
 """
