@@ -24,6 +24,7 @@ OUTPUTS = (
     "decision.json",
     "best_params.params",
     "rollback.params",
+    "candidates.yaml",
 )
 QUIET = {"EKF2_ACC_NOISE": 0.2, "EKF2_GYR_NOISE": 0.015}
 PRESENT = {"EKF2_ACC_NOISE": 0.35, "EKF2_GYR_NOISE": 0.015}

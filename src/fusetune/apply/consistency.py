@@ -12,7 +12,8 @@ What of σ_c is the source's and what the inertial solution's cannot be told apa
 that of σ_w and ends at that of σ_t. A source whose error cannot be had so has only a bound: white noise is no larger
 than the innovations.
 
-Figures are means over flights of logarithms of ratios to what was told. Their scatter is pooled with a prior one, so
+Sizes are means over flights of logarithms of ratios to what was told; of σ_e², which single flights rate far apart, it
+is the plain mean, so that the flights on which the source wanders count. The scatter is pooled with a prior one, so
 that a single flight has an interval, too.
 """
 
@@ -46,6 +47,8 @@ _METRICS = (
 )  # fmt: skip
 _RULES_WITHIN = 1.1
 """A parameter rules a noise that is at most so many times its own value; beyond, another figure does."""
+_MOSTLY = 0.5 * math.log(2.0)
+"""What wanders matters where it makes the wanted variance more than twice as large."""
 _WORTH_A_TRY = 1.25
 """A value is proposed where it differs by this factor from the present one."""
 
@@ -60,7 +63,7 @@ class SourceNoise:
     size : of the error, σ_t; with its interval `lower` to `upper`
     innovation : RMS of the innovations
     wanted : σ_e, what a filter would have to be told
-    wanders_s : correlation time of what wanders; None where that is the smaller part
+    wanders_s : correlation time of what wanders; None where that hardly matters
     is_bound : whether only an upper bound of the noise is known, from the innovations
     parameter : that goes into it; None where none does
     now : value of the parameter
@@ -222,8 +225,13 @@ def _remedy(noise: SourceNoise, value: float | None) -> str:
     name = noise.parameter
     if name is None:
         return "No parameter says how noisy it is"
-    wanders = "" if noise.wanders_s is None else f"; part of its error wanders for some {noise.wanders_s:.2g} s, "
-    wanders += "against which a filter wants a larger noise" if wanders else ""
+    wanders = ""
+    if noise.wanders_s is not None:
+        unit = AID_SOURCES[noise.source].unit
+        wanders = (
+            f"; part of its error wanders for some {noise.wanders_s:.2g} s, and a filter, which takes it for white, "
+            f"has to be told {noise.wanted:.2g} {unit}"
+        )
     if value is not None:
         return f"Compare {name} = {value:g} in a study before flying it (now {noise.now:g}){wanders}"
     if noise.size > noise.told:
@@ -233,7 +241,9 @@ def _remedy(noise: SourceNoise, value: float | None) -> str:
         if others:
             return f"Lowering {name} changes little: {' and '.join(others)} makes up more of what PX4 takes"
         return f"Lowering {name} changes nothing: what the sensor itself reports is larger, and rules"
-    return f"Leave {name} as it is{wanders}" if wanders else f"Leave {name} as it is: other sources of it are noisier"
+    if noise.wanted_value is not None and noise.now is not None and noise.wanted_value * _WORTH_A_TRY >= noise.now:
+        return f"Leave {name} as it is{wanders}"
+    return f"Leave {name} as it is: it is that of another source, too, which is noisier"
 
 
 def _by_flight(metrics: pa.Table, present: str) -> dict[str, list[dict[tuple[str, str], float]]]:
@@ -281,7 +291,8 @@ def _source_noise(
     size, reach = _mean(used, "size"), _reach([one.size for one in used], confidence)
     white = _mean(used, "white")
     lower = white - _reach([one.white for one in used], confidence) if math.isfinite(white) else -math.inf
-    wandering = [one.wanders_s for one in used if one.wanders_s is not None]
+    wanted = _root_mean_square(used)
+    wandering = [one.wanders_s for one in used if one.wanders_s is not None and wanted > size + _MOSTLY]
     parameter = next(iter((*source.noise_parameters, *(floor.parameter for floor in source.noise_floors))), None)
     now = parameters.get(parameter) if parameter is not None else None
     return SourceNoise(
@@ -292,8 +303,8 @@ def _source_noise(
         lower=told * math.exp(lower),
         upper=told * math.exp(size + reach),
         innovation=told * math.exp(_mean(used, "innovation")),
-        wanted=told * math.exp(_mean(used, "wanted")),
-        wanders_s=float(np.median(wandering)) if 2 * len(wandering) > len(used) else None,
+        wanted=told * math.exp(wanted),
+        wanders_s=float(np.median(wandering)) if wandering else None,
         is_bound=used[0].is_bound,
         parameter=parameter if now is not None else None,
         now=now,
@@ -307,14 +318,14 @@ def _of_flight(source: AidSource, figures: Mapping[tuple[str, str], float]) -> _
     if len(axes) != source.axes:
         return None
     bound = any(one.is_bound for one in axes)
-    wandering = [one.wanders_s for one in axes if one.wanders_s is not None]
+    wandering = [] if bound else [one.wanders_s for one in axes if one.wanders_s is not None]
     return _OneFlight(
         told=axes[0].told,
         white=-math.inf if bound else _mean(axes, "white"),
         size=_mean(axes, "innovation" if bound else "size"),
-        wanted=_mean(axes, "innovation" if bound else "wanted"),
+        wanted=_mean(axes, "innovation") if bound else _root_mean_square(axes),
         innovation=_mean(axes, "innovation"),
-        wanders_s=None if bound or 2 * len(wandering) <= len(axes) else float(np.median(wandering)),
+        wanders_s=float(np.median(wandering)) if wandering else None,
         is_bound=bound,
     )
 
@@ -344,6 +355,11 @@ def _factor(source: AidSource) -> float:
 
 def _mean(values: Sequence[_OneFlight], name: str) -> float:
     return float(np.mean([getattr(one, name) for one in values]))
+
+
+def _root_mean_square(values: Sequence[_OneFlight]) -> float:
+    """Logarithm of that of what is wanted."""
+    return 0.5 * math.log(float(np.mean(np.exp([2.0 * one.wanted for one in values]))))
 
 
 def _reach(values: Sequence[float], confidence: float) -> float:

@@ -77,13 +77,11 @@ def decide(
     """
     settings = settings or DecisionSettings()
     sets = list(dict.fromkeys((present, *sets)))
-    folders = {Path(folder).name: Path(folder) for folder in analyze_folders}
-    newest_flight = newest_flight or max(folders, default=None)
-    vehicle = decided_vehicle(flights_table, list(folders), newest_flight)
-    flights = read_flights(
-        [folder for name, folder in folders.items() if name not in vehicle.others], settings, present
-    )
-    others = [read_left_out(folder, why) for name, folder in folders.items() if (why := vehicle.without(name))]
+    folders = [Path(folder) for folder in analyze_folders]
+    newest_flight = newest_flight or max((folder.name for folder in folders), default=None)
+    vehicle = decided_vehicle(flights_table, [folder.name for folder in folders], newest_flight)
+    flights = read_flights([one for one in folders if one.name not in vehicle.others], settings, present)
+    others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
     newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
     vetoed = {name: vetoes(name, present, flights, metrics) for name in sets if name != present}

@@ -218,7 +218,7 @@ def read_present(file: str | os.PathLike[str]) -> Present:
     """
     document = read_document(file)
     try:
-        return Present(**document)
-    except TypeError as error:
+        return Present(**document | {"same": tuple(document["same"])})
+    except (TypeError, KeyError) as error:
         reason = f"does not say what the vehicle flies now ({error})"
         raise UserError(file, reason, "Delete it and run the pipeline again") from error

@@ -40,6 +40,7 @@ from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.sensors.measurement_errors import COVERED, VELOCITY_SOURCES, ErrorSeries, measurement_errors
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
@@ -49,6 +50,8 @@ VELOCITY_HORIZON_S = 3.0
 HORIZON_S = 10.0
 """Of everything else: about the slowest time constant with which the filter follows a source."""
 CORRELATION_TIMES_S = (0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+USUAL_INTERVAL_S = {"gnss": 0.2, "baro": 0.05, "mag": 0.05}
+"""Between two samples that a vehicle's estimator takes, by sensor: a thinned log holds fewer."""
 FEWEST_SAMPLES = 30
 FEWEST_LAGS = 5
 _LAGS = 20
@@ -82,11 +85,13 @@ class Whiteness:
         """White noise σ_e of the same spectral density at low frequency, unit of the source.
 
         σ_e² = σ_w² + σ_c² max(1, 2 min(τ, H) / Δt), with the correlated noise as far as it is seen: a filter that takes
-        errors for white averages those that wander as if they were as many.
+        errors for white averages those that wander as if they were as many. Δt is that of the vehicle where the log is
+        thinned.
         """
         if self.correlated_noise == 0.0:
             return self.white_noise
-        alike = 2.0 * min(self.correlation_time_s, horizon_s(self.source)) / self.interval_s
+        interval_s = min(self.interval_s, USUAL_INTERVAL_S.get(AID_SOURCES[self.source].sensor, self.interval_s))
+        alike = 2.0 * min(self.correlation_time_s, horizon_s(self.source)) / interval_s
         return float(np.hypot(self.white_noise, self.correlated_noise * np.sqrt(max(1.0, alike))))
 
     @property

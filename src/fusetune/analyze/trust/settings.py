@@ -81,5 +81,5 @@ class TrustSettings:
 
 
 def reaches(grade: str | None, lowest: str) -> bool:
-    """Whether a trust grade is no lower than another; so is that of a flight with nothing to compare, which has none."""
+    """Whether a trust grade is no lower than another; one of None, of a flight with nothing to compare, is not."""
     return grade is None or grade <= lowest

@@ -31,7 +31,7 @@ def findings_section(results: Results) -> str:
         rows = [(one.found, one.remedy) for one in findings]
         parts += [paragraph(_INTRODUCTION), table(("what PX4 is told, and what the flights say", "what to do"), rows)]
     else:
-        parts.append(paragraph("Nothing that PX4 is told of the sensors is wrong beyond doubt."))
+        parts.append(paragraph("Nothing shows that PX4 is told anything wrong of the sensors."))
     if noises:
         head = ("source", "unit", "flights", "told", "size of the error", "interval", "a filter would want")
         text = paragraph(_NOISES)
