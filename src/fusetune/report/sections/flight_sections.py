@@ -21,8 +21,8 @@ _TRUE_ERRORS = (
     ("truth_position_mean_removed", "all", "rmse", "position, mean removed m"),
     ("truth_attitude_deg", "tilt", "rmse", "tilt °"),
     ("truth_attitude_deg", "heading", "rmse", "heading °"),
-    ("truth_withheld_position", "horizontal", "rmse", "drift of position without GNSS m"),
-    ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity without GNSS m/s"),
+    ("truth_withheld_position", "horizontal", "rmse", "drift of position in its gaps without GNSS m"),
+    ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity in its gaps without GNSS m/s"),
     ("truth_velocity", "all", "nees", "velocity NEES / 3"),
 )
 _AS_FLOWN_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
