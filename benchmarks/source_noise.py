@@ -4,7 +4,7 @@ is known.
     python -m benchmarks.source_noise [--flights 10] [--folder build/source_noise]
 
 Prints for each world and source what PX4 is told, the true size of the error, the estimate and the value that a filter
-would want over all flights, and how often intervals of drawn studies of one, three and five flights hold the truth.
+would want over all flights, and how often intervals of drawn studies of one, three and five flights held the truth.
 """
 
 from __future__ import annotations
@@ -105,7 +105,11 @@ def main() -> None:
     use_kernel_cache()
     files, rng = StudyFiles(), np.random.default_rng(1)
     sizes = [size for size in STUDY_SIZES if size <= options.flights]
-    print("| world | source | told | true size | estimate | interval | wanted | " + " | ".join(map(str, sizes)) + " |")
+    print(
+        "| world | source | told | true size | estimate | interval | a filter may want | held, "
+        + " | ".join(map(str, sizes))
+        + " |"
+    )
     print("|---" * (7 + len(sizes)) + "|")
     for world, document in files.worlds_by_name().items():
         folders = [options.folder / world / f"flight_{number:02}" for number in range(options.flights)]

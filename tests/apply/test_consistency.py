@@ -144,7 +144,7 @@ def test_of_an_error_that_wanders_no_lower_value_is_proposed() -> None:
     assert "16 times worse" in finding.found  # 3.5 / √(0.1² + 0.2²)
     assert finding.remedy == (
         "Leave EKF2_BARO_NOISE as it is; part of its error wanders for some 8 s, and a filter, which takes it for "
-        "white, has to be told 10 m"
+        "white, may have to be told as much as 10 m"
     )
     assert consistency_candidates(noises, SETTINGS) == []
 

@@ -5,16 +5,17 @@ state is wrong with it, and E ν² − H P Hᵀ, which should be R, comes out be
 from `fusetune.analyze.sensors.source_whiteness`, in which the filter has no part: white noise σ_w, and σ_c, which
 wanders with a correlation time τ, as far as it does within the horizon H.
 
-    σ_t² = σ_w² + σ_c²                                   size of the error
-    σ_e² = σ_w² + σ_c² max(1, 2 min(τ, H) / Δt)          what a filter, which takes errors for white, has to be told
+    σ_t² = σ_w² + σ_c²                                size of the error
+    σ_e² = σ_w² + σ_c² max(1, 2 min(τ, H) / Δt)       what a filter, which takes errors for white, may have to be told
 
 What of σ_c is the source's and what the inertial solution's cannot be told apart, so the interval of the size begins at
 that of σ_w and ends at that of σ_t. A source whose error cannot be had so has only a bound: white noise is no larger
 than the innovations.
 
 Sizes are means over flights of logarithms of ratios to what was told; of σ_e², which single flights rate far apart, it
-is the plain mean, so that the flights on which the source wanders count. The scatter is pooled with a prior one, so
-that a single flight has an interval, too.
+is the plain mean, so that the flights on which the source wanders count. It guards against telling too little: no
+noise is proposed below σ_e, and where more is needed than was told, σ_t is proposed, which is proved. The scatter is
+pooled with a prior one, so that a single flight has an interval, too.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class SourceNoise:
     told : what the estimator was told
     size : of the error, σ_t; with its interval `lower` to `upper`
     innovation : RMS of the innovations
-    wanted : σ_e, what a filter would have to be told
+    wanted : σ_e, as much as a filter may have to be told
     wanders_s : correlation time of what wanders; None where that hardly matters
     is_bound : whether only an upper bound of the noise is known, from the innovations
     parameter : that goes into it; None where none does
@@ -93,15 +94,16 @@ class SourceNoise:
         return not self.is_bound and self.lower > factor * self.told and self.innovation > self.told
 
     @property
-    def wanted_value(self) -> float | None:
-        """Of the parameter, for the estimator to be told what it would want; within its range, to two digits."""
+    def value(self) -> float | None:
+        """Of the parameter, for the estimator to be told what it may want, or, where it was told less than the size,
+        that; within its range, to two digits."""
         if self.parameter is None or self.now is None:
             return None
         metadata = PARAMETERS[self.parameter]
-        value = max(self.wanted, self.size) / _factor(AID_SOURCES[self.source])
+        noise = self.size if self.size > self.told else max(self.wanted, self.size)
         low = -math.inf if metadata.minimum is None else metadata.minimum
         high = math.inf if metadata.maximum is None else metadata.maximum
-        return min(max(float(f"{value:.2g}"), low), high)
+        return min(max(float(f"{noise / _factor(AID_SOURCES[self.source]):.2g}"), low), high)
 
 
 def source_noises(
@@ -152,10 +154,10 @@ def proposed_value(noise: SourceNoise, noises: Iterable[SourceNoise]) -> float |
     A parameter that several sources share gets the largest value that one of them wants. What a receiver reports
     cannot be made smaller by a floor.
     """
-    sharing = [one for one in noises if one.parameter == noise.parameter and one.wanted_value is not None]
+    sharing = [one for one in noises if one.parameter == noise.parameter and one.value is not None]
     if noise.parameter is None or noise.now is None or noise.now <= 0.0 or not sharing:
         return None
-    value = max(one.wanted_value or 0.0 for one in sharing)
+    value = max(one.value or 0.0 for one in sharing)
     if noise.size > noise.told:
         return value if value > noise.now * _WORTH_A_TRY else None
     return value if noise.rules and 0.0 < value * _WORTH_A_TRY < noise.now else None
@@ -230,7 +232,7 @@ def _remedy(noise: SourceNoise, value: float | None) -> str:
         unit = AID_SOURCES[noise.source].unit
         wanders = (
             f"; part of its error wanders for some {noise.wanders_s:.2g} s, and a filter, which takes it for white, "
-            f"has to be told {noise.wanted:.2g} {unit}"
+            f"may have to be told as much as {noise.wanted:.2g} {unit}"
         )
     if value is not None:
         return f"Compare {name} = {value:g} in a study before flying it (now {noise.now:g}){wanders}"
@@ -241,7 +243,7 @@ def _remedy(noise: SourceNoise, value: float | None) -> str:
         if others:
             return f"Lowering {name} changes little: {' and '.join(others)} makes up more of what PX4 takes"
         return f"Lowering {name} changes nothing: what the sensor itself reports is larger, and rules"
-    if noise.wanted_value is not None and noise.now is not None and noise.wanted_value * _WORTH_A_TRY >= noise.now:
+    if noise.value is not None and noise.now is not None and noise.value * _WORTH_A_TRY >= noise.now:
         return f"Leave {name} as it is{wanders}"
     return f"Leave {name} as it is: it is that of another source, too, which is noisier"
 

@@ -16,7 +16,8 @@ _INTRODUCTION = (
 _NOISES = (
     "The size of a source's error is its white noise and what wanders within 3 s (velocities) or 10 s (all else); the "
     "interval begins at the white noise alone, for what wanders cannot be told from the drift of the inertial "
-    "solution. As a filter takes errors for white, one that wanders has to be told as a larger one: the last column."
+    "solution. As a filter takes errors for white, one that wanders may have to be told as a larger one: the last "
+    "column."
 )
 
 
@@ -33,7 +34,7 @@ def findings_section(results: Results) -> str:
     else:
         parts.append(paragraph("Nothing shows that PX4 is told anything wrong of the sensors."))
     if noises:
-        head = ("source", "unit", "flights", "told", "size of the error", "interval", "a filter would want")
+        head = ("source", "unit", "flights", "told", "size of the error", "interval", "a filter may want")
         text = paragraph(_NOISES)
         parts.append(details("Every source", text, table(head, [_noise_row(one) for one in noises])))
     return section("What PX4 is told, and what the data say", *parts)
