@@ -44,6 +44,42 @@ class Candidate:
     reason: str
 
 
+def between_vetoed_and_present(
+    better: Mapping[str, Sequence[str]], sets: Mapping[str, Mapping[str, float]], present: Mapping[str, float]
+) -> list[Candidate]:
+    """Candidates for all sets that are ruled out and predict better, none of them a set that was compared.
+
+    Parameters
+    ----------
+    better : name of each such set → what rules it out
+    sets : overrides of all sets that were compared
+    present : all parameters of the present set
+    """
+    found = [one for name, why in better.items() for one in candidates_of_vetoed(name, sets[name], present, why)]
+    return without_twins(found, sets)
+
+
+def candidates_sentence(candidates: Sequence[Candidate], vetoed: Mapping[str, float]) -> str:
+    """What a reader of the decision is told of them; empty where nothing is proposed.
+
+    Parameters
+    ----------
+    vetoed : name of each set that is ruled out and predicts better → by how many percent its errors are smaller
+    """
+    sentences = []
+    if vetoed:
+        sets = ", ".join(f"“{name}” (errors {percent:.1f} % smaller)" for name, percent in vetoed.items())
+        sentences.append(f"Ruled out, though better than now beyond doubt by its predictions: {sets}.")
+    if candidates:
+        ways = "; ".join(f"{one.name} ({_values(one)})" for one in candidates)
+        sentences.append(f"Worth comparing next, and ready as a study in candidates.yaml: {ways}.")
+    return " ".join(sentences)
+
+
+def _values(candidate: Candidate) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in candidate.overrides.items())
+
+
 def candidates_of_vetoed(
     name: str, overrides: Mapping[str, float], present: Mapping[str, float], why: Sequence[str]
 ) -> list[Candidate]:

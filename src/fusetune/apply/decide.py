@@ -9,7 +9,13 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from fusetune.apply.candidates import without_twins, write_candidates
+from fusetune.apply.candidates import (
+    Candidate,
+    between_vetoed_and_present,
+    candidates_sentence,
+    without_twins,
+    write_candidates,
+)
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.consistency import (
     SourceNoise,
@@ -54,7 +60,7 @@ def decide(
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
-    `decision.json`, `candidates.yaml`, `best_params.params` and `rollback.params` to `output_folder`.
+    `decision.json`, `best_params.params`, `rollback.params` and `candidates.yaml` to `output_folder`.
 
     Parameters
     ----------
@@ -84,7 +90,7 @@ def decide(
     others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
     newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
-    vetoed = {name: vetoes(name, present, flights, metrics) for name in sets if name != present}
+    vetoed = {name: vetoes(name, present, flights, metrics, settings) for name in sets if name != present}
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
     evidence = [flight.evidence for flight in flights if flight.evidence is not None]
     choice = choose(ranked, present, evidence, _distances(newest, present), settings)
@@ -92,14 +98,18 @@ def decide(
     changes = _changes(choice, newest, present)
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
+    better = _vetoed_but_better(ranked)
+    proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     sentences = (
         paragraph(choice, ranked, flights, settings),
         sentence_of_largest(findings),
+        candidates_sentence(proposed, _gains(better)),
         *vehicle.sentences(),
         *unsure_of_present(flights, newest),
     )
     text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
     decision["findings"] = documents(findings)
     decision["noises"] = [asdict(one) for one in noises]
@@ -114,9 +124,7 @@ def decide(
     output = Path(output_folder)
     _write_ranking(output, ranked, values)
     _write_per_flight(output, flights)
-    taken = {one["set"]: one["overrides"] for one in decision["sets"]}
-    candidates = consistency_candidates(noises, settings)
-    write_candidates(output / "candidates.yaml", without_twins(candidates, taken))
+    write_candidates(output / "candidates.yaml", proposed)
     firmware = newest.summary["firmware"] if newest else "unknown"
     written = write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
@@ -150,6 +158,27 @@ def _noises(
     deciding = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
     parameters = newest.summary["sets"].get(present, {}).get("parameters", {}) if newest is not None else {}
     return source_noises(metrics.filter(pc.is_in(metrics["flight"], deciding)), present, parameters, settings)
+
+
+def _vetoed_but_better(ranked: Sequence[RankedSet]) -> list[RankedSet]:
+    """Sets that are ruled out though they predict better than the present one beyond doubt."""
+    return [one for one in ranked if one.is_vetoed and one.upper is not None and one.upper < 0.0]
+
+
+def _candidates(
+    better: Sequence[RankedSet], newest: AnalyzedFlight | None, present: str, found: Sequence[Candidate]
+) -> list[Candidate]:
+    """What to compare next: what lies between such sets and the present one, and what was found beside."""
+    if newest is None:
+        return []
+    sets = {name: one["overrides"] for name, one in newest.summary["sets"].items()}
+    now = newest.summary["sets"].get(present, {}).get("parameters", {})
+    between = between_vetoed_and_present({one.name: one.reasons for one in better if one.name in sets}, sets, now)
+    return without_twins([*between, *found], sets)
+
+
+def _gains(better: Sequence[RankedSet]) -> dict[str, float]:
+    return {one.name: one.improvement_percent for one in better}
 
 
 def _changes(choice: Choice, newest: AnalyzedFlight | None, present: str) -> tuple[ParameterChange, ...]:

@@ -1,7 +1,8 @@
 """The evidence of each flight: block sums of the errors that every parameter set made on the same measurements.
 
-Two kinds of prediction are judged, the aims. *Aided*: one step ahead, all sensors in use. *Unaided*: seconds ahead,
-without GNSS. Each has columns (source, axis and, unaided, horizon), and each column a scale-profiled NLL.
+What sets are judged by are the aims. *Aided*: predictions one step ahead, all sensors in use. *Unaided*: seconds
+ahead, without GNSS. *Smoothed*: the velocity against one that is smoothed from before and after. Each has columns
+(source, axis and, unaided, horizon), and each column a scale-profiled NLL.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,8 +25,8 @@ from fusetune.storage.parquet import read_table
 
 Array = npt.NDArray[np.float64]
 
-AIDED, UNAIDED = "aided", "unaided"
-AIMS = (AIDED, UNAIDED)
+AIDED, UNAIDED, SMOOTHED = "aided", "unaided", "smoothed"
+AIMS = (AIDED, UNAIDED, SMOOTHED)
 
 
 @dataclass(frozen=True)
@@ -185,7 +186,8 @@ def _evidence_of(
         return NoEvidence(DISTRUSTED, words)
     aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
     unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
-    evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings)
+    smoothed = _smoothed(read_table(folder / "smoothed.parquet"))
+    evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings, smoothed)
     if evidence is None or present not in evidence.sets:
         return NoEvidence(WITHOUT_SAMPLES, f"the flight has nothing of {', '.join(settings.sources)} to judge by")
     return evidence
@@ -221,14 +223,16 @@ def flight_evidence(
     unaided: _Sums | None,
     whiteness: Mapping[str, float],
     settings: DecisionSettings,
+    smoothed: _Sums | None = None,
 ) -> FlightEvidence | None:
     """Weigh the columns and aims of a flight.
 
     A source is a witness of the aided prediction only as far as its errors are white: a filter that follows a
-    wandering error predicts it well. Where no source is white enough and nothing was withheld, the aided predictions
-    are all there is, and count.
+    wandering error predicts it well. What weight it lacks the smoothed velocity has, which takes the wander for the
+    receiver's. Where no source is white enough, and there is nothing else, the aided predictions are all there is, and
+    count.
     """
-    parts = {}
+    parts, share = {}, 0.0
     if unaided is not None:
         parts[UNAIDED] = (unaided, _weights(unaided, settings.withheld_sources), settings.unaided_weight)
     if aided is not None:
@@ -239,8 +243,11 @@ def flight_evidence(
         share = sum(trusted[source] for source in present) / full if full else 0.0
         if share > 0.0 and settings.aided_weight > 0.0:
             parts[AIDED] = (aided, _weights(aided, trusted), settings.aided_weight * share)
-        elif UNAIDED not in parts and full:
+        elif unaided is None and smoothed is None and full:
             parts[AIDED] = (aided, _weights(aided, settings.sources), 1.0)
+    if smoothed is not None:
+        by_axis = {f"{source}.{axis}": settings.smoothed_axes.get(axis, 0.0) for source, axis in _axes_of(smoothed)}
+        parts[SMOOTHED] = (smoothed, _weights(smoothed, by_axis), settings.smoothed_weight * (1.0 - share))
     parts = {name: part for name, part in parts.items() if part[2] > 0.0 and part[1].any()}
     if not parts:
         return None
@@ -311,6 +318,22 @@ def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
     label = np.array([f"{name} after {seconds:g} s" for name, seconds in zip(axis, horizon, strict=True)])
     source = np.asarray(table["source"].to_pylist())
     return _block_sums(np.asarray(table["set"].to_pylist()), source, label, table["block"].to_numpy(), columns)
+
+
+def _smoothed(table: pa.Table) -> _Sums | None:
+    """Sums of the squared differences to the smoothed velocity: of the error alone, as no set knows its variance."""
+    if table.num_rows == 0:
+        return None
+    squares = table["sum_squares_winsorised"].to_numpy()
+    columns = {"n": table["n"].to_numpy(), "sum_nis": squares, "sum_log_variance": np.zeros(squares.size)}
+    axis = np.array(AXES)[table["axis"].to_numpy()]
+    source = np.asarray(table["source"].to_pylist())
+    return _block_sums(np.asarray(table["set"].to_pylist()), source, axis, table["block"].to_numpy(), columns)
+
+
+def _axes_of(sums: _Sums) -> list[tuple[str, str]]:
+    """Source and axis of each column."""
+    return [(source, label.split()[1]) for source, label in sums.columns]
 
 
 def _weighted(weights: Mapping[str, float]) -> list[str]:
