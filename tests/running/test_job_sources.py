@@ -20,7 +20,7 @@ MADE_BY = {
     "design": ("design",),
     "simulate_flight": ("execute",),
     "save_flight": ("save",),
-    "list_flights": ("save",),
+    "list_flights": ("score", "save"),
     "replay_flight": ("replay", "save"),
     "estimate_delays": ("replay", "delays", "save"),
     "join_delays": ("delays", "replay", "save"),

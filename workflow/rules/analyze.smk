@@ -37,6 +37,7 @@ if MENDS_DELAYS:
     checkpoint join_delays:
         input:
             present="results/save/present.json",
+            flights="results/save/flights.parquet",
             listed="results/save/flights.csv",
             delays=of_replayable_flights("results/analyze/{flight}/delays.json"),
         output:

@@ -16,5 +16,6 @@ keep_out("pandas")
 with logged_job(snakemake.log[0]):
     files = {Path(file).parent.name: file for file in snakemake.input.delays}
     newest = read_present(snakemake.input.present).flight
-    found = write_joined(files, newest, DelaySettings(**snakemake.params.settings), snakemake.output[0])
+    settings = DelaySettings(**snakemake.params.settings)
+    found = write_joined(files, newest, settings, snakemake.output[0], flights_table=snakemake.input.flights)
     print(*found, sep="\n")

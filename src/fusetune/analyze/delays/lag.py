@@ -225,14 +225,14 @@ class _Fit:
 def _generalised(rows: list[_Rows], order: int) -> _Fit:
     """Least squares over white rows of usual size; the filter that makes them white is fitted to what is left."""
     axes, parameters = rows[0].design.shape[1:]
-    solution = np.zeros(parameters)
+    solution: Array = np.zeros(parameters)
     for _ in range(2):
         white = [_whitened(rows, solution, axis, order) for axis in range(axes)]
         residual, design, when = (np.concatenate([one[part] for one in white]) for part in range(3))
         weight: Array = np.ones(residual.size)
         for _ in range(3):
-            solution = np.linalg.lstsq(design * weight[:, None], residual * weight, rcond=None)[0]
-            left = np.abs(residual - design @ solution)
+            solution = np.asarray(np.linalg.lstsq(design * weight[:, None], residual * weight, rcond=None)[0])
+            left = np.asarray(np.abs(residual - design @ solution))
             weight = np.asarray(np.sqrt(np.minimum(1.0, _HUBER / np.maximum(left, 1e-12))))
     return _Fit(design, residual, weight, when, solution)
 

@@ -19,8 +19,10 @@ from fusetune.analyze.delays.sensor_delays import CONFIDENCE, SensorDelay, read_
 from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import AnyPath, atomic_path
+from fusetune.storage.parquet import read_table
 
 STEP_MS = 10.0
 """A delay acts in steps of an update of the filter."""
@@ -119,9 +121,23 @@ def mended_values(delays: Iterable[JoinedDelay]) -> dict[str, float]:
 
 
 def write_joined(
-    files: Mapping[str, AnyPath], newest: str | None, settings: DelaySettings, output: AnyPath
+    files: Mapping[str, AnyPath],
+    newest: str | None,
+    settings: DelaySettings,
+    output: AnyPath,
+    *,
+    flights_table: AnyPath | None = None,
 ) -> tuple[JoinedDelay, ...]:
-    """Join the `delays.json` of flights, by name, and write what was found as JSON."""
+    """Join the `delays.json` of flights, by name, and write what was found as JSON.
+
+    Parameters
+    ----------
+    newest : the flight whose parameters count as the present ones
+    flights_table : `results/save/flights.parquet`, by which flights of other vehicles are left out; None leaves none
+    """
+    if flights_table is not None and newest is not None:
+        rows = {row["flight"]: VehicleIdentity.from_row(row) for row in read_table(flights_table).to_pylist()}
+        files = {name: file for name, file in files.items() if rows[name].is_same(rows[newest])}
     flights = {name: read_delays(read_document(file)["delays"]) for name, file in files.items()}
     found = join_delays(flights, newest, settings)
     with atomic_path(output) as temporary:
