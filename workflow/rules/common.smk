@@ -73,7 +73,8 @@ def scored_sets(wildcards):
 def of_mended_sets(pattern):
     """Input function: files of the sets with mended delays, where there are any."""
     return lambda wildcards: expand(
-        expand(pattern, pset=mended_sets(), part=PARTS), flight=getattr(wildcards, "flight", None) or replayable_flights()
+        expand(pattern, pset=mended_sets(), part=PARTS),
+        flight=getattr(wildcards, "flight", None) or replayable_flights(),
     )
 
 
