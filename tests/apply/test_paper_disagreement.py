@@ -22,6 +22,7 @@ CASE = Disagreement(
     any_consistent=False,
     aided=MeanDifference(math.log(1.02), math.log(0.98), math.log(1.06), 6),
     unaided=MeanDifference(math.log(1.5), math.log(1.2), math.log(1.8), 6),
+    smoothed=None,
     score=MeanDifference(math.log(1.2), math.log(0.95), math.log(1.4), 6),
     position_white_share=0.25,
     objections=(),

@@ -10,6 +10,7 @@ SCORE_TABLES = {
     "blocks": "scores.parquet",
     "windows": "windows.parquet",
     "withheld": "withheld.parquet",
+    "smoothed": "smoothed.parquet",
 }
 """Table of `fusetune.analyze.scoring.score_sets.FlightScores` → its file."""
 

@@ -1,7 +1,8 @@
 """The evidence of each flight: block sums of the errors that every parameter set made on the same measurements.
 
-Two kinds of prediction are judged, the aims. *Aided*: one step ahead, all sensors in use. *Unaided*: seconds ahead,
-without GNSS. Each has columns (source, axis and, unaided, horizon), and each column a scale-profiled NLL.
+What sets are judged by are the aims. *Aided*: predictions one step ahead, all sensors in use. *Unaided*: seconds
+ahead, without GNSS. *Smoothed*: the velocity against one that is smoothed from before and after. Each has columns
+(source, axis and, unaided, horizon), and each column a scale-profiled NLL.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.metrics.likelihood import profile_nll
+from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.aid_sources import AXES
 from fusetune.storage.documents import read_document
@@ -23,8 +25,8 @@ from fusetune.storage.parquet import read_table
 
 Array = npt.NDArray[np.float64]
 
-AIDED, UNAIDED = "aided", "unaided"
-AIMS = (AIDED, UNAIDED)
+AIDED, UNAIDED, SMOOTHED = "aided", "unaided", "smoothed"
+AIMS = (AIDED, UNAIDED, SMOOTHED)
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,10 @@ class FlightEvidence:
 
 
 NOT_SCORED, DISTRUSTED, WITHOUT_SAMPLES = "not scored", "distrusted", "without samples"
-"""Why a flight has no evidence: it could not be scored, its replay is not trusted, or nothing in it is judged by."""
+MISLEADING = "misleading"
+OTHER_VEHICLE = "other vehicle"
+"""Why a flight has no evidence: it could not be scored, its replay is not trusted, nothing in it is judged by, what is
+there would mislead, or another vehicle is decided for."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,7 @@ class NoEvidence:
 
     Attributes
     ----------
-    kind : `NOT_SCORED`, `DISTRUSTED` or `WITHOUT_SAMPLES`
+    kind : `NOT_SCORED`, `DISTRUSTED`, `WITHOUT_SAMPLES`, `MISLEADING` or `OTHER_VEHICLE`
     reason : in words
     """
 
@@ -130,7 +135,8 @@ class _Sums:
 
 
 def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
-    """Read `results/analyze/<flight>` of all flights, ordered by name so that the order of arguments does not matter.
+    """Read `results/analyze/<flight>` of all flights of a vehicle, ordered by name so that the order of arguments does
+    not matter.
 
     A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
     """
@@ -143,6 +149,15 @@ def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present
     usual = {source: float(np.mean(sorted(found))) for source, found in known.items()}
     flights = (_read_flight(one, table, settings, present, usual | shares[one]) for one, table in metrics.items())
     return sorted(flights, key=lambda one: one.name)
+
+
+def read_left_out(folder: AnyPath, without: NoEvidence) -> AnalyzedFlight:
+    """Read `results/analyze/<flight>` of a flight that is left out, whatever it holds."""
+    folder = Path(folder)
+    summary = read_document(folder / "scoring.json")
+    return AnalyzedFlight(
+        summary["flight"], folder, summary, read_table(folder / "metrics.parquet"), evidence=None, without=without
+    )
 
 
 def _read_flight(
@@ -164,7 +179,7 @@ def _evidence_of(
     if summary["status"] != "scored":
         return NoEvidence(NOT_SCORED, summary["reason"])
     grade, why = trust_grade(folder)
-    if grade is not None and grade > settings.lowest_grade:
+    if not reaches(grade, settings.lowest_grade):
         because = f" ({why})" if why else ""
         words = (
             f"its replay has trust grade {grade}{because}, and the decision takes none below {settings.lowest_grade}"
@@ -172,10 +187,26 @@ def _evidence_of(
         return NoEvidence(DISTRUSTED, words)
     aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
     unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
-    evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings)
+    smoothed = _smoothed(read_table(folder / "smoothed.parquet"))
+    evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings, smoothed)
+    if evidence is None and aided is not None:
+        return NoEvidence(MISLEADING, _why_misleading(aided, whiteness, settings))
     if evidence is None or present not in evidence.sets:
         return NoEvidence(WITHOUT_SAMPLES, f"the flight has nothing of {', '.join(settings.sources)} to judge by")
     return evidence
+
+
+def _why_misleading(aided: _Sums, whiteness: Mapping[str, float], settings: DecisionSettings) -> str:
+    shares = [
+        f"{source} {whiteness[source]:.2f}"
+        for source in settings.sources
+        if source in whiteness and source in {name for name, _ in aided.columns}
+    ]
+    return (
+        "nothing on this flight can be trusted to tell sets apart: the errors of its sensors wander "
+        f"(white share of {', '.join(shares)}), so that a filter which follows them predicts best, and there is no "
+        "time without GNSS to judge by instead"
+    )
 
 
 def trust_grade(folder: AnyPath) -> tuple[str | None, str]:
@@ -208,14 +239,15 @@ def flight_evidence(
     unaided: _Sums | None,
     whiteness: Mapping[str, float],
     settings: DecisionSettings,
+    smoothed: _Sums | None = None,
 ) -> FlightEvidence | None:
     """Weigh the columns and aims of a flight.
 
     A source is a witness of the aided prediction only as far as its errors are white: a filter that follows a
-    wandering error predicts it well. Where no source is white enough and nothing was withheld, the aided predictions
-    are all there is, and count.
+    wandering error predicts it well. What weight it lacks the smoothed velocity has, which takes the wander for the
+    receiver's. Where no source is white enough, and there is nothing else, there is no evidence: None.
     """
-    parts = {}
+    parts, share = {}, 0.0
     if unaided is not None:
         parts[UNAIDED] = (unaided, _weights(unaided, settings.withheld_sources), settings.unaided_weight)
     if aided is not None:
@@ -226,8 +258,9 @@ def flight_evidence(
         share = sum(trusted[source] for source in present) / full if full else 0.0
         if share > 0.0 and settings.aided_weight > 0.0:
             parts[AIDED] = (aided, _weights(aided, trusted), settings.aided_weight * share)
-        elif UNAIDED not in parts and full:
-            parts[AIDED] = (aided, _weights(aided, settings.sources), 1.0)
+    if smoothed is not None:
+        by_axis = {f"{source}.{axis}": settings.smoothed_axes.get(axis, 0.0) for source, axis in _axes_of(smoothed)}
+        parts[SMOOTHED] = (smoothed, _weights(smoothed, by_axis), settings.smoothed_weight * (1.0 - share))
     parts = {name: part for name, part in parts.items() if part[2] > 0.0 and part[1].any()}
     if not parts:
         return None
@@ -298,6 +331,22 @@ def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
     label = np.array([f"{name} after {seconds:g} s" for name, seconds in zip(axis, horizon, strict=True)])
     source = np.asarray(table["source"].to_pylist())
     return _block_sums(np.asarray(table["set"].to_pylist()), source, label, table["block"].to_numpy(), columns)
+
+
+def _smoothed(table: pa.Table) -> _Sums | None:
+    """Sums of the squared differences to the smoothed velocity: of the error alone, as no set knows its variance."""
+    if table.num_rows == 0:
+        return None
+    squares = table["sum_squares_winsorised"].to_numpy()
+    columns = {"n": table["n"].to_numpy(), "sum_nis": squares, "sum_log_variance": np.zeros(squares.size)}
+    axis = np.array(AXES)[table["axis"].to_numpy()]
+    source = np.asarray(table["source"].to_pylist())
+    return _block_sums(np.asarray(table["set"].to_pylist()), source, axis, table["block"].to_numpy(), columns)
+
+
+def _axes_of(sums: _Sums) -> list[tuple[str, str]]:
+    """Source and axis of each column."""
+    return [(source, label.split()[1]) for source, label in sums.columns]
 
 
 def _weighted(weights: Mapping[str, float]) -> list[str]:

@@ -20,9 +20,7 @@ from fusetune.apply.paper_mode import (
 )
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.statistics.bootstrap import bootstrap_scores, units_redrawn
-from fusetune.apply.statistics.mean_difference import MeanDifference, mean_difference
-from fusetune.apply.statistics.rounding import without_rounding
+from fusetune.apply.statistics.mean_difference import MeanDifference, mean_differences
 
 WANDERING = 0.6
 """A source whose error is less white than this rewards a filter for following it."""
@@ -153,7 +151,7 @@ class Disagreement:
     Attributes
     ----------
     any_consistent : whether any set's mean NIS lies inside the paper's bounds on half of the flights at least
-    aided, unaided, score : by how much the logarithm of a prediction error of the paper's set exceeds that of the
+    aided, unaided, smoothed, score : by how much the logarithm of an error of the paper's set exceeds that of the
         decision's set; None where no flight tells
     position_white_share : how white the error of GNSS position is; NaN where unknown
     objections : why the decision may not choose the paper's set, in words; empty where it may
@@ -165,6 +163,7 @@ class Disagreement:
     any_consistent: bool
     aided: MeanDifference | None
     unaided: MeanDifference | None
+    smoothed: MeanDifference | None
     score: MeanDifference | None
     position_white_share: float
     objections: Sequence[str]
@@ -179,19 +178,14 @@ def _log_ratios(
     both = [evidence for flight in flights if (evidence := flight.evidence) and {one, other} <= set(evidence.sets)]
     if not both:
         return ratios
-    # With the same seed these are the draws of the ranking: its intervals come out again.
-    redrawn = bootstrap_scores(both, [one, other], settings.draws, settings.seed)
-    scores = {"score": [(evidence, evidence.scores) for evidence in both]}
+    # All sets that were scored on these flights, as in the ranking: its intervals come out again.
+    common = [name for name in both[0].sets if all(name in flight.sets for flight in both)]
+    names = list(dict.fromkeys((other, one, *common)))
+    ratios["score"] = mean_differences(both, names, settings)[1]
     for aim in AIMS:
-        scores[aim] = [(evidence, part.scores) for evidence in both if (part := evidence.aim(aim)) is not None]
-    for name, found in scores.items():
-        if found:
-            draws = redrawn.total if name == "score" else redrawn.aims[name]
-            each = without_rounding(
-                [row[flight.sets.index(one)] - row[flight.sets.index(other)] for flight, row in found]
-            )
-            units = units_redrawn(both, None if name == "score" else name)
-            ratios[name] = mean_difference(draws[:, 0] - draws[:, 1], each, units, settings.confidence)
+        having = [flight for flight in both if flight.aim(aim) is not None]
+        if having:
+            ratios[aim] = mean_differences(having, names, settings, aim)[1]
     return ratios
 
 
@@ -202,7 +196,8 @@ def reasons(case: Disagreement) -> list[str]:
     for ratio, where in (
         (case.aided, "One step ahead, with all sensors in use"),
         (case.unaided, "After seconds without GNSS"),
-        (case.score, "Both taken together, as the decision weighs them"),
+        (case.smoothed, "Of the velocity, against the smoothed one"),
+        (case.score, "All taken together, as the decision weighs them"),
     ):
         if ratio is not None:
             found.append(_prediction(where, ratio, case))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -43,6 +44,20 @@ class DecisionSettings:
     )
     aided_weight: float = setting(1.0, "weight of the predictions one step ahead", low=0, high=100)
     unaided_weight: float = setting(1.0, "weight of the predictions without the sensor", low=0, high=100)
+    smoothed_axes: Mapping[str, float] = setting(
+        {"x": 1.0, "y": 1.0, "z": 1.0},
+        "axes of the velocity (north, east, down) that is compared with the smoothed one, with their weights",
+        low=0,
+        high=1_000_000,
+        choices=AXES,
+        at_least=1,
+    )
+    smoothed_weight: float = setting(
+        1.0,
+        "weight of the difference to the smoothed velocity, as far as the predictions one step ahead are not trusted",
+        low=0,
+        high=100,
+    )
     distrust_white_share: float = setting(
         0.6, "a source whose error is less white has no say in the predictions one step ahead", low=0, high=1
     )
@@ -59,6 +74,14 @@ class DecisionSettings:
         low=0,
         high=100,
     )
+    smallest_gain_percent: float = setting(
+        1.0,
+        "a change is made only for a set whose errors are smaller by more than this beyond doubt: its whole interval "
+        "lies beyond it",
+        unit="%",
+        low=0,
+        high=50,
+    )
     lowest_grade: Literal["A", "B", "C", "D"] = setting(
         "C",
         "flights whose replay has a lower trust grade do not count; one that has nothing to be compared with does",
@@ -66,6 +89,12 @@ class DecisionSettings:
     confidence: float = setting(0.95, "level of the interval that must exclude zero for a change", low=0.5, high=0.999)
     draws: int = setting(4000, "draws of the paired bootstrap", low=200, high=200_000)
     minimum_flights: int = setting(5, "with fewer flights the decision is called exploratory", low=1, high=1000)
+    noise_factor: float = setting(
+        2.0,
+        "the noise of a source is told of where PX4 is told beyond doubt one so many times too large or too small",
+        above=1,
+        high=100,
+    )
     seed: int = 0
     """Of the bootstrap; the configuration has it beside the sections."""
 
@@ -75,6 +104,11 @@ class DecisionSettings:
         if span <= 0.0:
             return float(white_share >= self.trust_white_share)
         return min(max((white_share - self.distrust_white_share) / span, 0.0), 1.0)
+
+    @property
+    def smallest_gain(self) -> float:
+        """Difference of scores, nat, below which a gain matters (0 or negative)."""
+        return math.log1p(-0.01 * self.smallest_gain_percent)
 
     @property
     def main_source(self) -> str:

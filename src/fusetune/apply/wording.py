@@ -3,8 +3,17 @@
 from collections.abc import Iterator, Sequence
 
 from fusetune.apply.choice import Choice
-from fusetune.apply.evidence import AIDED, DISTRUSTED, NOT_SCORED, UNAIDED, WITHOUT_SAMPLES, AnalyzedFlight
-from fusetune.apply.ranking import RankedSet, improvement_percent, is_proved
+from fusetune.apply.evidence import (
+    AIDED,
+    DISTRUSTED,
+    MISLEADING,
+    NOT_SCORED,
+    SMOOTHED,
+    UNAIDED,
+    WITHOUT_SAMPLES,
+    AnalyzedFlight,
+)
+from fusetune.apply.ranking import RankedSet, gains_enough, improvement_percent
 from fusetune.apply.settings import DecisionSettings
 
 _MOST_NAMES = 4
@@ -58,6 +67,7 @@ def _not_counted(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) 
             f"do not count, as their replays have trust grades below {lowest}",
         ),
         (WITHOUT_SAMPLES, "has nothing that sets are judged by", "have nothing that sets are judged by"),
+        (MISLEADING, "has nothing that can be trusted to tell sets apart", "have nothing that can be trusted to"),
     ):
         count = sum(flight.without is not None and flight.without.kind == kind for flight in flights)
         if count:
@@ -76,7 +86,9 @@ def _basis(flights: Sequence[AnalyzedFlight]) -> str:
         ways.append("how well the estimator predicted each measurement before it saw it")
     if UNAIDED in aims:
         ways.append("how far the estimated velocity and position had drifted after seconds without GNSS")
-    return " and ".join(ways)
+    if SMOOTHED in aims:
+        ways.append("how near its velocity came to the one that the whole flight, before and after, makes likely")
+    return " and ".join(filter(None, (", ".join(ways[:-1]), *ways[-1:])))
 
 
 def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionSettings) -> str:
@@ -104,6 +116,11 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
             f"{found}but that interval includes no difference at all, so these flights do not show that a change "
             "would help."
         )
+    if not gains_enough(best, settings):
+        return (
+            f"{found}but a change is made only for a gain that matters, at least "
+            f"{settings.smallest_gain_percent:g} % beyond doubt."
+        )
     p_value = best.p_holm if settings.multiplicity == "holm" else best.p_family
     if p_value is None:
         return f"{found}but one flight cannot show whether the best of several candidates is only favoured by chance."
@@ -117,7 +134,7 @@ def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) 
     span = _smaller(pick.lower, pick.upper, settings.confidence)
     wins = f"better on {pick.flights_better} of {_count(pick.flights, 'flight')}"
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
-    if pick.name != best.name and is_proved(best, settings):
+    if pick.name != best.name and gains_enough(best, settings):
         text += (
             f" “{best.name}” did no better beyond its standard error ({best.improvement_percent:.1f} %) and lies "
             "further from what flies now."

@@ -7,18 +7,23 @@ import numpy.typing as npt
 import pandas as pd
 from scipy.special import bdtr
 
-from fusetune.apply.evidence import AIDED, AIMS, UNAIDED
+from fusetune.apply.evidence import AIDED, AIMS, SMOOTHED, UNAIDED
 from fusetune.apply.statistics.rounding import without_rounding
 from fusetune.report.results import Results
 
 Array = npt.NDArray[np.float64]
 
 SCORE = "score"
-AIM_LABELS = {SCORE: "the score that decides", AIDED: "aided: one step ahead", UNAIDED: "unaided: seconds without GNSS"}
+AIM_LABELS = {
+    SCORE: "the score that decides",
+    AIDED: "aided: one step ahead",
+    UNAIDED: "unaided: seconds without GNSS",
+    SMOOTHED: "smoothed: against the smoothed velocity",
+}
 """What is compared → its label."""
 
-AIM_WORDS = {AIDED: "one step ahead", UNAIDED: "after seconds without GNSS"}
-"""Kind of prediction → when it is made, within a sentence."""
+AIM_WORDS = {AIDED: "one step ahead", UNAIDED: "after seconds without GNSS", SMOOTHED: "against the smoothed velocity"}
+"""What sets are judged by → when an error is made or against what, within a sentence."""
 
 _HOPELESS = 4.0
 _NEVER_HOPELESS = 10.0

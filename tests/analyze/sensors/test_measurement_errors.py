@@ -70,7 +70,7 @@ def test_heights_are_held_against_the_way_fallen_whichever_way_they_count(sign: 
     record = record_of("baro_hgt", TIME[rows], observation[:, None], innovation[:, None])
     found = measurement_errors(record, states_of(velocity), EMPTY, "baro_hgt")
     assert found is not None
-    np.testing.assert_allclose(found.values[:, 0], 40.0 + errors, atol=1e-9)
+    np.testing.assert_allclose(found.values[:, 0], sign * (40.0 + errors), atol=1e-9)
 
 
 def test_gnss_positions_are_taken_from_the_log_in_full_resolution() -> None:

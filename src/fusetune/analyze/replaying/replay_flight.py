@@ -9,7 +9,15 @@ import numpy as np
 
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare_flight
 from fusetune.analyze.replaying.replay_summary import ReplayIdentity, summary_document
-from fusetune.analyze.replaying.replayed_set import STATE_BLOCKS, Columns, ReplayedSet, joined_states, values_of
+from fusetune.analyze.replaying.replayed_set import (
+    STATE_BLOCKS,
+    STEP_BLOCKS,
+    Columns,
+    ReplayedSet,
+    joined_states,
+    joined_steps,
+    values_of,
+)
 from fusetune.analyze.replaying.samples import SampleSpool, SpooledSamples, gate_of
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.replaying.store.columns import (
@@ -62,6 +70,7 @@ def replay_set(prepared: PreparedFlight, name: str, overrides: Mapping[str, floa
         flags=columns_of(flags_table(joined_rows(kept.flags, FLAGS_ROW))),
         local_position=columns_of(local_position_table(joined_rows(kept.local_position, _LOCAL_POSITION))),
         states=partial(joined_states, kept.states),
+        steps=partial(joined_steps, kept.states),
         withheld=withheld,
         gaps=gaps,
     )
@@ -78,10 +87,7 @@ class _Kept:
 
     def take(self, rows: RecordArrays) -> None:
         self.innovations.append(rows.innovations)
-        states = {
-            name: rows.states[array][:, first : first + size].copy()
-            for name, (array, first, size) in STATE_BLOCKS.items()
-        }
+        states = {name: block.of_rows(rows.states) for name, block in (STATE_BLOCKS | STEP_BLOCKS).items()}
         self.states.append({"time": rows.states["timestamp_sample"].copy(), **states})
         self.local_position.append(with_fields(rows.local_position, _LOCAL_POSITION.names or ()))
         self.flags.append(rows.flags)

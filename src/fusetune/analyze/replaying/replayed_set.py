@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -46,27 +46,103 @@ class FilterStates:
     position_variance: Array
 
 
+@dataclass(frozen=True)
+class ReplayedSteps:
+    """The state after each update and the IMU interval that it was predicted over; N rows in order of time.
+
+    Attributes
+    ----------
+    time : (N,) time on the fusion horizon, µs
+    quaternion, velocity : as in `FilterStates`
+    gyro_bias, accel_bias : (N, 3) body, rad/s and m/s²
+    delta_angle, delta_velocity : (N, 3) of the down-sampled IMU, body, rad and m/s
+    delta_angle_dt, delta_velocity_dt : (N,) over which they were integrated, s
+    """
+
+    time: npt.NDArray[np.int64]
+    quaternion: Array
+    velocity: Array
+    gyro_bias: Array
+    accel_bias: Array
+    delta_angle: Array
+    delta_angle_dt: Array
+    delta_velocity: Array
+    delta_velocity_dt: Array
+
+    def rows(self, selected: slice) -> ReplayedSteps:
+        """Some of the rows."""
+        return ReplayedSteps(**{one.name: getattr(self, one.name)[selected] for one in fields(self)})
+
+
+class Block(NamedTuple):
+    """Part of a row of states: the field of the row, and of a field of several elements the first one and their number.
+
+    `size` is 0 where the field is a single figure.
+    """
+
+    field: str
+    first: int = 0
+    size: int = 0
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of its columns in the table of states."""
+        if not self.size:
+            return (self.field,)
+        return tuple(f"{self.field}_{self.first + i}" for i in range(self.size))
+
+    def of_rows(self, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """A copy of it out of the rows of a replay."""
+        values = rows[self.field]
+        return np.array(values[:, self.first : self.first + self.size] if self.size else values)
+
+    def of_columns(self, columns: Columns) -> npt.NDArray[Any]:
+        """It out of the columns of the table of states."""
+        return np.column_stack([columns[name] for name in self.columns]) if self.size else columns[self.field]
+
+
 STATE_BLOCKS = {
-    "quaternion": ("states", state.PUBLISHED_QUATERNION, 4),
-    "velocity": ("states", state.PUBLISHED_VELOCITY, 3),
-    "attitude_variance": ("covariances", state.ATTITUDE, 3),
-    "velocity_variance": ("covariances", state.VELOCITY, 3),
-    "position_variance": ("covariances", state.POSITION, 3),
+    "quaternion": Block("states", state.PUBLISHED_QUATERNION, 4),
+    "velocity": Block("states", state.PUBLISHED_VELOCITY, 3),
+    "attitude_variance": Block("covariances", state.ATTITUDE, 3),
+    "velocity_variance": Block("covariances", state.VELOCITY, 3),
+    "position_variance": Block("covariances", state.POSITION, 3),
 }
-"""Part of `FilterStates` → the array that it is taken from, the first element and their number."""
+"""Where the parts of `FilterStates` are taken from."""
+
+STEP_BLOCKS = {
+    "quaternion": STATE_BLOCKS["quaternion"],
+    "velocity": STATE_BLOCKS["velocity"],
+    "gyro_bias": Block("states", state.PUBLISHED_GYRO_BIAS, 3),
+    "accel_bias": Block("states", state.PUBLISHED_ACCEL_BIAS, 3),
+    "delta_angle": Block("delta_angle", 0, 3),
+    "delta_angle_dt": Block("delta_angle_dt"),
+    "delta_velocity": Block("delta_velocity", 0, 3),
+    "delta_velocity_dt": Block("delta_velocity_dt"),
+}
+"""Where the parts of `ReplayedSteps` are taken from."""
 
 
 def joined_states(pieces: Iterable[Columns]) -> FilterStates:
-    """States out of pieces of the rows, each with `time` and the arrays of `STATE_BLOCKS`."""
+    """States out of pieces of the rows, each with `time` and at least the arrays of `STATE_BLOCKS`."""
+    return FilterStates(**_joined(pieces, STATE_BLOCKS))
+
+
+def joined_steps(pieces: Iterable[Columns]) -> ReplayedSteps:
+    """Steps out of pieces of the rows, each with `time` and at least the arrays of `STEP_BLOCKS`."""
+    return ReplayedSteps(**_joined(pieces, STEP_BLOCKS))
+
+
+def _joined(pieces: Iterable[Columns], blocks: Mapping[str, Block]) -> dict[str, npt.NDArray[Any]]:
     parts: dict[str, list[npt.NDArray]] = {
         "time": [np.zeros(0, np.int64)],
-        **{name: [np.zeros((0, size))] for name, (_, _, size) in STATE_BLOCKS.items()},
+        **{name: [np.zeros((0, block.size) if block.size else 0)] for name, block in blocks.items()},
     }
     for piece in pieces:
-        for name, values in piece.items():
-            parts[name].append(values.astype(np.int64 if name == "time" else np.float64))
+        for name, values in parts.items():
+            values.append(piece[name].astype(np.int64 if name == "time" else np.float64))
     # one after the other, so that no two are in memory in both forms
-    return FilterStates(**{name: np.concatenate(parts.pop(name)) for name in (*parts,)})
+    return {name: np.concatenate(parts.pop(name)) for name in (*parts,)}
 
 
 @dataclass(frozen=True)
@@ -80,6 +156,7 @@ class ReplayedSet:
     flags : status flags at their changes, with their `timestamp`
     local_position : the same goes for these columns as for the samples
     states : fetches the states at every update
+    steps : fetches these with the IMU; None of replays from elsewhere, which do not have it
     withheld : fetches what was predicted in gaps; None of replays from elsewhere, which have none
     gaps : fetches position and velocity at the ends of the gaps
     """
@@ -92,6 +169,7 @@ class ReplayedSet:
     flags: Columns
     local_position: Columns
     states: Callable[[], FilterStates] = lambda: joined_states(())
+    steps: Callable[[], ReplayedSteps] | None = None
     withheld: Callable[[], Columns] | None = None
     gaps: Callable[[], Columns] | None = None
 

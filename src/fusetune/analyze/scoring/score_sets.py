@@ -17,11 +17,18 @@ from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.scoring.filter_events import filter_events
 from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_ground_metrics, ground_window
-from fusetune.analyze.scoring.metrics_table import MetricsTable, add_events, add_true_errors, add_whiteness
+from fusetune.analyze.scoring.metrics_table import (
+    MetricsTable,
+    add_events,
+    add_told_noise,
+    add_true_errors,
+    add_whiteness,
+)
 from fusetune.analyze.scoring.sample_scores import add_onboard, no_sample_scores, score_samples
 from fusetune.analyze.scoring.scoring_summary import scoring_summary
 from fusetune.analyze.scoring.set_evidence import set_evidence
 from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.scoring.smoothed_scores import SMOOTHED_SCHEMA, STEP_US, SmoothedScores
 from fusetune.analyze.scoring.true_errors import true_errors
 from fusetune.analyze.scoring.window import ScoringWindow, after, end_of_warm_up, scoring_window
 from fusetune.analyze.scoring.withheld_scores import (
@@ -31,6 +38,8 @@ from fusetune.analyze.scoring.withheld_scores import (
     withheld_rows,
 )
 from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
+from fusetune.analyze.sensors.told_noise import told_noises
+from fusetune.analyze.smoothing.smoothed_velocity import smoothed_velocity
 from fusetune.px4.flight import Flight
 from fusetune.set_names import PRESENT
 from fusetune.storage.files import AnyPath
@@ -77,6 +86,7 @@ class FlightScores:
     blocks : sums over blocks of about 10 s, which the decision draws from, see `block_scores`
     windows : figures in windows of about 30 s, see `window_scores`
     withheld : predictions without a sensor, see `withheld_scores`
+    smoothed : velocity against the smoothed one, see `smoothed_scores`
     summary : what was scored of the flight, and how each set fared
     """
 
@@ -84,6 +94,7 @@ class FlightScores:
     blocks: pa.Table
     windows: pa.Table
     withheld: pa.Table
+    smoothed: pa.Table
     summary: dict[str, Any]
 
     def figure(self, set_name: str, source: str, axis: str, metric: str) -> float:
@@ -156,6 +167,7 @@ def score_sets(
     for record in records:
         add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
     samples, gaps, whiteness = no_sample_scores(), [], {}
+    smoothed = SMOOTHED_SCHEMA.empty_table()
     if window.intervals:
         kept = [record for record in records if record.name not in window.excluded]
         samples = score_samples(table, kept, present, window, settings, take_samples, spool_folder)
@@ -166,7 +178,9 @@ def score_sets(
         add_onboard(table, scored.onboard, window, settings, records[0].parameters)
         fused = {source for record in records for source in record.fused_sources}
         references = read_references(flight, fused, records[0].parameters)
-        whiteness = _add_state_figures(table, kept, flight, references, window, settings)
+        differences = SmoothedScores(smoothed_velocity(kept[0], flight, window.intervals, STEP_US))
+        whiteness = _add_state_figures(table, kept, flight, references, window, settings, differences)
+        smoothed = differences.rows(flight.name, window.block_edges(settings.block_s))
         for truth in references:
             if truth.kind == "truth" and has_gaps:
                 add_true_drift(table, kept, truth, window)
@@ -174,7 +188,7 @@ def score_sets(
     withheld = withheld_rows(flight.name, gaps, edges)
     evidence = set_evidence([record.name for record in records], window, samples.costs, gaps, settings)
     summary = scoring_summary(flight, records, present, window, events, evidence, whiteness, settings)
-    return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, summary)
+    return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, smoothed, summary)
 
 
 def _flight_after_warm_up(
@@ -197,8 +211,11 @@ def _add_state_figures(
     references: Sequence[Truth],
     window: ScoringWindow,
     settings: ScoringSettings,
+    differences: SmoothedScores,
 ) -> dict[SourceAxis, Whiteness]:
     """Append what takes the states of each replay: whiteness of the sources, errors against the references.
+
+    The differences to the smoothed velocity are taken, too.
 
     Returns
     -------
@@ -209,9 +226,12 @@ def _add_state_figures(
         states = record.states()
         found = source_whiteness(record, states, flight, window.intervals)
         add_whiteness(table, record.name, found)
-        present = present if number else found
+        if not number:
+            present = found
+            add_told_noise(table, record.name, told_noises(record, window.intervals))
         for truth in references:
             figures = true_errors(record, states, truth, window, settings.confidence)
             add_true_errors(table, record.name, figures, truth.kind)
+        differences.add(record.name, states)
         give_back_freed_memory()
     return present

@@ -51,7 +51,7 @@ def measurement_errors(record: ReplayedSet, states: FilterStates, flight: Flight
       the corrections back leaves the inertial solution running freely.
     * Heading: −ν_k. Gyros hold a heading for many seconds, and the other source of heading that most vehicles have
       would answer the corrections that were taken out.
-    * Position and height: the measurement less the integral of the estimated velocity.
+    * Position and height: the measurement less the integral of the estimated velocity; heights count downwards.
     * Magnetometer: the measurement less Rᵀ(q) m + b, with the constant earth field m and body bias b that fit best.
 
     Parameters
@@ -105,7 +105,7 @@ def _values(
     travelled = _travelled(states, time)
     if source in PLANE_SOURCES:
         return observation - travelled[:, :2]
-    return observation - _height_sign(observation + innovation, travelled[:, 2:]) * travelled[:, 2:]
+    return _height_sign(observation + innovation, travelled[:, 2:]) * observation - travelled[:, 2:]
 
 
 def _running_freely(innovation: Array, correction: Array) -> Array | None:

@@ -44,9 +44,15 @@ STATE_ROW = np.dtype(
         ("timestamp_sample", "i8"),
         ("states", "f4", (S.PUBLISHED_STATE_SIZE,)),
         ("covariances", "f4", (S.ERROR_STATE_SIZE,)),
+        ("delta_angle", "f4", (3,)),
+        ("delta_angle_dt", "f4"),
+        ("delta_velocity", "f4", (3,)),
+        ("delta_velocity_dt", "f4"),
     ],
     align=True,
 )
+"""`delta_angle` (rad, body) to `delta_velocity_dt` are the down-sampled IMU interval, dt in s, over which the state was
+predicted before it was corrected to what stands here."""
 
 LOCAL_POSITION_ROW = np.dtype(
     [
@@ -219,6 +225,12 @@ def _record_states(ekf, row, timestamp):
     states[S.PUBLISHED_TERRAIN] = ekf.terrain
     for i in range(S.ERROR_STATE_SIZE):
         row.covariances[i] = ekf.P[i, i]
+    imu = ekf.imu_delayed
+    for i in range(3):
+        row.delta_angle[i] = imu.delta_ang[i]
+        row.delta_velocity[i] = imu.delta_vel[i]
+    row.delta_angle_dt = imu.delta_ang_dt
+    row.delta_velocity_dt = imu.delta_vel_dt
 
 
 @kernel

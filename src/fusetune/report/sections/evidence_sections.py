@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from fusetune.apply.evidence import AIDED, UNAIDED
+from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, signed, table
@@ -213,15 +213,24 @@ def weights_section(results: Results) -> str:
             *(_share(shares, flight, source) for source in sources),
             Cell(f"{100.0 * of_aim.get(AIDED, 0.0):.0f} %", "number"),
             Cell(f"{100.0 * of_aim.get(UNAIDED, 0.0):.0f} %", "number"),
+            Cell(f"{100.0 * of_aim.get(SMOOTHED, 0.0):.0f} %", "number"),
         )
         for flight, of_aim in sorted(weights.items())
     ]
-    head = ("flight", *(f"{AID_SOURCES[one].label}, white" for one in sources), "weight aided", "weight unaided")
+    head = (
+        "flight",
+        *(f"{AID_SOURCES[one].label}, white" for one in sources),
+        "weight aided",
+        "weight unaided",
+        "weight smoothed",
+    )
     text = (
         "A filter that follows a wandering measurement predicts it well without knowing better, so the predictions one "
         "step ahead count only as far as the error of the measurement is white: fully from "
         f"{100.0 * rule['trust_white_share']:.0f} % on, not at all below {100.0 * rule['distrust_white_share']:.0f} %. "
-        "Where a flight has only one kind of prediction to tell of, that one decides there."
+        "As far as they do not, the difference of the velocity to one that is smoothed from the whole flight counts, "
+        "which takes the wander for the receiver's. "
+        "Where a flight has only one of these to tell of, that one decides there."
     )
     unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
     note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")

@@ -24,8 +24,7 @@ def ranking_table(results: Results) -> str:
     corrected = "p_holm" if results.decision["rule"]["multiplicity"] == "holm" else "p_family"
     if corrected not in results.ranking:
         corrected = "p_holm"
-    titles = {"aided": "aided %", "unaided": "unaided %"}
-    head = ("set", "", "change %", "interval %", *(titles[aim] for aim in aims), "p", "p, all sets", "P(best)", "score")
+    head = ("set", "", "change %", "interval %", *(f"{aim} %" for aim in aims), "p", "p, all sets", "P(best)", "score")
     rows = []
     for one in results.ranking.to_dict("records"):
         is_present = one["name"] == results.present

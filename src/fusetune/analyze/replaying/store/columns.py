@@ -42,8 +42,11 @@ def innovation_table(rows: np.ndarray, measured: np.ndarray | None = None) -> pa
 
 
 def state_table(rows: np.ndarray) -> pa.Table:
-    """One row per filter update: `states_0` … `states_24` and `covariances_0` … `covariances_23` (the variances)."""
-    return _flattened(rows, ("states", "covariances"))
+    """One row per filter update: `states_0` … `states_24` and `covariances_0` … `covariances_23` (the variances).
+
+    `delta_angle_0` … `delta_velocity_dt` are the IMU interval of its prediction.
+    """
+    return _flattened(rows, ("states", "covariances", "delta_angle", "delta_velocity"))
 
 
 def local_position_table(rows: np.ndarray) -> pa.Table:

@@ -1,7 +1,7 @@
 """Reads the files of one replay.
 
 Replays of another program in the same layout, as of PX4's own estimator, are read, too: they need no digest, and may
-have no gaps.
+have neither gaps nor the IMU beside the states.
 """
 
 from __future__ import annotations
@@ -11,16 +11,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.replaying.replayed_set import (
     STATE_BLOCKS,
+    STEP_BLOCKS,
+    Block,
     Columns,
     FilterStates,
     ReplayedSet,
+    ReplayedSteps,
     joined_states,
+    joined_steps,
     values_of,
 )
 from fusetune.analyze.replaying.samples import SampleSpool, SpooledSamples, gate_of
@@ -88,6 +91,7 @@ def read_set(folder: AnyPath, name: str, spool: SampleSpool | None = None) -> Re
         flags=read_columns(table_file(folder, name, "status_flags")),
         local_position=ColumnsOnDisk(table_file(folder, name, "local_position")),
         states=partial(read_states, folder, name),
+        steps=partial(read_steps, folder, name) if _has_steps(table_file(folder, name, "states")) else None,
         withheld=partial(read_columns, withheld) if withheld.exists() else None,
         gaps=partial(read_columns, gaps) if gaps.exists() else None,
     )
@@ -119,17 +123,24 @@ def read_states(folder: AnyPath, name: str) -> FilterStates:
     UserError
         If the file is missing or damaged.
     """
-    return joined_states(_state_pieces(table_file(folder, name, "states")))
+    return joined_states(_state_pieces(table_file(folder, name, "states"), STATE_BLOCKS))
 
 
-def _state_pieces(path: Path) -> Iterator[Columns]:
-    blocks = {
-        name: [f"{array}_{first + i}" for i in range(size)] for name, (array, first, size) in STATE_BLOCKS.items()
-    }
-    columns = ["timestamp_sample", *(column for block in blocks.values() for column in block)]
+def read_steps(folder: AnyPath, name: str) -> ReplayedSteps:
+    """Read the states of a set with the IMU that they were predicted with; errors as for `read_states`."""
+    return joined_steps(_state_pieces(table_file(folder, name, "states"), STEP_BLOCKS))
+
+
+def _has_steps(path: Path) -> bool:
+    names = {*read_schema(path, sealed=False).names}
+    return names.issuperset(column for block in STEP_BLOCKS.values() for column in block.columns)
+
+
+def _state_pieces(path: Path, blocks: Mapping[str, Block]) -> Iterator[Columns]:
+    columns = ["timestamp_sample", *(column for block in blocks.values() for column in block.columns)]
     for table in read_pieces(path, columns, sealed=False):
         piece = columns_of(table)
         yield {
             "time": piece["timestamp_sample"],
-            **{name: np.column_stack([piece[column] for column in block]) for name, block in blocks.items()},
+            **{name: block.of_columns(piece) for name, block in blocks.items()},
         }

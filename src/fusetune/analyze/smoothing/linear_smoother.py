@@ -1,0 +1,179 @@
+"""Fixed-interval smoothing of a linear Gaussian model: what a Kalman filter and the Rauch-Tung-Striebel pass find.
+
+    x_{k+1} = Φ_k x_k + Γ_k g + u_k + w_k    w_k ~ N(0, diag Q_k)
+    z_k     = H x_k + D_k g + e_k            e_k ~ N(0, diag R_k)
+
+with x_0 and the constants g normal around 0. The most probable course is a least-squares problem whose normal
+equations are block tridiagonal in the states, with a border for the constants: one banded Cholesky factor instead of a
+recursion. Its determinant gives the likelihood, the same that the innovations of the filter give.
+
+References
+----------
+Rauch, Tung and Striebel, "Maximum likelihood estimates of linear dynamic systems", 1965; Bell, "The iterated Kalman
+smoother as a Gauss-Newton method", 1994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve, cholesky_banded
+from scipy.linalg.lapack import dtbtrs
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """The model for N epochs, n states, m constants and p measurements an epoch.
+
+    Attributes
+    ----------
+    transition : (N − 1, n, n) Φ
+    of_constants : (N − 1, n, m) Γ
+    known : (N − 1, n) u
+    process_variance : (N − 1, n) diagonals of Q, all above 0
+    observation : (p, n) H
+    observed_constants : (N, p, m) D
+    measured : (N, p) z
+    measurement_variance : (N, p) diagonals of R; infinite where there is no measurement, of which z is anything finite
+    first_variance : (n,) of x_0
+    constant_variance : (m,) of g
+    """
+
+    transition: Array
+    of_constants: Array
+    known: Array
+    process_variance: Array
+    observation: Array
+    observed_constants: Array
+    measured: Array
+    measurement_variance: Array
+    first_variance: Array
+    constant_variance: Array
+
+    @property
+    def measurements(self) -> int:
+        """How many there are, M."""
+        return int(np.count_nonzero(np.isfinite(self.measurement_variance)))
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """How probable the measurements are: −2 ln L = `cost` + `log_determinant` + M ln 2π.
+
+    Attributes
+    ----------
+    cost : sum of all squared residuals of the most probable course, each divided by its variance
+    log_determinant : of the covariance of all M measurements
+    """
+
+    cost: float
+    log_determinant: float
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """The most probable course: `states` (N, n) and `constants` (m,), and the likelihood of the measurements."""
+
+    states: Array
+    constants: Array
+    likelihood: Likelihood
+
+
+def smooth(model: LinearModel) -> Smoothed:
+    """The most probable states and constants, given all measurements, and the likelihood of these."""
+    solved = _Solved(model)
+    return Smoothed(solved.states(), solved.constants, solved.likelihood)
+
+
+def likelihood(model: LinearModel) -> Likelihood:
+    """The likelihood alone, in half the time."""
+    return _Solved(model).likelihood
+
+
+class _Solved:
+    """Residuals are linear in the states x, the constants g and the number 1, and the cost is a square of all three.
+
+    x is eliminated by the factor A = L Lᵀ of its part, g from what is left; what is left then, of the 1, is the cost.
+    """
+
+    def __init__(self, model: LinearModel) -> None:
+        epochs, size = model.measured.shape[0], model.observation.shape[1]
+        self._shape = epochs, size
+        q, r = 1.0 / model.process_variance, 1.0 / model.measurement_variance
+        left = np.swapaxes(model.transition, 1, 2) * q[:, None, :]
+        seen = model.observation.T[None] * r[:, None, :]
+
+        diagonal = seen @ model.observation
+        diagonal[0] += np.diag(1.0 / model.first_variance)
+        diagonal[:-1] += left @ model.transition
+        diagonal[1:] += np.eye(size) * q[:, None, :]
+        banded = _banded(diagonal, -np.swapaxes(left, 1, 2))
+        self._factor = cholesky_banded(banded, overwrite_ab=True, lower=True, check_finite=False)
+
+        # columns of the constants, and of the 1
+        moves = np.concatenate([model.of_constants, model.known[:, :, None]], axis=2)
+        sights = np.concatenate([-model.observed_constants, model.measured[:, :, None]], axis=2)
+        border = -(seen @ sights)
+        border[:-1] += left @ moves
+        border[1:] -= q[:, :, None] * moves
+        corner = _summed(sights, r) + _summed(moves, q)
+        flat = border.reshape(epochs * size, -1)
+        self._halved, info = dtbtrs(self._factor, flat, uplo="L")
+        assert info == 0, "a Cholesky factor has no zeros on its diagonal"
+        # not by a matrix product: its order of summation could change with the number of cores
+        corner -= np.einsum("ki,kj->ij", self._halved, self._halved)
+        corner[:-1, :-1] += np.diag(1.0 / model.constant_variance)
+        schur = cho_factor(corner[:-1, :-1], lower=True, check_finite=False)
+        self.constants = -cho_solve(schur, corner[:-1, -1], check_finite=False)
+
+        cost = float(corner[-1, -1] + corner[-1, :-1] @ self.constants)
+        there = model.measurement_variance[np.isfinite(model.measurement_variance)]
+        variances = (model.process_variance, there, model.first_variance, model.constant_variance)
+        information = 2.0 * float(np.sum(np.log(self._factor[0])) + np.sum(np.log(np.diag(schur[0]))))
+        self.likelihood = Likelihood(cost, information + sum(float(np.sum(np.log(one))) for one in variances))
+
+    def states(self) -> Array:
+        """(N, n) by the other half of the factor."""
+        right = -self._halved[:, -1] - self._halved[:, :-1] @ self.constants
+        found, info = dtbtrs(self._factor, right[:, None], uplo="L", trans="T")
+        assert info == 0, "a Cholesky factor has no zeros on its diagonal"
+        return np.asarray(found).reshape(self._shape)
+
+
+def _summed(columns: Array, weights: Array) -> Array:
+    """Σ cᵀ W c over the epochs."""
+    rows = (columns * weights[:, :, None]).reshape(-1, columns.shape[2])
+    return np.asarray(np.einsum("ki,kj->ij", rows, columns.reshape(rows.shape)))
+
+
+def process_residuals(model: LinearModel, states: Array, constants: Array) -> Array:
+    """(N − 1, n) w of a course."""
+    predicted = np.einsum("kij,kj->ki", model.transition, states[:-1]) + model.of_constants @ constants + model.known
+    return np.asarray(states[1:] - predicted)
+
+
+def measurement_residuals(model: LinearModel, states: Array, constants: Array) -> Array:
+    """(N, p) e of a course."""
+    return np.asarray(model.measured - states @ model.observation.T - model.observed_constants @ constants)
+
+
+def _banded(diagonal: Array, below: Array) -> Array:
+    """Symmetric block tridiagonal matrix in LAPACK's lower banded form.
+
+    Parameters
+    ----------
+    diagonal : (N, n, n)
+    below : (N − 1, n, n) blocks below the diagonal
+    """
+    epochs, size, _ = diagonal.shape
+    banded = np.zeros((2 * size, epochs * size))
+    for row in range(size):
+        for column in range(size):
+            if row >= column:
+                banded[row - column, column::size] = diagonal[:, row, column]
+            banded[size + row - column, column::size][:-1] = below[:, row, column]
+    return banded
