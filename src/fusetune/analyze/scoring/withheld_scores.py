@@ -70,7 +70,7 @@ class PairedGaps:
     @property
     def winsor_limit(self) -> float:
         """See `fusetune.analyze.metrics.likelihood.winsor_limit`; of the complete sets, as others have no say."""
-        return winsor_limit(self.error[list(self.complete)] if self.complete else self.error.copy())
+        return winsor_limit(self.error[list(self.complete)] if self.complete else self.error)
 
 
 WITHHELD_METRICS: tuple[Metric[PairedGaps], ...] = (
