@@ -274,6 +274,8 @@ def _interval(draws: Array, found: Array) -> tuple[Array, Array]:
 def _family_p_values(differences: Array) -> Array:
     """(C,) one-sided single-step max-t p-values of (F, C) differences over all flips of the flights' signs."""
     flights = len(differences)
+    if flights < 2:
+        return np.ones(differences.shape[1])
     signs = np.array(list(itertools.product((1.0, -1.0), repeat=flights)))
     squares = np.square(differences).sum(axis=0)
 

@@ -63,6 +63,7 @@ class World:
     ----------
     sets : names, the present one first
     overrides : parameters of each set
+    settings : by which the flights were weighed and vetoed
     folders : where the flights are
     flights : what the decision reads
     old_flights : what that of version 0.1 read of the same flights
@@ -74,6 +75,7 @@ class World:
     name: str
     sets: tuple[str, ...]
     overrides: Mapping[str, Mapping[str, float]]
+    settings: DecisionSettings
     folders: tuple[Path, ...]
     flights: tuple[AnalyzedFlight, ...]
     old_flights: tuple[FlightEvidence | None, ...]
@@ -99,7 +101,7 @@ class World:
             folders=folders,
             flights=flights,
             old_flights=self.old_flights[:count],
-            vetoed=_vetoed(self.sets, flights),
+            vetoed=_vetoed(self.sets, flights, self.settings),
             old_vetoed=old_vetoes(self.sets, folders, self.sets[0]),
             figures={rule: rows[:count] for rule, rows in self.figures.items()},
         )
@@ -144,19 +146,22 @@ def read_world(
         name=name,
         sets=sets,
         overrides=overrides,
+        settings=settings,
         folders=ordered,
         flights=tuple(flights),
         old_flights=tuple(old),
-        vetoed=_vetoed(sets, flights),
+        vetoed=_vetoed(sets, flights, settings),
         old_vetoed=old_vetoes(sets, ordered, present),
         figures={rule: np.array(rows) for rule, rows in figures.items()} | _aims_alone(ordered, sets),
         truth={quantity: np.array(rows) for quantity, rows in truth.items()},
     )
 
 
-def _vetoed(sets: Sequence[str], flights: Sequence[AnalyzedFlight]) -> dict[str, Sequence[str]]:
+def _vetoed(
+    sets: Sequence[str], flights: Sequence[AnalyzedFlight], settings: DecisionSettings
+) -> dict[str, Sequence[str]]:
     metrics = metrics_of(flights)
-    reasons = {one: vetoes(one, sets[0], flights, metrics) for one in sets[1:]}
+    reasons = {one: vetoes(one, sets[0], flights, metrics, settings) for one in sets[1:]}
     return {one: why for one, why in reasons.items() if why}
 
 

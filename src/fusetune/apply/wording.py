@@ -6,6 +6,7 @@ from fusetune.apply.choice import Choice
 from fusetune.apply.evidence import (
     AIDED,
     DISTRUSTED,
+    MISLEADING,
     NOT_SCORED,
     SMOOTHED,
     UNAIDED,
@@ -66,6 +67,7 @@ def _not_counted(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) 
             f"do not count, as their replays have trust grades below {lowest}",
         ),
         (WITHOUT_SAMPLES, "has nothing that sets are judged by", "have nothing that sets are judged by"),
+        (MISLEADING, "has nothing that can be trusted to tell sets apart", "have nothing that can be trusted to"),
     ):
         count = sum(flight.without is not None and flight.without.kind == kind for flight in flights)
         if count:

@@ -89,7 +89,9 @@ def test_course_and_likelihood_are_those_of_the_kalman_filter_with_the_backward_
     np.testing.assert_allclose(found.states, states, atol=1e-9)
     np.testing.assert_allclose(found.constants, constants, atol=1e-9)
     of_constant_factors = model.measured.size * np.log(2.0 * np.pi)
-    assert found.cost + found.log_determinant + of_constant_factors == pytest.approx(minus_two_ln, abs=1e-8)
+    assert found.likelihood.cost + found.likelihood.log_determinant + of_constant_factors == pytest.approx(
+        minus_two_ln, abs=1e-8
+    )
 
 
 def test_two_measurements_of_a_walk_by_hand() -> None:
@@ -106,8 +108,8 @@ def test_two_measurements_of_a_walk_by_hand() -> None:
     )  # fmt: skip
     found = smooth(model)
     np.testing.assert_allclose(found.states[:, 0], [1.6, 4.8])
-    assert found.cost == pytest.approx(25.6)
-    assert found.log_determinant == pytest.approx(np.log(5.0))
+    assert found.likelihood.cost == pytest.approx(25.6)
+    assert found.likelihood.log_determinant == pytest.approx(np.log(5.0))
 
 
 def test_residuals_of_a_course_without_noise_are_zero() -> None:

@@ -71,7 +71,7 @@ EVENT_METRICS: tuple[Metric[FilterEvents], ...] = (
     ),
     Metric(
         "significant_resets", "1", f"how often a reset moved the state by more than {FAR}",
-        lambda events: {"all": events.significant_resets}, "lower",
+        lambda events: {"all": events.significant_resets}, "lower", ("apply",),
     ),
     Metric(
         "timeouts", "1", "how often a source that was fused stopped being fused, by source",

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_factor, cho_solve, cholesky_banded
+from scipy.linalg.lapack import dtbtrs
 
 Array = npt.NDArray[np.float64]
 
@@ -60,62 +61,93 @@ class LinearModel:
 
 
 @dataclass(frozen=True)
-class Smoothed:
-    """The most probable course.
+class Likelihood:
+    """How probable the measurements are: −2 ln L = `cost` + `log_determinant` + M ln 2π.
 
     Attributes
     ----------
-    states : (N, n)
-    constants : (m,)
-    cost : sum of all squared residuals, each divided by its variance, at the course
-    log_determinant : of the covariance of all M measurements, so that −2 ln L = cost + log_determinant + M ln 2π
+    cost : sum of all squared residuals of the most probable course, each divided by its variance
+    log_determinant : of the covariance of all M measurements
     """
 
-    states: Array
-    constants: Array
     cost: float
     log_determinant: float
 
 
+@dataclass(frozen=True)
+class Smoothed:
+    """The most probable course: `states` (N, n) and `constants` (m,), and the likelihood of the measurements."""
+
+    states: Array
+    constants: Array
+    likelihood: Likelihood
+
+
 def smooth(model: LinearModel) -> Smoothed:
     """The most probable states and constants, given all measurements, and the likelihood of these."""
-    epochs, size = model.measured.shape[0], model.observation.shape[1]
-    q, r = 1.0 / model.process_variance, 1.0 / model.measurement_variance
-    left = np.swapaxes(model.transition, 1, 2) * q[:, None, :]
-    seen = model.observation.T[None] * r[:, None, :]
+    solved = _Solved(model)
+    return Smoothed(solved.states(), solved.constants, solved.likelihood)
 
-    diagonal = seen @ model.observation
-    diagonal[0] += np.diag(1.0 / model.first_variance)
-    diagonal[:-1] += left @ model.transition
-    diagonal[1:] += np.eye(size) * q[:, None, :]
-    factor = cholesky_banded(
-        _banded(diagonal, -np.swapaxes(left, 1, 2)), overwrite_ab=True, lower=True, check_finite=False
-    )
 
-    border = seen @ model.observed_constants
-    border[:-1] += left @ model.of_constants
-    border[1:] -= q[:, :, None] * model.of_constants
-    corner = np.diag(1.0 / model.constant_variance)
-    corner += np.einsum("kpi,kp,kpj->ij", model.observed_constants, r, model.observed_constants)
-    corner += np.einsum("kni,kn,knj->ij", model.of_constants, q, model.of_constants)
+def likelihood(model: LinearModel) -> Likelihood:
+    """The likelihood alone, in half the time."""
+    return _Solved(model).likelihood
 
-    right = np.einsum("knp,kp->kn", seen, model.measured)
-    right[:-1] -= np.einsum("kij,kj->ki", left, model.known)
-    right[1:] += q * model.known
-    right_constants = np.einsum("kpi,kp,kp->i", model.observed_constants, r, model.measured)
-    right_constants -= np.einsum("kni,kn,kn->i", model.of_constants, q, model.known)
 
-    flat = border.reshape(epochs * size, -1)
-    solved = cho_solve_banded((factor, True), np.column_stack([right.ravel(), flat]), check_finite=False)
-    schur = cho_factor(corner - flat.T @ solved[:, 1:], lower=True, check_finite=False)
-    constants = cho_solve(schur, right_constants - flat.T @ solved[:, 0], check_finite=False)
-    states = (solved[:, 0] - solved[:, 1:] @ constants).reshape(epochs, size)
+class _Solved:
+    """Residuals are linear in the states x, the constants g and the number 1, and the cost is a square of all three.
 
-    information = 2.0 * float(np.sum(np.log(factor[0])) + np.sum(np.log(np.diag(schur[0]))))
-    there = model.measurement_variance[np.isfinite(model.measurement_variance)]
-    variances = (model.process_variance, there, model.first_variance, model.constant_variance)
-    log_determinant = information + sum(float(np.sum(np.log(one))) for one in variances)
-    return Smoothed(states, constants, _cost(model, states, constants), log_determinant)
+    x is eliminated by the factor A = L Lᵀ of its part, g from what is left; what is left then, of the 1, is the cost.
+    """
+
+    def __init__(self, model: LinearModel) -> None:
+        epochs, size = model.measured.shape[0], model.observation.shape[1]
+        self._shape = epochs, size
+        q, r = 1.0 / model.process_variance, 1.0 / model.measurement_variance
+        left = np.swapaxes(model.transition, 1, 2) * q[:, None, :]
+        seen = model.observation.T[None] * r[:, None, :]
+
+        diagonal = seen @ model.observation
+        diagonal[0] += np.diag(1.0 / model.first_variance)
+        diagonal[:-1] += left @ model.transition
+        diagonal[1:] += np.eye(size) * q[:, None, :]
+        banded = _banded(diagonal, -np.swapaxes(left, 1, 2))
+        self._factor = cholesky_banded(banded, overwrite_ab=True, lower=True, check_finite=False)
+
+        # columns of the constants, and of the 1
+        moves = np.concatenate([model.of_constants, model.known[:, :, None]], axis=2)
+        sights = np.concatenate([-model.observed_constants, model.measured[:, :, None]], axis=2)
+        border = -(seen @ sights)
+        border[:-1] += left @ moves
+        border[1:] -= q[:, :, None] * moves
+        corner = _summed(sights, r) + _summed(moves, q)
+        flat = border.reshape(epochs * size, -1)
+        self._halved, info = dtbtrs(self._factor, flat, uplo="L")
+        assert info == 0, "a Cholesky factor has no zeros on its diagonal"
+        # not by a matrix product: its order of summation could change with the number of cores
+        corner -= np.einsum("ki,kj->ij", self._halved, self._halved)
+        corner[:-1, :-1] += np.diag(1.0 / model.constant_variance)
+        schur = cho_factor(corner[:-1, :-1], lower=True, check_finite=False)
+        self.constants = -cho_solve(schur, corner[:-1, -1], check_finite=False)
+
+        cost = float(corner[-1, -1] + corner[-1, :-1] @ self.constants)
+        there = model.measurement_variance[np.isfinite(model.measurement_variance)]
+        variances = (model.process_variance, there, model.first_variance, model.constant_variance)
+        information = 2.0 * float(np.sum(np.log(self._factor[0])) + np.sum(np.log(np.diag(schur[0]))))
+        self.likelihood = Likelihood(cost, information + sum(float(np.sum(np.log(one))) for one in variances))
+
+    def states(self) -> Array:
+        """(N, n) by the other half of the factor."""
+        right = -self._halved[:, -1] - self._halved[:, :-1] @ self.constants
+        found, info = dtbtrs(self._factor, right[:, None], uplo="L", trans="T")
+        assert info == 0, "a Cholesky factor has no zeros on its diagonal"
+        return np.asarray(found).reshape(self._shape)
+
+
+def _summed(columns: Array, weights: Array) -> Array:
+    """Σ cᵀ W c over the epochs."""
+    rows = (columns * weights[:, :, None]).reshape(-1, columns.shape[2])
+    return np.asarray(np.einsum("ki,kj->ij", rows, columns.reshape(rows.shape)))
 
 
 def process_residuals(model: LinearModel, states: Array, constants: Array) -> Array:
@@ -127,16 +159,6 @@ def process_residuals(model: LinearModel, states: Array, constants: Array) -> Ar
 def measurement_residuals(model: LinearModel, states: Array, constants: Array) -> Array:
     """(N, p) e of a course."""
     return np.asarray(model.measured - states @ model.observation.T - model.observed_constants @ constants)
-
-
-def _cost(model: LinearModel, states: Array, constants: Array) -> float:
-    parts = (
-        (process_residuals(model, states, constants), model.process_variance),
-        (measurement_residuals(model, states, constants), model.measurement_variance),
-        (states[0], model.first_variance),
-        (constants, model.constant_variance),
-    )
-    return sum(float(np.sum(np.square(residual) / variance)) for residual, variance in parts)
 
 
 def _banded(diagonal: Array, below: Array) -> Array:

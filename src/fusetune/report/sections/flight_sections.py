@@ -189,8 +189,9 @@ def _set_troubles(summary: dict[str, Any]) -> str:
         resets = sum(one["resets"].values())
         lost = ", ".join(f"{source} ×{count}" for source, count in one["timeouts"].items())
         faults = ", ".join(fault.removeprefix("fs_") for fault in one["faults"])
-        if one["reason"] or resets or lost or faults:
-            rows.append((name, str(resets), lost, faults, one["reason"]))
+        if one["reason"] or one["evidence"]["left_out"] or resets or lost or faults:
+            far = f"{resets}, {one['significant_resets']} of them far" if resets else "0"
+            rows.append((name, far, lost, faults, one["reason"] or "; ".join(one["evidence"]["left_out"].values())))
     return table(("set", "resets in flight", "lost sources", "faults", "note"), rows) if rows else ""
 
 
