@@ -274,6 +274,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
         row: dict[str, Any] = {"rank": position, **_figures_of(one), **_flat_aims(one), **values[one.name]}
         del row["aims"], row["is_present"]
         row["reasons"] = "; ".join(one.reasons)
+        row["worse_aims"] = " ".join(one.worse_aims)
         rows.append(_rounded(row))
     table = pa.Table.from_pylist(rows)
     # A column in which nothing is known is one of figures all the same.
