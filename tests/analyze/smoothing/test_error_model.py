@@ -55,7 +55,7 @@ def found(white: float, correlated: float, tau: float, seed: int, seconds: float
     if tau:
         measured = measured + gauss_markov(generator, steps, correlated, tau)
     model = horizontal_model(Stretch(sums, epoch, measured))
-    return likeliest_errors(lambda one: [model(one)], ErrorModel(0.1, 0.0, 0.0, WALK))
+    return likeliest_errors([model], ErrorModel(0.1, 0.0, 0.0, WALK))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -85,7 +85,7 @@ def test_measurements_twice_as_large_have_noises_twice_as_large() -> None:
     epoch = np.arange(UPDATES_PER_STEP, sums.time.size, UPDATES_PER_STEP)
     measured = 0.1 * np.random.default_rng(2).normal(size=(epoch.size, 3))
     models = [horizontal_model(Stretch(sums, epoch, scale * measured)) for scale in (1.0, 2.0)]
-    one, two = (likeliest_errors(lambda e, m=m: [m(e)], ErrorModel(0.1, 0.0, 0.0, WALK)) for m in models)  # type: ignore[misc]
+    one, two = (likeliest_errors([m], ErrorModel(0.1, 0.0, 0.0, WALK)) for m in models)
     assert two.white == pytest.approx(2.0 * one.white, rel=0.03)
 
 

@@ -174,7 +174,7 @@ def _fitted(models: Sequence[VelocityModel]) -> tuple[ErrorModel, list[Smoothed]
             off = np.abs(residual[there, column])
             one.excess[there, column] = np.maximum(1.0, off / (OUTLIER_SIGMAS * max(_spread(off), SMALLEST_NOISE)))
     every = max(1, -(-len(models) // SEARCHED_STRETCHES))
-    errors = likeliest_errors(lambda one: [build(one) for build in models[::every]], errors)
+    errors = likeliest_errors(models[::every], errors)
     return errors, [smooth(one(errors)) for one in models]
 
 
