@@ -8,15 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from fusetune.apply.choice import choose, parameter_distance
+from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
 
+from .old_rule import OldRule
 from .world import PAPER_AGGREGATE, World, scores
 
 Rule = Callable[[World, Sequence[int], Sequence[int]], int]
 """World, flights, sets of the study (the present one first) → the chosen one of these sets."""
 
-OURS, SCORE_ONLY = "fusetune", "fusetune, lowest score"
+OURS, OLD, SCORE_ONLY = "fusetune", "fusetune 0.1", "fusetune, lowest score"
 
 DEFAULTS = {
     "EKF2_ACC_NOISE": 0.35,
@@ -27,6 +29,7 @@ DEFAULTS = {
     "EKF2_GPS_P_NOISE": 0.5,
     "EKF2_BARO_NOISE": 3.5,
     "EKF2_MAG_NOISE": 0.05,
+    "EKF2_GPS_DELAY": 110.0,
 }
 
 
@@ -46,15 +49,37 @@ def rules(settings: DecisionSettings) -> dict[str, Rule]:
     return {
         **{name: _lowest(name) for name in plain},
         "paper's design, a flight per set": _flight_per_set,
-        SCORE_ONLY: lambda world, flights, sets: int(
-            sets[np.argmin(scores(world.flights, world.sets)[np.ix_(flights, sets)].mean(axis=0))]
-        ),
+        SCORE_ONLY: _lowest_score,
+        OLD: old_rule(OldRule()),
         OURS: lambda world, flights, sets: decide(world, flights, sets, settings)[0],
     }
 
 
+def _lowest_score(world: World, flights: Sequence[int], sets: Sequence[int]) -> int:
+    return _lowest_mean(scores(world.flights, world.sets)[np.ix_(flights, sets)], sets)
+
+
+def _lowest_mean(rows: np.ndarray, sets: Sequence[int]) -> int:
+    """Over the flights that tell of all sets that any flight tells of; the present set where there are none."""
+    told = np.isfinite(rows).any(axis=0)
+    usable = rows[np.isfinite(rows[:, told]).all(axis=1)]
+    return int(sets[int(np.nanargmin(np.where(told, usable.mean(axis=0), np.inf)))]) if len(usable) else int(sets[0])
+
+
+def old_rule(rule: OldRule) -> Rule:
+    """The decision of version 0.1 on what it read of the flights."""
+
+    def choose_by_it(world: World, flights: Sequence[int], sets: Sequence[int]) -> int:
+        read = [one for one in (world.old_flights[index] for index in flights) if one is not None]
+        names = [world.sets[index] for index in sets]
+        distances = {name: parameter_distance(world.overrides[name], DEFAULTS) for name in names}
+        return world.sets.index(rule.choose(read, names, world.old_vetoed, distances)) if read else int(sets[0])
+
+    return choose_by_it
+
+
 def _lowest(name: str) -> Rule:
-    return lambda world, flights, sets: int(sets[np.argmin(world.figures[name][np.ix_(flights, sets)].mean(axis=0))])
+    return lambda world, flights, sets: _lowest_mean(world.figures[name][np.ix_(flights, sets)], sets)
 
 
 def _flight_per_set(world: World, flights: Sequence[int], sets: Sequence[int]) -> int:
@@ -70,9 +95,13 @@ def decide(
     """The product's own decision on some flights: the chosen set, and the ranking."""
     names = [world.sets[index] for index in sets]
     # A flight that was drawn twice counts as two.
-    chosen = [replace(world.flights[index], name=f"{number}") for number, index in enumerate(flights)]
-    chosen = [replace(one, evidence=replace(one.evidence, flight=one.name)) for one in chosen]
+    chosen = [_named(world.flights[index], f"{number}") for number, index in enumerate(flights)]
     ranked = rank(names, names[0], chosen, world.vetoed, settings)
     distances = {name: parameter_distance(world.overrides[name], DEFAULTS) for name in names}
-    choice = choose(ranked, names[0], [one.evidence for one in chosen], distances, settings)
+    choice = choose(ranked, names[0], [one.evidence for one in chosen if one.evidence], distances, settings)
     return world.sets.index(choice.chosen), ranked
+
+
+def _named(flight: AnalyzedFlight, name: str) -> AnalyzedFlight:
+    evidence = flight.evidence
+    return replace(flight, name=name, evidence=evidence and replace(evidence, flight=name))

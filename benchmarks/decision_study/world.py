@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from fusetune.apply.criteria import criteria, metrics_of, paper_entries
-from fusetune.apply.evidence import AnalyzedFlight, read_flights
+from fusetune.apply.evidence import AimEvidence, AnalyzedFlight, FlightEvidence, read_flights
 from fusetune.apply.paper_mode import paper_ranking
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
+
+from .old_rule import AIDED, UNAIDED, old_vetoes, read_old_aims, read_old_evidence
 
 TRUTH = {
     "velocity": ("truth_velocity", "all"),
@@ -28,6 +31,30 @@ horizontal position error grew in 9 s without GNSS (m)."""
 PAPER_AGGREGATE = "paper, aggregate RMS"
 
 
+class KeptAim(AimEvidence):
+    """Evidence whose scores are computed once, for thousands of studies ask for them."""
+
+    column_scores = cached_property(AimEvidence.column_scores.fget)  # type: ignore[attr-defined,assignment]
+    scores = cached_property(AimEvidence.scores.fget)  # type: ignore[attr-defined,assignment]
+
+
+class KeptEvidence(FlightEvidence):
+    """The same for a flight."""
+
+    scores = cached_property(FlightEvidence.scores.fget)  # type: ignore[attr-defined,assignment]
+
+
+def kept(evidence: FlightEvidence) -> KeptEvidence:
+    """Evidence that computes its scores once."""
+    aims = tuple(KeptAim(**vars_of(aim)) for aim in evidence.aims)
+    return KeptEvidence(**vars_of(evidence) | {"aims": aims})
+
+
+def vars_of(one: AimEvidence | FlightEvidence) -> dict:  # type: ignore[type-arg]
+    """Values of the fields of a dataclass, without what was computed of them."""
+    return {name: getattr(one, name) for name in one.__dataclass_fields__}
+
+
 @dataclass(frozen=True)
 class World:
     """All flights of one world; arrays (F, S), the flights first.
@@ -36,23 +63,48 @@ class World:
     ----------
     sets : names, the present one first
     overrides : parameters of each set
+    settings : by which the flights were weighed and vetoed
+    folders : where the flights are
     flights : what the decision reads
-    vetoed : reasons against a set, from all flights
+    old_flights : what that of version 0.1 read of the same flights
+    vetoed, old_vetoed : reasons against a set, from these flights
     figures : criteria of the innovations and scores of single aims, lower is better
-    truth : the judge's figures
+    truth : the judge's figures on all flights of the world, whichever of them the others are of
     """
 
     name: str
     sets: tuple[str, ...]
     overrides: Mapping[str, Mapping[str, float]]
+    settings: DecisionSettings
+    folders: tuple[Path, ...]
     flights: tuple[AnalyzedFlight, ...]
+    old_flights: tuple[FlightEvidence | None, ...]
     vetoed: Mapping[str, Sequence[str]]
+    old_vetoed: Mapping[str, str]
     figures: dict[str, np.ndarray]
     truth: dict[str, np.ndarray]
 
     def true_error(self, quantity: str) -> np.ndarray:
         """(S,) mean over the flights."""
         return self.truth[quantity].mean(axis=0)
+
+    @cached_property
+    def true_errors(self) -> np.ndarray:
+        """(quantities, S) the same of all."""
+        return np.array([self.true_error(quantity) for quantity in TRUTH])
+
+    def first(self, count: int) -> World:
+        """What is known after the first flights; the truth is that of all."""
+        folders, flights = self.folders[:count], self.flights[:count]
+        return replace(
+            self,
+            folders=folders,
+            flights=flights,
+            old_flights=self.old_flights[:count],
+            vetoed=_vetoed(self.sets, flights, self.settings),
+            old_vetoed=old_vetoes(self.sets, folders, self.sets[0]),
+            figures={rule: rows[:count] for rule, rows in self.figures.items()},
+        )
 
 
 def read_world(
@@ -61,9 +113,10 @@ def read_world(
     """Read what the flights of a world left behind."""
     sets = tuple(overrides)
     present = sets[0]
-    flights = read_flights(folders, settings, present)
-    metrics = metrics_of(flights)
-    reasons = {one: vetoes(one, present, flights, metrics) for one in sets if one != present}
+    flights = [
+        replace(one, evidence=kept(one.evidence)) if one.evidence is not None else one
+        for one in read_flights(folders, settings, present)
+    ]
     figures: dict[str, list[list[float]]] = {}
     truth: dict[str, list[list[float]]] = {quantity: [] for quantity in TRUTH}
     for flight in flights:
@@ -86,32 +139,53 @@ def read_world(
         indexed = _indexed(table, sets)
         for quantity, key in TRUTH.items():
             truth[quantity].append([indexed[(one, *key)] for one in sets])
+    ordered = tuple(sorted(folders, key=lambda folder: folder.name))
+    assert [one.name for one in flights] == [one.name for one in ordered], f"{name}: flights named otherwise"
+    old = [None if one is None else kept(one) for one in read_old_evidence(ordered, present)]
     return World(
         name=name,
         sets=sets,
         overrides=overrides,
+        settings=settings,
+        folders=ordered,
         flights=tuple(flights),
-        vetoed={one: why for one, why in reasons.items() if why},
-        figures={rule: np.array(rows) for rule, rows in figures.items()} | _aims_alone(folders, sets, settings),
+        old_flights=tuple(old),
+        vetoed=_vetoed(sets, flights, settings),
+        old_vetoed=old_vetoes(sets, ordered, present),
+        figures={rule: np.array(rows) for rule, rows in figures.items()} | _aims_alone(ordered, sets),
         truth={quantity: np.array(rows) for quantity, rows in truth.items()},
     )
 
 
-def _aims_alone(folders: Sequence[Path], sets: Sequence[str], settings: DecisionSettings) -> dict[str, np.ndarray]:
-    """Scores of one kind of prediction alone, the aided one whether its source is white or not."""
-    blind = replace(settings, unaided_weight=0.0, distrust_white_share=0.0, trust_white_share=0.0)
-    alone = {"one-step predictions alone": blind, "withheld GNSS alone": replace(settings, aided_weight=0.0)}
-    return {name: scores(read_flights(folders, one, sets[0]), sets) for name, one in alone.items()}
+def _vetoed(
+    sets: Sequence[str], flights: Sequence[AnalyzedFlight], settings: DecisionSettings
+) -> dict[str, Sequence[str]]:
+    metrics = metrics_of(flights)
+    reasons = {one: vetoes(one, sets[0], flights, metrics, settings) for one in sets[1:]}
+    return {one: why for one, why in reasons.items() if why}
+
+
+def _aims_alone(folders: Sequence[Path], sets: Sequence[str]) -> dict[str, np.ndarray]:
+    """(F, S) scores of one kind of prediction alone, the aided one whether its source is white or not."""
+    names = {"one-step predictions alone": AIDED, "withheld GNSS alone": UNAIDED}
+    found = {rule: np.full((len(folders), len(sets)), np.nan) for rule in names}
+    for row, folder in enumerate(folders):
+        aims = read_old_aims(folder)
+        for rule, name in names.items():
+            scored, aim = aims.get(name, ([], None))
+            if aim is not None:
+                found[rule][row] = [aim.scores[scored.index(one)] if one in scored else np.nan for one in sets]
+    return found
 
 
 def scores(flights: Sequence[AnalyzedFlight], sets: Sequence[str]) -> np.ndarray:
-    """(F, S) scores of the sets on the flights."""
-    rows = []
-    for flight in flights:
+    """(F, S) scores of the sets on the flights; NaN where a flight has none of a set."""
+    rows = np.full((len(flights), len(sets)), np.nan)
+    for row, flight in zip(rows, flights, strict=True):
         evidence = flight.evidence
-        assert evidence is not None, flight.reason
-        rows.append([evidence.scores[evidence.sets.index(name)] for name in sets])
-    return np.array(rows)
+        if evidence is not None:
+            row[:] = [evidence.scores[evidence.sets.index(name)] if name in evidence.sets else np.nan for name in sets]
+    return rows
 
 
 def _rms(values: Mapping[str, float]) -> float:

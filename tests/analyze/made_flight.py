@@ -48,7 +48,8 @@ class MadeSet:
 
     `error` is the standard deviation of its GNSS velocity innovations, `claimed` the one that it claims; `own` the
     share of the innovations that is its own noise, the rest being common to all sets of the flight. `drift` is the
-    standard deviation of its velocity error after 9 s without GNSS, m/s, ten times `error` where not given.
+    standard deviation of its velocity error after 9 s without GNSS, m/s, ten times `error` where not given. Each reset
+    moves its position by `jump_m` to the north.
     """
 
     error: float = 0.1
@@ -61,6 +62,7 @@ class MadeSet:
     fault_flags: int = 0
     lost_gnss_s: float | None = None
     drift: float | None = None
+    jump_m: float = 3.0
 
 
 def at(seconds: float) -> int:
@@ -198,7 +200,7 @@ def _output_time() -> np.ndarray:
 def _local_position(made: MadeSet) -> pa.Table:
     time = _output_time()
     counter = sum((time >= at(second)).astype(np.int32) for second in made.resets_s) + np.zeros(time.size, np.int32)
-    position = true_position(time)
+    position = true_position(time) + np.outer(made.jump_m * counter, [1.0, 0.0, 0.0])
     return pa.table(
         {
             "timestamp": time,
@@ -208,6 +210,7 @@ def _local_position(made: MadeSet) -> pa.Table:
             "vx": np.full(time.size, 2.0 + made.error),
             "vy": np.zeros(time.size),
             "vz": np.zeros(time.size),
+            "heading": np.zeros(time.size),
             "xy_reset_counter": counter,
             **{f"{kind}_reset_counter": np.zeros(time.size, np.int32) for kind in ("z", "vxy", "vz", "heading")},
             "xy_valid": np.ones(time.size, bool),

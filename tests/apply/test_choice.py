@@ -6,7 +6,7 @@ import pytest
 from tests.apply.statistics.test_leave_one_out import flight
 
 from fusetune.apply.choice import choose, parameter_distance
-from fusetune.apply.ranking import RankedSet, is_proved
+from fusetune.apply.ranking import RankedSet, proved_sets
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.mean_difference import MeanDifference
 from fusetune.apply.wording import _for_the_pick
@@ -35,10 +35,23 @@ def test_the_proved_set_with_the_lowest_score_is_chosen() -> None:
     assert chosen(one("b", -0.2, -0.1), one("c", -0.1, -0.05)) == "b"
 
 
-def test_a_better_score_that_may_be_luck_does_not_stand_before_a_proved_one() -> None:
-    assert chosen(one("b", -0.2, -0.1, p_family=0.07), one("c", -0.1, -0.05)) == "c"
+def test_that_a_change_helps_is_shown_once_then_the_one_that_predicts_best_is_taken() -> None:
+    """c alone is more than the luck of many; b gains twice as much, and its own interval is clear of 0 as well."""
+    assert chosen(one("b", -0.2, -0.1, p_family=0.07), one("c", -0.1, -0.05)) == "b"
+    assert chosen(one("b", -0.2, -0.1, p_family=0.07), one("c", -0.1, -0.05, p_family=0.06)) == "a"
+
+
+def test_a_better_score_that_may_be_chance_does_not_stand_before_a_proved_one() -> None:
     assert chosen(one("b", -0.2, 0.01), one("c", -0.1, -0.05)) == "c"
     assert chosen(one("b", -0.2, 0.01), one("c", -0.1, 0.01)) == "a"
+
+
+def test_a_gain_that_does_not_matter_is_no_reason_for_a_change() -> None:
+    """ln 0.99 is −0.01005: with an upper bound of −0.0101 at least 1 % is gained, with −0.01 less."""
+    assert chosen(one("b", -0.02, -0.0101)) == "b"
+    assert chosen(one("b", -0.02, -0.01)) == "a"
+    assert chosen(one("b", -0.02, -0.01), smallest_gain_percent=0.5) == "b"
+    assert chosen(one("b", -0.02, -1e-6), smallest_gain_percent=0.0) == "b"
 
 
 def test_a_set_that_is_worse_in_one_kind_of_prediction_is_not_eligible() -> None:
@@ -57,12 +70,12 @@ def test_of_two_sets_that_predict_alike_the_nearer_one_is_chosen() -> None:
 def test_holm_decides_where_it_is_asked_to() -> None:
     assert chosen(one("b", -0.2, -0.1, p_holm=0.2), multiplicity="holm") == "a"
     assert chosen(one("b", -0.2, -0.1, p_holm=0.02, p_family=0.3), multiplicity="holm") == "b"
-    assert is_proved(one("b", -0.2, -0.1, p_family=0.9), DecisionSettings(multiplicity="none"))
+    assert proved_sets([one("b", -0.2, -0.1, p_family=0.9)], DecisionSettings(multiplicity="none"))
 
 
 def test_the_words_say_why_a_better_score_was_passed_over() -> None:
     settings = DecisionSettings()
-    luck = _for_the_pick(one("c", -0.1, -0.05), one("b", -0.2, -0.1, p_family=0.2), settings)
+    luck = _for_the_pick(one("c", -0.1, -0.05), one("b", -0.2, 0.01), settings)
     assert "“b” are 18.1 % smaller, but not beyond chance" in luck
     far = _for_the_pick(one("c", -0.195, -0.05), one("b", -0.2, -0.1), settings)
     assert "further from what flies now" in far

@@ -12,6 +12,7 @@ from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
+from fusetune.design.study import load_study
 from fusetune.errors import UserError
 from fusetune.px4.parameters.params_file import read_params
 from fusetune.storage.documents import read_document, write_document
@@ -24,6 +25,7 @@ OUTPUTS = (
     "decision.json",
     "best_params.params",
     "rollback.params",
+    "candidates.yaml",
 )
 QUIET = {"EKF2_ACC_NOISE": 0.2, "EKF2_GYR_NOISE": 0.015}
 PRESENT = {"EKF2_ACC_NOISE": 0.35, "EKF2_GYR_NOISE": 0.015}
@@ -98,7 +100,10 @@ def test_a_single_flight_is_decided_by_its_blocks_only_and_called_exploratory(tm
 @pytest.mark.parametrize(
     ("made", "reason"),
     [
-        (MadeSet(error=0.05, resets_s=(40.0,)), "6 resets, the present set has 0"),
+        (
+            MadeSet(error=0.05, resets_s=(40.0,)),
+            "6 resets that moved the state far (by up to 3 m), the present set has 0",
+        ),
         (MadeSet(error=0.05, fault_flags=8), "filter fault fs_bad_hdg on flight_0"),
         (MadeSet(error=0.05, lost_gnss_s=40.0), "6 lost aid sources, the present set has 0"),
         (MadeSet(error=0.05, status="diverged"), "flight_0: diverged: the covariance is not finite"),
@@ -112,6 +117,44 @@ def test_vetoes(tmp_path: Path, made: MadeSet, reason: str) -> None:
     assert any(reason in one for one in ranked(decision, "tempting")["reasons"])
     assert "tempting" in decision["paragraph"]
     assert ranked(decision, "tempting")["status"] == ("not scored" if made.status == "diverged" else "not eligible")
+
+
+def test_resets_that_hardly_move_the_state_rule_nothing_out(tmp_path: Path) -> None:
+    made = MadeSet(error=0.05, resets_s=(40.0,), jump_m=0.3, overrides=QUIET)
+    decision = run(tmp_path, {"present": MadeSet(error=0.1, overrides=PRESENT), "calm": made})
+    assert (decision["status"], decision["chosen"]) == ("change", "calm")
+
+
+def test_a_set_that_is_ruled_out_and_predicts_better_leads_to_candidates(tmp_path: Path) -> None:
+    bold = MadeSet(error=0.05, resets_s=(40.0,), overrides={"EKF2_GPS_V_NOISE": 0.1, "EKF2_ACC_NOISE": 0.1})
+    decision = run(tmp_path, {"present": MadeSet(error=0.1, overrides=PRESENT), "bold": bold})
+    assert (decision["status"], ranked(decision, "bold")["status"]) == ("keep", "not eligible")
+    proposed = {one["name"]: one["overrides"] for one in decision["candidates"]}
+    # The gate of 5 at a noise of 0.3 m/s reaches as far as one of 15 at 0.1; √(0.3 · 0.1) and √(0.35 · 0.1)
+    assert proposed == {
+        "bold_wider_gates": {"EKF2_ACC_NOISE": 0.1, "EKF2_GPS_V_GATE": 15.0, "EKF2_GPS_V_NOISE": 0.1},
+        "bold_halfway": {"EKF2_ACC_NOISE": 0.187, "EKF2_GPS_V_NOISE": 0.173},
+    }
+    assert (
+        "Ruled out, though better than now beyond doubt by its predictions: “bold” (errors 4" in decision["paragraph"]
+    )
+    assert "bold_halfway (EKF2_ACC_NOISE 0.187, EKF2_GPS_V_NOISE 0.173)" in decision["paragraph"]
+    study = load_study(tmp_path / "apply" / "candidates.yaml")
+    assert {one.name: one.overrides for one in study.sets} == proposed
+
+
+def test_a_set_that_resets_all_the_time_changes_nothing_for_the_others(tmp_path: Path) -> None:
+    """A set better by a quarter is found beside one whose resets lie 3 s apart on every flight, as without it."""
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "better": MadeSet(error=0.1, overrides=QUIET)}
+    restless = {"restless": MadeSet(error=0.02, resets_s=tuple(float(second) for second in range(11, 69, 3)))}
+    alone, beside = (run(tmp_path / name, made) for name, made in (("alone", sets), ("beside", sets | restless)))
+    assert (alone["chosen"], beside["chosen"]) == ("better", "better")
+    figures = ("score", "difference", "flights", "aims")
+    for name in sets:
+        one, other = ranked(alone, name), ranked(beside, name)
+        assert {figure: one[figure] for figure in figures[:3]} == {figure: other[figure] for figure in figures[:3]}
+    assert ranked(beside, "restless")["status"] == "not eligible"
+    assert ranked(beside, "restless")["score"] > ranked(beside, "present")["score"] - 0.05
 
 
 def test_a_set_that_fails_on_one_flight_is_not_eligible_but_shown(tmp_path: Path) -> None:

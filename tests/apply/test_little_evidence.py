@@ -22,7 +22,7 @@ from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.choice import choose
 from fusetune.apply.decide import decide
 from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight, FlightEvidence, _Sums, flight_evidence
-from fusetune.apply.ranking import ELIGIBLE, RankedSet, is_proved, rank
+from fusetune.apply.ranking import ELIGIBLE, RankedSet, proved_sets, rank
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.bootstrap import FEWEST_REDRAWN, expanded_interval, holm, p_value, units_redrawn
 from fusetune.apply.statistics.leave_one_out import leave_one_out
@@ -56,7 +56,7 @@ def test_of_one_flight_of_one_block_nothing_is_known() -> None:
     assert (worse.aims[AIDED].lower, worse.aims[AIDED].upper, worse.worse_aims) == (None, None, ())
     assert worse.status == ELIGIBLE
     for multiplicity in ("none", "holm", "sign_flips"):
-        assert not is_proved(worse, DecisionSettings(multiplicity=multiplicity))
+        assert not proved_sets([worse], DecisionSettings(multiplicity=multiplicity))
 
 
 def test_blocks_of_one_flight_are_few_units_like_flights() -> None:
@@ -110,7 +110,7 @@ def test_without_variance_there_is_no_interval_and_nobody_is_out(rows: list[list
     assert found.aims[AIDED].lower is None
     assert found.is_eligible
     assert found.p_best is None
-    assert not is_proved(found, DecisionSettings(multiplicity="none"))
+    assert not proved_sets([found], DecisionSettings(multiplicity="none"))
 
 
 @pytest.mark.parametrize("flights", [1, 2, 6])

@@ -8,7 +8,7 @@ from tests.apply.statistics.test_leave_one_out import flight
 
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
-from fusetune.apply.ranking import is_proved, rank
+from fusetune.apply.ranking import proved_sets, rank
 from fusetune.apply.settings import DecisionSettings
 
 
@@ -19,15 +19,15 @@ def analyzed(number: int, scores: list[float]) -> AnalyzedFlight:
 
 
 def test_sets_are_measured_against_the_best_proved_one() -> None:
-    """b and d are surely better than a; c is so on the average by far, but not on every flight."""
+    """b and d are surely better than a; c is so on the average, but not on every flight."""
     settings = DecisionSettings(draws=2000)
     small, large = np.array([1.0, -1.0] * 4), np.array([1.0, 1.0, -1.0, -1.0] * 2)
-    columns = np.column_stack([np.zeros(8), -0.1 + 0.01 * small, -0.3 + 0.9 * large, -0.095 + 0.01 * large])
+    columns = np.column_stack([np.zeros(8), -0.1 + 0.01 * small, -0.12 + 0.3 * large, -0.095 + 0.01 * large])
     flights = [analyzed(number, list(row)) for number, row in enumerate(columns)]
     found = {one.name: one for one in rank("abcd", "a", flights, {}, settings)}
     assert found["c"].is_eligible
     assert found["c"].score < found["b"].score
-    assert [name for name in "bcd" if is_proved(found[name], settings)] == ["b", "d"]
+    assert [one.name for one in proved_sets(list(found.values()), settings)] == ["b", "d"]
     assert (found["b"].behind_best, found["b"].behind_best_error) == (0.0, 0.0)
     assert found["d"].behind_best == pytest.approx(0.005)
     # d less b is 0.005 + 0.01 (large − small), with values 0 and ±2 in parentheses, mean square 2, on 8 flights

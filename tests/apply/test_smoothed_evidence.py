@@ -38,12 +38,10 @@ def table(squares: dict[tuple[str, int], float], n: int = 50) -> pa.Table:
 VELOCITY = _smoothed(table({("a", axis): 0.04 for axis in range(3)} | {("b", axis): 0.01 for axis in range(3)}))
 
 
-def weights(
-    white_share: float, settings: DecisionSettings = DEFAULTS, *, unaided: bool = True, smoothed: bool = True
-) -> dict[str, float]:
+def weights(white_share: float, settings: DecisionSettings = DEFAULTS, *, unaided: bool = True) -> dict[str, float]:
     found = flight_evidence(
         "f", AIDED_SUMS, UNAIDED_SUMS if unaided else None, {"gnss_vel": white_share}, settings,
-        VELOCITY if smoothed else None,
+        VELOCITY,
     )  # fmt: skip
     assert found is not None
     assert sum(aim.weight for aim in found.aims) == pytest.approx(1.0)
@@ -72,9 +70,7 @@ def test_its_weight_is_a_setting() -> None:
 
 
 def test_it_stands_in_before_predictions_that_are_not_trusted() -> None:
-    """Without gaps, and with a receiver that wanders, aided predictions count only where there is nothing else."""
     assert weights(0.3, unaided=False) == {SMOOTHED: 1.0}
-    assert weights(0.3, unaided=False, smoothed=False) == {AIDED: 1.0}
 
 
 def evidence_of(settings: DecisionSettings, squares: dict[tuple[str, int], float]) -> FlightEvidence:

@@ -16,7 +16,7 @@ SETS = {
     "present": MadeSet(error=0.13, overrides={"EKF2_ACC_NOISE": 0.35}),
     "better": MadeSet(error=0.1, overrides={"EKF2_ACC_NOISE": 0.2}),
     "drifting": MadeSet(error=0.11, drift=5.0, overrides={"EKF2_ACC_NOISE": 0.9}),
-    "<restless>": MadeSet(resets_s=(40.0,)),
+    "<restless>": MadeSet(resets_s=(40.0, 50.0)),
 }
 """One set to choose, one that is better one step ahead and worse without GNSS, one that is vetoed."""
 

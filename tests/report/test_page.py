@@ -27,7 +27,7 @@ def test_the_page_says_what_was_decided_and_why(made: tuple[Path, str]) -> None:
     assert "Change to “better”" in page
     assert "better on 5 of 5 flights" in page
     assert "EKF2_ACC_NOISE" in page
-    assert "5 resets, the present set has 0" in page
+    assert "10 resets that moved the state far (by up to 3 m), the present set has 0" in page
     assert "IMU at 20 Hz" in page
     assert "ab" * 32 in page
     for heading in (
@@ -116,7 +116,7 @@ def without_pictures(page: str) -> str:
 
 
 def test_all_sets_ruled_out_are_told_as_such(tmp_path: Path) -> None:
-    sets = {"present": MadeSet(error=0.1), "a": MadeSet(resets_s=(40.0,)), "b": MadeSet(fault_flags=8)}
+    sets = {"present": MadeSet(error=0.1), "a": MadeSet(resets_s=(40.0, 50.0)), "b": MadeSet(fault_flags=8)}
     page = without_pictures(make_report(tmp_path, sets, flights=3))
     assert "No other set was eligible for comparison." in page
     assert "Ruled out, and so not eligible: " in page

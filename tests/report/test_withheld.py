@@ -8,7 +8,16 @@ from fusetune.apply.ranking import ELIGIBLE, NOT_ELIGIBLE, PRESENT
 from fusetune.report.figures.drawing import figure_style
 from fusetune.report.figures.unaided_figures import drift_figure
 from fusetune.report.results import Results
-from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY, drift, drift_summary
+from fusetune.report.sections.evidence_sections import _shorter_gaps
+from fusetune.report.withheld import (
+    BAROMETER,
+    MAGNETOMETER,
+    POSITION,
+    VELOCITY,
+    drift,
+    drift_summary,
+    usual_gap_length,
+)
 
 
 def results(rows: list[tuple], shown: tuple[str, ...] = ("present", "b"), vetoed: tuple[str, ...] = ()) -> Results:
@@ -78,6 +87,26 @@ def test_the_change_is_paired_by_flight_and_a_mean_of_logarithms() -> None:
     # Standard error of (ln 2, -ln 2): sd √2 ln 2, divided by √2.
     assert summary["change_high"].loc["b", 9.0] == pytest.approx(100.0)
     assert summary["change_low"].loc["b", 9.0] == pytest.approx(-50.0)
+
+
+def test_flights_with_gaps_of_another_length_are_not_averaged_with_the_others() -> None:
+    """Three flights with gaps of 9 s, a short one with gaps of 3 s: its drift after 3 s is of the end of a gap."""
+    rows = []
+    for flight in ("f", "g", "h"):
+        rows += position(flight, "present", 3.0, 4.0) + position(flight, "present", 0.3, 0.4, "3")
+    rows += position("short", "present", 30.0, 40.0, "3") + position("short", "present", 3.0, 4.0, "1")
+    summary = drift_summary(results(rows), POSITION)
+    assert summary["mean"].to_dict() == pytest.approx({("present", 3.0): 0.5, ("present", 9.0): 5.0})
+    assert set(summary["flights"]) == {3}
+    (note,) = _shorter_gaps(results(rows))
+    assert "Drawn are gaps of 9 s." in note
+    assert "short 3 s" in note
+    assert _shorter_gaps(results(position("f", "present", 3.0, 4.0))) == []
+
+
+def test_of_as_many_flights_those_with_the_longer_gaps_are_drawn() -> None:
+    lengths = pd.Series({"f": 9.0, "g": 3.0})
+    assert usual_gap_length(lengths) == 9.0
 
 
 def test_the_figure_shows_each_set_at_each_horizon_and_lets_a_hopeless_one_leave() -> None:

@@ -30,6 +30,7 @@ rule decide:
             labels={"table": "parameters to load"},
         ),
         "results/apply/rollback.params",
+        "results/apply/candidates.yaml",
     log:
         "results/logs/decide.log",
     conda:

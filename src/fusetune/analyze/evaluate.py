@@ -24,8 +24,9 @@ def evaluate(
 ) -> FlightScores:
     """Replay parameter sets on a flight and score them.
 
-    All sets are scored on the samples that they have in common. A search that asks for one candidate after the other
-    hands on the present set's replay, so that it is made once and two sets are in memory at a time::
+    All sets are scored on the present set's samples: what a candidate lacks there costs it alone. Only the limit beyond
+    which errors are clipped follows from all complete sets. A search that asks for one candidate after the other hands
+    on the present set's replay, so that it is made once and two sets are in memory at a time::
 
         now = replay_set(prepared, "present", {})
         for candidate in asked:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fusetune.apply.evidence import FlightEvidence
-from fusetune.apply.ranking import RankedSet, is_proved
+from fusetune.apply.ranking import RankedSet, proved_sets
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.leave_one_out import LeaveOneOut, leave_one_out
 
@@ -49,11 +49,11 @@ def choose(
 
     Notes
     -----
-    Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. It is
-    proved better where its interval is known and lies wholly below 0, and the difference holds in spite of the number
-    of candidates (`DecisionSettings.multiplicity`). The proved set with the lowest score is chosen, or one that is
-    proved, within one standard error of it, hardly worse (`DecisionSettings.equivalence_percent`) and nearer to the
-    present parameters.
+    Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. Proved
+    better are those whose interval lies wholly beyond the smallest gain, if one of them is better in spite of the
+    number of candidates (`fusetune.apply.ranking.proved_sets`). The proved set with the lowest score is chosen, or one
+    that is proved, within one standard error of it, hardly worse (`DecisionSettings.equivalence_percent`) and nearer
+    to the present parameters.
     """
     exploratory = len(evidence) < settings.minimum_flights
     eligible = [one for one in ranked if one.is_eligible]
@@ -62,7 +62,7 @@ def choose(
         return Choice("no_evidence", present, None, None, exploratory, None)
     names = [one.name for one in eligible if one.flights == len(evidence)]
     validated = leave_one_out(evidence, names, present, settings.confidence)
-    proved = [one for one in eligible if is_proved(one, settings)]
+    proved = proved_sets(ranked, settings)
     if not proved:
         return Choice("keep", present, best, None, exploratory, validated)
     first = min(proved, key=lambda one: (one.score, one.name))

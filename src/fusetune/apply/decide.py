@@ -8,6 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from fusetune.apply.candidates import Candidate, between_vetoed_and_present, candidates_sentence, write_candidates
 from fusetune.apply.choice import Choice, choose, parameter_distance
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
@@ -42,7 +43,7 @@ def decide(
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
-    `decision.json`, `best_params.params` and `rollback.params` to `output_folder`.
+    `decision.json`, `best_params.params`, `rollback.params` and `candidates.yaml` to `output_folder`.
 
     Parameters
     ----------
@@ -66,14 +67,18 @@ def decide(
     flights = read_flights(analyze_folders, settings, present)
     newest = _newest(flights, newest_flight, flights_table)
     metrics = metrics_of(flights)
-    vetoed = {name: vetoes(name, present, flights, metrics) for name in sets if name != present}
+    vetoed = {name: vetoes(name, present, flights, metrics, settings) for name in sets if name != present}
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
     evidence = [flight.evidence for flight in flights if flight.evidence is not None]
     choice = choose(ranked, present, evidence, _distances(newest, present), settings)
     values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present)
+    better = _vetoed_but_better(ranked)
+    proposed = _candidates(better, newest, present)
     text = paragraph(choice, ranked, flights, settings)
+    text = " ".join(filter(None, (text, candidates_sentence(proposed, _gains(better)))))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
     decision["provenance"] = provenance(configuration_files)
     decision["flights"] = flight_rows(flights_table, flights)
@@ -85,6 +90,7 @@ def decide(
     output = Path(output_folder)
     _write_ranking(output, ranked, values)
     _write_per_flight(output, flights)
+    write_candidates(output / "candidates.yaml", proposed)
     firmware = newest.summary["firmware"] if newest else "unknown"
     written = write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
@@ -107,6 +113,24 @@ def _distances(newest: AnalyzedFlight | None, present: str) -> dict[str, float]:
     sets = newest.summary["sets"] if newest is not None else {}
     now = sets.get(present, {}).get("parameters", {})
     return {name: parameter_distance(one["overrides"], now) for name, one in sets.items()}
+
+
+def _vetoed_but_better(ranked: Sequence[RankedSet]) -> list[RankedSet]:
+    """Sets that are ruled out though they predict better than the present one beyond doubt."""
+    return [one for one in ranked if one.is_vetoed and one.upper is not None and one.upper < 0.0]
+
+
+def _candidates(better: Sequence[RankedSet], newest: AnalyzedFlight | None, present: str) -> list[Candidate]:
+    """What lies between such sets and the present one, to compare next."""
+    if newest is None:
+        return []
+    sets = {name: one["overrides"] for name, one in newest.summary["sets"].items()}
+    now = newest.summary["sets"].get(present, {}).get("parameters", {})
+    return between_vetoed_and_present({one.name: one.reasons for one in better if one.name in sets}, sets, now)
+
+
+def _gains(better: Sequence[RankedSet]) -> dict[str, float]:
+    return {one.name: one.improvement_percent for one in better}
 
 
 def _changes(choice: Choice, newest: AnalyzedFlight | None, present: str) -> tuple[ParameterChange, ...]:

@@ -82,7 +82,9 @@ class FlightEvidence:
 
 
 NOT_SCORED, DISTRUSTED, WITHOUT_SAMPLES = "not scored", "distrusted", "without samples"
-"""Why a flight has no evidence: it could not be scored, its replay is not trusted, or nothing in it is judged by."""
+MISLEADING = "misleading"
+"""Why a flight has no evidence: it could not be scored, its replay is not trusted, nothing in it is judged by, or what
+is there would mislead."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ class NoEvidence:
 
     Attributes
     ----------
-    kind : `NOT_SCORED`, `DISTRUSTED` or `WITHOUT_SAMPLES`
+    kind : `NOT_SCORED`, `DISTRUSTED`, `WITHOUT_SAMPLES` or `MISLEADING`
     reason : in words
     """
 
@@ -175,9 +177,24 @@ def _evidence_of(
     unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
     smoothed = _smoothed(read_table(folder / "smoothed.parquet"))
     evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings, smoothed)
+    if evidence is None and aided is not None:
+        return NoEvidence(MISLEADING, _why_misleading(aided, whiteness, settings))
     if evidence is None or present not in evidence.sets:
         return NoEvidence(WITHOUT_SAMPLES, f"the flight has nothing of {', '.join(settings.sources)} to judge by")
     return evidence
+
+
+def _why_misleading(aided: _Sums, whiteness: Mapping[str, float], settings: DecisionSettings) -> str:
+    shares = [
+        f"{source} {whiteness[source]:.2f}"
+        for source in settings.sources
+        if source in whiteness and source in {name for name, _ in aided.columns}
+    ]
+    return (
+        "nothing on this flight can be trusted to tell sets apart: the errors of its sensors wander "
+        f"(white share of {', '.join(shares)}), so that a filter which follows them predicts best, and there is no "
+        "time without GNSS to judge by instead"
+    )
 
 
 def trust_grade(folder: AnyPath) -> tuple[str | None, str]:
@@ -216,8 +233,7 @@ def flight_evidence(
 
     A source is a witness of the aided prediction only as far as its errors are white: a filter that follows a
     wandering error predicts it well. What weight it lacks the smoothed velocity has, which takes the wander for the
-    receiver's. Where no source is white enough, and there is nothing else, the aided predictions are all there is, and
-    count.
+    receiver's. Where no source is white enough, and there is nothing else, there is no evidence: None.
     """
     parts, share = {}, 0.0
     if unaided is not None:
@@ -230,8 +246,6 @@ def flight_evidence(
         share = sum(trusted[source] for source in present) / full if full else 0.0
         if share > 0.0 and settings.aided_weight > 0.0:
             parts[AIDED] = (aided, _weights(aided, trusted), settings.aided_weight * share)
-        elif unaided is None and smoothed is None and full:
-            parts[AIDED] = (aided, _weights(aided, settings.sources), 1.0)
     if smoothed is not None:
         by_axis = {f"{source}.{axis}": settings.smoothed_axes.get(axis, 0.0) for source, axis in _axes_of(smoothed)}
         parts[SMOOTHED] = (smoothed, _weights(smoothed, by_axis), settings.smoothed_weight * (1.0 - share))

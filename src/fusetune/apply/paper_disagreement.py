@@ -20,9 +20,7 @@ from fusetune.apply.paper_mode import (
 )
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.statistics.bootstrap import bootstrap_scores, units_redrawn
-from fusetune.apply.statistics.mean_difference import MeanDifference, mean_difference
-from fusetune.apply.statistics.rounding import without_rounding
+from fusetune.apply.statistics.mean_difference import MeanDifference, mean_differences
 
 WANDERING = 0.6
 """A source whose error is less white than this rewards a filter for following it."""
@@ -180,19 +178,14 @@ def _log_ratios(
     both = [evidence for flight in flights if (evidence := flight.evidence) and {one, other} <= set(evidence.sets)]
     if not both:
         return ratios
-    # With the same seed these are the draws of the ranking: its intervals come out again.
-    redrawn = bootstrap_scores(both, [one, other], settings.draws, settings.seed)
-    scores = {"score": [(evidence, evidence.scores) for evidence in both]}
+    # All sets that were scored on these flights, as in the ranking: its intervals come out again.
+    common = [name for name in both[0].sets if all(name in flight.sets for flight in both)]
+    names = list(dict.fromkeys((other, one, *common)))
+    ratios["score"] = mean_differences(both, names, settings)[1]
     for aim in AIMS:
-        scores[aim] = [(evidence, part.scores) for evidence in both if (part := evidence.aim(aim)) is not None]
-    for name, found in scores.items():
-        if found:
-            draws = redrawn.total if name == "score" else redrawn.aims[name]
-            each = without_rounding(
-                [row[flight.sets.index(one)] - row[flight.sets.index(other)] for flight, row in found]
-            )
-            units = units_redrawn(both, None if name == "score" else name)
-            ratios[name] = mean_difference(draws[:, 0] - draws[:, 1], each, units, settings.confidence)
+        having = [flight for flight in both if flight.aim(aim) is not None]
+        if having:
+            ratios[aim] = mean_differences(having, names, settings, aim)[1]
     return ratios
 
 

@@ -1,7 +1,7 @@
 """Ranks the sets by the mean score over the flights and compares each with the present set."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,16 +11,13 @@ from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.bootstrap import (
     FEWEST_REDRAWN,
-    Redrawn,
     bootstrap_scores,
     holm,
-    p_value,
     probability_best,
-    spread_of_flights,
     standard_error,
     units_redrawn,
 )
-from fusetune.apply.statistics.mean_difference import MeanDifference, mean_difference
+from fusetune.apply.statistics.mean_difference import MeanDifference, mean_differences
 from fusetune.apply.statistics.rounding import EQUAL_WITHIN, without_rounding
 from fusetune.apply.statistics.sign_flips import family_p_values
 
@@ -101,12 +98,25 @@ class RankedSet:
         return self.status == ELIGIBLE
 
 
-def is_proved(candidate: RankedSet, settings: DecisionSettings) -> bool:
-    """Better than the present set beyond doubt, by itself and as one of many candidates."""
+def proved_sets(ranked: Sequence[RankedSet], settings: DecisionSettings) -> list[RankedSet]:
+    """Sets that are better than the present one beyond doubt, in the order of the ranking.
+
+    That a change helps at all is shown for all candidates together: the best of those whose interval lies beyond the
+    smallest gain must be better than luck makes the best of many. Once that is shown, any of these may be chosen.
+    """
+    beyond = [one for one in ranked if one.is_eligible and gains_enough(one, settings)]
+    return beyond if any(is_no_luck(one, settings) for one in beyond) else []
+
+
+def gains_enough(candidate: RankedSet, settings: DecisionSettings) -> bool:
+    """Whether the whole interval of its difference lies beyond the smallest gain for which a change is made."""
+    return candidate.upper is not None and candidate.upper < settings.smallest_gain
+
+
+def is_no_luck(candidate: RankedSet, settings: DecisionSettings) -> bool:
+    """Whether the set is better by more than the luck of the best of all candidates."""
     p_value = {"holm": candidate.p_holm, "sign_flips": candidate.p_family, "none": 0.0}[settings.multiplicity]
-    if candidate.upper is None or p_value is None:
-        return False
-    return candidate.upper < 0.0 and p_value <= 1.0 - settings.confidence
+    return p_value is not None and p_value <= 1.0 - settings.confidence
 
 
 def rank(
@@ -134,95 +144,62 @@ def rank(
     }
     ranked: list[RankedSet] = []
     if complete:
+        ranked = _compared(complete, present, evidence, vetoed, equal, settings)
         redrawn = bootstrap_scores(evidence, complete, settings.draws, settings.seed)
-        ranked = [
-            _compared(name, present, evidence, complete, redrawn, vetoed, name in equal, settings) for name in complete
-        ]
         ranked = _with_family(ranked, present, evidence, complete, redrawn.total, settings)
     for name in partial:
         # A set that failed on some flights: its figures come from the others, for information.
-        redrawn = bootstrap_scores(by_set[name], [name, present], settings.draws, settings.seed)
-        ranked.append(_compared(name, present, by_set[name], [name, present], redrawn, vetoed, False, settings))
+        ranked += [one for one in _compared([name], present, by_set[name], vetoed, equal, settings) if one.name == name]
     ranked += [_never_scored(name, present, vetoed) for name in sets if not by_set[name]]
     return sorted(ranked, key=lambda one: (not one.flights, one.is_vetoed, one.score, not one.is_present, one.name))
 
 
 def _compared(
-    name: str,
+    sets: Sequence[str],
     present: str,
     evidence: Sequence[FlightEvidence],
-    sets: Sequence[str],
-    redrawn: Redrawn,
     vetoed: Mapping[str, Sequence[str]],
-    equal: bool,
+    equal: Collection[str],
     settings: DecisionSettings,
-) -> RankedSet:
-    own = np.array([one.scores[one.sets.index(name)] for one in evidence])
-    base = np.array([one.scores[one.sets.index(present)] for one in evidence])
-    found = without_rounding(own - base)
-    draws = _differences(redrawn.total, sets, name, present)
-    units = units_redrawn(evidence)
-    to_present = mean_difference(draws, found, units, settings.confidence)
-    return RankedSet(
-        name=name,
-        is_present=name == present,
-        reasons=tuple(vetoed.get(name, ())),
-        score=float(np.mean(own)),
-        difference=to_present.difference,
-        lower=to_present.lower,
-        upper=to_present.upper,
-        p_value=p_value(to_present.difference, spread_of_flights(draws, found), units),
-        p_holm=1.0,
-        p_family=1.0,
-        p_best=0.0,
-        flights=len(evidence),
-        flights_better=int(np.count_nonzero(found < 0.0)),
-        equal_to_present=equal,
-        improvement_percent=improvement_percent(to_present.difference),
-        aims=_aims(name, present, evidence, sets, redrawn, settings),
-    )
+) -> list[RankedSet]:
+    """Sets that were all scored on all of these flights, against the present one."""
+    names = list(dict.fromkeys((present, *sets)))
+    scores = np.array([one.scores[[one.sets.index(name) for name in names]] for one in evidence])
+    to_present = mean_differences(evidence, names, settings)
+    aims = _aims(names, evidence, settings)
+    return [
+        RankedSet(
+            name=name,
+            is_present=name == present,
+            reasons=tuple(vetoed.get(name, ())),
+            score=float(np.mean(scores[:, index])),
+            difference=compared.difference,
+            lower=compared.lower,
+            upper=compared.upper,
+            p_value=compared.p_value,
+            p_holm=1.0,
+            p_family=1.0,
+            p_best=0.0,
+            flights=len(evidence),
+            flights_better=int(np.count_nonzero(without_rounding(scores[:, index] - scores[:, 0]) < 0.0)),
+            equal_to_present=name in equal,
+            improvement_percent=improvement_percent(compared.difference),
+            aims={aim: of_sets[index] for aim, of_sets in aims.items()},
+        )
+        for index, (name, compared) in enumerate(zip(names, to_present, strict=True))
+    ]
+
+
+def _aims(
+    names: Sequence[str], evidence: Sequence[FlightEvidence], settings: DecisionSettings
+) -> dict[str, list[MeanDifference]]:
+    """Differences in each kind of prediction, on the flights that have it."""
+    having = {aim: [one for one in evidence if one.aim(aim) is not None] for aim in AIMS}
+    return {aim: mean_differences(flights, names, settings, aim) for aim, flights in having.items() if flights}
 
 
 def _differences(scores: Array, sets: Sequence[str], name: str, base: str) -> Array:
     return np.asarray(scores[:, sets.index(name)] - scores[:, sets.index(base)])
-
-
-def _aims(
-    name: str,
-    present: str,
-    evidence: Sequence[FlightEvidence],
-    sets: Sequence[str],
-    redrawn: Redrawn,
-    settings: DecisionSettings,
-) -> dict[str, MeanDifference]:
-    compared = {}
-    for aim in AIMS:
-        flights = [(one, part) for one in evidence if (part := one.aim(aim)) is not None]
-        if not flights:
-            continue
-        found = without_rounding(
-            [part.scores[one.sets.index(name)] - part.scores[one.sets.index(present)] for one, part in flights]
-        )
-        draws = _aim_differences(aim, [one for one, _ in flights], redrawn, sets, name, present, settings)
-        compared[aim] = mean_difference(draws, found, units_redrawn(evidence, aim), settings.confidence)
-    return compared
-
-
-def _aim_differences(
-    aim: str,
-    flights: Sequence[FlightEvidence],
-    redrawn: Redrawn,
-    sets: Sequence[str],
-    name: str,
-    present: str,
-    settings: DecisionSettings,
-) -> Array:
-    """Redrawn mean differences in one kind of prediction, on the flights that have it."""
-    if len(flights) > 1:
-        return _differences(redrawn.aims[aim], sets, name, present)
-    # Drawn several times among others, one flight would seem to be as many.
-    alone = bootstrap_scores(flights, [name, present], settings.draws, settings.seed)
-    return _differences(alone.aims[aim], [name, present], name, present)
 
 
 def improvement_percent(difference: float) -> float:
@@ -273,8 +250,7 @@ def _with_distance_to_the_best(
     ranked: list[RankedSet], complete: Sequence[str], scores: Array, units: int, settings: DecisionSettings
 ) -> list[RankedSet]:
     able = [one for one in ranked if one.is_present or one.is_eligible]
-    proved = [one for one in able if one.is_eligible and is_proved(one, settings)]
-    lead = min(proved or able, key=lambda one: (one.score, one.name))
+    lead = min(proved_sets(ranked, settings) or able, key=lambda one: (one.score, one.name))
 
     def error(name: str) -> float | None:
         if name == lead.name:

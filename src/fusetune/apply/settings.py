@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -73,6 +74,14 @@ class DecisionSettings:
         low=0,
         high=100,
     )
+    smallest_gain_percent: float = setting(
+        1.0,
+        "a change is made only for a set whose errors are smaller by more than this beyond doubt: its whole interval "
+        "lies beyond it",
+        unit="%",
+        low=0,
+        high=50,
+    )
     lowest_grade: Literal["A", "B", "C", "D"] = setting(
         "C",
         "flights whose replay has a lower trust grade do not count; one that has nothing to be compared with does",
@@ -89,6 +98,11 @@ class DecisionSettings:
         if span <= 0.0:
             return float(white_share >= self.trust_white_share)
         return min(max((white_share - self.distrust_white_share) / span, 0.0), 1.0)
+
+    @property
+    def smallest_gain(self) -> float:
+        """Difference of scores, nat, below which a gain matters (0 or negative)."""
+        return math.log1p(-0.01 * self.smallest_gain_percent)
 
     @property
     def main_source(self) -> str:

@@ -6,13 +6,14 @@ from fusetune.apply.choice import Choice
 from fusetune.apply.evidence import (
     AIDED,
     DISTRUSTED,
+    MISLEADING,
     NOT_SCORED,
     SMOOTHED,
     UNAIDED,
     WITHOUT_SAMPLES,
     AnalyzedFlight,
 )
-from fusetune.apply.ranking import RankedSet, improvement_percent, is_proved
+from fusetune.apply.ranking import RankedSet, gains_enough, improvement_percent
 from fusetune.apply.settings import DecisionSettings
 
 _MOST_NAMES = 4
@@ -66,6 +67,7 @@ def _not_counted(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) 
             f"do not count, as their replays have trust grades below {lowest}",
         ),
         (WITHOUT_SAMPLES, "has nothing that sets are judged by", "have nothing that sets are judged by"),
+        (MISLEADING, "has nothing that can be trusted to tell sets apart", "have nothing that can be trusted to"),
     ):
         count = sum(flight.without is not None and flight.without.kind == kind for flight in flights)
         if count:
@@ -114,6 +116,11 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
             f"{found}but that interval includes no difference at all, so these flights do not show that a change "
             "would help."
         )
+    if not gains_enough(best, settings):
+        return (
+            f"{found}but a change is made only for a gain that matters, at least "
+            f"{settings.smallest_gain_percent:g} % beyond doubt."
+        )
     p_value = best.p_holm if settings.multiplicity == "holm" else best.p_family
     if p_value is None:
         return f"{found}but one flight cannot show whether the best of several candidates is only favoured by chance."
@@ -127,7 +134,7 @@ def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) 
     span = _smaller(pick.lower, pick.upper, settings.confidence)
     wins = f"better on {pick.flights_better} of {_count(pick.flights, 'flight')}"
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
-    if pick.name != best.name and is_proved(best, settings):
+    if pick.name != best.name and gains_enough(best, settings):
         text += (
             f" “{best.name}” did no better beyond its standard error ({best.improvement_percent:.1f} %) and lies "
             "further from what flies now."

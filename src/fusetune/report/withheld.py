@@ -73,8 +73,18 @@ def _horizon(metric: str) -> float:
     return float(match[1]) if match else float("nan")
 
 
+def gap_lengths(table: pd.DataFrame) -> pd.Series:
+    """Length of the gaps of each flight, s, from its `drift`: their last horizon. Short flights have shorter gaps."""
+    return table.groupby("flight")["horizon_s"].max()
+
+
+def usual_gap_length(lengths: pd.Series) -> float:
+    """What most flights have, the longest of several."""
+    return float(lengths.mode().max())
+
+
 def drift_summary(results: Results, withheld: Withheld) -> pd.DataFrame:
-    """Drift of each set over the flights.
+    """Drift of each set over the flights whose gaps are as long as those of most: means of others are of other times.
 
     Returns
     -------
@@ -86,6 +96,8 @@ def drift_summary(results: Results, withheld: Withheld) -> pd.DataFrame:
     columns = ["mean", "low", "high", "flights", "change", "change_low", "change_high"]
     if table.empty:
         return pd.DataFrame(columns=columns)
+    lengths = gap_lengths(table)
+    table = table[table["flight"].isin(lengths.index[lengths == usual_gap_length(lengths)])]
     base = table[table["set"] == results.present].rename(columns={"drift": "base"})
     paired = table.merge(base[["flight", "horizon_s", "base"]], on=["flight", "horizon_s"], how="left")
     with np.errstate(divide="ignore", invalid="ignore"):

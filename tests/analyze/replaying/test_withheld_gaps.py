@@ -1,5 +1,7 @@
 """Where gaps lie, and the averages that are kept of what was predicted in them; expectations by hand."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -30,7 +32,9 @@ def result(innovation: np.ndarray, variance: float = 0.25, start: int = 10 * SEC
 
 
 def test_gaps_are_staggered_over_the_flight_time_of_each_sensor() -> None:
-    settings = WithholdingSettings(gnss_s=9.0, gnss_every_s=4.5, baro_s=10.0, baro_every_s=20.0, mag_s=0.0)
+    settings = WithholdingSettings(
+        gnss_s=9.0, gnss_every_s=4.5, gnss_fewest=0, baro_s=10.0, baro_every_s=20.0, mag_s=0.0
+    )
     airborne = [(0, 20 * SECOND), (100 * SECOND, 105 * SECOND)]
     gaps = plan_gaps(flight("vehicle_gps_position", "vehicle_air_data", "vehicle_magnetometer"), airborne, settings)
     # 20 s hold gaps of 9 s that begin at 0, 4.5 and 9 s, and one of 10 s; 5 s hold none.
@@ -40,6 +44,48 @@ def test_gaps_are_staggered_over_the_flight_time_of_each_sensor() -> None:
         ("gnss", 9 * SECOND, 18 * SECOND),
         ("baro", 0, 10 * SECOND),
     ]
+
+
+@pytest.mark.parametrize(
+    ("airborne_s", "lengths"),
+    [
+        # Four gaps every half gap take 2.5 of their length after 6 s of lead-in: 22.5, 15 and 7.5 s.
+        ([(0.0, 28.5)], [9.0] * 5),
+        ([(0.0, 28.4)], [6.0] * 8),
+        ([(0.0, 21.0)], [6.0] * 6),
+        ([(0.0, 20.9)], [3.0] * 12),
+        # Nothing fits four times: the shortest, all the same.
+        ([(0.0, 8.0)], [3.0] * 4),
+        ([(0.0, 2.0)], []),
+        # Two short hops together hold enough: two gaps of 9 s in each of 13.5 s after the lead-in.
+        ([(0.0, 19.5), (100.0, 119.5)], [9.0] * 6),
+    ],
+)
+def test_short_flights_have_shorter_gaps_without_gnss(
+    airborne_s: list[tuple[float, float]], lengths: list[float]
+) -> None:
+    airborne = [(round(start * 1e6), round(stop * 1e6)) for start, stop in airborne_s]
+    sensors = flight("vehicle_gps_position", "vehicle_air_data")
+    gaps = plan_gaps(sensors, airborne, WithholdingSettings())
+    gnss = [gap for gap in gaps if gap.sensor == "gnss"]
+    assert [(gap.stop - gap.start) * 1e-6 for gap in gnss] == pytest.approx(lengths)
+    assert all(any(start <= gap.start and gap.stop <= stop for start, stop in airborne) for gap in gaps)
+    steps = {round((b.start - a.start) * 1e-6, 6) for a, b in pairwise(gnss) if b.start - a.start < 50 * SECOND}
+    assert steps <= {round(length / 2, 6) for length in lengths}
+    # Those of the other sensors, which no set is chosen by, keep their length.
+    assert {gap.stop - gap.start for gap in gaps if gap.sensor == "baro"} <= {9 * SECOND}
+
+
+def test_horizons_of_a_shorter_gap_are_thirds_of_it() -> None:
+    seconds = (np.arange(15) + 1) * 0.2
+    gap = result(seconds)
+    short = GapResult(
+        Gap("gnss", gap.gap.start, gap.gap.start + 3 * SECOND), gap.start, gap.innovations, gap.local_position
+    )
+    table = prediction_table([short]).to_pydict()
+    assert table["horizon_s"] == pytest.approx([1.0, 2.0, 3.0])
+    # Samples at 0.2 … 1.0 s, and so on: their means.
+    assert table["innovation"] == pytest.approx([0.6, 1.6, 2.6], abs=1e-6)
 
 
 def test_a_sensor_that_the_log_lacks_is_not_withheld() -> None:

@@ -144,3 +144,71 @@ def test_as_flown_figures_of_a_real_flight(real_flight: tuple[Path, Path]) -> No
     replayed = value(metrics, "asflown", "gnss_pos", "horizontal", "rms_innovation")
     # v1.12 on board and v1.16 replayed are two releases of one filter: of one size, not equal.
     assert 0.3 < logged / replayed < 3.0
+
+
+SPOILERS = {
+    "restless": MadeSet(error=0.5, resets_s=tuple(float(second) for second in range(11, 69, 3))),
+    "late": MadeSet(error=0.02, aiding_s=14.0),
+    "very_late": MadeSet(error=0.02, aiding_s=50.0),
+    "broken": MadeSet(status="diverged"),
+}
+"""Sets that once cut the flight of all others, or moved the start of what is scored."""
+
+
+@pytest.mark.parametrize("spoiler", [*SPOILERS, "all"])
+def test_a_set_that_fails_costs_the_others_nothing(tmp_path: Path, spoiler: str) -> None:
+    """Every figure, block and gap of the present set and of a good one, bit by bit, with and without the others."""
+    spoilers = SPOILERS if spoiler == "all" else {spoiler: SPOILERS[spoiler]}
+    sets = {"present": MadeSet(error=0.13, resets_s=(33.0,)), "good": MadeSet(error=0.1), **spoilers}
+    save, folder = make_flight(tmp_path, "flight", sets, truth=True)
+    found = []
+    for names in (["present", "good"], list(sets)):
+        score_saved_flight(save, folder, names)
+        tables = {table: pd.read_parquet(folder / f"{table}.parquet") for table in TABLES}
+        kept = {name: table[table["set"].isin(["present", "good"])] for name, table in tables.items()}
+        found.append({name: table.reset_index(drop=True) for name, table in kept.items()})
+    for name in TABLES:
+        pd.testing.assert_frame_equal(found[0][name], found[1][name], check_exact=True)
+    assert len(found[0]["withheld"]) > 0
+
+
+TABLES = ("scores", "withheld", "metrics", "windows")
+
+
+def test_the_summary_tells_what_each_set_cost_itself(tmp_path: Path) -> None:
+    """Scored are 10 to 70 s at 5 Hz, and gaps of 9 s from 12, 15, … 60 s on; the log's IMU begins with them."""
+    save, folder = make_flight(tmp_path, "flight", {"present": MadeSet(), **SPOILERS})
+    score_saved_flight(save, folder, ["present", *SPOILERS])
+    summary = json.loads((folder / "scoring.json").read_text())["sets"]
+    evidence = {name: one["evidence"] for name, one in summary.items()}
+    mask, gaps = evidence["present"]["samples"]["gnss_vel"]["mask"], evidence["present"]["gaps"]["gnss_vel"]["mask"]
+    assert (mask, gaps) == (300, 17)
+    assert evidence["present"]["samples"]["gnss_vel"] == {"mask": 300, "lacking": 0, "after_reset": 0}
+    assert (evidence["present"]["own_resets_s"], evidence["present"]["left_out"]) == (0.0, {})
+    # A second and a half before the first reset and half a second before the landing lie around none.
+    assert evidence["restless"]["own_resets_s"] == pytest.approx(59.5)
+    assert evidence["restless"]["samples"]["gnss_vel"]["lacking"] == 0
+    assert evidence["restless"]["samples"]["gnss_vel"]["after_reset"] > 290
+    # The measurements of 10 to 14 s, and the gap at 12 s.
+    assert evidence["late"]["samples"]["gnss_vel"] == {"mask": 300, "lacking": 20, "after_reset": 0}
+    assert evidence["late"]["gaps"]["gnss_vel"] == {"mask": 17, "lacking": 1, "after_reset": 0}
+    assert evidence["late"]["left_out"] == {}
+    assert evidence["very_late"]["left_out"]["gnss_vel"] == (
+        "lacks 200 of 300 samples of gnss_vel that the present set has, more than 20 %"
+    )
+    assert evidence["broken"] == {"samples": {}, "gaps": {}, "own_resets_s": 0.0, "left_out": {}}
+    assert summary["broken"]["reason"] == "diverged: the covariance is not finite"
+
+
+def test_resets_are_told_with_their_size(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(resets_s=(20.0, 40.0)), "calm": MadeSet(resets_s=(20.0,), jump_m=0.4)}
+    save, folder = make_flight(tmp_path, "flight", sets)
+    score_saved_flight(save, folder, list(sets))
+    summary = json.loads((folder / "scoring.json").read_text())["sets"]
+    jumps = {name: one["reset_jumps"] for name, one in summary.items()}
+    assert jumps["present"] == {
+        "horizontal_position": {"largest": pytest.approx(3.0, abs=0.1), "rms": pytest.approx(3.0, abs=0.1), "unit": "m"}
+    }
+    assert (summary["present"]["resets"]["horizontal_position"], summary["present"]["significant_resets"]) == (2, 2)
+    assert (summary["calm"]["resets"]["horizontal_position"], summary["calm"]["significant_resets"]) == (1, 0)
+    assert summary["calm"]["flight_s"] == pytest.approx(60.0, abs=0.2)

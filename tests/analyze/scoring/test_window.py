@@ -1,11 +1,11 @@
-"""The window is the same for all sets: cuts and warm-up by hand, intervals by their invariants."""
+"""The window follows from the present set: cuts and warm-up by hand, intervals by their invariants."""
 
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.analyze.made_flight import LANDING_S, MadeSet, at, make_flight
 
@@ -13,7 +13,7 @@ from fusetune.analyze.flight.intervals import Cut, subtract
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.window import FUSION_DELAY_US, scoring_window
+from fusetune.analyze.scoring.window import FUSION_DELAY_US, end_of_warm_up, scoring_window
 
 AIRBORNE = ((at(10.0), at(LANDING_S)),)
 SETTINGS = ScoringSettings()
@@ -40,21 +40,18 @@ def test_ground_and_warm_up_are_not_scored(tmp_path: Path) -> None:
     assert window.intervals == ((at(12.0 + 5.0 - 0.11), at(LANDING_S)),)
 
 
-def test_the_last_set_to_start_aiding_ends_the_warm_up_of_all(tmp_path: Path) -> None:
-    made = records(tmp_path, {"present": MadeSet(aiding_s=12.0), "late": MadeSet(aiding_s=20.0)})
-    window = scoring_window(made, "present", AIRBORNE, (), SETTINGS)
-    assert window.warm_up_end == at(20.0 + 5.0 - 0.11)
-
-
-def test_a_set_that_starts_far_too_late_is_left_out_and_costs_the_others_nothing(tmp_path: Path) -> None:
+def test_a_set_that_starts_later_does_not_move_the_warm_up(tmp_path: Path) -> None:
     made = records(tmp_path, {"present": MadeSet(aiding_s=12.0), "late": MadeSet(aiding_s=40.0)})
     window = scoring_window(made, "present", AIRBORNE, (), SETTINGS)
-    assert window.excluded == {"late": "starts aiding 28.0 s later than the present set"}
+    assert window.excluded == {}
     assert window.warm_up_end == at(12.0 + 5.0 - 0.11)
+    # Its own warm-up ends later; a set that starts earlier settles with the present one.
+    assert end_of_warm_up(made[1], made[0], SETTINGS) == at(40.0 + 5.0 - 0.11)
+    assert end_of_warm_up(made[0], made[1], SETTINGS) == at(40.0 + 5.0 - 0.11)
 
 
-def test_a_reset_of_one_set_is_cut_from_all(tmp_path: Path) -> None:
-    made = records(tmp_path, {"present": MadeSet(), "other": MadeSet(resets_s=(40.0,))})
+def test_a_reset_of_the_present_set_is_cut(tmp_path: Path) -> None:
+    made = records(tmp_path, {"present": MadeSet(resets_s=(40.0,)), "other": MadeSet()})
     window = scoring_window(made, "present", AIRBORNE, (), SETTINGS)
     assert window.intervals == ((at(10.0), at(40.0) - FUSION_DELAY_US), (at(43.0), at(LANDING_S)))
     assert [cut.reason for cut in window.cuts] == ["reset of horizontal position"]
@@ -63,26 +60,38 @@ def test_a_reset_of_one_set_is_cut_from_all(tmp_path: Path) -> None:
     assert (finding.start_us, finding.stop_us, finding.figure) == (at(40.0) - FUSION_DELAY_US, at(43.0), 3.5)
 
 
+def test_a_reset_of_another_set_is_its_own_affair(tmp_path: Path) -> None:
+    """3.5 s around each of two resets, of which the second overlaps the first by 1.5 s, and the landing none."""
+    made = records(tmp_path, {"present": MadeSet(), "other": MadeSet(resets_s=(40.0, 42.0))})
+    window = scoring_window(made, "present", AIRBORNE, (), SETTINGS)
+    assert (window.intervals, window.cuts) == (AIRBORNE, ())
+    assert window.own_resets_s("other") == pytest.approx(5.5)
+    assert window.own_resets_s("present") == 0.0
+    times = np.array([at(39.4), at(39.5), at(44.9), at(45.0)])
+    assert window.after_own_reset("other", times).tolist() == [False, True, True, False]
+    assert not window.after_own_reset("present", times).any()
+
+
 def test_a_gap_in_the_log_is_cut_with_the_time_after_it(tmp_path: Path) -> None:
     made = records(tmp_path, {"present": MadeSet()})
     window = scoring_window(made, "present", AIRBORNE, ((at(30.0), at(31.0)),), SETTINGS)
     assert window.intervals == ((at(10.0), at(30.0)), (at(34.0), at(LANDING_S)))
 
 
-def test_a_set_that_resets_all_the_time_is_left_out(tmp_path: Path) -> None:
-    restless = MadeSet(resets_s=tuple(float(s) for s in range(12, 68, 3)))
-    window = scoring_window(
-        records(tmp_path, {"present": MadeSet(), "restless": restless}), "present", AIRBORNE, (), SETTINGS
-    )
-    assert set(window.excluded) == {"restless"}
-    assert window.intervals == AIRBORNE
+@settings(max_examples=20, deadline=None)
+@given(resets=st.lists(st.integers(0, 70), max_size=12, unique=True), aiding_s=st.integers(0, 60))
+def test_whatever_another_set_does_the_window_stays(tmp_path_factory, resets: list[int], aiding_s: int) -> None:
+    present = MadeSet(resets_s=(33.0,))
+    other = MadeSet(resets_s=tuple(map(float, resets)), aiding_s=float(aiding_s))
+    made = records(tmp_path_factory.mktemp("flight"), {"present": present, "other": other})
+    alone, beside = (scoring_window(part, "present", AIRBORNE, (), SETTINGS) for part in (made[:1], made))
+    assert (alone.intervals, alone.cuts, alone.warm_up_end) == (beside.intervals, beside.cuts, beside.warm_up_end)
 
 
-def test_a_set_that_resets_as_often_as_the_present_one_is_not_left_out(tmp_path: Path) -> None:
+def test_a_present_set_that_resets_often_leaves_what_lies_between(tmp_path: Path) -> None:
     restless = tuple(float(s) for s in range(12, 58, 4))
-    made = records(tmp_path, {"present": MadeSet(resets_s=restless), "alike": MadeSet(resets_s=restless)})
+    made = records(tmp_path, {"present": MadeSet(resets_s=restless)})
     window = scoring_window(made, "present", AIRBORNE, (), SETTINGS)
-    assert window.excluded == {}
     # 1.5 s before the first cut, half a second between each two of the twelve, and 11 s after the last
     assert window.duration_s == pytest.approx(1.5 + 11 * 0.5 + 11.0)
 

@@ -5,9 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from fusetune.analyze.flight.intervals import Cut
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples
+from fusetune.analyze.scoring.charges import EvidenceCost
 from fusetune.analyze.scoring.metrics_table import MetricsTable
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.true_errors import Truth
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.withheld_scores import add_true_drift, add_withheld_metrics, paired_gaps, withheld_rows
@@ -43,13 +46,63 @@ def predicted(starts_s: list[int], errors: list[float], variance: float = 1.0) -
     }
 
 
-def test_only_gaps_that_all_sets_have_and_that_lie_in_the_window_are_paired() -> None:
-    now = record("present", predicted([10, 20, 30, 95], [1.0, 2.0, 3.0, 4.0]))
-    late = record("late", predicted([20, 30, 95], [5.0, 6.0, 7.0]))
-    (group,) = paired_gaps([now, late], "present", WINDOW)
-    # The gap at 10 s is missing in one set, the one at 95 s reaches beyond the window.
-    np.testing.assert_array_equal(group.start, [20 * SECOND, 30 * SECOND])
-    np.testing.assert_array_equal(group.error, [[2.0, 3.0], [5.0, 6.0]])
+LENIENT = ScoringSettings(max_lacking_percent=50.0)
+
+
+def test_the_gaps_are_those_of_the_present_set_that_lie_in_the_window() -> None:
+    now = record("present", predicted([10, 20, 30, 95], [1.0, -2.0, 3.0, 4.0]))
+    late = record("late", predicted([20, 30, 40, 95], [5.0, 6.0, 0.1, 7.0]))
+    (group,) = paired_gaps([now, late], "present", WINDOW, LENIENT)
+    # The gap at 95 s reaches beyond the window; that at 40 s the present set does not have.
+    np.testing.assert_array_equal(group.start, np.array([10, 20, 30]) * SECOND)
+    # The other set lacks that at 10 s: 5 robust standard deviations of the present set's errors, of median 2, count.
+    np.testing.assert_allclose(group.error, [[1.0, -2.0, 3.0], [5 * 1.4826 * 2.0, 5.0, 6.0]])
+    assert group.costs["late"] == EvidenceCost(mask=3, lacking=1, after_reset=0)
+
+
+def test_a_set_that_lacks_too_much_is_left_out_and_no_other_is_touched() -> None:
+    now = record("present", predicted([10, 20, 30], [1.0, 2.0, 3.0]))
+    good, late = record("good", predicted([10, 20, 30], [0.5, 1.0, 1.5])), record("late", predicted([30], [9.0]))
+    (group,) = paired_gaps([now, late, good], "present", WINDOW)
+    (without,) = paired_gaps([now, good], "present", WINDOW)
+    assert group.sets == without.sets == ("present", "good")
+    np.testing.assert_array_equal(group.error, without.error)
+    assert group.winsor_limit == without.winsor_limit
+    assert group.costs["late"].lacking_percent == pytest.approx(200 / 3)
+
+
+@pytest.mark.parametrize("broken", [{"innovation": np.nan}, {"innovation_variance": 0.0}])
+def test_a_prediction_that_is_no_number_is_lacking(broken: dict[str, float]) -> None:
+    now = record("present", predicted([10, 20, 30, 40], [1.0, 1.0, 1.0, 1.0]))
+    other = predicted([10, 20, 30, 40], [0.1, 0.1, 0.1, 0.1])
+    for name, value in broken.items():
+        other[name][1] = value
+    (group,) = paired_gaps([now, record("other", other)], "present", WINDOW, LENIENT)
+    np.testing.assert_allclose(group.error[1], [0.1, 5 * 1.4826, 0.1, 0.1])
+    np.testing.assert_allclose(group.variance[1], 1.0)
+
+
+def test_a_horizon_without_a_measurement_before_it_says_nothing() -> None:
+    """Of the gap at 20 s the other set predicted after 3 s, and no measurement came in the second before 9 s."""
+    long = predicted([10, 20, 30], [1.0, 2.0, 1.0])
+    short = predicted([10, 20, 30], [0.1, 0.1, 0.1]) | {"horizon_s": np.full(3, 3.0)}
+    both = {name: np.concatenate([long[name], short[name]]) for name in long}
+    without = {name: np.delete(values, 1) for name, values in both.items()}
+    without["innovation"] = np.array([0.5, 0.5, 0.1, 0.1, 0.1])
+    (_, after_9_s) = paired_gaps([record("present", both), record("other", without)], "present", WINDOW, LENIENT)
+    np.testing.assert_allclose(after_9_s.error, [[1.0, 2.0, 1.0], [0.5, 2.0, 0.5]])
+
+
+def test_a_gap_after_a_reset_of_its_own_counts_no_better_than_the_present_set() -> None:
+    window = dataclasses.replace(WINDOW, own_resets={"other": (Cut(18 * SECOND, 22 * SECOND, "reset"),)})
+    now = record("present", predicted([10, 20, 30], [1.0, -2.0, 3.0]))
+    other = record("other", predicted([10, 20, 30], [0.1, 0.2, 0.3]))
+    (group,) = paired_gaps([now, other], "present", window)
+    np.testing.assert_allclose(group.error, [[1.0, -2.0, 3.0], [0.1, -2.0, 0.3]])
+    # What it does worse than the present set stays its own.
+    other = record("other", predicted([10, 20, 30], [0.1, 4.0, 0.3]))
+    (group,) = paired_gaps([now, other], "present", window)
+    np.testing.assert_allclose(group.error[1], [0.1, 4.0, 0.3])
 
 
 def test_a_gap_counts_only_while_the_present_set_uses_the_sensor() -> None:

@@ -1,4 +1,4 @@
-"""The max-t test by sign flips: by hand, under the null hypothesis, and against Holm's correction."""
+"""The test by sign flips: by hand, under the null hypothesis, and against Holm's correction."""
 
 import numpy as np
 import pytest
@@ -9,12 +9,12 @@ from fusetune.apply.statistics.sign_flips import family_p_values
 
 
 def test_one_candidate_by_hand() -> None:
-    # All eight differences are below 0: only the unflipped signs reach so much, one of 256 flips.
+    # All eight differences are below 0: only the unflipped signs reach so much, one of 256 flips, of which half counts.
     differences = -np.array([0.1, 0.2, 0.15, 0.3, 0.25, 0.12, 0.18, 0.22])[:, None]
-    assert family_p_values(differences, 0) == pytest.approx([1 / 256])
-    # With the smallest one above 0 it is one of the two flips that reach at least as much.
+    assert family_p_values(differences, 0) == pytest.approx([0.5 / 256])
+    # With the smallest one above 0 one flip reaches further.
     differences[0] *= -1.0
-    assert family_p_values(differences, 0) == pytest.approx([2 / 256])
+    assert family_p_values(differences, 0) == pytest.approx([1.5 / 256])
 
 
 def test_a_twin_costs_nothing_and_a_hopeless_set_neither() -> None:
@@ -67,3 +67,21 @@ def test_equal_within_rounding_is_no_luck_and_no_merit() -> None:
     found = family_p_values(np.hstack([one, rounding]), 0)
     assert found[1] == 1.0
     assert found[0] == family_p_values(one, 0)[0]
+
+
+def test_a_large_gain_that_varies_is_found_beside_a_small_even_one() -> None:
+    """Measured by Student's t alone the small one, 3 % that hardly varies, hides it: t is −60 against −2.6."""
+    large = np.array([-0.8, -0.6, -0.1, -0.5, -0.05])
+    small = np.array([-0.03, -0.031, -0.029, -0.03, -0.032])
+    generator = np.random.default_rng(5)
+    others = generator.normal(0.0, 0.03, (5, 6))
+    found = family_p_values(np.column_stack([large, small, others]), 0)
+    assert found[0] <= 0.05
+
+
+def test_five_flights_that_agree_are_enough_and_three_are_not() -> None:
+    for flights, enough in ((3, False), (4, True), (5, True)):
+        one = -np.linspace(0.1, 0.2, flights)[:, None]
+        # of 2^n flips the unflipped one alone reaches so far, and half of it counts
+        assert family_p_values(one, 0) == pytest.approx([0.5 / 2**flights])
+        assert (family_p_values(one, 0)[0] <= 0.05) == enough

@@ -40,7 +40,7 @@ def student_t_nll(innovation: Array, innovation_variance: Array, dof: float = ST
 
 
 def winsor_limit(innovation: Array) -> float:
-    """Limit beyond which innovations are winsorised: 5 robust standard deviations over all sets together.
+    """Limit beyond which innovations are winsorised: 5 robust standard deviations over all given sets together.
 
     It must not depend on S: clipping ν/√S would let a set win by making S small.
     """
@@ -104,7 +104,7 @@ METRICS = (
         lambda given: _mean(student_t_nll, given.innovation, given), "lower",
     ),
     InnovationMetric(
-        "nll_winsorised", "nat", "the same with innovations clipped at 5 robust standard deviations of all sets",
+        "nll_winsorised", "nat", "the same with innovations clipped at 5 robust standard deviations of complete sets",
         lambda given: _mean(gaussian_nll, given.once(_winsorised), given), "lower",
         window=InWindow("worst_window_nll_winsorised", _winsorised_nll),
     ),

@@ -90,6 +90,12 @@ class SpooledRows(Sequence[np.ndarray]):
     def append(self, rows: np.ndarray) -> None:
         self._parts.append((self._spool.put(rows), len(rows), rows.dtype))
 
+    def in_order(self, places: Iterable[int]) -> SpooledRows:
+        """The same arrays in another order."""
+        ordered = SpooledRows(self._spool)
+        ordered._parts = [self._parts[place] for place in places]
+        return ordered
+
     @overload
     def __getitem__(self, number: int) -> np.ndarray: ...
     @overload

@@ -38,6 +38,12 @@ class WithholdingSettings:
     gnss_every_s: float = setting(
         4.5, "time from the start of one gap without GNSS to the next; gaps may overlap", unit="s", low=0.5, high=600
     )
+    gnss_fewest: int = setting(
+        4,
+        "a flight too short for so many gaps without GNSS has shorter ones, two thirds or a third as long",
+        low=0,
+        high=100,
+    )
     baro_s: float = setting(9.0, "length of the gaps without barometer", unit="s", low=0, high=60)
     baro_every_s: float = setting(
         18.0, "time from the start of one gap without barometer to the next", unit="s", low=0.5, high=600

@@ -1,13 +1,14 @@
-"""What the filter did beside fusing: resets, faults, sources that timed out, time spent without aid."""
+"""What the filter did beside fusing: resets and how far they moved it, faults, lost sources, time spent without aid."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.flight.intervals import Interval, duration, inside
 from fusetune.analyze.metrics.metric import Metric
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.scoring.reset_jumps import FAR, JumpFigures, jump_figures, reset_jumps, significant
 from fusetune.px4.aid_sources import AID_SOURCES
 
 _FLAGS_OF_SOURCES = tuple(
@@ -31,17 +32,25 @@ class FilterEvents:
 
     Attributes
     ----------
+    flight_s : time over which they are counted, s
     resets : number of resets of each kind
+    jumps : how far those of each kind moved the state, of the kinds that there were
+    significant_resets : updates at which the state was moved far, see `reset_jumps`
     timeouts : how often a source that was fused stopped being fused
-    faults : names of the fault flags (`fs_*`) that were ever set
+    faults : names of the fault flags (`fs_*`) that were ever set, on the ground and during the warm-up as well
+    fault_s : time that each of them was set, s, of those that were
     fault_flags : largest value of `filter_fault_flags`
     dead_reckoning_s : time without any horizontal aiding
     aid : by source that was ever fused
     """
 
+    flight_s: float
     resets: dict[str, int]
+    jumps: dict[str, JumpFigures]
+    significant_resets: int
     timeouts: dict[str, int]
     faults: tuple[str, ...]
+    fault_s: dict[str, float]
     fault_flags: int
     dead_reckoning_s: float
     aid: dict[str, SourceAid]
@@ -61,6 +70,10 @@ EVENT_METRICS: tuple[Metric[FilterEvents], ...] = (
         lambda events: {**events.resets, "all": events.total_resets}, "lower", ("apply", "report"),
     ),
     Metric(
+        "significant_resets", "1", f"how often a reset moved the state by more than {FAR}",
+        lambda events: {"all": events.significant_resets}, "lower", ("apply",),
+    ),
+    Metric(
         "timeouts", "1", "how often a source that was fused stopped being fused, by source",
         lambda events: {**{name: n for name, n in events.timeouts.items() if n}, "all": events.total_timeouts},
         "lower", ("apply", "report"),
@@ -76,7 +89,7 @@ EVENT_METRICS: tuple[Metric[FilterEvents], ...] = (
 )  # fmt: skip
 """What the filter did beside fusing, by kind."""
 
-ON_GROUND = EVENT_METRICS[:2]
+ON_GROUND = tuple(metric for metric in EVENT_METRICS if metric.name in ("resets", "timeouts"))
 """Given for the time on the ground as well, all kinds together."""
 
 SERVICE_METRICS: tuple[Metric[SourceAid], ...] = (
@@ -108,10 +121,16 @@ def filter_events(record: ReplayedSet, flight: tuple[Interval, ...]) -> FilterEv
         stopped = time[1:][values[:-1].astype(bool) & ~values[1:].astype(bool)]
         timeouts[flag.removeprefix("cs_")] = int(np.count_nonzero(inside(stopped, flight)))
     faults = tuple(sorted(name for name, values in record.flags.items() if name.startswith("fs_") and values.any()))
+    jumps = {kind: found for kind, one in reset_jumps(record).items() if (found := one.inside(flight)).time.size}
+    fault_s = {name: _time_true(time, record.flags[name], flight) for name in faults}
     return FilterEvents(
+        flight_s=duration(flight) * 1e-6,
         resets=resets,
+        jumps={kind: jump_figures(kind, one) for kind, one in jumps.items()},
+        significant_resets=significant(jumps),
         timeouts=timeouts,
         faults=faults,
+        fault_s={name: seconds for name, seconds in fault_s.items() if seconds > 0.0},
         fault_flags=int(record.summary.get("filter_fault_flags_max", 0)),
         dead_reckoning_s=_time_true(time, record.flags.get("cs_inertial_dead_reckoning"), flight),
         aid=_source_aid(record, flight),

@@ -13,7 +13,7 @@ from fusetune.analyze.scoring.filter_events import ON_GROUND, FilterEvents
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, paired_samples
 from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, add_innovation_metrics, groups_of
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.window import ScoringWindow, cuts_within
+from fusetune.analyze.scoring.window import ScoringWindow, after, cuts_within, own_resets
 from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
 
 BEFORE_TAKE_OFF_US = 2_000_000
@@ -41,17 +41,20 @@ def ground_window(
     window : of the flight; the sets that it leaves out are left out here too
     """
     flying = [Cut(start - BEFORE_TAKE_OFF_US, stop + AFTER_LANDING_US, "in the air") for start, stop in airborne]
-    warm_up = [] if window.warm_up_end is None else [Cut(-(2**62), window.warm_up_end, "warm-up")]
-    standing = subtract([log], [*flying, *warm_up])
+    standing = subtract([log], flying)
+    if window.warm_up_end is not None:
+        standing = after(standing, window.warm_up_end)
     if window.warm_up_end is None or not standing:
         return ScoringWindow((), (), window.excluded, window.warm_up_end, "no time on the ground after the warm-up")
-    excluded = dict(window.excluded)
-    cuts = merged(cuts_within(records, excluded, standing, present, gaps, settings))
-    return ScoringWindow(subtract(standing, cuts), cuts, excluded, window.warm_up_end)
+    present_record = next(record for record in records if record.name == present)
+    cuts = merged(cuts_within(present_record, standing, gaps, settings))
+    intervals = subtract(standing, cuts)
+    own = own_resets(records, present, intervals, settings)
+    return ScoringWindow(intervals, cuts, window.excluded, window.warm_up_end, own_resets=own)
 
 
 def add_ground_metrics(
-    table: MetricsTable, records: Sequence[ReplayedSet], present: str, ground: ScoringWindow, confidence: float
+    table: MetricsTable, records: Sequence[ReplayedSet], present: str, ground: ScoringWindow, settings: ScoringSettings
 ) -> None:
     """Append the metrics that are given of the ground, of every source and axis, named `ground_…`."""
     if not ground.intervals:
@@ -61,12 +64,12 @@ def add_ground_metrics(
     for source in MEASURED_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         for axis in range(source.axes):
-            found = paired_samples(standing, (source.name, axis), present, ground)
+            found = paired_samples(standing, (source.name, axis), present, ground, settings=settings)
             if found is not None and found.time.size >= FEWEST_SAMPLES:
                 pairs[axis] = found
         single = [(AXES[axis], [one]) for axis, one in pairs.items()]
         for axis_name, members in (*single, *groups_of(pairs)):
-            add_innovation_metrics(table, members, axis_name, metrics, confidence, GROUND)
+            add_innovation_metrics(table, members, axis_name, metrics, settings.confidence, GROUND)
 
 
 def add_ground_events(table: MetricsTable, set_name: str, events: FilterEvents, ground: ScoringWindow) -> None:

@@ -1,9 +1,9 @@
-"""Brings the samples of all parameter sets to the same measurements."""
+"""Brings the samples of all parameter sets to the same measurements: those of the present set."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,9 @@ from fusetune.analyze.metrics.likelihood import winsor_limit
 from fusetune.analyze.metrics.metric import Innovations
 from fusetune.analyze.replaying.measurement_times import match, measurement_time
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
-from fusetune.analyze.replaying.samples import SampleSpool, SourceAxis, SpooledRows
+from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis, SpooledRows, gate_of
+from fusetune.analyze.scoring.charges import EvidenceCost, charged, passed_over
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow
 
 _TOLERANCE = 0.4
@@ -40,10 +42,11 @@ class SamplesOfSet:
 
 @dataclass(frozen=True)
 class PairedSamples:
-    """Samples of one source and axis that all named sets have in common; calculate with what `each` gives.
+    """Samples of one source and axis at the same measurements, as they count; calculate with what `each` gives.
 
     `rows` holds the samples of each set, (N,) with the `FIGURES`, in single precision where that is exact, and may read
-    them from the disk.
+    them from the disk. `complete` says of each set whether all of them are its own, so that nothing was charged.
+    `costs` says what each of the sets that were asked for cost itself, also of those that are left out.
     """
 
     source: str
@@ -51,6 +54,8 @@ class PairedSamples:
     sets: tuple[str, ...]
     time: npt.NDArray[np.int64]
     rows: Sequence[np.ndarray]
+    complete: tuple[bool, ...] = ()
+    costs: Mapping[str, EvidenceCost] = field(default_factory=dict)
 
     def each(self) -> Iterator[SamplesOfSet]:
         """The samples of one set after the other, in double precision."""
@@ -61,10 +66,11 @@ class PairedSamples:
 
     @cached_property
     def winsor_limit(self) -> float:
-        """See `fusetune.analyze.metrics.likelihood.winsor_limit`."""
-        together = np.empty((len(self.sets), self.time.size))
-        for number, rows in enumerate(self.rows):
-            together[number] = rows["innovation"]
+        """See `fusetune.analyze.metrics.likelihood.winsor_limit`; of the complete sets, as others have no say."""
+        chosen = [number for number, complete in enumerate(self.complete or (True,) * len(self.sets)) if complete]
+        together = np.empty((len(chosen), self.time.size))
+        for row, number in enumerate(chosen):
+            together[row] = self.rows[number]["innovation"]
         return winsor_limit(together)
 
 
@@ -111,40 +117,137 @@ def paired_samples(
     present: str,
     window: ScoringWindow,
     spool: SampleSpool | None = None,
+    settings: ScoringSettings | None = None,
 ) -> PairedSamples | None:
-    """Common samples of one source and axis inside the window.
+    """Samples of one source and axis at the present set's measurements inside the window.
+
+    Where the present set does not fuse the source, the first one that does stands for it, so that there are figures.
 
     Parameters
     ----------
     spool : takes the samples; by default they stay in memory
+    settings : by how much a set that lacks measurements is left out
 
     Returns
     -------
-    PairedSamples of the sets that fuse this source at least once (the present set's, where it does, is the
-    reference), or None where there are none. Rows count from the time at which every set has fused the source
-    once: before the local origin exists innovations mean nothing.
+    PairedSamples of the sets that fuse this source at least once, the present one first where it does, or None where
+    there are none. Rows count from the time at which the present set has fused the source once: before the local
+    origin exists innovations mean nothing. What the others lack, and what follows their own resets, counts as
+    `fusetune.analyze.scoring.charges` says.
     """
     source, axis = key
+    most = (settings or ScoringSettings()).max_lacking_percent
     using = sorted((one for one in records if key in one.first_fused), key=lambda record: record.name != present)
     if not using:
         return None
-    reference = measurement_time(using[0].samples[key], source, using[0].parameters)
-    if reference.size < 2:
+    time, mask, tolerance = _mask(using[0], key, window)
+    if not mask.any():
         return None
-    tolerance = _TOLERANCE * float(np.median(np.diff(reference)))
-    common = window.contains(reference)
-    index = []
+    time = time[mask]
+    costs = {record.name: EvidenceCost(time.size, time.size, 0) for record in records}
+    kept: list[_Matched] = []
     for record in using:
-        one = record.samples[key]
-        time = measurement_time(one, source, record.parameters)
-        row = match(reference, time, tolerance)
-        usable = np.isfinite(one.innovation) & np.isfinite(one.innovation_variance) & (one.innovation_variance > 0.0)
-        common &= (row >= 0) & usable[row] & (reference >= time[np.argmax(one.fused)])
-        index.append(row.astype(np.int32))
-    if not common.any():
-        return None
-    kept: list[np.ndarray] | SpooledRows = [] if spool is None else SpooledRows(spool)
-    for record, rows in zip(using, index, strict=True):
-        one = record.samples[key].rows(rows[common])
-        kept.append(paired_rows({name: getattr(one, name) for name in FIGURES}))
-    return PairedSamples(source, axis, tuple(record.name for record in using), reference[common], kept)
+        one = _matched(record, key, time, tolerance, window, is_reference=record is using[0])
+        costs[record.name] = one.cost
+        if one.cost.lacking_percent <= most:
+            kept.append(one)
+    rows: list[np.ndarray] | SpooledRows = [] if spool is None else SpooledRows(spool)
+    whole = [one for one in kept if one.is_complete]
+    for one in whole:
+        rows.append(paired_rows(_figures(one, key)))
+    found = PairedSamples(source, axis, _names(whole), time, rows, costs=costs)
+    others = [one for one in kept if not one.is_complete]
+    if not others:
+        return found
+    # What counts for the others follows from the complete sets, of which the first is the reference.
+    reference, limit = rows[0]["innovation"].astype(np.float64), found.winsor_limit
+    for one in others:
+        rows.append(paired_rows(_charged_figures(one, key, reference, limit)))
+    places = [[*whole, *others].index(one) for one in kept]
+    ordered = rows.in_order(places) if isinstance(rows, SpooledRows) else [rows[place] for place in places]
+    complete = tuple(one.is_complete for one in kept)
+    return PairedSamples(source, axis, _names(kept), time, ordered, complete, costs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Matched:
+    """Which of a set's samples are those of the mask: row of each, and where it is lacking or follows a reset."""
+
+    record: ReplayedSet
+    row: npt.NDArray[np.int32]
+    lacking: npt.NDArray[np.bool_]
+    after_reset: npt.NDArray[np.bool_]
+
+    @property
+    def cost(self) -> EvidenceCost:
+        return EvidenceCost(self.row.size, int(self.lacking.sum()), int(self.after_reset.sum()))
+
+    @property
+    def is_complete(self) -> bool:
+        return not (self.lacking.any() or self.after_reset.any())
+
+
+def _names(matched: Sequence[_Matched]) -> tuple[str, ...]:
+    return tuple(one.record.name for one in matched)
+
+
+def _mask(
+    record: ReplayedSet, key: SourceAxis, window: ScoringWindow
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_], float]:
+    """Times of all measurements of a set, which of them are scored, and how near to one its like must be, µs."""
+    samples = record.samples[key]
+    time = measurement_time(samples, key[0], record.parameters)
+    if time.size < 2:
+        return time, np.zeros(time.shape, bool), 0.0
+    scored = window.contains(time) & _is_usable(samples) & (time >= time[np.argmax(samples.fused)])
+    return time, scored, _TOLERANCE * float(np.median(np.diff(time)))
+
+
+def _is_usable(samples: AxisSamples) -> npt.NDArray[np.bool_]:
+    variance = samples.innovation_variance
+    return np.isfinite(samples.innovation) & np.isfinite(variance) & (variance > 0.0)
+
+
+def _matched(
+    record: ReplayedSet,
+    key: SourceAxis,
+    scored: npt.NDArray[np.int64],
+    tolerance: float,
+    window: ScoringWindow,
+    *,
+    is_reference: bool,
+) -> _Matched:
+    samples = record.samples[key]
+    time = measurement_time(samples, key[0], record.parameters)
+    row = match(scored, time, tolerance)
+    lacking = (row < 0) | ~_is_usable(samples)[row] | (scored < time[np.argmax(samples.fused)])
+    after_reset = np.zeros(scored.shape, bool) if is_reference else window.after_own_reset(record.name, scored)
+    return _Matched(record, row.astype(np.int32), lacking, after_reset & ~lacking)
+
+
+def _figures(matched: _Matched, key: SourceAxis) -> dict[str, npt.NDArray]:
+    samples = matched.record.samples[key].rows(np.maximum(matched.row, 0))
+    return {name: getattr(samples, name) for name in FIGURES}
+
+
+def _charged_figures(
+    matched: _Matched, key: SourceAxis, reference: npt.NDArray[np.float64], limit: float
+) -> dict[str, npt.NDArray]:
+    """The figures as they count; a measurement that is lacking, other than one passed over, counts as rejected."""
+    figures = _figures(matched, key)
+    lacking, after_reset = matched.lacking, matched.after_reset
+    own = figures["innovation"]
+    alone = passed_over(lacking)
+    counted = charged(own, figures["innovation_variance"], reference, lacking, after_reset, limit, alone)
+    gate = gate_of(matched.record.parameters, key[0])
+    ratio = np.square(counted.error) / (gate * gate * counted.variance)
+    ratio = np.where(after_reset, np.fmax(ratio, figures["test_ratio"]), ratio)
+    absent = lacking & ~alone
+    unchanged = ~lacking & ~after_reset
+    return {
+        # In single precision, so that the column can be kept so.
+        "innovation": np.where(unchanged, own, counted.error.astype(np.float32)),
+        "innovation_variance": counted.variance,
+        "test_ratio": np.where(absent, np.nan, np.where(unchanged, figures["test_ratio"], ratio.astype(np.float32))),
+        "rejected": np.where(lacking, absent, figures["rejected"]),
+    }

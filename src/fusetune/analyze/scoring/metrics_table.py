@@ -122,11 +122,11 @@ def groups_of(pairs: dict[int, PairedSamples]) -> Iterator[tuple[str, list[Paire
             yield group, members
 
 
-def add_events(table: MetricsTable, set_name: str, events: FilterEvents, flight_s: float) -> None:
-    """Append resets, timeouts, faults and time without aid; `flight_s` is the time over which they were counted."""
+def add_events(table: MetricsTable, set_name: str, events: FilterEvents) -> None:
+    """Append resets, timeouts, faults and time without aid; `n` is the time over which they were counted, s."""
     for metric in EVENT_METRICS:
         for kind, value in metric.function(events).items():
-            table.add(set_name, "filter", kind, metric.name, value, flight_s)
+            table.add(set_name, "filter", kind, metric.name, value, events.flight_s)
     for source, aid in events.aid.items():
         for service in SERVICE_METRICS:
             table.add(set_name, source, "all", service.name, service.function(aid), aid.samples)

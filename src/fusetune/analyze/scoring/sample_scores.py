@@ -11,6 +11,7 @@ import pyarrow as pa
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis
 from fusetune.analyze.scoring.block_scores import BLOCK_SCHEMA, block_rows
+from fusetune.analyze.scoring.charges import EvidenceCost
 from fusetune.analyze.scoring.measurement_alignment import PairedSamples, SamplesOfSet, paired_samples
 from fusetune.analyze.scoring.metrics_table import (
     FEWEST_SAMPLES,
@@ -47,15 +48,16 @@ SAMPLES_SCHEMA = pa.schema(
 
 
 class SampleScores(NamedTuple):
-    """Rows of `scores.parquet` and of `windows.parquet`."""
+    """Rows of `scores.parquet` and of `windows.parquet`, and what each set cost itself, by source and axis."""
 
     blocks: pa.Table
     windows: pa.Table
+    costs: Mapping[SourceAxis, Mapping[str, EvidenceCost]]
 
 
 def no_sample_scores() -> SampleScores:
     """Of a flight of which nothing is scored; made when asked for, as PyArrow's first table looks for pandas."""
-    return SampleScores(BLOCK_SCHEMA.empty_table(), WINDOW_SCHEMA.empty_table())
+    return SampleScores(BLOCK_SCHEMA.empty_table(), WINDOW_SCHEMA.empty_table(), {})
 
 
 def score_samples(
@@ -69,6 +71,8 @@ def score_samples(
 ) -> SampleScores:
     """Append the figures of every source and axis, and of their groups; sums of blocks and windows.
 
+    Sources that the present set does not fuse have figures, but no blocks: on them no set can be compared with it.
+
     Parameters
     ----------
     records : replays of the sets that are scored
@@ -76,16 +80,19 @@ def score_samples(
     """
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
     blocks, windows = [], []
+    costs: dict[SourceAxis, Mapping[str, EvidenceCost]] = {}
     for source in MEASURED_SOURCES.values():
         pairs: dict[int, PairedSamples] = {}
         spool = SampleSpool(spool_folder)
         for axis in range(source.axes):
-            found = paired_samples(records, (source.name, axis), present, window, spool)
+            found = paired_samples(records, (source.name, axis), present, window, spool, settings)
             if found is not None:
                 pairs[axis] = found
         for one in pairs.values():
             add_axis_metrics(table, one, settings)
-            blocks.append(block_rows(table.flight, one, edges))
+            if one.sets[0] == present:
+                blocks.append(block_rows(table.flight, one, edges))
+                costs[source.name, one.axis] = one.costs
             # of what is sampled at every update the samples would fill the disk, and no plot shows them
             if take_samples is not None and not source.every_update:
                 for of_set in one.each():
@@ -101,6 +108,7 @@ def score_samples(
     return SampleScores(
         pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
         pa.concat_tables(windows) if windows else WINDOW_SCHEMA.empty_table(),
+        costs,
     )
 
 

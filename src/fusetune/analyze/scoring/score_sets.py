@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
-from fusetune.analyze.flight.intervals import Cut, Interval, subtract
+from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import IMU_TOPICS, airborne_intervals, imu_gaps
 from fusetune.analyze.flight.reference_truth import TRUTH_TOPICS, Truth, read_references
 from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
@@ -19,12 +20,12 @@ from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_groun
 from fusetune.analyze.scoring.metrics_table import MetricsTable, add_events, add_true_errors, add_whiteness
 from fusetune.analyze.scoring.sample_scores import add_onboard, no_sample_scores, score_samples
 from fusetune.analyze.scoring.scoring_summary import scoring_summary
+from fusetune.analyze.scoring.set_evidence import set_evidence
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.smoothed_scores import SMOOTHED_SCHEMA, STEP_US, SmoothedScores
 from fusetune.analyze.scoring.true_errors import true_errors
-from fusetune.analyze.scoring.window import ScoringWindow, scoring_window
+from fusetune.analyze.scoring.window import ScoringWindow, after, end_of_warm_up, scoring_window
 from fusetune.analyze.scoring.withheld_scores import (
-    WITHHELD_SCHEMA,
     add_true_drift,
     add_withheld_metrics,
     paired_gaps,
@@ -133,8 +134,8 @@ def score_sets(
 ) -> FlightScores:
     """Score every parameter set of one flight.
 
-    The window and the samples are those that all sets have in common, so a score depends on the other sets. Of samples
-    one source and axis is looked up at a time, of states one set.
+    The window, the samples and the gaps are those of the present set; what another set lacks of them costs it alone. Of
+    samples one source and axis is looked up at a time, of states one set.
 
     Parameters
     ----------
@@ -147,28 +148,26 @@ def score_sets(
     records = sorted(replays, key=lambda record: record.name != present)
     airborne = airborne_intervals(flight, records[0].flags)
     window = scoring_window(records, present, airborne, scored.log_gaps, settings)
-    phase = _flight_after_warm_up(airborne, window)
-    events = {record.name: filter_events(record, phase) for record in records}
+    phases = {record.name: _flight_after_warm_up(record, records[0], airborne, window, settings) for record in records}
+    events = {record.name: filter_events(record, phases[record.name]) for record in records}
 
     table = MetricsTable(flight.name)
-    flight_s = sum(stop - start for start, stop in phase) * 1e-6
     for name, event in events.items():
-        add_events(table, name, event, flight_s)
+        add_events(table, name, event)
     log = flight.start_timestamp, flight.last_timestamp
     ground = ground_window(records, present, airborne, log, scored.log_gaps, window, settings)
-    add_ground_metrics(table, records, present, ground, settings.confidence)
+    add_ground_metrics(table, records, present, ground, settings)
     for record in records:
         add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
-    samples, withheld, whiteness = no_sample_scores(), WITHHELD_SCHEMA.empty_table(), {}
+    samples, gaps, whiteness = no_sample_scores(), [], {}
     smoothed = SMOOTHED_SCHEMA.empty_table()
     if window.intervals:
         kept = [record for record in records if record.name not in window.excluded]
         samples = score_samples(table, kept, present, window, settings, take_samples, spool_folder)
         # Replays from elsewhere, such as PX4's own estimator, come without gaps.
         has_gaps = all(record.withheld is not None for record in kept)
-        gaps = paired_gaps(kept, present, window) if has_gaps else []
+        gaps = paired_gaps(kept, present, window, settings) if has_gaps else []
         add_withheld_metrics(table, gaps)
-        withheld = withheld_rows(flight.name, gaps, window.block_edges(settings.block_s))
         add_onboard(table, scored.onboard, window, settings, records[0].parameters)
         fused = {source for record in records for source in record.fused_sources}
         references = read_references(flight, fused, records[0].parameters)
@@ -178,14 +177,24 @@ def score_sets(
         for truth in references:
             if truth.kind == "truth" and has_gaps:
                 add_true_drift(table, kept, truth, window)
-    summary = scoring_summary(flight, records, present, window, events, whiteness, settings)
+    edges = window.block_edges(settings.block_s) if gaps else np.zeros(0, np.int64)
+    withheld = withheld_rows(flight.name, gaps, edges)
+    evidence = set_evidence([record.name for record in records], window, samples.costs, gaps, settings)
+    summary = scoring_summary(flight, records, present, window, events, evidence, whiteness, settings)
     return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, smoothed, summary)
 
 
-def _flight_after_warm_up(airborne: Sequence[Interval], window: ScoringWindow) -> tuple[Interval, ...]:
+def _flight_after_warm_up(
+    record: ReplayedSet,
+    present: ReplayedSet,
+    airborne: Sequence[Interval],
+    window: ScoringWindow,
+    settings: ScoringSettings,
+) -> tuple[Interval, ...]:
+    """Flight time of one set after its own warm-up: before it every filter resets and switches sources."""
     if window.warm_up_end is None:
         return tuple(airborne)
-    return subtract(airborne, [Cut(-(2**62), window.warm_up_end, "warm-up")])
+    return after(airborne, end_of_warm_up(record, present, settings))
 
 
 def _add_state_figures(

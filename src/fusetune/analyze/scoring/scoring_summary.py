@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ def scoring_summary(
     present: str,
     window: ScoringWindow,
     events: Mapping[str, FilterEvents],
+    evidence: Mapping[str, Mapping[str, Any]],
     whiteness: Mapping[tuple[str, int], Whiteness],
     settings: ScoringSettings,
 ) -> dict[str, Any]:
@@ -32,6 +34,7 @@ def scoring_summary(
     Parameters
     ----------
     events : of every set, in the flight after the warm-up
+    evidence : of every set, from `set_evidence`
     whiteness : of the sources, as the present set sees it
     """
     by_name = {record.name: record for record in records}
@@ -48,7 +51,7 @@ def scoring_summary(
         "block_edges_us": window.block_edges(settings.block_s).tolist() if window.intervals else [],
         "cuts": documents(cut.finding for cut in window.cuts),
         "sets": {
-            name: _set_summary(record, by_name[present], window, events[name], flight)
+            name: _set_summary(record, by_name[present], window, events[name], flight) | {"evidence": evidence[name]}
             for name, record in by_name.items()
         },
         "white_share": {
@@ -70,9 +73,13 @@ def _set_summary(
         "reason": excluded,
         "overrides": record.overrides,
         "parameters": record.parameters,
+        "flight_s": round(events.flight_s, 3),
         "resets": events.resets,
+        "reset_jumps": {kind: asdict(jumps) for kind, jumps in events.jumps.items()},
+        "significant_resets": events.significant_resets,
         "timeouts": {name: count for name, count in events.timeouts.items() if count},
         "faults": list(events.faults),
+        "fault_s": {name: round(seconds, 3) for name, seconds in events.fault_s.items()},
         "fault_flags": events.fault_flags,
         "dead_reckoning_s": round(events.dead_reckoning_s, 3),
         "same_results_as_present": record is not present and ok and same_results(record, present),

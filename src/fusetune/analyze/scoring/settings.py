@@ -21,11 +21,12 @@ class ScoringSettings:
     block_s: float = setting(10.0, "length of the blocks that the bootstrap draws", unit="s", low=2, high=60)
     window_s: float = setting(30.0, "length of the windows of which the worst is reported", unit="s", low=5, high=300)
     minimum_scored_s: float = setting(5.0, "a flight with less than this is not scored", unit="s", low=1, high=600)
-    max_start_delay_s: float = setting(
-        10.0,
-        "a set that starts aiding this much later than the others is left out on that flight",
-        unit="s",
+    max_lacking_percent: float = setting(
+        20.0,
+        "a set that lacks more than this of what the present set predicted of a source is left out there on that "
+        "flight; up to it, what it lacks counts with the largest error",
+        unit="%",
         low=0,
-        high=120,
+        high=100,
     )
     confidence: float = setting(0.95, "level of all intervals and bounds of the metrics", low=0.5, high=0.999)

@@ -1,7 +1,11 @@
-"""Which part of a flight is scored: in the air, after the warm-up, away from resets and gaps, alike for all sets."""
+"""Which part of a flight is scored: in the air, after the warm-up, away from resets and gaps.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+It follows from the present set and the log alone, so that no other set can take evidence from the rest. What such a set
+does in it is its own affair: resets of its own do not cut, see `fusetune.analyze.scoring.charges`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -14,27 +18,38 @@ from fusetune.px4.aid_sources import AID_SOURCES, HORIZONTAL_AIDING
 FUSION_DELAY_US = 500_000
 """Innovations belong to the fusion horizon, up to this much before the time of the output that shows a reset."""
 
-_LONGEST_CUT_SHARE = 0.5
-"""A set whose own resets cost more of the flight than this does not cut the flight of the others."""
-
 
 @dataclass(frozen=True)
 class ScoringWindow:
-    """Scored intervals of a flight, µs, half-open and in order, with what was cut and which sets were left out."""
+    """Scored intervals of a flight, µs, half-open and in order, with what was cut and which sets were left out.
+
+    `own_resets` holds, for each set other than the present one, the times around resets of its own, which are scored
+    all the same.
+    """
 
     intervals: tuple[Interval, ...]
     cuts: tuple[Cut, ...]
     excluded: dict[str, str]
     warm_up_end: int | None
     reason: str = ""
+    own_resets: Mapping[str, tuple[Cut, ...]] = field(default_factory=dict)
 
     @property
     def duration_s(self) -> float:
-        return sum(stop - start for start, stop in self.intervals) * 1e-6
+        return duration(self.intervals) * 1e-6
 
     def contains(self, time: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
         """True for the times (N,), µs, that are scored."""
         return inside(time, self.intervals)
+
+    def after_own_reset(self, name: str, time: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+        """True for the times (N,), µs, around a reset of that set alone."""
+        return inside(time, [(cut.start, cut.stop) for cut in self.own_resets.get(name, ())])
+
+    def own_resets_s(self, name: str) -> float:
+        """Scored time around resets of that set alone."""
+        left = subtract(self.intervals, self.own_resets.get(name, ()))
+        return (duration(self.intervals) - duration(left)) * 1e-6
 
     def block_edges(self, length_s: float) -> npt.NDArray[np.int64]:
         """Edges of blocks of equal length, as near to `length_s` as the span of the window allows, µs."""
@@ -65,15 +80,15 @@ def scoring_window(
     Parameters
     ----------
     records : replays of all sets on this flight, the present one among them
-    present : name of the present set; what it cannot do is not asked of the others
+    present : name of the present set, from whose warm-up and resets the window follows
     airborne : flight time, µs
     gaps : gaps in the IMU data, µs
 
     Returns
     -------
     ScoringWindow
-        Without intervals, and with a reason, where nothing can be scored. A set that diverged, that never or
-        late starts aiding, or that resets all the time is left out with its reason: it would cut the others.
+        Without intervals, and with a reason, where nothing can be scored. A set that diverged or that never starts
+        aiding is left out with its reason.
     """
     present_record = next(record for record in records if record.name == present)
     excluded = {record.name: _failure(record) for record in records if _failure(record)}
@@ -81,26 +96,13 @@ def scoring_window(
         return ScoringWindow((), (), excluded, None, f"the present set: {excluded[present]}")
     if not airborne:
         return ScoringWindow((), (), excluded, None, "the log holds no flight time")
-    reference = aiding_start(present_record)
-    assert reference is not None, "a set without aiding has failed"
-    starts = {}
-    for record in records:
-        if record.name in excluded:
-            continue
-        start = aiding_start(record)
-        assert start is not None, "a set without aiding has failed"
-        late_s = (start - reference) * 1e-6
-        if late_s > settings.max_start_delay_s:
-            excluded[record.name] = f"starts aiding {late_s:.1f} s later than the present set"
-        else:
-            starts[record.name] = start
-    settle_s = settings.warm_settle_s if present_record.is_warm_started else settings.settle_s
-    warm_up_end = max(starts.values()) + round(settle_s * 1e6)
-    flying = subtract(airborne, [Cut(-(2**62), warm_up_end, "warm-up")])
-    single_cuts = cuts_within(records, excluded, flying, present, gaps, settings)
+    warm_up_end = end_of_warm_up(present_record, present_record, settings)
+    flying = after(airborne, warm_up_end)
+    single_cuts = cuts_within(present_record, flying, gaps, settings)
     cuts = merged(single_cuts)
     intervals = subtract(flying, cuts)
-    window = ScoringWindow(intervals, cuts, excluded, warm_up_end)
+    own = own_resets(records, present, intervals, settings)
+    window = ScoringWindow(intervals, cuts, excluded, warm_up_end, own_resets=own)
     if window.duration_s < settings.minimum_scored_s:
         reason = (
             f"only {window.duration_s:.1f} s of flight remain after the warm-up and the cuts, "
@@ -108,6 +110,19 @@ def scoring_window(
         )
         return ScoringWindow((), cuts, excluded, warm_up_end, reason)
     return window
+
+
+def end_of_warm_up(record: ReplayedSet, present: ReplayedSet, settings: ScoringSettings) -> int:
+    """When a set has settled after it started aiding, µs, but not before the present one has."""
+    settle_s = settings.warm_settle_s if present.is_warm_started else settings.settle_s
+    starts = [start for one in (record, present) if (start := aiding_start(one)) is not None]
+    assert starts, "a set without aiding has failed"
+    return max(starts) + round(settle_s * 1e6)
+
+
+def after(intervals: Sequence[Interval], time_us: int) -> tuple[Interval, ...]:
+    """What of the intervals lies after a time."""
+    return subtract(intervals, [Cut(-(2**62), time_us, "warm-up")])
 
 
 def _what_was_taken(airborne: Sequence[Interval], flying: Sequence[Interval], cuts: Sequence[Cut]) -> str:
@@ -136,30 +151,31 @@ def _failure(record: ReplayedSet) -> str:
 
 
 def cuts_within(
-    records: Sequence[ReplayedSet],
-    excluded: dict[str, str],
-    flying: Sequence[Interval],
-    present: str,
-    gaps: Sequence[Interval],
-    settings: ScoringSettings,
+    present: ReplayedSet, flying: Sequence[Interval], gaps: Sequence[Interval], settings: ScoringSettings
 ) -> list[Cut]:
-    """Cuts around the resets of all sets and the gaps of the log inside `flying`; those at one time are one.
+    """Cuts around the resets of the present set and the gaps of the log inside `flying`; those at one time are one."""
+    behind = round(settings.reset_cut_s * 1e6)
+    cuts = [Cut(start, stop + behind, "gap in the log") for start, stop in gaps]
+    return _within([*cuts, *_around_resets(present, behind)], flying)
 
-    `excluded` takes sets whose own resets would cost the others too much of what the present set leaves of the flight.
-    """
-    after = round(settings.reset_cut_s * 1e6)
-    cuts = [Cut(start, stop + after, "gap in the log") for start, stop in gaps]
-    of_set = {record.name: _around_resets(record, after) for record in records if record.name not in excluded}
-    cuts += of_set.get(present, [])
-    left = subtract(flying, cuts)
-    total = duration(left)
-    for name, own in of_set.items():
-        lost = total - duration(subtract(left, own))
-        if name != present and lost > _LONGEST_CUT_SHARE * total:
-            excluded[name] = f"its resets would cut {lost * 1e-6:.1f} s of {total * 1e-6:.1f} s"
-        else:
-            cuts += own
-    return [cut for cut in dict.fromkeys(cuts) if any(cut.stop > start and cut.start < stop for start, stop in flying)]
+
+def own_resets(
+    records: Sequence[ReplayedSet], present: str, intervals: Sequence[Interval], settings: ScoringSettings
+) -> dict[str, tuple[Cut, ...]]:
+    """Times around the resets of each set but the present one that reach into the intervals."""
+    behind = round(settings.reset_cut_s * 1e6)
+    found = {
+        record.name: merged(_within(_around_resets(record, behind), intervals))
+        for record in records
+        if record.name != present
+    }
+    return {name: cuts for name, cuts in found.items() if cuts}
+
+
+def _within(cuts: Sequence[Cut], intervals: Sequence[Interval]) -> list[Cut]:
+    return [
+        cut for cut in dict.fromkeys(cuts) if any(cut.stop > start and cut.start < stop for start, stop in intervals)
+    ]
 
 
 def _around_resets(record: ReplayedSet, after_us: int) -> list[Cut]:

@@ -1,9 +1,9 @@
-"""What the sets of one flight predicted in the same gaps without a sensor: errors, drift and likelihood."""
+"""What the sets of one flight predicted in the present set's gaps without a sensor: errors, drift and likelihood."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,10 @@ from fusetune.analyze.metrics.innovation_metrics import rms_innovation
 from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, winsorised
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
+from fusetune.analyze.scoring.charges import EvidenceCost, charged
 from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of
 from fusetune.analyze.scoring.metrics_table import MetricsTable
+from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.px4.aid_sources import AID_SOURCES, AXES, WITHHOLDABLE
@@ -40,13 +42,17 @@ WITHHELD_SCHEMA = pa.schema(
 FEWEST_GAPS = 3
 """Fewer gaps than this make no figure."""
 
+_HORIZONS = 1000
+"""Keys of predictions leave room for horizons below 100 s, in tenths."""
+
 _STALE_US = 1_000_000
 """A sensor that the present set has not fused for so long was not there to be withheld."""
 
 
 @dataclass(frozen=True)
 class PairedGaps:
-    """Predictions of one source, axis and horizon in the gaps that all sets share; arrays (S, G), the sets first."""
+    """Predictions of one source, axis and horizon in the gaps of the present set, as they count; arrays (S, G), the
+    sets first. `complete` and `costs` are as of `fusetune.analyze.scoring.measurement_alignment.PairedSamples`."""
 
     sensor: str
     source: str
@@ -58,6 +64,13 @@ class PairedGaps:
     n: npt.NDArray[np.int64]
     error: Array
     variance: Array
+    complete: tuple[bool, ...] = ()
+    costs: Mapping[str, EvidenceCost] = field(default_factory=dict)
+
+    @property
+    def winsor_limit(self) -> float:
+        """See `fusetune.analyze.metrics.likelihood.winsor_limit`; of the complete sets, as others have no say."""
+        return winsor_limit(self.error[list(self.complete)] if self.complete else self.error.copy())
 
 
 WITHHELD_METRICS: tuple[Metric[PairedGaps], ...] = (
@@ -78,43 +91,105 @@ DRIFT: Metric[Sequence[PairedGaps]] = Metric(
 )  # fmt: skip
 
 
-def paired_gaps(records: Sequence[ReplayedSet], present: str, window: ScoringWindow) -> list[PairedGaps]:
-    """Predictions in the gaps that lie wholly in the scored part of the flight.
+def paired_gaps(
+    records: Sequence[ReplayedSet], present: str, window: ScoringWindow, settings: ScoringSettings | None = None
+) -> list[PairedGaps]:
+    """Predictions in the gaps of the present set that lie wholly in the scored part of the flight.
 
     Parameters
     ----------
     records : sets that are scored on this flight, the present one among them; each with predictions
-    present : a gap counts if this set used the sensor when the gap began
+    present : a gap counts if this set used the sensor when the gap began. What the others lack, and what follows their
+        own resets, counts as `fusetune.analyze.scoring.charges` says.
+    settings : by how much a set that lacks gaps is left out
     """
-    names = [record.name for record in records]
+    most = (settings or ScoringSettings()).max_lacking_percent
+    records = sorted(records, key=lambda record: record.name != present)
     tables = [_by_key(record.withheld()) for record in records if record.withheld is not None]
-    present_record = records[names.index(present)]
-    common = tables[0]["key"]
-    for table in tables[1:]:
-        common = np.intersect1d(common, table["key"])
-    rows = [np.flatnonzero(np.isin(table["key"], common)) for table in tables]
-    base = {name: values[rows[0]] for name, values in tables[0].items()}
-    error = np.stack([table["innovation"][row] for table, row in zip(tables, rows, strict=True)])
-    variance = np.stack([table["innovation_variance"][row] for table, row in zip(tables, rows, strict=True)])
-    usable = (
-        _inside(base["start"], base["stop"], window) & np.isfinite(error).all(axis=0) & (variance > 0.0).all(axis=0)
-    )
+    base = tables[0]
+    usable = _inside(base["start"], base["stop"], window) & _is_usable(base)
     groups: list[PairedGaps] = []
     for sensor, sources in WITHHOLDABLE.items():
         for source in sources:
             used = usable & (base["sensor"] == sensor) & (base["source"] == source)
-            used &= _in_use(present_record, source, base["start"])
+            used &= _in_use(records[0], source, base["start"])
             for axis in range(AID_SOURCES[source].axes):
                 for horizon in np.unique(base["horizon_s"][used]):
                     take = np.flatnonzero(used & (base["axis"] == axis) & (base["horizon_s"] == horizon))
                     if take.size:
-                        groups.append(
-                            PairedGaps(
-                                sensor, source, axis, float(horizon), tuple(names), base["gap"][take],
-                                base["start"][take], base["n"][take], error[:, take], variance[:, take],
-                            )
-                        )  # fmt: skip
+                        mask = {name: values[take] for name, values in base.items()}
+                        groups.append(_paired(records, tables, mask, window, most))
     return groups
+
+
+def _paired(
+    records: Sequence[ReplayedSet],
+    tables: Sequence[Mapping[str, npt.NDArray]],
+    mask: Mapping[str, npt.NDArray],
+    window: ScoringWindow,
+    most_lacking_percent: float,
+) -> PairedGaps:
+    """One source, axis and horizon: those rows of the present set, the first of the records, and the others' like."""
+    source, axis = str(mask["source"][0]), int(mask["axis"][0])
+    matched = [_matched(record, table, mask, window) for record, table in zip(records, tables, strict=True)]
+    costs = {record.name: one.cost for record, one in zip(records, matched, strict=True)}
+    kept = [number for number, one in enumerate(matched) if one.cost.lacking_percent <= most_lacking_percent]
+    present = matched[0].error
+    limit = winsor_limit(np.stack([matched[number].error for number in kept if matched[number].is_complete]))
+    counted = [
+        charged(one.error, one.variance, present, one.lacking, one.after_reset, limit, one.alone)
+        for one in (matched[number] for number in kept)
+    ]
+    return PairedGaps(
+        str(mask["sensor"][0]), source, axis, float(mask["horizon_s"][0]),
+        tuple(records[number].name for number in kept), mask["gap"], mask["start"], mask["n"],
+        np.stack([one.error for one in counted]), np.stack([one.variance for one in counted]),
+        tuple(matched[number].is_complete for number in kept), costs,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Matched:
+    """A set's predictions in gaps of the present one; where it is lacking its error and variance mean nothing. `alone`
+    is true where the set predicted in the gap, but no measurement fell into the second before this horizon."""
+
+    error: Array
+    variance: Array
+    lacking: npt.NDArray[np.bool_]
+    alone: npt.NDArray[np.bool_]
+    after_reset: npt.NDArray[np.bool_]
+
+    @property
+    def cost(self) -> EvidenceCost:
+        return EvidenceCost(self.error.size, int(self.lacking.sum()), int(self.after_reset.sum()))
+
+    @property
+    def is_complete(self) -> bool:
+        return not (self.lacking.any() or self.after_reset.any())
+
+
+def _matched(
+    record: ReplayedSet,
+    table: Mapping[str, npt.NDArray],
+    mask: Mapping[str, npt.NDArray],
+    window: ScoringWindow,
+) -> _Matched:
+    start = mask["start"]
+    if not table["key"].size:
+        nothing, nowhere = np.zeros(start.shape), np.zeros(start.shape, bool)
+        return _Matched(nothing, nothing + 1.0, ~nowhere, nowhere, nowhere)
+    row = np.minimum(np.searchsorted(table["key"], mask["key"]), table["key"].size - 1)
+    # Before it was fused once a source is predicted from nothing.
+    since = record.first_fused.get((str(mask["source"][0]), 0), np.iinfo(np.int64).max)
+    absent = table["key"][row] != mask["key"]
+    lacking = absent | ~_is_usable(table)[row] | (start < since)
+    alone = absent & (start >= since) & np.isin(mask["key"] // _HORIZONS, table["key"] // _HORIZONS)
+    after_reset = window.after_own_reset(record.name, start) & ~lacking
+    return _Matched(table["innovation"][row], table["innovation_variance"][row], lacking, alone, after_reset)
+
+
+def _is_usable(table: Mapping[str, npt.NDArray]) -> npt.NDArray[np.bool_]:
+    return np.isfinite(table["innovation"]) & (table["innovation_variance"] > 0.0)
 
 
 def _by_key(table: Columns) -> dict[str, npt.NDArray]:
@@ -122,7 +197,7 @@ def _by_key(table: Columns) -> dict[str, npt.NDArray]:
     sources = list(AID_SOURCES)
     source = np.array([sources.index(name) if name in AID_SOURCES else -1 for name in table["source"]], np.int64)
     horizon_ds = np.rint(table["horizon_s"] * 10.0).astype(np.int64)
-    key = ((table["start"] * 64 + source) * 4 + table["axis"]) * 1000 + horizon_ds
+    key = ((table["start"] * 64 + source) * 4 + table["axis"]) * _HORIZONS + horizon_ds
     order = np.argsort(key, kind="stable")
     return {"key": key[order]} | {name: values[order] for name, values in table.items()}
 
@@ -154,7 +229,7 @@ def withheld_rows(flight: str, groups: Sequence[PairedGaps], edges: npt.NDArray[
 def _rows_of(flight: str, group: PairedGaps, edges: npt.NDArray[np.int64]) -> pa.Table:
     sets, gaps = group.error.shape
     block = np.clip(np.searchsorted(edges, group.start, side="right") - 1, 0, edges.size - 2)
-    clipped = winsorised(group.error, winsor_limit(group.error))
+    clipped = winsorised(group.error, group.winsor_limit)
     count = sets * gaps
     columns = {
         "flight": pa.array([flight] * count, pa.string()),
@@ -189,9 +264,13 @@ def add_withheld_metrics(table: MetricsTable, groups: Sequence[PairedGaps]) -> N
     for source in dict.fromkeys(source for source, _ in last):
         for name, axes in AID_SOURCES[source].groups:
             members = [last[source, axis] for axis in axes if (source, axis) in last]
-            if len(members) == len(axes) and all(np.array_equal(one.gap, members[0].gap) for one in members):
+            if len(members) == len(axes) and all(_are_alike(one, members[0]) for one in members):
                 drift = DRIFT.function(members)
                 table.add_each(members[0].sets, source, name, DRIFT.name, drift, members[0].gap.size)
+
+
+def _are_alike(one: PairedGaps, other: PairedGaps) -> bool:
+    return one.sets == other.sets and np.array_equal(one.gap, other.gap)
 
 
 def add_true_drift(table: MetricsTable, records: Sequence[ReplayedSet], truth: Truth, window: ScoringWindow) -> None:

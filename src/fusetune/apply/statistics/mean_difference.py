@@ -1,23 +1,39 @@
 """By how much two sets differ over flights, and how sure that is."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.apply.statistics.bootstrap import Interval, expanded_interval, spread_of_flights
+from fusetune.apply.evidence import FlightEvidence
+from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.statistics.bootstrap import (
+    Interval,
+    bootstrap_scores,
+    expanded_interval,
+    p_value,
+    spread_of_flights,
+    units_redrawn,
+)
+from fusetune.apply.statistics.moderated import moderated
+from fusetune.apply.statistics.rounding import without_rounding
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class MeanDifference:
-    """Mean difference of two sets over flights, and its interval, which is None where nothing shows its spread."""
+    """Mean difference of two sets over flights, and its interval, which is None where nothing shows its spread.
+
+    `p_value` is two-sided, against no difference; None where it is not known.
+    """
 
     difference: float
     lower: float | None
     upper: float | None
     flights: int
+    p_value: float | None = None
 
     @property
     def is_certain(self) -> bool:
@@ -28,6 +44,58 @@ class MeanDifference:
     def is_worse(self) -> bool:
         """Above 0 beyond doubt: of scores, lower is better."""
         return self.lower is not None and self.lower > 0.0
+
+
+def mean_differences(
+    flights: Sequence[FlightEvidence], names: Sequence[str], settings: DecisionSettings, aim: str | None = None
+) -> list[MeanDifference]:
+    """Mean difference of each set's score to that of the first one.
+
+    What differs between flights shows the spread (`moderated`); of a single flight, what differs between its blocks.
+
+    Parameters
+    ----------
+    flights : at least one
+    names : of sets that were scored on all of them, the present one first
+    aim : in this kind of prediction alone; all flights have it
+    """
+    scores = np.array([_scores(one, aim)[[one.sets.index(name) for name in names]] for one in flights])
+    differences = without_rounding(scores - scores[:, :1])
+    if len(flights) == 1:
+        return _of_blocks(flights, names, differences[0], settings, aim)
+    found = []
+    for one in moderated(differences):
+        lower, upper = one.interval(settings.confidence) or (None, None)
+        found.append(MeanDifference(one.mean, lower, upper, len(flights), one.p_value))
+    return found
+
+
+def _scores(flight: FlightEvidence, aim: str | None) -> Array:
+    if aim is None:
+        return flight.scores
+    part = flight.aim(aim)
+    assert part is not None, "only flights that have the aim are asked for it"
+    return part.scores
+
+
+def _of_blocks(
+    flights: Sequence[FlightEvidence],
+    names: Sequence[str],
+    differences: Array,
+    settings: DecisionSettings,
+    aim: str | None,
+) -> list[MeanDifference]:
+    redrawn = bootstrap_scores(flights, names, settings.draws, settings.seed)
+    scores = redrawn.total if aim is None else redrawn.aims[aim]
+    units = units_redrawn(flights, aim)
+    found = []
+    for index, difference in enumerate(differences):
+        draws = scores[:, index] - scores[:, 0]
+        one = mean_difference(draws, np.array([difference]), units, settings.confidence)
+        spread = spread_of_flights(draws, np.array([difference]))
+        known = p_value(one.difference, spread, units)
+        found.append(MeanDifference(one.difference, one.lower, one.upper, 1, known))
+    return found
 
 
 def mean_difference(draws: Array, differences: Array, units: int, confidence: float) -> MeanDifference:

@@ -19,7 +19,17 @@ from fusetune.report.sections.ranking_tables import (
     set_name,
     sign_table,
 )
-from fusetune.report.withheld import BAROMETER, MAGNETOMETER, POSITION, VELOCITY, Withheld, drift_summary
+from fusetune.report.withheld import (
+    BAROMETER,
+    MAGNETOMETER,
+    POSITION,
+    VELOCITY,
+    Withheld,
+    drift,
+    drift_summary,
+    gap_lengths,
+    usual_gap_length,
+)
 from fusetune.storage.files import AnyPath
 
 
@@ -82,6 +92,7 @@ def withheld_section(results: Results, figures: AnyPath) -> str:
     ]
     others = _drift_table(results, (BAROMETER, MAGNETOMETER), "Without barometer, without magnetometer")
     parts += [others, _drift_note(results)] if others else []
+    parts += _shorter_gaps(results)
     gnss = _drift_table(results, (POSITION, VELOCITY), "Without GNSS, horizontal")
     parts += [details("Figures of the drift without GNSS", gnss)] if gnss else []
     return section("Without a sensor", *parts)
@@ -104,6 +115,21 @@ def _drift_table(results: Results, withheld: tuple[Withheld, ...], caption: str)
             row.append(signed(None if name == results.present else _figure(summary, name, last, "change")))
         rows.append(row)
     return table(head, rows, f"{caption}: drift, mean over the flights; change: at the end, against the present set")
+
+
+def _shorter_gaps(results: Results) -> list[str]:
+    """Which flights count with gaps of another length than those that are drawn."""
+    table = drift(results, POSITION)
+    if table.empty:
+        return []
+    lengths = gap_lengths(table)
+    usual = usual_gap_length(lengths)
+    others = lengths[lengths != usual]
+    if others.empty:
+        return []
+    told = ", ".join(f"{flight} {seconds:g} s" for flight, seconds in others.items())
+    text = f"Drawn are gaps of {usual:g} s. Flights with gaps of another length count in the ranking, too: {told}."
+    return [paragraph(text, "note")]
 
 
 def _drift_note(results: Results) -> str:

@@ -21,8 +21,8 @@ _TRUE_ERRORS = (
     ("truth_position_mean_removed", "all", "rmse", "position, mean removed m"),
     ("truth_attitude_deg", "tilt", "rmse", "tilt °"),
     ("truth_attitude_deg", "heading", "rmse", "heading °"),
-    ("truth_withheld_position", "horizontal", "rmse", "drift of position without GNSS m"),
-    ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity without GNSS m/s"),
+    ("truth_withheld_position", "horizontal", "rmse", "drift of position in its gaps without GNSS m"),
+    ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity in its gaps without GNSS m/s"),
     ("truth_velocity", "all", "nees", "velocity NEES / 3"),
 )
 _AS_FLOWN_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
@@ -188,8 +188,9 @@ def _set_troubles(summary: dict[str, Any]) -> str:
         resets = sum(one["resets"].values())
         lost = ", ".join(f"{source} ×{count}" for source, count in one["timeouts"].items())
         faults = ", ".join(fault.removeprefix("fs_") for fault in one["faults"])
-        if one["reason"] or resets or lost or faults:
-            rows.append((name, str(resets), lost, faults, one["reason"]))
+        if one["reason"] or one["evidence"]["left_out"] or resets or lost or faults:
+            far = f"{resets}, {one['significant_resets']} of them far" if resets else "0"
+            rows.append((name, far, lost, faults, one["reason"] or "; ".join(one["evidence"]["left_out"].values())))
     return table(("set", "resets in flight", "lost sources", "faults", "note"), rows) if rows else ""
 
 

@@ -1,0 +1,94 @@
+"""Mean differences over few flights, their spread steadied by that of the other candidates.
+
+Five flights say little of how a difference varies from flight to flight: Student's quantile is 2.8 instead of 2. But
+the other candidates, seen on the same flights, show how much differences vary here in proportion to their size. Each
+variance is therefore drawn towards what the size of its own differences and that proportion, the median of the others,
+let expect, as if that were known from `PRIOR_FLIGHTS` further flights.
+
+References
+----------
+Smyth, "Linear models and empirical Bayes methods for assessing differential expression in microarray experiments",
+Statistical Applications in Genetics and Molecular Biology 3(1), 2004 (the moderated t).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import stdtr, stdtrit
+
+from fusetune.apply.statistics.rounding import EQUAL_WITHIN, without_rounding
+
+Array = npt.NDArray[np.float64]
+
+PRIOR_FLIGHTS = 4
+"""Weight of the other candidates: with it the 95 % intervals of 5 to 12 flights hold the truth in 91 to 96 %
+(docs/decision.md); with 8 in 89 to 95 %."""
+
+
+@dataclass(frozen=True)
+class Moderated:
+    """Mean difference of one candidate to the present set over at least two flights, nat.
+
+    Attributes
+    ----------
+    error : standard error of the mean; None where the flights do not differ
+    freedom : degrees of freedom of its Student distribution
+    """
+
+    mean: float
+    error: float | None
+    freedom: float
+
+    def interval(self, confidence: float) -> tuple[float, float] | None:
+        """Two-sided interval of the mean; None where nothing shows its spread."""
+        if self.error is None:
+            return None
+        reach = -float(stdtrit(self.freedom, 0.5 * (1.0 - confidence))) * self.error
+        return self.mean - reach, self.mean + reach
+
+    @property
+    def p_value(self) -> float | None:
+        """Two-sided, against no difference; 1 where there is none beyond rounding, None where it is not known."""
+        if abs(self.mean) <= EQUAL_WITHIN:
+            return 1.0
+        if self.error is None:
+            return None
+        return float(min(2.0 * stdtr(self.freedom, -abs(self.mean) / self.error), 1.0))
+
+
+def moderated(differences: Array) -> list[Moderated]:
+    """Mean differences of all candidates.
+
+    Parameters
+    ----------
+    differences : (F, C) score of each candidate less that of the present set on each flight, F ≥ 2; twins of a
+        candidate count once among the others
+    """
+    differences = without_rounding(differences)
+    flights = len(differences)
+    variance = differences.var(axis=0, ddof=1)
+    size = np.square(differences).mean(axis=0)
+    share = np.minimum(np.divide(variance, size, out=np.ones_like(size), where=size > 0.0), 1.0)
+    twin_of = _first_twins(differences)
+    found = []
+    for index, own in enumerate(twin_of):
+        others = [other for other in np.unique(twin_of) if other != own and size[other] > 0.0]
+        weight = min(PRIOR_FLIGHTS, len(others))
+        steadied = variance[index]
+        if weight and steadied > EQUAL_WITHIN**2:
+            expected = float(np.median(share[others])) * size[index]
+            steadied = (weight * expected + (flights - 1) * steadied) / (weight + flights - 1)
+        error = math.sqrt(steadied / flights)
+        known = error > EQUAL_WITHIN
+        mean = float(differences[:, index].mean())
+        found.append(Moderated(mean, error if known else None, float(flights - 1 + weight)))
+    return found
+
+
+def _first_twins(differences: Array) -> Sequence[int]:
+    """(C,) index of the first candidate that has the same differences on every flight."""
+    _, first, group = np.unique(np.round(differences / EQUAL_WITHIN), axis=1, return_index=True, return_inverse=True)
+    return np.asarray(first[np.ravel(group)]).tolist()
