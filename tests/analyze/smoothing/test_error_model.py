@@ -66,11 +66,11 @@ def test_white_errors_are_found_white(seed: int) -> None:
     assert 0.4 * WALK < errors.walk < 2.5 * WALK
 
 
-@pytest.mark.parametrize(("tau", "near"), [(0.5, (0.5, 1.0)), (2.0, (1.0, 2.0, 4.0)), (4.0, (2.0, 4.0, 8.0))])
-def test_the_time_over_which_errors_wander_is_found(tau: float, near: tuple[float, ...]) -> None:
+@pytest.mark.parametrize("tau", [0.5, 2.0, 4.0])
+def test_the_time_over_which_errors_wander_is_found(tau: float) -> None:
     errors = found(0.05, 0.15, tau, seed=5)
-    assert errors.correlation_time_s in near
-    # how far 240 s of a process that forgets over τ tell its size: 1/√(2 · 240/τ) is 9 % for 4 s; and factors of two
+    assert 0.5 * tau < errors.correlation_time_s < 2.0 * tau
+    # how far 240 s of a process that forgets over τ tell its size: 1/√(2 · 240/τ) is 9 % for 4 s
     assert math.hypot(errors.white, errors.correlated) == pytest.approx(math.hypot(0.05, 0.15), rel=0.4)
 
 
