@@ -44,6 +44,7 @@ SCORE_TOPICS = (
             "vehicle_land_detected",
             *IMU_TOPICS,
             *TRUTH_TOPICS,
+            "vehicle_air_data",
             "estimator_selector_status",
             "estimator_status",
             *INNOVATION_TOPICS,
