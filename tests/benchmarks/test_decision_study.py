@@ -165,6 +165,7 @@ def test_equal_sets_are_not_changed(worlds) -> None:
     assert {kind: share for (rule, kind), share in shares.items() if rule == OLD} == {
         "equal": 0.0,
         "persistent": 0.0,
+        "persistent, skewed": 0.0,
         "nearly equal": 0.0,
         "nearly equal, noisy": 0.0,
     }
