@@ -57,7 +57,13 @@ class Configuration:
         at_least=1,
     )
     present_flight: str | None = setting(
-        None, "name of the flight whose parameters count as the vehicle's present ones; empty: the newest"
+        None, "name of the flight whose parameters count as the vehicle's present ones; empty: the newest that counts"
+    )
+    vehicle: str | None = setting(
+        None,
+        "vehicle that is decided for: its name or id in `results/save/flights.csv`, or how either begins; empty: that "
+        "of the newest real flight that counts",
+        at_least=1,
     )
     sets_per_job: int = setting(
         8,

@@ -56,7 +56,7 @@ def test_a_gain_that_does_not_matter_is_no_reason_for_a_change() -> None:
 
 def test_a_set_that_is_worse_in_one_kind_of_prediction_is_not_eligible() -> None:
     worse = {"aided": MeanDifference(0.02, 0.01, 0.03, 6)}
-    assert chosen(one("b", -0.2, -0.1, aims=worse), one("c", -0.1, -0.05)) == "c"
+    assert chosen(one("b", -0.2, -0.1, aims=worse, worse_aims=("aided",)), one("c", -0.1, -0.05)) == "c"
 
 
 def test_of_two_sets_that_predict_alike_the_nearer_one_is_chosen() -> None:

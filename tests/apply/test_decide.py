@@ -130,8 +130,11 @@ def test_a_set_that_is_ruled_out_and_predicts_better_leads_to_candidates(tmp_pat
     decision = run(tmp_path, {"present": MadeSet(error=0.1, overrides=PRESENT), "bold": bold})
     assert (decision["status"], ranked(decision, "bold")["status"]) == ("keep", "not eligible")
     proposed = {one["name"]: one["overrides"] for one in decision["candidates"]}
+    # its innovations of 0.1 m/s beside a noise of 0.3 lead to another one
+    measured = {name: proposed[name] for name in proposed if name.startswith("measured")}
+    assert list(measured) == ["measured_gps_v_noise"]
     # The gate of 5 at a noise of 0.3 m/s reaches as far as one of 15 at 0.1; √(0.3 · 0.1) and √(0.35 · 0.1)
-    assert proposed == {
+    assert proposed == measured | {
         "bold_wider_gates": {"EKF2_ACC_NOISE": 0.1, "EKF2_GPS_V_GATE": 15.0, "EKF2_GPS_V_NOISE": 0.1},
         "bold_halfway": {"EKF2_ACC_NOISE": 0.187, "EKF2_GPS_V_NOISE": 0.173},
     }

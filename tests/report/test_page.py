@@ -32,6 +32,7 @@ def test_the_page_says_what_was_decided_and_why(made: tuple[Path, str]) -> None:
     assert "ab" * 32 in page
     for heading in (
         "What the flights say",
+        "What PX4 is told, and what the data say",
         "Without a sensor",
         "Does the choice hold?",
         "What counts how much",

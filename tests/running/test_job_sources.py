@@ -20,7 +20,7 @@ MADE_BY = {
     "design": ("design",),
     "simulate_flight": ("execute",),
     "save_flight": ("save",),
-    "list_flights": ("save",),
+    "list_flights": ("score", "save"),
     "replay_flight": ("replay", "save"),
     "analyze_flight": ("replay", "score", "save"),
     "decide": ("apply", "score", "replay", "save"),

@@ -137,6 +137,7 @@ def test_metadata_says_who_when_and_how_long(tmp_path: Path, log: Path) -> None:
     metadata = json.loads((tmp_path / "made" / "metadata.json").read_text())
     assert metadata["firmware"] == "v1.13.1"
     assert metadata["hardware"] == {"ver_hw": "PX4_SITL"}
+    assert (metadata["vehicle"], metadata["vehicle_kind"], metadata["vehicle_uuid"]) == ("PX4_SITL", "SITL", "")
     assert metadata["recorded"] == "2020-09-13T12:26:41Z"  # 1.6e9 s of Unix time and one second
     assert metadata["duration_s"] == pytest.approx(2599 * 0.005)
     assert metadata["airborne_s"] == pytest.approx(2599 * 0.005 - 0.2)

@@ -6,10 +6,15 @@ from typing import Any
 import pytest
 
 from fusetune.errors import UserError
+from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.save import FlightSets, Present, find_present, flight_folder, read_present, write_present
 from fusetune.set_names import AS_FLOWN, PRESENT, RESERVED_SET_NAMES
 from fusetune.storage.documents import write_document
 
+QUADROTOR = VehicleIdentity("0001" + "0" * 28 + "003a", "PX4_FMU_V4", "4011", "quadrotor")
+OCTOROTOR = VehicleIdentity("0002" + "0" * 28 + "002d", "PX4_FMU_V5", "8001", "octorotor")
+SITL = VehicleIdentity("", "PX4_SITL", "4001", "quadrotor", "SITL")
+HITL = VehicleIdentity(QUADROTOR.uuid, "PX4_FMU_V4", "4011", "quadrotor", "HITL")
 VARIED = ("EKF2_GPS_V_NOISE", "EKF2_ACC_NOISE", "EKF2_NOT_IN_THESE_LOGS")
 
 
@@ -31,14 +36,21 @@ def folders(tmp_path: Path) -> dict[str, Path]:
     return found
 
 
-def row(flight: str, recorded: str, status: str = "replayable") -> dict[str, Any]:
-    return {"flight": flight, "recorded": recorded, "status": status}
+def row(
+    flight: str,
+    recorded: str,
+    status: str = "replayable",
+    vehicle: VehicleIdentity = QUADROTOR,
+    airborne_s: float = 60.0,
+) -> dict[str, Any]:
+    row = {"flight": flight, "recorded": recorded, "status": status, "airborne_s": airborne_s}
+    return row | vehicle.columns()
 
 
 def test_the_newest_flight_that_can_be_replayed_is_present(folders: dict[str, Path]) -> None:
     rows = [row("c", "2026-05-03", "refused"), row("b", "2026-05-02"), row("a", "2026-05-01")]
     present = find_present(rows, folders, VARIED, None)
-    assert present == Present("b", "sum of b", {"EKF2_ACC_NOISE": 0.35, "EKF2_GPS_V_NOISE": 0.1})
+    assert present == Present("b", "sum of b", {"EKF2_ACC_NOISE": 0.35, "EKF2_GPS_V_NOISE": 0.1}, ("b",))
 
 
 def test_of_flights_of_one_time_the_last_by_name_is_present(folders: dict[str, Path]) -> None:
@@ -60,9 +72,90 @@ def test_without_a_flight_there_is_no_present(folders: dict[str, Path]) -> None:
 
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
-    present = Present("a", "0123", {"EKF2_ACC_NOISE": 0.1, "EKF2_GPS_V_NOISE": 1 / 3})
+    present = Present("a", "0123", {"EKF2_ACC_NOISE": 0.1, "EKF2_GPS_V_NOISE": 1 / 3}, ("a", "c"))
     write_present(tmp_path / "present.json", present)
     assert read_present(tmp_path / "present.json") == present
+
+
+class Grades:
+    """What a flight counts for, and which flights it was asked of: each costs a replay."""
+
+    def __init__(self, *counting: str) -> None:
+        self.counting, self.asked = counting, []
+
+    def __call__(self, flight: str) -> bool:
+        self.asked.append(flight)
+        return flight in self.counting
+
+
+@pytest.mark.parametrize("simulated", [SITL, HITL])
+def test_a_newer_simulated_flight_is_passed_over_for_a_real_one(
+    folders: dict[str, Path], simulated: VehicleIdentity
+) -> None:
+    rows = [row("a", "2026-05-01"), row("b", "2026-05-02"), row("c", "2026-05-03", vehicle=simulated)]
+    counts = Grades("b")
+    assert find_present(rows, folders, VARIED, None, None, counts).flight == "b"
+    assert counts.asked == ["b"]
+
+
+def test_where_all_is_simulated_that_decides(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01", vehicle=SITL), row("b", "2026-05-02", vehicle=SITL)]
+    assert find_present(rows, folders, VARIED, None).flight == "b"
+
+
+def test_a_flight_that_does_not_count_does_not_say_what_flies_now(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01"), row("b", "2026-05-02"), row("c", "2026-05-03")]
+    counts = Grades("a", "b")
+    present = find_present(rows, folders, VARIED, None, None, counts)
+    assert (present.flight, present.parameters["EKF2_GPS_V_NOISE"]) == ("b", 0.1)
+    assert counts.asked == ["c", "b"]
+
+
+def test_nor_does_it_say_which_vehicle_is_decided_for(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01"), row("c", "2026-05-03", vehicle=OCTOROTOR)]
+    assert find_present(rows, folders, VARIED, None, None, Grades("a")).flight == "a"
+
+
+def test_where_none_counts_the_newest_real_flight_stands(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01"), row("b", "2026-05-02"), row("c", "2026-05-03", vehicle=SITL)]
+    assert find_present(rows, folders, VARIED, None, None, Grades("c")).flight == "b"
+
+
+def test_no_replay_is_asked_for_where_all_flights_have_the_same_values(folders: dict[str, Path]) -> None:
+    rows = [row(name, f"2026-05-0{day}") for day, name in enumerate("abc", 1)]
+    counts = Grades()
+    present = find_present(rows, folders, ["EKF2_ACC_NOISE"], None, None, counts)
+    assert (present.flight, present.same, counts.asked) == ("c", ("c", "b", "a"), [])
+
+
+def test_a_log_without_flight_is_passed_over(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01"), row("b", "2026-05-02", airborne_s=0.0)]
+    assert find_present(rows, folders, VARIED, None).flight == "a"
+
+
+@pytest.mark.parametrize("asked", [OCTOROTOR.name, "px4_fmu_v5", OCTOROTOR.uuid[:6]])
+def test_another_vehicle_can_be_asked_for(folders: dict[str, Path], asked: str) -> None:
+    rows = [row("a", "2026-05-01", vehicle=OCTOROTOR), row("b", "2026-05-02"), row("c", "2026-05-03")]
+    present = find_present(rows, folders, VARIED, None, asked)
+    assert (present.flight, present.same) == ("a", ("a",))
+
+
+def test_a_vehicle_that_is_not_there_is_told_with_those_that_are(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01", vehicle=OCTOROTOR), row("b", "2026-05-02")]
+    with pytest.raises(UserError, match=rf"'V9' has no flight.*{QUADROTOR.name}, {OCTOROTOR.name}"):
+        find_present(rows, folders, VARIED, None, "V9")
+
+
+def test_a_name_that_several_vehicles_have_is_told(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01", vehicle=OCTOROTOR), row("b", "2026-05-02")]
+    with pytest.raises(UserError, match=r"'PX4_FMU' can mean .*Write more of its name"):
+        find_present(rows, folders, VARIED, None, "PX4_FMU")
+
+
+def test_a_flight_of_another_vehicle_cannot_be_asked_for_with_it(folders: dict[str, Path]) -> None:
+    rows = [row("a", "2026-05-01", vehicle=OCTOROTOR), row("b", "2026-05-02")]
+    with pytest.raises(UserError, match="'b' is no flight of PX4_FMU_V5 that can be replayed"):
+        find_present(rows, folders, VARIED, "b", "PX4_FMU_V5")
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"flight": "a"}', '{"flight": 1, "other": 2}'])

@@ -27,6 +27,11 @@ def of_its_logs(fixed, for_each_mb=0.0):
     return needed
 
 
+def of_the_largest_log(fixed, for_each_mb):
+    """Resource function of a job that works on one log after the other."""
+    return lambda wildcards, attempt: round((fixed + for_each_mb * max(map(log_mb, LOGS), default=0.0)) * attempt)
+
+
 def replay_resources(replayed, scored=0):
     """Memory, MB, and time, minutes, of a job that replays some sets and scores some."""
     return {

@@ -27,6 +27,8 @@ rule save_flight:
 checkpoint list_flights:
     input:
         folders=expand("results/save/{flight}", flight=LOGS),
+        # which flight says what flies now can depend on how its replay is graded
+        kernels=KERNELS_READY,
     output:
         # first, for by it Snakemake knows whether a job has the checkpoint behind it
         present="results/save/present.json",
@@ -42,13 +44,18 @@ checkpoint list_flights:
     conda:
         "../envs/fusetune.yaml"
     resources:
-        mem_mb=of_its_logs(LIBRARIES_MB),
-        runtime=of_its_logs(5),
+        mem_mb=of_the_largest_log(KERNELS_MB, 5.0),
+        runtime=of_its_logs(10, 0.02),
     params:
         refused=[list(astuple(entry)) for entry in INPUTS.found.refused],
         code=DIGEST["save"],
         varied=SETS.varied,
         present_flight=SETTINGS.present_flight,
+        vehicle=SETTINGS.vehicle,
+        replay=asdict(SETTINGS.replay),
+        trust=asdict(SETTINGS.trust),
+        lowest_grade=SETTINGS.decision.lowest_grade,
+        grade_code=DIGEST["score"],
     message:
         "Save: list which flights can be replayed"
     script:

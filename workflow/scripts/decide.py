@@ -14,13 +14,15 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
+    now = read_present(snakemake.input.present)
     decide(
         [Path(scores).parent for scores in snakemake.input.scores],
         Path(snakemake.input.flights),
         Path(snakemake.output[0]).parent,
         sets=snakemake.params.sets,
         present=snakemake.params.present,
-        newest_flight=read_present(snakemake.input.present).flight,
+        newest_flight=now.flight,
+        same_present=now.same,
         descriptions=snakemake.params.descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
         settings=DecisionSettings(**snakemake.params.decision),

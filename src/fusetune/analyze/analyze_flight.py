@@ -9,7 +9,7 @@ what it reads of the log, and what no later one reads leaves the memory, so that
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fusetune.analyze.flight_files import ONBOARD_FILE
@@ -22,7 +22,7 @@ from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, scored_flight
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.as_flown_comparison import AsFlownComparison, AsFlownReplay
 from fusetune.analyze.trust.as_flown_figures import compared_rows
-from fusetune.analyze.trust.grade import COMPARED_SOURCES, TRUST_TOPICS, grade_flight
+from fusetune.analyze.trust.grade import COMPARED_SOURCES, TRUST_TOPICS, TrustGrade, grade_flight
 from fusetune.analyze.trust.onboard_fidelity import write_flight_fidelity
 from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.ekf2.replay.kept_rows import KeptRows
@@ -107,6 +107,19 @@ def _replay_and_grade(
     grade = grade_flight(prepared, settings.replay, settings.trust, comparison)
     write_flight_fidelity(prepared, output_folder, grade)
     return flight
+
+
+def grade_saved_flight(flight_folder: AnyPath, settings: AnalysisSettings) -> TrustGrade:
+    """Grade a saved flight as `analyze_flight` does, without what the causes cost; nothing is written.
+
+    Raises
+    ------
+    UserError
+        If the saved flight is missing or damaged.
+    """
+    flight = canonical(load_flight(flight_folder, topics={*REPLAY_TOPICS, *COMPARED_TOPICS}))
+    prepared = prepare_flight(flight, settings.replay).with_flight(with_onboard_columns(flight, COMPARED_SOURCES))
+    return grade_flight(prepared, settings.replay, replace(settings.trust, causes=False))
 
 
 def write_replays(prepared: PreparedFlight, replayed: Mapping[str, Mapping[str, float]], folder: AnyPath) -> None:

@@ -7,11 +7,26 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
-from fusetune.apply.candidates import Candidate, between_vetoed_and_present, candidates_sentence, write_candidates
+from fusetune.apply.candidates import (
+    Candidate,
+    between_vetoed_and_present,
+    candidates_sentence,
+    without_twins,
+    write_candidates,
+)
 from fusetune.apply.choice import Choice, choose, parameter_distance
+from fusetune.apply.consistency import (
+    SourceNoise,
+    consistency_candidates,
+    consistency_findings,
+    sentence_of_largest,
+    source_noises,
+)
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
-from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights
+from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out
+from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
@@ -21,6 +36,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
+from fusetune.finding import documents
 from fusetune.set_names import PRESENT
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
@@ -38,6 +54,7 @@ def decide(
     sets: Sequence[str],
     present: str = PRESENT,
     newest_flight: str | None = None,
+    same_present: Sequence[str] = (),
     descriptions: Mapping[str, str] | None = None,
     configuration_files: Sequence[AnyPath] = (),
     settings: DecisionSettings | None = None,
@@ -53,7 +70,9 @@ def decide(
     present : the configuration that the vehicle flies now, replayed on every flight like any other set. Its
         parameters on the newest flight are the "previous values". Given with explicit values it is one
         configuration on all flights; with none it is each flight's own.
-    newest_flight : by whose log the vehicle's present parameters are known; the last by name if None
+    newest_flight : by whose log the vehicle's present parameters are known; the last by name if None. Its vehicle is
+        decided for, flights of others are left out.
+    same_present : flights that have the same values, the newest first; one that counts stands for it where it does not
     descriptions : a line about each set, from the study
     configuration_files : hashed into the decision
 
@@ -64,8 +83,12 @@ def decide(
     """
     settings = settings or DecisionSettings()
     sets = list(dict.fromkeys((present, *sets)))
-    flights = read_flights(analyze_folders, settings, present)
-    newest = _newest(flights, newest_flight, flights_table)
+    folders = [Path(folder) for folder in analyze_folders]
+    newest_flight = newest_flight or max((folder.name for folder in folders), default=None)
+    vehicle = decided_vehicle(flights_table, [folder.name for folder in folders], newest_flight)
+    flights = read_flights([one for one in folders if one.name not in vehicle.others], settings, present)
+    others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
+    newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
     vetoed = {name: vetoes(name, present, flights, metrics, settings) for name in sets if name != present}
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
@@ -73,15 +96,26 @@ def decide(
     choice = choose(ranked, present, evidence, _distances(newest, present), settings)
     values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present)
+    noises = _noises(flights, metrics, newest, present, settings)
+    findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
-    proposed = _candidates(better, newest, present)
-    text = paragraph(choice, ranked, flights, settings)
-    text = " ".join(filter(None, (text, candidates_sentence(proposed, _gains(better)))))
+    proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
+    sentences = (
+        paragraph(choice, ranked, flights, settings),
+        sentence_of_largest(findings),
+        candidates_sentence(proposed, _gains(better)),
+        *vehicle.sentences(),
+        *unsure_of_present(flights, newest),
+    )
+    text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
+    decision["findings"] = documents(findings)
+    decision["noises"] = [asdict(one) for one in noises]
     decision["provenance"] = provenance(configuration_files)
-    decision["flights"] = flight_rows(flights_table, flights)
+    decision["vehicle"] = vehicle.document(flights, newest.name if newest else None)
+    decision["flights"] = flight_rows(flights_table, [*flights, *others])
     decision["sets"] = _sets(sets, present, newest, descriptions or {}, flights)
     decision["paper_mode"] = _paper_mode(
         paper_entries(sets, flights, metrics, values), choice, ranked, flights, metrics, settings
@@ -99,10 +133,8 @@ def decide(
 
 
 def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: AnyPath) -> AnalyzedFlight | None:
-    if not flights:
-        return None
     if name is None:
-        return flights[-1]
+        return None
     for flight in flights:
         if flight.name == name:
             return flight
@@ -115,18 +147,34 @@ def _distances(newest: AnalyzedFlight | None, present: str) -> dict[str, float]:
     return {name: parameter_distance(one["overrides"], now) for name, one in sets.items()}
 
 
+def _noises(
+    flights: Sequence[AnalyzedFlight],
+    metrics: pa.Table,
+    newest: AnalyzedFlight | None,
+    present: str,
+    settings: DecisionSettings,
+) -> list[SourceNoise]:
+    """What PX4 is told of the sources, and what the flights that decide say of them."""
+    deciding = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
+    parameters = newest.summary["sets"].get(present, {}).get("parameters", {}) if newest is not None else {}
+    return source_noises(metrics.filter(pc.is_in(metrics["flight"], deciding)), present, parameters, settings)
+
+
 def _vetoed_but_better(ranked: Sequence[RankedSet]) -> list[RankedSet]:
     """Sets that are ruled out though they predict better than the present one beyond doubt."""
     return [one for one in ranked if one.is_vetoed and one.upper is not None and one.upper < 0.0]
 
 
-def _candidates(better: Sequence[RankedSet], newest: AnalyzedFlight | None, present: str) -> list[Candidate]:
-    """What lies between such sets and the present one, to compare next."""
+def _candidates(
+    better: Sequence[RankedSet], newest: AnalyzedFlight | None, present: str, found: Sequence[Candidate]
+) -> list[Candidate]:
+    """What to compare next: what lies between such sets and the present one, and what was found beside."""
     if newest is None:
         return []
     sets = {name: one["overrides"] for name, one in newest.summary["sets"].items()}
     now = newest.summary["sets"].get(present, {}).get("parameters", {})
-    return between_vetoed_and_present({one.name: one.reasons for one in better if one.name in sets}, sets, now)
+    between = between_vetoed_and_present({one.name: one.reasons for one in better if one.name in sets}, sets, now)
+    return without_twins([*between, *found], sets)
 
 
 def _gains(better: Sequence[RankedSet]) -> dict[str, float]:
@@ -226,6 +274,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
         row: dict[str, Any] = {"rank": position, **_figures_of(one), **_flat_aims(one), **values[one.name]}
         del row["aims"], row["is_present"]
         row["reasons"] = "; ".join(one.reasons)
+        row["worse_aims"] = " ".join(one.worse_aims)
         rows.append(_rounded(row))
     table = pa.Table.from_pylist(rows)
     # A column in which nothing is known is one of figures all the same.
@@ -273,6 +322,8 @@ def _reason(choice: Choice) -> str:
 
 def _file_origin(choice: Choice, decision: dict[str, Any], newest: AnalyzedFlight | None) -> tuple[str, ...]:
     lines = [f"written by {decision['provenance']['product']}, decision: {choice.status} ({choice.chosen})"]
+    if decision["vehicle"] is not None:
+        lines.append(f"for the {decision['vehicle']['in_words']}")
     if newest is not None:
         lines.append(f"previous values from flight {newest.name}, firmware {newest.summary['firmware']}")
     if choice.exploratory:

@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.metrics.likelihood import profile_nll
+from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.aid_sources import AXES
 from fusetune.storage.documents import read_document
@@ -83,8 +84,9 @@ class FlightEvidence:
 
 NOT_SCORED, DISTRUSTED, WITHOUT_SAMPLES = "not scored", "distrusted", "without samples"
 MISLEADING = "misleading"
-"""Why a flight has no evidence: it could not be scored, its replay is not trusted, nothing in it is judged by, or what
-is there would mislead."""
+OTHER_VEHICLE = "other vehicle"
+"""Why a flight has no evidence: it could not be scored, its replay is not trusted, nothing in it is judged by, what is
+there would mislead, or another vehicle is decided for."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class NoEvidence:
 
     Attributes
     ----------
-    kind : `NOT_SCORED`, `DISTRUSTED`, `WITHOUT_SAMPLES` or `MISLEADING`
+    kind : `NOT_SCORED`, `DISTRUSTED`, `WITHOUT_SAMPLES`, `MISLEADING` or `OTHER_VEHICLE`
     reason : in words
     """
 
@@ -133,7 +135,8 @@ class _Sums:
 
 
 def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
-    """Read `results/analyze/<flight>` of all flights, ordered by name so that the order of arguments does not matter.
+    """Read `results/analyze/<flight>` of all flights of a vehicle, ordered by name so that the order of arguments does
+    not matter.
 
     A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
     """
@@ -146,6 +149,15 @@ def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present
     usual = {source: float(np.mean(sorted(found))) for source, found in known.items()}
     flights = (_read_flight(one, table, settings, present, usual | shares[one]) for one, table in metrics.items())
     return sorted(flights, key=lambda one: one.name)
+
+
+def read_left_out(folder: AnyPath, without: NoEvidence) -> AnalyzedFlight:
+    """Read `results/analyze/<flight>` of a flight that is left out, whatever it holds."""
+    folder = Path(folder)
+    summary = read_document(folder / "scoring.json")
+    return AnalyzedFlight(
+        summary["flight"], folder, summary, read_table(folder / "metrics.parquet"), evidence=None, without=without
+    )
 
 
 def _read_flight(
@@ -167,7 +179,7 @@ def _evidence_of(
     if summary["status"] != "scored":
         return NoEvidence(NOT_SCORED, summary["reason"])
     grade, why = trust_grade(folder)
-    if grade is not None and grade > settings.lowest_grade:
+    if not reaches(grade, settings.lowest_grade):
         because = f" ({why})" if why else ""
         words = (
             f"its replay has trust grade {grade}{because}, and the decision takes none below {settings.lowest_grade}"

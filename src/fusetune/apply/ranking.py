@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
+from fusetune.apply.evidence_cost import evidence_lost_percent
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.bootstrap import (
     FEWEST_REDRAWN,
@@ -20,6 +21,7 @@ from fusetune.apply.statistics.bootstrap import (
 from fusetune.apply.statistics.mean_difference import MeanDifference, mean_differences
 from fusetune.apply.statistics.rounding import EQUAL_WITHIN, without_rounding
 from fusetune.apply.statistics.sign_flips import family_p_values
+from fusetune.apply.worse_aims import mean_weights, worse_aims
 
 Array = npt.NDArray[np.float64]
 
@@ -50,6 +52,8 @@ class RankedSet:
     behind_best, behind_best_error : score less that of the best set, and its standard error; best is the lowest of
         those that are proved better than the present set, or where none is, of all that may be flown
     aims : mean difference of the score to that of the present set in each kind of prediction
+    worse_aims : kinds of prediction in which the set is worse than the present one beyond doubt, and that rule it out
+    evidence_lost_percent : how much of the evidence it lacks or spoilt by resets of its own, and is charged for
     """
 
     name: str
@@ -70,6 +74,8 @@ class RankedSet:
     behind_best: float = math.nan
     behind_best_error: float | None = None
     aims: dict[str, MeanDifference] = field(default_factory=dict)
+    worse_aims: tuple[str, ...] = ()
+    evidence_lost_percent: float | None = None
 
     @property
     def status(self) -> str:
@@ -81,11 +87,6 @@ class RankedSet:
         if self.reasons or self.worse_aims:
             return NOT_ELIGIBLE
         return SAME if self.equal_to_present else ELIGIBLE
-
-    @property
-    def worse_aims(self) -> tuple[str, ...]:
-        """Kinds of prediction in which the set is worse than the present one beyond doubt."""
-        return tuple(name for name, aim in self.aims.items() if aim.is_worse)
 
     @property
     def is_vetoed(self) -> bool:
@@ -151,6 +152,7 @@ def rank(
         # A set that failed on some flights: its figures come from the others, for information.
         ranked += [one for one in _compared([name], present, by_set[name], vetoed, equal, settings) if one.name == name]
     ranked += [_never_scored(name, present, vetoed) for name in sets if not by_set[name]]
+    ranked = [replace(one, evidence_lost_percent=evidence_lost_percent(one.name, flights, settings)) for one in ranked]
     return sorted(ranked, key=lambda one: (not one.flights, one.is_vetoed, one.score, not one.is_present, one.name))
 
 
@@ -167,6 +169,7 @@ def _compared(
     scores = np.array([one.scores[[one.sets.index(name) for name in names]] for one in evidence])
     to_present = mean_differences(evidence, names, settings)
     aims = _aims(names, evidence, settings)
+    weights = mean_weights(evidence)
     return [
         RankedSet(
             name=name,
@@ -184,7 +187,8 @@ def _compared(
             flights_better=int(np.count_nonzero(without_rounding(scores[:, index] - scores[:, 0]) < 0.0)),
             equal_to_present=name in equal,
             improvement_percent=improvement_percent(compared.difference),
-            aims={aim: of_sets[index] for aim, of_sets in aims.items()},
+            aims=(own := {aim: of_sets[index] for aim, of_sets in aims.items()}),
+            worse_aims=worse_aims(own, weights, compared),
         )
         for index, (name, compared) in enumerate(zip(names, to_present, strict=True))
     ]

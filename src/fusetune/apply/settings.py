@@ -89,6 +89,12 @@ class DecisionSettings:
     confidence: float = setting(0.95, "level of the interval that must exclude zero for a change", low=0.5, high=0.999)
     draws: int = setting(4000, "draws of the paired bootstrap", low=200, high=200_000)
     minimum_flights: int = setting(5, "with fewer flights the decision is called exploratory", low=1, high=1000)
+    noise_factor: float = setting(
+        2.0,
+        "the noise of a source is told of where PX4 is told beyond doubt one so many times too large or too small",
+        above=1,
+        high=100,
+    )
     seed: int = 0
     """Of the bootstrap; the configuration has it beside the sections."""
 

@@ -23,6 +23,7 @@ from fusetune.execute.world.vehicle_state import sensor_selection, vehicle_land_
 from fusetune.px4.flight import Flight, LoggedMessage, ParameterHistory, TopicKey, TopicTable
 from fusetune.px4.releases import BASELINE
 from fusetune.px4.ulog.writer import write_ulog
+from fusetune.px4.vehicle_identity import OWN_SIMULATOR
 
 LONGEST_FLIGHT_S = 4500.0
 RELEASE = BASELINE[0] << 24 | BASELINE[1] << 16 | 255
@@ -142,7 +143,8 @@ def _flight(
         info={
             "sys_name": "PX4",
             "sys_os_name": "fusetune",
-            "ver_hw": "FUSETUNE_SIM",
+            "ver_hw": OWN_SIMULATOR,
+            "sys_uuid": vehicle.name,
             "ver_sw": "0" * 40,
             "ver_sw_release": RELEASE,
             "sys_mcu": vehicle.name,

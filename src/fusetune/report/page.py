@@ -12,6 +12,7 @@ from fusetune.report.sections.evidence_sections import (
     weights_section,
     withheld_section,
 )
+from fusetune.report.sections.findings_section import findings_section
 from fusetune.report.sections.flight_sections import (
     as_flown_section,
     flight_figure_paths,
@@ -53,6 +54,7 @@ def build_report(
     pictures = flight_figure_paths([Path(folder).name for folder in analyze_folders], flight_figures)
     sections = (
         decision_section(results),
+        findings_section(results),
         evidence_section(results, figures),
         withheld_section(results, figures),
         holds_section(results),

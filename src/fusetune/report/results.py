@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from fusetune.apply.evidence import AIMS
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
 from fusetune.set_names import ONBOARD
@@ -76,11 +75,6 @@ class Results:
     def _ranked(self) -> dict[str, dict[Hashable, Any]]:
         """Rows of the ranking by set: the figures ask for them hundreds of times."""
         return {row["name"]: row for row in self.ranking.to_dict("records")}
-
-
-def worse_aims(row: Mapping[Hashable, Any]) -> list[str]:
-    """Kinds of prediction in which a set is worse than the present one beyond doubt, from its row of the ranking."""
-    return [aim for aim in AIMS if row.get(f"{aim}_lower", 0.0) > 0.0]
 
 
 def read_results(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath) -> Results:

@@ -34,8 +34,8 @@ JOB_SOURCES = {
         "analyze/replaying",
     ),
     "score": (*BASE, "ekf2", "save", "analyze"),
-    "apply": (*BASE, "apply"),
-    "report": (*BASE, "apply", "report"),
+    "apply": (*BASE, "design", "apply"),
+    "report": (*BASE, "design", "apply", "report"),
 }
 """Kind of job → files and folders of the package."""
 

@@ -10,6 +10,7 @@ from typing import Any
 import pyarrow as pa
 
 from fusetune.finding import Finding, documents, from_documents, of_severity
+from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.save.discovery import RefusedEntry
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
 from fusetune.save.log_folder import VERDICT_FILE
@@ -29,6 +30,7 @@ SCHEMA = pa.schema(
         ("checks", pa.string()),
         ("firmware", pa.string()),
         ("hardware", pa.string()),
+        *((name, pa.string()) for name in VehicleIdentity().columns()),
         ("recorded", pa.string()),
         ("duration_s", pa.float64()),
         ("airborne_s", pa.float64()),
@@ -40,6 +42,8 @@ SCHEMA = pa.schema(
 """Columns of the table: `status` is replayable or refused, `reason` says why a flight is refused.
 
 `file` is the path of the log below the folder of flights.
+`vehicle` is the short name of who flew, the columns behind it what it is made of (`fusetune.px4.vehicle_identity`);
+all are empty where the log could not be read.
 `checks` holds id, severity and figure of every check's finding; `advice`, which the CSV leaves out, those that did not
 pass and have a remedy, as findings (`fusetune.finding.from_documents`).
 """
@@ -88,6 +92,7 @@ def _row(folder: Path) -> dict[str, Any]:
         "status": verdict["status"],
         "firmware": metadata.get("firmware", "unknown"),
         "hardware": str(metadata.get("hardware", {}).get("ver_hw", "")),
+        **{name: str(metadata.get(name, "")) for name in VehicleIdentity().columns()},
         "recorded": metadata.get("recorded", ""),
         "duration_s": metadata.get("duration_s"),
         "airborne_s": metadata.get("airborne_s"),
@@ -97,7 +102,10 @@ def _row(folder: Path) -> dict[str, Any]:
 
 
 def _row_of_refused(entry: RefusedEntry) -> dict[str, Any]:
-    row = dict.fromkeys(("hardware", "recorded", "checksum"), "") | {"firmware": "unknown", "size_bytes": 0}
+    row = dict.fromkeys(("hardware", *VehicleIdentity().columns(), "recorded", "checksum"), "") | {
+        "firmware": "unknown",
+        "size_bytes": 0,
+    }
     row |= {"flight": entry.flight, "file": entry.shown, "status": "refused"}
     return row | _told([Finding("readable", "fail", entry.reason, entry.remedy)])
 

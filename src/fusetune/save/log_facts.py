@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fusetune.px4.flight import Flight, TopicTable
+from fusetune.px4.vehicle_identity import vehicle_identity
 
 # as people write it, or as PX4 names folder and file of a log: 2024-01-31/10_20_30.ulg
 _NAME_DATE = re.compile(r"(20\d\d)-(\d{1,2})-(\d{1,2})[-_](\d{1,2})[-_](\d{1,2})[-_](\d{1,2})")
@@ -107,12 +108,13 @@ def _readable_info(flight: Flight, keys: tuple[str, ...]) -> dict[str, str | int
 
 
 def log_facts(flight: Flight) -> dict[str, Any]:
-    """Versions, hardware and times as entries of `metadata.json`."""
+    """Versions, hardware, vehicle and times as entries of `metadata.json`."""
     times = flight_times(flight)
     return {
         "firmware": flight.release_name,
         "versions": _readable_info(flight, _VERSION_KEYS),
         "hardware": _readable_info(flight, _HARDWARE_KEYS),
+        **vehicle_identity(flight).columns(),
         "recorded": recorded_at(flight),
         "duration_s": round(times.duration_s, 6),
         "airborne_s": None if times.airborne_s is None else round(times.airborne_s, 6),

@@ -1,6 +1,7 @@
 """What `present` and `as_flown` mean, and which sets are replayed and scored on a flight.
 
-* `present` is what the vehicle flies now: its parameters at the end of one flight, the newest unless told otherwise.
+* `present` is what the vehicle flies now: its parameters at the end of one flight, the newest that counts unless told
+  otherwise. That flight also says which vehicle is decided for.
   All other sets are compared with it. Of these parameters those count that the study varies; in all others a set
   leaves each log as it is.
 * `as_flown` is each log's own parameters, without exception. It is replayed to be compared with what the vehicle's own
@@ -12,11 +13,13 @@ Rules of the workflow ask this module, too: what needs the saved flights is impo
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 from fusetune.errors import UserError
+from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.set_names import AS_FLOWN, PRESENT
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import atomic_path
@@ -68,11 +71,41 @@ class Present:
     flight : None where no flight can be replayed
     checksum : of the flight's log
     parameters : name → value, sorted by name; those of the study's parameters that the log knows
+    same : all flights of the vehicle that have these values, the newest first
     """
 
     flight: str | None
     checksum: str | None
     parameters: dict[str, float]
+    same: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A flight that can be replayed."""
+
+    flight: str
+    vehicle: VehicleIdentity
+    recorded: str
+    may_be_scored: bool
+    folder: str | os.PathLike[str]
+    varied: Collection[str]
+
+    @cached_property
+    def metadata(self) -> dict[str, Any]:
+        from fusetune.save.flight_folder import read_metadata
+
+        return read_metadata(self.folder)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Those that the study varies, at the end of the flight."""
+        values = self.metadata["ekf2_parameters"]
+        return {name: values[name] for name in sorted(set(self.varied) & values.keys())}
+
+    def is_like(self, other: _Candidate) -> bool:
+        """Whether it does not matter which of the two is taken."""
+        return self.vehicle.is_same(other.vehicle) and self.values == other.values
 
 
 def find_present(
@@ -80,37 +113,93 @@ def find_present(
     folders: Mapping[str, str | os.PathLike[str]],
     varied: Collection[str],
     wanted: str | None,
+    vehicle: str | None = None,
+    counts: Callable[[str], bool] = lambda flight: True,
 ) -> Present:
-    """Find the flight whose parameters count as the present ones.
+    """Find the flight whose parameters count as the present ones; its vehicle is the one that is decided for.
+
+    Where neither flight nor vehicle is wanted, it is the newest real flight, or the newest simulated one where none is
+    real. One that does not count in the decision is passed over for the next where that makes a difference: another
+    vehicle, or other values.
 
     Parameters
     ----------
-    rows : `flight`, `status` and `recorded` of every flight
+    rows : `flight`, `status`, `recorded`, `airborne_s` and the columns of `VehicleIdentity` of every flight
     folders : of the saved flights, by name
     varied : names of the parameters that the study varies
     wanted : name of the flight; None for the one recorded last, of several the last by name
+    vehicle : name or id of the vehicle, or how it begins; None for any
+    counts : whether the replay of a flight is trusted enough to decide; costs a replay, so it is asked of few
 
     Raises
     ------
     UserError
-        The wanted flight cannot be replayed.
+        The wanted flight or vehicle has no flight that can be replayed, or several vehicles are meant.
     """
-    replayable = [row for row in rows if row["status"] == "replayable"]
-    if wanted is None:
-        if not replayable:
-            return Present(None, None, {})
-        wanted = str(max(replayable, key=lambda row: (row["recorded"], row["flight"]))["flight"])
-    elif wanted not in [row["flight"] for row in replayable]:
-        raise UserError(
-            "present_flight",
-            f"{wanted!r} is no flight that can be replayed",
-            "Name one that results/save/flights.csv calls replayable, or none for the newest",
+    found = [
+        _Candidate(
+            row["flight"],
+            VehicleIdentity.from_row(row),
+            row["recorded"],
+            row.get("airborne_s") != 0.0,
+            folders[row["flight"]],
+            varied,
         )
-    from fusetune.save.flight_folder import read_metadata
+        for row in rows
+        if row["status"] == "replayable"
+    ]
+    found.sort(key=lambda one: (one.recorded, one.flight), reverse=True)
+    if vehicle is not None:
+        found = _of_vehicle(found, vehicle)
+    chosen = _wanted(found, wanted, vehicle) if wanted is not None else _newest(found, counts)
+    if chosen is None:
+        return Present(None, None, {})
+    same = tuple(one.flight for one in found if one.is_like(chosen))
+    return Present(chosen.flight, chosen.metadata["checksum"], chosen.values, same)
 
-    metadata = read_metadata(folders[wanted])
-    values = metadata["ekf2_parameters"]
-    return Present(wanted, metadata["checksum"], {name: values[name] for name in sorted(set(varied) & values.keys())})
+
+def _of_vehicle(found: Sequence[_Candidate], vehicle: str) -> list[_Candidate]:
+    of_it = [one for one in found if one.vehicle.is_called(vehicle)]
+    others = sorted({one.vehicle.name for one in (of_it or found)})
+    if not of_it:
+        reason = f"{vehicle!r} has no flight that can be replayed"
+        known = f"Name one of {', '.join(others)}" if others else "Add flights of it"
+        raise UserError("vehicle", reason, f"{known}, or none for that of the newest flight")
+    if not all(one.vehicle.is_same(of_it[0].vehicle) for one in of_it):
+        raise UserError(
+            "vehicle",
+            f"{vehicle!r} can mean {', '.join(others)}",
+            "Write more of its name or id, see results/save/flights.csv",
+        )
+    return of_it
+
+
+def _wanted(found: Sequence[_Candidate], wanted: str, vehicle: str | None) -> _Candidate:
+    for one in found:
+        if one.flight == wanted:
+            return one
+    raise UserError(
+        "present_flight",
+        f"{wanted!r} is no flight {'' if vehicle is None else f'of {vehicle} '}that can be replayed",
+        "Name one that results/save/flights.csv calls replayable, or none for the newest",
+    )
+
+
+def _newest(found: Sequence[_Candidate], counts: Callable[[str], bool]) -> _Candidate | None:
+    """The newest that counts, of those that come first in question."""
+    for preferred in (
+        [one for one in found if one.vehicle.is_real and one.may_be_scored],
+        [one for one in found if one.vehicle.is_real],
+        [one for one in found if one.may_be_scored],
+        found,
+    ):
+        if not preferred:
+            continue
+        first = preferred[0]
+        if all(first.is_like(other) for other in preferred):
+            return first
+        return next((one for one in preferred if counts(one.flight)), first)
+    return None
 
 
 def write_present(file: str | os.PathLike[str], present: Present) -> None:
@@ -129,7 +218,7 @@ def read_present(file: str | os.PathLike[str]) -> Present:
     """
     document = read_document(file)
     try:
-        return Present(**document)
-    except TypeError as error:
+        return Present(**document | {"same": tuple(document["same"])})
+    except (TypeError, KeyError) as error:
         reason = f"does not say what the vehicle flies now ({error})"
         raise UserError(file, reason, "Delete it and run the pipeline again") from error

@@ -140,3 +140,31 @@ def test_simulated_receivers_are_told_apart(kind: str) -> None:
     # The barometer's white noise is 0.18 m, the magnetometer's 0.006 G, in both.
     assert found["baro_hgt", 0].white_noise == pytest.approx(0.18, rel=0.1)
     assert found["mag", 0].white_noise == pytest.approx(0.006, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("source", "white", "correlated", "tau_s", "interval_s", "expected"),
+    [
+        ("gnss_vel", 0.1, 0.0, 1.0, 0.2, 0.1),
+        # 2 · 1 s / 0.2 s = 10 samples that are alike
+        ("gnss_vel", 0.1, 0.05, 1.0, 0.2, np.sqrt(0.01 + 0.0025 * 10.0)),
+        # no longer than the horizon of velocities, 3 s
+        ("gnss_vel", 0.1, 0.05, 8.0, 0.2, np.sqrt(0.01 + 0.0025 * 30.0)),
+        # what forgets within a sample is white
+        ("ev_vel", 0.1, 0.05, 0.1, 0.5, np.sqrt(0.01 + 0.0025)),
+        # a log thinned to 1 Hz: the vehicle takes GNSS five times as often
+        ("gnss_vel", 0.1, 0.05, 1.0, 1.0, np.sqrt(0.01 + 0.0025 * 10.0)),
+    ],
+)
+def test_the_equivalent_noise_counts_samples_that_are_alike(
+    source: str, white: float, correlated: float, tau_s: float, interval_s: float, expected: float
+) -> None:
+    found = Whiteness(source, 0, white, correlated, tau_s, 300, interval_s)
+    assert found.equivalent_noise == pytest.approx(expected)
+
+
+def test_the_mean_of_a_wandering_error_scatters_as_its_equivalent_noise_says() -> None:
+    # a Gauss-Markov process of 0.05 over 1 s: its mean over 100 s scatters as that of 500 white samples of 0.158
+    found = Whiteness("gnss_vel", 0, 0.0, 0.05, 1.0, 500, 0.2)
+    means = [made(0.0, 0.05, 1.0, seed, 500).mean() for seed in range(200)]
+    assert np.std(means) == pytest.approx(found.equivalent_noise / np.sqrt(500), rel=0.1)

@@ -12,6 +12,7 @@ from fusetune.analyze.scoring.filter_events import EVENT_METRICS, ON_GROUND, SER
 from fusetune.analyze.scoring.ground_metrics import GROUND
 from fusetune.analyze.scoring.withheld_scores import DRIFT, WITHHELD_METRICS
 from fusetune.analyze.sensors.source_whiteness import WHITENESS_METRICS
+from fusetune.analyze.sensors.told_noise import TOLD_METRICS
 
 
 class Family(NamedTuple):
@@ -25,6 +26,7 @@ FAMILIES = (
     Family("Innovations of a source, by axis; with ● also by group of axes", INNOVATION_METRICS),
     Family("How a source served in flight after the warm-up", SERVICE_METRICS),
     Family("The error of the source itself, see below", WHITENESS_METRICS),
+    Family("What the estimator is told of a source, by axis, of the present set", TOLD_METRICS),
     Family("Predictions while a sensor is withheld", (*WITHHELD_METRICS, DRIFT)),
     Family("What the filter did beside fusing: source `filter`", EVENT_METRICS),
     Family(

@@ -18,6 +18,7 @@ from fusetune.analyze.scoring.measurement_alignment import PairedSamples, innova
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.sensors.source_whiteness import WHITE_SHARE, WHITENESS_METRICS, Whiteness, joint_white_share
+from fusetune.analyze.sensors.told_noise import TOLD_METRICS, ToldNoise
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
 
 Array = npt.NDArray[np.float64]
@@ -143,6 +144,13 @@ def add_whiteness(table: MetricsTable, set_name: str, found: dict[tuple[str, int
             if len(members) == len(axes):
                 share = joint_white_share(members)
                 table.add(set_name, source, group, WHITE_SHARE.name, share, members[0].samples)
+
+
+def add_told_noise(table: MetricsTable, set_name: str, found: dict[tuple[str, int], ToldNoise]) -> None:
+    """Append what the estimator was told of each source's noise, by axis."""
+    for (source, axis), one in found.items():
+        for metric in TOLD_METRICS:
+            table.add(set_name, source, AXES[axis], metric.name, metric.function(one), one.samples)
 
 
 def add_true_errors(table: MetricsTable, set_name: str, figures: list[ErrorFigure], kind: str = "truth") -> None:

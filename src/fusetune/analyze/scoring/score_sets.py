@@ -17,7 +17,13 @@ from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.scoring.filter_events import filter_events
 from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_ground_metrics, ground_window
-from fusetune.analyze.scoring.metrics_table import MetricsTable, add_events, add_true_errors, add_whiteness
+from fusetune.analyze.scoring.metrics_table import (
+    MetricsTable,
+    add_events,
+    add_told_noise,
+    add_true_errors,
+    add_whiteness,
+)
 from fusetune.analyze.scoring.sample_scores import add_onboard, no_sample_scores, score_samples
 from fusetune.analyze.scoring.scoring_summary import scoring_summary
 from fusetune.analyze.scoring.set_evidence import set_evidence
@@ -32,6 +38,7 @@ from fusetune.analyze.scoring.withheld_scores import (
     withheld_rows,
 )
 from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
+from fusetune.analyze.sensors.told_noise import told_noises
 from fusetune.analyze.smoothing.smoothed_velocity import smoothed_velocity
 from fusetune.px4.flight import Flight
 from fusetune.set_names import PRESENT
@@ -219,7 +226,9 @@ def _add_state_figures(
         states = record.states()
         found = source_whiteness(record, states, flight, window.intervals)
         add_whiteness(table, record.name, found)
-        present = present if number else found
+        if not number:
+            present = found
+            add_told_noise(table, record.name, told_noises(record, window.intervals))
         for truth in references:
             figures = true_errors(record, states, truth, window, settings.confidence)
             add_true_errors(table, record.name, figures, truth.kind)

@@ -20,10 +20,13 @@ one with the smallest remainder. It is no shorter than two samples: what forgets
 counts what is correlated up to the horizon H, for what changes more slowly is a constant to every parameter set alike,
 and the drift of the inertial solution hides it.
 
+A filter takes errors for white. What it should be told of a source that wanders is the white noise of the same density
+at low frequency, σ_e (`Whiteness.equivalent_noise`).
+
 References
 ----------
 Matheron, "Principles of geostatistics", 1963 (variogram, nugget, sill); Cressie and Hawkins, "Robust estimation of the
-variogram", 1980.
+variogram", 1980; Jazwinski, "Stochastic processes and filtering theory", 1970, ch. 8 (coloured noise).
 """
 
 from collections.abc import Sequence
@@ -37,6 +40,7 @@ from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.sensors.measurement_errors import COVERED, VELOCITY_SOURCES, ErrorSeries, measurement_errors
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
@@ -46,6 +50,8 @@ VELOCITY_HORIZON_S = 3.0
 HORIZON_S = 10.0
 """Of everything else: about the slowest time constant with which the filter follows a source."""
 CORRELATION_TIMES_S = (0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+USUAL_INTERVAL_S = {"gnss": 0.2, "baro": 0.05, "mag": 0.05}
+"""Between two samples that a vehicle's estimator takes, by sensor: a thinned log holds fewer."""
 FEWEST_SAMPLES = 30
 FEWEST_LAGS = 5
 _LAGS = 20
@@ -63,6 +69,7 @@ class Whiteness:
     correlated_noise : square root of σ_c² (1 − exp(−H/τ)), unit of the source
     correlation_time_s : τ
     samples : number of measurements behind it
+    interval_s : time between two of them
     """
 
     source: str
@@ -71,6 +78,21 @@ class Whiteness:
     correlated_noise: float
     correlation_time_s: float
     samples: int
+    interval_s: float
+
+    @property
+    def equivalent_noise(self) -> float:
+        """White noise σ_e of the same spectral density at low frequency, unit of the source.
+
+        σ_e² = σ_w² + σ_c² max(1, 2 min(τ, H) / Δt), with the correlated noise as far as it is seen: a filter that takes
+        errors for white averages those that wander as if they were as many. Δt is that of the vehicle where the log is
+        thinned.
+        """
+        if self.correlated_noise == 0.0:
+            return self.white_noise
+        interval_s = min(self.interval_s, USUAL_INTERVAL_S.get(AID_SOURCES[self.source].sensor, self.interval_s))
+        alike = 2.0 * min(self.correlation_time_s, horizon_s(self.source)) / interval_s
+        return float(np.hypot(self.white_noise, self.correlated_noise * np.sqrt(max(1.0, alike))))
 
     @property
     def white_share(self) -> float:
@@ -93,9 +115,23 @@ WHITE_SHARE: Metric[Whiteness] = Metric(
 
 WHITENESS_METRICS: tuple[Metric[Whiteness], ...] = (
     WHITE_SHARE,
-    Metric("white_noise", SOURCE_UNIT, "σ_w", lambda one: one.white_noise),
-    Metric("correlated_noise", SOURCE_UNIT, "square root of σ_c² (1 − exp(−H/τ))", lambda one: one.correlated_noise),
-    Metric("error_correlation_s", "s", "τ", lambda one: one.correlation_time_s),
+    Metric("white_noise", SOURCE_UNIT, "σ_w", lambda one: one.white_noise, used=("apply",)),
+    Metric(
+        "correlated_noise",
+        SOURCE_UNIT,
+        "square root of σ_c² (1 − exp(−H/τ))",
+        lambda one: one.correlated_noise,
+        used=("apply",),
+    ),
+    Metric("error_correlation_s", "s", "τ", lambda one: one.correlation_time_s, used=("apply",)),
+    Metric(
+        "equivalent_noise",
+        SOURCE_UNIT,
+        "√(σ_w² + σ_c² (1 − exp(−H/τ)) max(1, 2 min(τ, H) / Δt)), the white noise of "
+        "the same density at low frequency, Δt between two samples",
+        lambda one: one.equivalent_noise,
+        used=("apply",),
+    ),
 )
 """Of the error of the source itself, by axis; they belong to the flight, not to the set."""
 
@@ -146,7 +182,7 @@ def series_whiteness(source: str, series: ErrorSeries, intervals: Sequence[Inter
     for axis in axes:
         white, correlated, tau = fit_variogram(np.asarray(lags * step_s, dtype=np.float64), gamma[:, axis], step_s)
         seen = correlated * -np.expm1(-horizon_s(source) / tau)
-        results.append(Whiteness(source, axis, float(np.sqrt(white)), float(np.sqrt(seen)), tau, time.size))
+        results.append(Whiteness(source, axis, float(np.sqrt(white)), float(np.sqrt(seen)), tau, time.size, step_s))
     return results
 
 

@@ -78,3 +78,8 @@ class TrustSettings:
             if list(limits) != sorted(limits, reverse=falls):
                 order = "falling" if falls else "rising"
                 yield f"{name} is {list(limits)}; expected three {order} numbers for A, B and C"
+
+
+def reaches(grade: str | None, lowest: str) -> bool:
+    """Whether a trust grade is no lower than another; one of None, of a flight with nothing to compare, is not."""
+    return grade is None or grade <= lowest

@@ -18,6 +18,7 @@ def decision_section(results: Results) -> str:
     heading = escape(_HEADINGS[status].format(chosen=decision["chosen"]))
     tag = '<span class="tag">exploratory</span>' if decision["exploratory"] else ""
     parts = [f'<section class="decision {escape(status)}"><h2>{heading}{tag}</h2>', paragraph(decision["paragraph"])]
+    parts.append(_vehicle(decision["vehicle"]))
     if decision["changes"]:
         rows = [_change_row(change) for change in decision["changes"]]
         parts.append(table(("parameter", "now", "new", "unit", ""), rows))
@@ -31,6 +32,21 @@ def decision_section(results: Results) -> str:
     else:
         parts.append(paragraph("There is nothing to load: best_params.params holds no parameter and says so.", "note"))
     return "".join(parts) + "</section>"
+
+
+def _vehicle(vehicle: dict[str, Any] | None) -> str:
+    """Who is decided for, and from which flight it is known what flies now."""
+    if vehicle is None:
+        return ""
+    text = f"Vehicle: {vehicle['in_words']}. What flies now is what {vehicle['present_flight']} ended with."
+    if vehicle["kind"] == "real" and not vehicle["uuid"]:
+        text += " Its logs do not name the board: all of this hardware and airframe are taken for one vehicle."
+    if vehicle["left_out"]:
+        text += (
+            " Flights of other vehicles were replayed and graded as well, the present set with this vehicle's values; "
+            "they do not decide."
+        )
+    return paragraph(text, "note")
 
 
 def _change_row(change: dict[str, Any]) -> tuple[Cell, ...]:

@@ -32,7 +32,7 @@ def flights_section(results: Results, flights_table: AnyPath) -> str:
     """Every log with its verdict."""
     verdicts = read_table(flights_table).to_pandas().to_dict("records")
     rows = [_flight_row(verdict, results) for verdict in sorted(verdicts, key=lambda one: str(one["flight"]))]
-    head = ("flight", "verdict", "scored s", "airborne s", "firmware", "reason")
+    head = ("flight", "verdict", "scored s", "airborne s", "vehicle", "firmware", "reason")
     count, decide = len(rows), results.decision["flights_scored"]
     text = f"{count} log{'s' if count != 1 else ''}, {len(results.scored)} scored, {decide} in the decision."
     return section("The flights", paragraph(text), table(head, rows), advice_table(verdicts))
@@ -49,6 +49,7 @@ def _flight_row(verdict: Mapping[Hashable, Any], results: Results) -> tuple[Cell
         Cell(words, "short good" if decides else "short bad"),
         number(results.scoring[name]["scored_s"] if scored else None),
         number(verdict.get("airborne_s")),
+        str(verdict.get("vehicle") or "unknown"),
         Cell(str(verdict.get("firmware") or "unknown"), "short"),
         str(reason),
     )

@@ -7,7 +7,7 @@ from typing import Any
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.comparison import AIM_WORDS, flight_changes, percent_change, sign_counts, told_aims
 from fusetune.report.markup import Cell, number, paragraph, signed, table
-from fusetune.report.results import OUT, Results, worse_aims
+from fusetune.report.results import OUT, Results
 
 _MOST_REASONS = 4
 NOT_KNOWN = "not known"
@@ -110,14 +110,14 @@ def _mark(change: float) -> Cell:
 def objections_table(results: Results) -> str:
     """Why sets are not eligible: vetoes, and kinds of prediction in which they are worse beyond doubt."""
     rows = []
-    vetoes = {one["name"]: one["reasons"] for one in results.decision["ranking"]}
+    judged = {one["name"]: one for one in results.decision["ranking"]}
     for one in results.ranking.to_dict("records"):
         reasons = []
         if one["name"] != results.present:
-            reasons = _first_few(vetoes[one["name"]]) + [
+            reasons = _first_few(judged[one["name"]]["reasons"]) + [
                 f"{AIM_WORDS[aim]} its errors are {_percent(one[f'{aim}_difference']):.1f} % larger than now (interval "
                 f"{interval_text(one[f'{aim}_lower'], one[f'{aim}_upper'])} %)"
-                for aim in worse_aims(one)
+                for aim in judged[one["name"]]["worse_aims"]
             ]
         if reasons:
             rows.append((Cell(one["name"], "short"), "; ".join(reasons)))
