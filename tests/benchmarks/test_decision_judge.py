@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,12 +13,7 @@ from fusetune.apply.settings import DecisionSettings
 NAMES = ("present", "one", "two")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def benchmarks(project_root: Path):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(project_root)
-        yield
-    sys.modules.pop("benchmarks", None)
+pytestmark = pytest.mark.usefixtures("benchmarks")
 
 
 def world(errors: dict[str, list[float]], **more):
