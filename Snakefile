@@ -47,6 +47,12 @@ rule all:
         rules.build_report.output,
 
 
+if MENDS_DELAYS:
+
+    localrules:
+        join_delays,
+
+
 for each in workflow.rules:
     each.set_input(before_any_job)
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings, WithholdingSettings
 from fusetune.analyze.scoring.settings import ScoringSettings
@@ -80,6 +81,7 @@ class Configuration:
     trust: TrustSettings = section(TrustSettings)
     scoring: ScoringSettings = section(ScoringSettings)
     withheld: WithholdingSettings = section(WithholdingSettings)
+    delays: DelaySettings = section(DelaySettings)
     decision: DecisionSettings = section(DecisionSettings)
     seed: int = setting(1, "seed of the bootstrap of the decision", low=0)
 

@@ -7,5 +7,14 @@ AS_FLOWN = "as_flown"
 ONBOARD = "onboard"
 """What the vehicle flies now, each log's own parameters (`fusetune.save.present`), and the vehicle's own estimator."""
 
-RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, "sets", "scoring", "fidelity")
-"""With the names of `sets.parquet`, `scoring.json` and `fidelity.json`, which a set so called would overwrite."""
+DELAY_MENDED = "delay_mended"
+"""What the vehicle flies now, with those delays of sensors mended that are proved wrong; behind a set's name, that set
+with them mended."""
+
+RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, "sets", "scoring", "fidelity", "delays")
+"""With the names of `sets.parquet`, `scoring.json` and the like, which a set so called would overwrite."""
+
+
+def mended_name(name: str) -> str:
+    """Name of a set with the delays mended; no study can give one with a plus sign."""
+    return DELAY_MENDED if name == PRESENT else f"{name}+{DELAY_MENDED}"

@@ -16,7 +16,8 @@ def one(name: str, difference: float, upper: float, p_family: float = 0.01, **ch
     values = {
         "name": name, "is_present": False, "reasons": (), "score": difference, "difference": difference,
         "lower": 2 * difference - upper, "upper": upper, "bound": upper,
-        "p_value": 0.01, "p_holm": 0.2, "p_family": p_family, "p_best": 0.5, "flights": 6, "flights_better": 6, "equal_to_present": False,
+        "p_value": 0.01, "p_holm": 0.2, "p_family": p_family, "p_best": 0.5,
+        "flights": 6, "flights_better": 6, "equal_to_present": False,
         "improvement_percent": 100.0 * (1.0 - math.exp(difference)), "behind_best": 0.0, "behind_best_error": 0.05,
         "aims": {},
     }  # fmt: skip

@@ -22,6 +22,8 @@ MADE_BY = {
     "save_flight": ("save",),
     "list_flights": ("score", "save"),
     "replay_flight": ("replay", "save"),
+    "estimate_delays": ("replay", "delays", "save"),
+    "join_delays": ("delays", "replay", "save"),
     "analyze_flight": ("replay", "score", "save"),
     "decide": ("apply", "score", "replay", "save"),
     "plot_flight": ("report", "apply", "score", "replay", "save"),

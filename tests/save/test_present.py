@@ -184,3 +184,17 @@ def test_present_gives_what_flies_now_and_as_flown_leaves_each_log_as_it_is() ->
 
 def test_no_study_can_name_a_set_as_these_are_called() -> None:
     assert {PRESENT, AS_FLOWN} <= {*RESERVED_SET_NAMES}
+
+
+def test_sets_with_mended_delays_are_the_sets_but_for_the_delay() -> None:
+    sets = FlightSets({"quiet": {"EKF2_ACC_NOISE": 0.2}, "late": {"EKF2_GPS_DELAY": 150.0}})
+    assert sets.mendable == [PRESENT, "quiet"]  # a set that varies a delay is left as it is
+    mended = sets.mended(sets.mendable, {"EKF2_ACC_NOISE": 0.35, "EKF2_GPS_DELAY": 110.0}, {"EKF2_GPS_DELAY": 200.0})
+    assert mended == {
+        "delay_mended": {"EKF2_ACC_NOISE": 0.35, "EKF2_GPS_DELAY": 200.0},
+        "quiet+delay_mended": {"EKF2_ACC_NOISE": 0.2, "EKF2_GPS_DELAY": 200.0},
+    }
+    assert "delay_mended" in RESERVED_SET_NAMES
+    described = sets.described({"quiet": "less noise", "late": ""})
+    assert described["quiet+delay_mended"] == "less noise, delays mended"
+    assert described["delay_mended"] == "the configuration that flies now, delays mended"

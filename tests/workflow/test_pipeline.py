@@ -15,7 +15,7 @@ from tests.workflow.conftest import STUDY, Workspace
 
 from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
-SUMMARIES = {"list_flights": 1, "decide": 1, "plot_summary": 1, "build_report": 1, "all": 1}
+SUMMARIES = {"list_flights": 1, "join_delays": 1, "decide": 1, "plot_summary": 1, "build_report": 1, "all": 1}
 DECISION = "results/apply/decision.json"
 PATIENCE_S = 300.0
 

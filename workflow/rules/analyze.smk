@@ -1,7 +1,88 @@
-REPLAY_CHUNKS = [
-    SETS.replayed[first : first + SETTINGS.sets_per_job]
-    for first in range(0, len(SETS.replayed), SETTINGS.sets_per_job)
-]
+def in_chunks(names):
+    """So many sets as one job replays, at a time."""
+    return [names[first : first + SETTINGS.sets_per_job] for first in range(0, len(names), SETTINGS.sets_per_job)]
+
+
+# The present set is replayed by the job that estimates delays, where there is one.
+REPLAY_CHUNKS = in_chunks([name for name in SETS.replayed if name != PRESENT or not MENDS_DELAYS])
+
+
+if MENDS_DELAYS:
+
+    rule estimate_delays:
+        input:
+            flight="results/save/{flight}",
+            present=ancient("results/save/present.json"),
+            kernels=KERNELS_READY,
+        output:
+            update(replay_files([PRESENT])),
+            delays="results/analyze/{flight}/delays.json",
+        log:
+            "results/logs/delays/{flight}.log",
+        conda:
+            "../envs/fusetune.yaml"
+        resources:
+            **replay_resources(1, 1),
+        params:
+            sets=overrides_of([PRESENT]),
+            replay=asdict(SETTINGS.replay),
+            code=DIGEST["replay"],
+            delay_code=DIGEST["delays"],
+        message:
+            "Analyze: replay {wildcards.flight} with the present parameters, estimate delays"
+        script:
+            "../scripts/estimate_delays.py"
+
+    # Whether there are sets with mended delays is known when all flights have told.
+    checkpoint join_delays:
+        input:
+            present="results/save/present.json",
+            flights="results/save/flights.parquet",
+            listed="results/save/flights.csv",
+            delays=of_replayable_flights("results/analyze/{flight}/delays.json"),
+        output:
+            "results/analyze/delays.json",
+        log:
+            "results/logs/join_delays.log",
+        conda:
+            "../envs/fusetune.yaml"
+        resources:
+            mem_mb=LIBRARIES_MB,
+            runtime=5,
+        params:
+            settings=asdict(SETTINGS.delays),
+            code=DIGEST["delays"],
+        message:
+            "Analyze: compare the sensors' delays with what PX4 is told"
+        script:
+            "../scripts/join_delays.py"
+
+    for number, chunk in enumerate(in_chunks(SETS.mendable), 1):
+
+        rule:
+            name:
+                f"replay_mended_{number}"
+            input:
+                flight="results/save/{flight}",
+                present=ancient("results/save/present.json"),
+                delays=ancient("results/analyze/delays.json"),
+                kernels=KERNELS_READY,
+            output:
+                update(replay_files([mended_name(name) for name in chunk])),
+            log:
+                f"results/logs/replay/{{flight}}.mended.{number}.log",
+            conda:
+                "../envs/fusetune.yaml"
+            resources:
+                **replay_resources(len(chunk)),
+            params:
+                sets=mended_overrides_of(chunk),
+                replay=asdict(SETTINGS.replay),
+                code=DIGEST["replay"],
+            message:
+                f"Analyze: replay {{wildcards.flight}} with mended delays, {', '.join(chunk)}"
+            script:
+                "../scripts/replay_flight.py"
 
 
 # Replays of several sets are one job's work; each set keeps its own files. They are updated, not made anew, so that a
@@ -43,6 +124,9 @@ rule analyze_flight:
         present=ancient("results/save/present.json"),
         kernels=KERNELS_READY,
         replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
+        delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
+        present_replay=replay_files([PRESENT]) if MENDS_DELAYS else [],
+        mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
     output:
         update(replay_files(REPLAY_CHUNKS[-1])),
         expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
@@ -60,7 +144,7 @@ rule analyze_flight:
         sets=overrides_of(REPLAY_CHUNKS[-1]),
         replay=asdict(SETTINGS.replay),
         code=DIGEST["replay"],
-        scored=SETS.scored,
+        scored=scored_sets,
         present=PRESENT,
         scoring=asdict(SETTINGS.scoring),
         trust=asdict(SETTINGS.trust),

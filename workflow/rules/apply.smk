@@ -7,6 +7,8 @@ rule decide:
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
         # asked for so that a set that is new is replayed and scored, and a file that was taken away is made again
         replays=of_replayable_flights(ANALYZED_FILES),
+        mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
+        delays="results/analyze/delays.json" if MENDS_DELAYS else [],
         configuration=CONFIGURATION_FILES,
     output:
         "results/apply/ranking.parquet",
@@ -39,9 +41,9 @@ rule decide:
         mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
         runtime=of_its_logs(10, 0.01),
     params:
-        sets=SETS.scored,
+        sets=scored_sets,
         present=PRESENT,
-        descriptions={pset.name: pset.description for pset in INPUTS.study.sets},
+        descriptions=SETS.described({pset.name: pset.description for pset in INPUTS.study.sets}),
         decision=asdict(SETTINGS.decision) | {"seed": SETTINGS.seed},
         contents=contents(*CONFIGURATION_FILES),
         code=DIGEST["apply"],

@@ -7,6 +7,8 @@ from fusetune.analyze.replaying.store.parts import PARTS
 from fusetune.storage.cells import as_it_was
 from fusetune.storage.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
+from fusetune.set_names import mended_name
+from fusetune.storage.documents import read_document
 from fusetune.save import read_present
 from fusetune.save.discovery import printable
 
@@ -46,6 +48,39 @@ def present_values():
 def overrides_of(names):
     """Params function: the values of some sets, so that only sets whose values change are replayed again."""
     return lambda wildcards: SETS.overrides(names, present_values() if PRESENT in names else {})
+
+
+MENDS_DELAYS = SETTINGS.delays.mend
+
+
+def mended_delays():
+    """Parameters of delays that are proved wrong, with the values to set."""
+    if not MENDS_DELAYS:
+        return {}
+    return told_in_one_line(read_document, checkpoints.join_delays.get().output[0])["mended"]
+
+
+def mended_sets():
+    """Names of the sets with mended delays; none where no delay is proved wrong."""
+    return [mended_name(name) for name in SETS.mendable] if mended_delays() else []
+
+
+def scored_sets(wildcards):
+    """Params function: names of all sets that are scored."""
+    return [*SETS.scored, *mended_sets()]
+
+
+def of_mended_sets(pattern):
+    """Input function: files of the sets with mended delays, where there are any."""
+    return lambda wildcards: expand(
+        expand(pattern, pset=mended_sets(), part=PARTS),
+        flight=getattr(wildcards, "flight", None) or replayable_flights(),
+    )
+
+
+def mended_overrides_of(names):
+    """Params function: the values of some sets with the delays mended, by the names that they have then."""
+    return lambda wildcards: SETS.mended(names, present_values(), mended_delays())
 
 
 def closing_words():

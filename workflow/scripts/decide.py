@@ -25,5 +25,6 @@ with logged_job(snakemake.log[0]):
         same_present=now.same,
         descriptions=snakemake.params.descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
+        delays=Path(snakemake.input.delays) if snakemake.input.delays else None,
         settings=DecisionSettings(**snakemake.params.decision),
     )

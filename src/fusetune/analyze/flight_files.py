@@ -16,6 +16,7 @@ SCORE_TABLES = {
 
 SAMPLES_FILE = "samples.parquet"
 SCORING_FILE = "scoring.json"
+DELAYS_FILE = "delays.json"
 ONBOARD_FILE = "onboard.innovations.parquet"
 FIDELITY_FILE = "fidelity.json"
 

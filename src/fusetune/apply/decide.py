@@ -9,6 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from fusetune.analyze.delays.wrong_delays import read_joined
 from fusetune.apply.candidates import (
     Candidate,
     between_vetoed_and_present,
@@ -25,6 +26,7 @@ from fusetune.apply.consistency import (
     source_noises,
 )
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
+from fusetune.apply.delays import delay_findings, delay_sentences
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
@@ -36,7 +38,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
-from fusetune.finding import documents
+from fusetune.finding import Finding, documents
 from fusetune.set_names import PRESENT
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
@@ -57,6 +59,7 @@ def decide(
     same_present: Sequence[str] = (),
     descriptions: Mapping[str, str] | None = None,
     configuration_files: Sequence[AnyPath] = (),
+    delays: AnyPath | None = None,
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
@@ -75,6 +78,7 @@ def decide(
     same_present : flights that have the same values, the newest first; one that counts stands for it where it does not
     descriptions : a line about each set, from the study
     configuration_files : hashed into the decision
+    delays : `results/analyze/delays.json`, what the sensors' delays are; None where they were not estimated
 
     Raises
     ------
@@ -99,8 +103,10 @@ def decide(
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
+    late = _delay_findings(delays, newest, present)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     sentences = (
+        delay_sentences(late),
         paragraph(choice, ranked, flights, settings),
         sentence_of_largest(findings),
         candidates_sentence(proposed, _gains(better)),
@@ -111,7 +117,7 @@ def decide(
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
-    decision["findings"] = documents(findings)
+    decision["findings"] = documents((*late, *findings))
     decision["noises"] = [asdict(one) for one in noises]
     decision["provenance"] = provenance(configuration_files)
     decision["vehicle"] = vehicle.document(flights, newest.name if newest else None)
@@ -130,6 +136,12 @@ def decide(
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
     with atomic_path(output / "decision.json") as temporary:
         write_document(temporary, _rounded(decision), allow_nan=False)
+
+
+def _delay_findings(delays: AnyPath | None, newest: AnalyzedFlight | None, present: str) -> tuple[Finding, ...]:
+    sets = newest.summary["sets"] if newest is not None else {}
+    joined = read_joined(delays) if delays is not None else ()
+    return delay_findings(joined, sets.get(present, {}).get("parameters", {}))
 
 
 def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: AnyPath) -> AnalyzedFlight | None:

@@ -19,6 +19,7 @@ from fusetune.analyze.metrics.likelihood import profile_nll
 from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.aid_sources import AXES
+from fusetune.set_names import DELAY_MENDED
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
@@ -141,7 +142,8 @@ def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present
     A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
     """
     metrics = {folder: read_table(folder / "metrics.parquet") for folder in map(Path, folders)}
-    shares = {folder: white_shares(table, present) for folder, table in metrics.items()}
+    # a source with a wrong delay looks coloured, as its error holds the acceleration
+    shares = {one: white_shares(table, DELAY_MENDED) or white_shares(table, present) for one, table in metrics.items()}
     known: dict[str, list[float]] = {}
     for one in shares.values():
         for source, share in one.items():

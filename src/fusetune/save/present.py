@@ -20,9 +20,11 @@ from typing import Any
 
 from fusetune.errors import UserError
 from fusetune.px4.vehicle_identity import VehicleIdentity
-from fusetune.set_names import AS_FLOWN, PRESENT
+from fusetune.set_names import AS_FLOWN, PRESENT, mended_name
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import atomic_path
+
+_DELAY = "_DELAY"
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,32 @@ class FlightSets:
         """
         known = {**self.study, PRESENT: present, AS_FLOWN: {}}
         return {name: dict(known[name]) for name in names}
+
+    @property
+    def mendable(self) -> list[str]:
+        """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves."""
+        study = [name for name, values in self.study.items() if not any(one.endswith(_DELAY) for one in values)]
+        return [PRESENT, *study]
+
+    def mended(
+        self, names: Collection[str], present: Mapping[str, float], delays: Mapping[str, float]
+    ) -> dict[str, dict[str, float]]:
+        """The values of some of the sets with the delays mended, by the name that each has then.
+
+        Parameters
+        ----------
+        present : those of the present set, `Present.parameters`
+        delays : delay parameters and the values that mend them
+        """
+        return {mended_name(name): {**values, **delays} for name, values in self.overrides(names, present).items()}
+
+    def described(self, descriptions: Mapping[str, str]) -> dict[str, str]:
+        """A line about each set, those with mended delays, too."""
+        plain = {PRESENT: "the configuration that flies now", **descriptions}
+        mended = {
+            mended_name(name): ", ".join(filter(None, (plain.get(name), "delays mended"))) for name in self.mendable
+        }
+        return {**descriptions, **mended}
 
 
 @dataclass(frozen=True)

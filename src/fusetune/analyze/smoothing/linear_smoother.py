@@ -71,10 +71,14 @@ class Likelihood:
 
 @dataclass(frozen=True)
 class Smoothed:
-    """The most probable course: `states` (N, n) and `constants` (m,), and the likelihood of the measurements."""
+    """The most probable course: `states` (N, n) and `constants` (m,), and the likelihood of the measurements.
+
+    `constant_covariance` (m, m) is that of the errors of the constants, under the variances of the model.
+    """
 
     states: Array
     constants: Array
+    constant_covariance: Array
     likelihood: Likelihood
 
 
@@ -123,7 +127,7 @@ class Solved:
 
     Attributes
     ----------
-    constants : (m,)
+    constants, constant_covariance : (m,), (m, m)
     cost : of the most probable course
     log_determinant : of the equations of x and g
     """
@@ -137,6 +141,7 @@ class Solved:
         corner = given.corner - np.einsum("ki,kj->ij", self._halved, self._halved)
         schur = cho_factor(corner[:-1, :-1], lower=True, check_finite=False)
         self.constants = -cho_solve(schur, corner[:-1, -1], check_finite=False)
+        self.constant_covariance = cho_solve(schur, np.eye(self.constants.size), check_finite=False)
         self.cost = float(corner[-1, -1] + corner[-1, :-1] @ self.constants)
         self.log_determinant = 2.0 * float(np.sum(np.log(self._factor[0])) + np.sum(np.log(np.diag(schur[0]))))
 
@@ -159,7 +164,7 @@ def smooth(model: LinearModel) -> Smoothed:
     variances = (model.process_variance, there, model.first_variance, model.constant_variance)
     log_determinant = solved.log_determinant + sum(float(np.sum(np.log(one))) for one in variances)
     states = solved.states().reshape(-1, size)
-    return Smoothed(states, solved.constants, Likelihood(solved.cost, log_determinant))
+    return Smoothed(states, solved.constants, solved.constant_covariance, Likelihood(solved.cost, log_determinant))
 
 
 def _summed(columns: Array, weights: Array) -> Array:

@@ -104,19 +104,19 @@ def smoothed_velocity(
     """
     if record.steps is None or not intervals:
         return None
-    source = next((one for one in VELOCITY_SOURCES if _measurements(record, one) is not None), None)
-    measured = _measurements(record, source) if source is not None else None
+    source = next((one for one in VELOCITY_SOURCES if measured_velocities(record, one) is not None), None)
+    measured = measured_velocities(record, source) if source is not None else None
     if source is None or measured is None:
         return None
     positions = position_series(record, flight, source)
     steps = record.steps()
-    rows = _stretches(steps.time, intervals, record.reset_times["heading"])
-    parts = [_stretch(steps.rows(one), *measured, positions) for one in rows]
+    rows = stretches_of(steps.time, intervals, record.reset_times["heading"])
+    parts = [stretch_of(steps.rows(one), *measured, positions) for one in rows]
     del steps
     return _smoothed(source, [one for one in parts if one is not None], intervals, step_us)
 
 
-def _measurements(record: ReplayedSet, source: str) -> tuple[npt.NDArray[np.int64], Array] | None:
+def measured_velocities(record: ReplayedSet, source: str) -> tuple[npt.NDArray[np.int64], Array] | None:
     """Times (N,) and values (N, 3) of a source, as the filter took them, from the first that was fused."""
     if AID_SOURCES[source].axes != 3 or any((source, axis) not in record.samples for axis in range(3)):
         return None
@@ -130,7 +130,7 @@ def _measurements(record: ReplayedSet, source: str) -> tuple[npt.NDArray[np.int6
     return time[first:][usable], values[usable]
 
 
-def _stretches(
+def stretches_of(
     time: npt.NDArray[np.int64], intervals: Sequence[Interval], resets: npt.NDArray[np.int64]
 ) -> Iterator[slice]:
     """Rows of the updates from the first to the last interval, parted where the IMU or the heading jumps."""
@@ -145,9 +145,10 @@ def _stretches(
         yield from (slice(int(one), int(other)) for one, other in pairwise(edges))
 
 
-def _stretch(
+def stretch_of(
     steps: ReplayedSteps, time: npt.NDArray[np.int64], values: Array, positions: Sequence[MeasuredPositions]
 ) -> Stretch | None:
+    """A stretch of the measurements (N, 3) at times (N,), µs; None with too few of them, or in another frame."""
     rows = (time > steps.time[0]) & (time <= steps.time[-1])
     epoch, first = np.unique(np.searchsorted(steps.time, time[rows]), return_index=True)
     if epoch.size < FEWEST_MEASUREMENTS:
@@ -170,8 +171,8 @@ def _smoothed(
 ) -> SmoothedVelocity | None:
     if not parts:
         return None
-    horizontal, courses = _fitted([horizontal_model(one) for one in parts])
-    vertical, falls = _fitted([vertical_model(*one) for one in zip(parts, courses, strict=True)])
+    horizontal, courses = fitted([horizontal_model(one) for one in parts])
+    vertical, falls = fitted([vertical_model(*one) for one in zip(parts, courses, strict=True)])
     pieces = [_reference(*one, step_us) for one in zip(parts, courses, falls, strict=True)]
     time = np.concatenate([one for one, _ in pieces])
     velocity = np.concatenate([one for _, one in pieces])
@@ -182,7 +183,7 @@ def _smoothed(
     return SmoothedVelocity(source, time[rows], velocity[rows], horizontal, vertical, plane, heights)
 
 
-def _fitted(models: Sequence[VelocityModel]) -> tuple[ErrorModel, list[Smoothed]]:
+def fitted(models: Sequence[VelocityModel]) -> tuple[ErrorModel, list[Smoothed]]:
     """The likeliest noises of the stretches together, and the course of each under these."""
     axes = models[0].axes
     change = np.concatenate([np.diff(one.measured[:, :axes], axis=0) for one in models])

@@ -1,0 +1,117 @@
+"""The delays of a flight's sensors against what PX4 is told of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from fusetune.analyze.delays.delayed_series import airspeed_series, flow_series, range_series, vision_series
+from fusetune.analyze.delays.inertial_motion import InertialMotion, inertial_motion
+from fusetune.analyze.delays.lag import Lag, LaggedSeries, lag_of
+from fusetune.analyze.delays.velocity_delay import CERTAIN_S, velocity_delay
+from fusetune.analyze.flight.intervals import inside
+from fusetune.analyze.flight.phases import airborne_intervals
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.px4.aid_sources import AID_SOURCES, SENSORS
+from fusetune.px4.flight import Flight
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+
+CONFIDENCE = 0.95
+LAG_UNCERTAINTY = 2.0
+"""Factor on the standard errors of `lag`: on made flights the error of its estimates is up to twice what their
+residuals promise, as the drift of the inertial solution is not all of the kind that an autoregressive model holds."""
+
+Series = Callable[[Flight, InertialMotion, Mapping[str, float]], LaggedSeries | None]
+
+LAGGED: Mapping[str, Series] = {
+    "range": range_series, "flow": flow_series, "ev": vision_series, "airspeed": airspeed_series,
+}  # fmt: skip
+"""Sensor → its measurements beside the motion; velocities are estimated by `velocity_delay`."""
+VELOCITIES = {"gnss": "gnss_vel"}
+
+
+@dataclass(frozen=True)
+class SensorDelay:
+    """Delay of one sensor on one flight.
+
+    Attributes
+    ----------
+    sensor : key of `fusetune.px4.aid_sources.SENSORS`
+    parameter : that tells PX4 the delay
+    told_ms : its value on the flight
+    value_ms, lower_ms, upper_ms : the delay and its interval (`CONFIDENCE`)
+    standard_error_ms : of the delay
+    n : measurements behind it
+    """
+
+    sensor: str
+    parameter: str
+    told_ms: float
+    value_ms: float
+    lower_ms: float
+    upper_ms: float
+    standard_error_ms: float
+    n: int
+
+    def document(self) -> dict[str, Any]:
+        """As JSON holds it."""
+        return asdict(self) | {"unit": "ms"}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> SensorDelay:
+        """Read what `document` made."""
+        return cls(**{name: value for name, value in document.items() if name != "unit"})
+
+
+def sensor_delays(prepared: PreparedFlight, record: ReplayedSet) -> tuple[SensorDelay, ...]:
+    """Delays of the sensors that a replay fused and whose delay the flight tells.
+
+    Parameters
+    ----------
+    record : replay of any set on the flight; what it was told of the delays does not matter for what is found
+    """
+    intervals = airborne_intervals(prepared.flight, record.flags)
+    found, motion = [], None
+    for sensor in (*VELOCITIES, *LAGGED):
+        parameter = SENSORS[sensor].delay_parameter
+        told_s = record.parameters.get(parameter, PARAMETERS[parameter].default) * 1e-3
+        if not any(AID_SOURCES[source].sensor == sensor for source in record.fused_sources):
+            continue
+        if sensor in VELOCITIES:
+            lag = velocity_delay(record, VELOCITIES[sensor], intervals, told_s)
+        else:
+            imu = prepared.reconstructed.flight.topics["sensor_combined", 0]
+            motion = motion or inertial_motion(imu, record.states())
+            series = LAGGED[sensor](prepared.flight, motion, record.parameters) if motion is not None else None
+            lag = _lag(series, intervals, told_s)
+        if lag is not None:
+            found.append(_delay(sensor, parameter, told_s, lag))
+    return tuple(found)
+
+
+def _lag(series: LaggedSeries | None, intervals: Sequence[Any], told_s: float) -> Lag | None:
+    if series is None:
+        return None
+    series = series.rows(inside(series.time - round(told_s * 1e6), intervals))
+    lag = lag_of(series, told_s) if series.time.size else None
+    if lag is None:
+        return None
+    error_s = LAG_UNCERTAINTY * lag.standard_error_s
+    return Lag(lag.delay_s, error_s, lag.freedom, lag.samples) if error_s <= CERTAIN_S else None
+
+
+def _delay(sensor: str, parameter: str, told_s: float, lag: Lag) -> SensorDelay:
+    value, half, error = (
+        round(1e3 * one, 1) for one in (lag.delay_s, lag.half_width_s(CONFIDENCE), lag.standard_error_s)
+    )
+    told = round(1e3 * told_s, 3)
+    return SensorDelay(
+        sensor, parameter, told, value, round(value - half, 1), round(value + half, 1), error, lag.samples
+    )
+
+
+def read_delays(documents: Iterable[Mapping[str, Any]]) -> tuple[SensorDelay, ...]:
+    """Delays as a result file holds them."""
+    return tuple(SensorDelay.from_document(one) for one in documents)

@@ -1,0 +1,161 @@
+"""Which delays that PX4 is told are wrong, from all flights together.
+
+Flights are joined as in a random-effects analysis: their delays vary by more than their own intervals say (DerSimonian
+and Laird, 1986), and the interval of the mean is that of Student's t over the flights (Hartung and Knapp, 2001), never
+narrower than what the flights' own errors give. A delay is wrong where the whole interval lies further from the told
+value than what matters: EKF2 acts on delays in steps of an update, 10 ms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.special import stdtrit
+
+from fusetune.analyze.delays.sensor_delays import CONFIDENCE, SensorDelay, read_delays
+from fusetune.analyze.delays.settings import DelaySettings
+from fusetune.errors import UserError
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.vehicle_identity import VehicleIdentity
+from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.files import AnyPath, atomic_path
+from fusetune.storage.parquet import read_table
+
+STEP_MS = 10.0
+"""A delay acts in steps of an update of the filter."""
+FEWEST_FLIGHTS = 2
+LEAST_ERROR_MS = 2.0
+"""Standard error that one flight has at least: stamps, and the update that takes a sample, are no finer."""
+
+
+@dataclass(frozen=True)
+class JoinedDelay:
+    """Delay of one sensor of a vehicle.
+
+    Attributes
+    ----------
+    sensor, parameter : as of `SensorDelay`
+    told_ms : what PX4 is told now
+    value_ms, lower_ms, upper_ms : mean over the flights and its interval (`CONFIDENCE`); of one flight, that of the
+        flight
+    flights : names of the flights behind it
+    mended_ms : value to set, where the told one is proved wrong
+    """
+
+    sensor: str
+    parameter: str
+    told_ms: float
+    value_ms: float
+    lower_ms: float
+    upper_ms: float
+    flights: tuple[str, ...]
+    mended_ms: float | None
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the told delay is proved wrong."""
+        return self.mended_ms is not None
+
+
+def join_delays(
+    flights: Mapping[str, Sequence[SensorDelay]], newest: str | None, settings: DelaySettings
+) -> tuple[JoinedDelay, ...]:
+    """Join the delays of all flights of a vehicle, sensor by sensor.
+
+    Parameters
+    ----------
+    flights : name of each flight → what `sensor_delays` found
+    newest : the flight whose parameters count as the present ones
+    """
+    found = []
+    for sensor in dict.fromkeys(one.sensor for delays in flights.values() for one in delays):
+        of_sensor = {name: one for name, delays in sorted(flights.items()) for one in delays if one.sensor == sensor}
+        now = of_sensor.get(newest or "", list(of_sensor.values())[-1])
+        value, lower, upper = joined(
+            [one.value_ms for one in of_sensor.values()], [one.standard_error_ms for one in of_sensor.values()]
+        )
+        if len(of_sensor) == 1:
+            lower, upper = now.lower_ms, now.upper_ms
+        mended = None
+        if len(of_sensor) >= FEWEST_FLIGHTS:
+            mended = _mended(now, value, max(lower - now.told_ms, now.told_ms - upper), settings)
+        value, lower, upper = (round(one, 1) for one in (value, lower, upper))
+        found.append(JoinedDelay(sensor, now.parameter, now.told_ms, value, lower, upper, tuple(of_sensor), mended))
+    return tuple(found)
+
+
+def _mended(now: SensorDelay, value: float, off_ms: float, settings: DelaySettings) -> float | None:
+    if off_ms <= settings.matters_ms:
+        return None
+    limits = PARAMETERS[now.parameter]
+    mended = STEP_MS * round(value / STEP_MS)
+    mended = max(mended, limits.minimum) if limits.minimum is not None else mended
+    mended = min(mended, limits.maximum) if limits.maximum is not None else mended
+    return mended if abs(mended - now.told_ms) > settings.matters_ms else None
+
+
+def joined(values: Sequence[float], errors: Sequence[float]) -> tuple[float, float, float]:
+    """Mean of flights with their own standard errors, and its interval; infinite of a single flight."""
+    value, own = np.array(values), np.hypot(errors, LEAST_ERROR_MS)
+    weight = own**-2
+    mean = float(np.sum(weight * value) / weight.sum())
+    freedom = value.size - 1
+    if not freedom:
+        return mean, -np.inf, np.inf
+    excess = float(np.sum(weight * (value - mean) ** 2)) - freedom
+    between = max(excess / float(weight.sum() - np.sum(weight**2) / weight.sum()), 0.0)
+    weight = 1.0 / (own**2 + between)
+    mean = float(np.sum(weight * value) / weight.sum())
+    promised = 1.0 / float(weight.sum())
+    scatter = float(np.sum(weight * (value - mean) ** 2)) / freedom * promised
+    half = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * max(scatter, promised) ** 0.5
+    return mean, mean - half, mean + half
+
+
+def mended_values(delays: Iterable[JoinedDelay]) -> dict[str, float]:
+    """Parameters of the delays that are proved wrong → values to set."""
+    return {one.parameter: one.mended_ms for one in delays if one.mended_ms is not None}
+
+
+def write_joined(
+    files: Mapping[str, AnyPath],
+    newest: str | None,
+    settings: DelaySettings,
+    output: AnyPath,
+    *,
+    flights_table: AnyPath | None = None,
+) -> tuple[JoinedDelay, ...]:
+    """Join the `delays.json` of flights, by name, and write what was found as JSON.
+
+    Parameters
+    ----------
+    newest : the flight whose parameters count as the present ones
+    flights_table : `results/save/flights.parquet`, by which flights of other vehicles are left out; None leaves none
+    """
+    if flights_table is not None and newest is not None:
+        rows = {row["flight"]: VehicleIdentity.from_row(row) for row in read_table(flights_table).to_pylist()}
+        files = {name: file for name, file in files.items() if rows[name].is_same(rows[newest])}
+    flights = {name: read_delays(read_document(file)["delays"]) for name, file in files.items()}
+    found = join_delays(flights, newest, settings)
+    with atomic_path(output) as temporary:
+        write_document(temporary, {"delays": [asdict(one) for one in found], "mended": mended_values(found)})
+    return found
+
+
+def read_joined(file: AnyPath) -> tuple[JoinedDelay, ...]:
+    """Read what `write_joined` wrote.
+
+    Raises
+    ------
+    UserError
+        There is none, or it cannot be read.
+    """
+    document = read_document(file)
+    try:
+        return tuple(JoinedDelay(**one | {"flights": tuple(one["flights"])}) for one in document["delays"])
+    except (KeyError, TypeError) as error:
+        reason = f"does not say what delays the sensors have ({error})"
+        raise UserError(Path(file), reason, "Delete it and run the pipeline again") from error

@@ -1,0 +1,88 @@
+"""Delays of sensors that PX4 is told wrong, as findings: told first, for other sets are worth little beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from fusetune.analyze.delays.wrong_delays import STEP_MS, JoinedDelay
+from fusetune.finding import Finding
+from fusetune.px4.aid_sources import SENSORS
+from fusetune.set_names import DELAY_MENDED
+
+WRONG, SINGLE = "sensor_delay_wrong", "sensor_delay_of_one_flight"
+BUFFERS = "EKF2_DELAY_MAX"
+
+
+def delay_findings(delays: Iterable[JoinedDelay], parameters: Mapping[str, float]) -> tuple[Finding, ...]:
+    """Findings about delays: warnings where one is proved wrong, notes where a single flight says so.
+
+    Parameters
+    ----------
+    parameters : of the present set
+    """
+    found = []
+    for one in delays:
+        if one.mended_ms is not None:
+            found.append(_wrong(one, parameters))
+        elif len(one.flights) == 1 and _off_ms(one) > STEP_MS:
+            found.append(_of_one_flight(one))
+    return tuple(found)
+
+
+def delay_sentences(findings: Sequence[Finding]) -> str:
+    """What the paragraph of the decision begins with; empty where no delay is proved wrong."""
+    wrong = [one for one in findings if one.id == WRONG]
+    return " ".join(f"{one.found}: {one.remedy[0].lower()}{one.remedy[1:]}." for one in wrong)
+
+
+def _wrong(one: JoinedDelay, parameters: Mapping[str, float]) -> Finding:
+    assert one.mended_ms is not None
+    remedy = f"Set {one.parameter} to {one.mended_ms:g}"
+    longest = parameters.get(BUFFERS)
+    if longest is not None and one.mended_ms > longest:
+        remedy += f", and {BUFFERS}, now {longest:g}, to as much, as EKF2 reaches no further back"
+    return Finding(
+        id=WRONG,
+        severity="warning",
+        found=_measured(one),
+        remedy=remedy,
+        figure=one.value_ms,
+        threshold=one.told_ms,
+        unit="ms",
+        evidence={**_evidence(one), "mended_ms": one.mended_ms, "set": DELAY_MENDED},
+    )
+
+
+def _of_one_flight(one: JoinedDelay) -> Finding:
+    return Finding(
+        id=SINGLE,
+        severity="note",
+        found=f"{_measured(one)}, as far as one flight can tell",
+        remedy="Fly and add another flight with brisk accelerations",
+        figure=one.value_ms,
+        threshold=one.told_ms,
+        unit="ms",
+        evidence=_evidence(one),
+    )
+
+
+def _measured(one: JoinedDelay) -> str:
+    label = SENSORS[one.sensor].label
+    label = label[0].upper() + label[1:]
+    span = f"{one.lower_ms:.0f} to {one.upper_ms:.0f}".replace("-", "−")
+    return (
+        f"{label} arrives {one.value_ms:.0f} ms after its measurement (95 % interval {span} ms), "
+        f"and PX4 is told {one.parameter} = {one.told_ms:g}"
+    ).replace("-", "−")
+
+
+def _evidence(one: JoinedDelay) -> dict[str, bool | int | float | str]:
+    return {
+        "sensor": one.sensor, "parameter": one.parameter, "told_ms": one.told_ms, "lower_ms": one.lower_ms,
+        "upper_ms": one.upper_ms, "flights": len(one.flights),
+    }  # fmt: skip
+
+
+def _off_ms(one: JoinedDelay) -> float:
+    """By how much the told delay lies outside the interval."""
+    return max(one.lower_ms - one.told_ms, one.told_ms - one.upper_ms)

@@ -1,0 +1,21 @@
+"""Join the delays of all flights and say which of them PX4 is told wrong."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusetune.analyze.delays.settings import DelaySettings
+from fusetune.analyze.delays.wrong_delays import write_joined
+from fusetune.save import read_present
+
+from job import keep_out, logged_job
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+keep_out("pandas")
+with logged_job(snakemake.log[0]):
+    files = {Path(file).parent.name: file for file in snakemake.input.delays}
+    newest = read_present(snakemake.input.present).flight
+    settings = DelaySettings(**snakemake.params.settings)
+    found = write_joined(files, newest, settings, snakemake.output[0], flights_table=snakemake.input.flights)
+    print(*found, sep="\n")
