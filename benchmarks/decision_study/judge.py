@@ -10,7 +10,7 @@ import numpy as np
 from fusetune.apply.settings import DecisionSettings
 
 from .rules import OURS, Rule, rules
-from .world import TRUTH, World
+from .world import World
 
 PROCESS = frozenset({"EKF2_ACC_NOISE", "EKF2_GYR_NOISE", "EKF2_ACC_B_NOISE", "EKF2_GYR_B_NOISE"})
 ALLOWED_REGRET, ALLOWED_HARM = 0.05, 0.05
@@ -85,10 +85,10 @@ def judge(world: World, study: str, sets: Sequence[int], rule: str, chosen: int)
         study,
         rule,
         world.sets[chosen],
-        dict(zip(TRUTH, (own[:, 0] / errors.min(axis=1) - 1.0).tolist(), strict=True)),
+        dict(zip(world.quantities, (own[:, 0] / errors.min(axis=1) - 1.0).tolist(), strict=True)),
         tuple(world.sets[sets[other]] for other in np.flatnonzero(beats)),
-        {name: float(one) for name, one in zip(TRUTH, harm, strict=True) if one > ALLOWED_HARM},
-        tuple(name for name, row in zip(TRUTH, errors, strict=True) if row[place] == row.max() > row.min()),
+        {name: float(one) for name, one in zip(world.quantities, harm, strict=True) if one > ALLOWED_HARM},
+        tuple(name for name, row in zip(world.quantities, errors, strict=True) if row[place] == row.max() > row.min()),
         bool(mean[place] == mean.max() > mean.min()),
         not dominates.any(),
     )

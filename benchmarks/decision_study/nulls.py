@@ -21,6 +21,8 @@ HARDLY = 0.005
 """True difference of the scores of nearly equal sets: 0.5 % of a prediction error."""
 LIKENESS = 0.1
 """Nearly equal sets differ from flight to flight by this share of what the real sets do."""
+FEW_DRAWS = 2
+"""Of the bootstrap: of several flights it only shows how close to each other the sets are that are proved better."""
 VERSIONS = 6
 """Of each flight with its blocks drawn anew."""
 
@@ -36,15 +38,18 @@ def false_changes(
     The kinds:
 
     * *equal*: on every flight the names are dealt out anew among the sets;
-    * *persistent*: what each set is worth on a flight stays as it is, and so does its spread over the flights, but its
-      mean over the world is that of the present set; in half of the studies with the sign of all that turned;
+    * *persistent*: on every flight each set is worth what a real set of chance is worth there, or the opposite;
+    * *persistent, skewed*: what each set is worth on a flight stays as it is, and so does its spread over the flights,
+      but its mean over the world is that of the present set: small losses on many flights and a large gain on few, or
+      the reverse, for in half of the studies the sign of all that is turned;
     * *nearly equal*: the same with a tenth of the spread, and a mean that is better or worse by 0.5 %;
     * *nearly equal, noisy*: the present set with its blocks drawn anew for each set, better or worse by 0.5 %.
     """
     shares: dict[tuple[str, str], float] = {}
+    quick = replace(settings, draws=FEW_DRAWS)
     for name in (OURS, OLD):
         source = world if name == OURS else _as_old(world)
-        rule = rules(settings)[name]
+        rule = rules(quick)[name]
         for kind, make in _kinds(source, generator).items():
             count = draws if name == OURS else max(draws // 5, 1)
             changed = sum(_changes(world, rule, name, make(source, flights, generator)) for _ in range(count))
@@ -54,14 +59,18 @@ def false_changes(
 
 def _kinds(world: World, generator: np.random.Generator) -> dict[str, EvidenceOf]:
     whole = [flight.evidence for flight in world.flights]
-    persistent = [with_means(whole, 0.0), with_means(mirrored(whole), 0.0)]
+    pairs = list(zip(_blended(whole, 1.0), mirrored(whole), strict=True))
+    skewed = [with_means(whole, 0.0), with_means(mirrored(whole), 0.0)]
     near = [with_means(_alike(one), HARDLY) for one in (whole, mirrored(whole))]
     noisy = [with_means(blocks_redrawn(whole, generator), HARDLY) for _ in range(VERSIONS)]
     return {
         "equal": lambda world, flights, chance: [
             None if one is None else dealt_out(one, chance) for one in _drawn([whole], flights, chance)
         ],
-        "persistent": lambda world, flights, chance: _drawn(persistent, flights, chance),
+        "persistent": lambda world, flights, chance: [
+            of_either_sign(*pairs[int(index)], chance) for index in chance.integers(0, len(pairs), flights)
+        ],
+        "persistent, skewed": lambda world, flights, chance: _drawn(skewed, flights, chance),
         "nearly equal": lambda world, flights, chance: _drawn(near, flights, chance),
         "nearly equal, noisy": lambda world, flights, chance: _drawn_apart(noisy, flights, chance),
     }
@@ -102,6 +111,29 @@ def dealt_out(evidence: FlightEvidence, generator: np.random.Generator) -> Fligh
     """The names dealt out anew among the sets."""
     order = generator.permutation(len(evidence.sets))
     return replace(evidence, sets=tuple(evidence.sets[index] for index in order))
+
+
+def of_either_sign(
+    evidence: FlightEvidence | None, turned: FlightEvidence | None, generator: np.random.Generator
+) -> FlightEvidence | None:
+    """Each set is one of the others of chance, or its opposite, which `turned` holds; the present one stays.
+
+    Both have the present set in their first row (`mirrored`).
+    """
+    if evidence is None or turned is None:
+        return None
+    count = len(evidence.sets)
+    rows = np.r_[0, generator.integers(1, count, count - 1)]
+    turn = (generator.random(count) < 0.5)[:, None, None]
+    aims = tuple(
+        replace(
+            own,
+            sum_nis=np.where(turn, its.sum_nis[rows], own.sum_nis[rows]),
+            sum_log_variance=np.where(turn, its.sum_log_variance[rows], own.sum_log_variance[rows]),
+        )
+        for own, its in zip(evidence.aims, turned.aims, strict=True)
+    )
+    return kept(replace(evidence, aims=aims))
 
 
 def mirrored(flights: Sequence[FlightEvidence | None]) -> list[FlightEvidence | None]:

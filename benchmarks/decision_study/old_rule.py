@@ -33,6 +33,8 @@ UNAIDED_COLUMNS = {("gnss_pos", 0): 1.5, ("gnss_pos", 1): 1.5, ("gnss_vel", 2): 
 """Source and axis → weight of its three horizons together."""
 DISTRUST, TRUST = 0.6, 0.9
 CONFIDENCE, DRAWS, INNER = 0.95, 400, 100
+MOST_KEPT = 500
+"""Aims of which the redrawn blocks are kept."""
 EQUIVALENCE = math.log(1.01)
 EQUAL = 1e-9
 
@@ -231,6 +233,8 @@ class OldRule:
     def _of(self, aim: AimEvidence) -> Array:
         """(INNER, S) scores with the blocks drawn anew."""
         if id(aim) not in self._redrawn:
+            if len(self._redrawn) >= MOST_KEPT:
+                self._redrawn.clear()
             self._redrawn[id(aim)] = (aim, _blocks_redrawn(aim, np.random.default_rng(len(self._redrawn))))
         return self._redrawn[id(aim)][1]
 

@@ -25,7 +25,7 @@ def _percent(value: float) -> str:
 
 
 def _whole_percents(values: Mapping[str, float]) -> str:
-    return "/".join(f"{100.0 * values[name]:.0f}" for name in TRUTH)
+    return "/".join(f"{100.0 * values[name]:.0f}" if name in values else "–" for name in TRUTH)
 
 
 def rules_table(verdicts: Sequence[Verdict]) -> str:
@@ -33,7 +33,7 @@ def rules_table(verdicts: Sequence[Verdict]) -> str:
     rows = []
     for rule, found in by_rule(verdicts).items():
         worst = max(found, key=lambda one: max(one.regret.values()))
-        regret = [[one.regret[name] for one in found] for name in TRUTH]
+        regret = [[one.regret[name] for one in found if name in one.regret] for name in TRUTH]
         rows.append(
             [
                 rule,
@@ -165,15 +165,18 @@ def truth_table(world: World) -> str:
     rows = []
     for index, name in enumerate(world.sets):
         change = world.true_errors[:, index] / world.true_errors[:, 0] - 1.0
-        values = [f"{world.true_errors[row, index]:.3f}" for row in range(len(TRUTH))]
+        own = dict(zip(world.quantities, world.true_errors[:, index], strict=True))
+        values = [f"{own[name]:.3f}" if name in own else "–" for name in TRUTH]
         against = world.vetoed.get(name, ())
-        rows.append([name, *values, _signed(dict(zip(TRUTH, change, strict=True))), against[0] if against else ""])
+        rows.append(
+            [name, *values, _signed(dict(zip(world.quantities, change, strict=True))), against[0] if against else ""]
+        )
     head = ["set", *(f"{name} {units[name]}" for name in TRUTH), f"change {'/'.join(TRUTH)} %", "vetoed"]
     return _table(head, rows)
 
 
 def _signed(values: Mapping[str, float]) -> str:
-    return "/".join(f"{100.0 * values[name]:+.0f}" for name in TRUTH)
+    return "/".join(f"{100.0 * values[name]:+.0f}" if name in values else "–" for name in TRUTH)
 
 
 def truth_tables(tables: Mapping[str, str]) -> str:

@@ -89,9 +89,14 @@ class World:
         return self.truth[quantity].mean(axis=0)
 
     @cached_property
+    def quantities(self) -> tuple[str, ...]:
+        """The judge's figures that these flights have: those too short for a gap have no drift."""
+        return tuple(name for name in TRUTH if np.isfinite(self.truth[name]).all())
+
+    @cached_property
     def true_errors(self) -> np.ndarray:
         """(quantities, S) the same of all."""
-        return np.array([self.true_error(quantity) for quantity in TRUTH])
+        return np.array([self.true_error(quantity) for quantity in self.quantities])
 
     def first(self, count: int) -> World:
         """What is known after the first flights; the truth is that of all."""
@@ -138,7 +143,7 @@ def read_world(
             figures.setdefault(rule, []).append(row)
         indexed = _indexed(table, sets)
         for quantity, key in TRUTH.items():
-            truth[quantity].append([indexed[(one, *key)] for one in sets])
+            truth[quantity].append([indexed.get((one, *key), np.nan) for one in sets])
     ordered = tuple(sorted(folders, key=lambda folder: folder.name))
     assert [one.name for one in flights] == [one.name for one in ordered], f"{name}: flights named otherwise"
     old = [None if one is None else kept(one) for one in read_old_evidence(ordered, present)]

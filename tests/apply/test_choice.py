@@ -15,8 +15,9 @@ from fusetune.apply.wording import _for_the_pick
 def one(name: str, difference: float, upper: float, p_family: float = 0.01, **changes) -> RankedSet:
     values = {
         "name": name, "is_present": False, "reasons": (), "score": difference, "difference": difference,
-        "lower": 2 * difference - upper, "upper": upper, "p_value": 0.01, "p_holm": 0.2, "p_family": p_family,
-        "p_best": 0.5, "flights": 6, "flights_better": 6, "equal_to_present": False,
+        "lower": 2 * difference - upper, "upper": upper, "bound": upper,
+        "p_value": 0.01, "p_holm": 0.2, "p_family": p_family, "p_best": 0.5,
+        "flights": 6, "flights_better": 6, "equal_to_present": False,
         "improvement_percent": 100.0 * (1.0 - math.exp(difference)), "behind_best": 0.0, "behind_best_error": 0.05,
         "aims": {},
     }  # fmt: skip
@@ -44,6 +45,23 @@ def test_that_a_change_helps_is_shown_once_then_the_one_that_predicts_best_is_ta
 def test_a_better_score_that_may_be_chance_does_not_stand_before_a_proved_one() -> None:
     assert chosen(one("b", -0.2, 0.01), one("c", -0.1, -0.05)) == "c"
     assert chosen(one("b", -0.2, 0.01), one("c", -0.1, 0.01)) == "a"
+
+
+def test_a_velocity_that_is_surely_nearer_is_proof_if_the_predictions_agree() -> None:
+    def nearer(difference: float, unaided: float, **changes) -> RankedSet:
+        aims = {"unaided": MeanDifference(unaided, unaided - 0.1, unaided + 0.1, 6),
+                "smoothed": MeanDifference(-0.3, -0.4, -0.2, 6)}  # fmt: skip
+        return one("b", difference, 0.05, 0.5, **({"aims": aims, "velocity_bound": -0.2, "p_velocity": 0.01} | changes))
+
+    assert chosen(nearer(-0.1, -0.02)) == "b"
+    # not where the drift without GNSS is larger, the whole score hardly smaller, the velocity or luck in doubt
+    assert chosen(nearer(-0.1, 0.01)) == "a"
+    assert chosen(nearer(-0.009, -0.02)) == "a"
+    assert chosen(nearer(-0.1, -0.02, velocity_bound=-0.005)) == "a"
+    assert chosen(nearer(-0.1, -0.02, p_velocity=0.06)) == "a"
+    assert chosen(nearer(-0.1, -0.02, aims={})) == "a"
+    text = _for_the_pick(nearer(-0.1, -0.02), nearer(-0.1, -0.02), DecisionSettings())
+    assert "its velocity is 25.9 % nearer to the one that the whole flight" in text
 
 
 def test_a_gain_that_does_not_matter_is_no_reason_for_a_change() -> None:

@@ -49,7 +49,8 @@ def weights(white_share: float, settings: DecisionSettings = DEFAULTS, *, unaide
 
 
 def test_where_the_receiver_is_white_it_has_none() -> None:
-    assert weights(0.95) == {AIDED: 0.5, UNAIDED: 0.5}
+    """It stays at hand, for it may prove a set better that the score is for as well."""
+    assert weights(0.95) == {AIDED: 0.5, UNAIDED: 0.5, SMOOTHED: 0.0}
 
 
 def test_where_the_receiver_wanders_it_has_what_the_aided_part_would_have() -> None:

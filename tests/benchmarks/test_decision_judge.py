@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,12 +13,7 @@ from fusetune.apply.settings import DecisionSettings
 NAMES = ("present", "one", "two")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def benchmarks(project_root: Path):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(project_root)
-        yield
-    sys.modules.pop("benchmarks", None)
+pytestmark = pytest.mark.usefixtures("benchmarks")
 
 
 def world(errors: dict[str, list[float]], **more):
@@ -151,6 +144,19 @@ def test_mirrored_sets_are_worse_by_what_they_were_better() -> None:
     turned = mirrored(flights)
     assert turned[1] is None
     assert differences(turned[:1])[0] == pytest.approx([0.0, 0.3, -0.1])
+
+
+def test_sets_of_either_sign_are_worth_what_the_others_are_or_the_opposite() -> None:
+    from benchmarks.decision_study.nulls import mirrored, of_either_sign
+
+    one = flight(0, {"one": -0.3, "two": 0.1})
+    turned = mirrored([one])[0]
+    generator = np.random.default_rng(0)
+    made = differences([of_either_sign(one, turned, generator) for _ in range(200)])
+    assert made[:, 0] == pytest.approx(0.0)
+    assert set(made[:, 1:].round(9).ravel()) == {-0.3, 0.3, -0.1, 0.1}
+    # Each of them is drawn once in four times: 400 draws, standard deviation 8.7.
+    assert np.count_nonzero(made[:, 1:].round(9) == 0.3) == pytest.approx(100, abs=35)
 
 
 def test_blocks_drawn_anew_are_the_present_sets() -> None:

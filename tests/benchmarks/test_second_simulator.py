@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-
-@pytest.fixture(scope="module", autouse=True)
-def benchmarks(project_root: Path):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(project_root)
-        yield
-    sys.modules.pop("benchmarks", None)
+pytestmark = pytest.mark.usefixtures("benchmarks")
 
 
 @pytest.fixture(scope="module")

@@ -67,7 +67,7 @@ class AimEvidence:
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """What one flight says about the sets that were scored on it; its aims have weights above 0 that sum to 1."""
+    """What one flight says about the sets that were scored on it; the weights of its aims sum to 1."""
 
     flight: str
     sets: tuple[str, ...]
@@ -260,11 +260,12 @@ def flight_evidence(
         share = sum(trusted[source] for source in present) / full if full else 0.0
         if share > 0.0 and settings.aided_weight > 0.0:
             parts[AIDED] = (aided, _weights(aided, trusted), settings.aided_weight * share)
-    if smoothed is not None:
+    if smoothed is not None and settings.smoothed_weight > 0.0:
         by_axis = {f"{source}.{axis}": settings.smoothed_axes.get(axis, 0.0) for source, axis in _axes_of(smoothed)}
         parts[SMOOTHED] = (smoothed, _weights(smoothed, by_axis), settings.smoothed_weight * (1.0 - share))
-    parts = {name: part for name, part in parts.items() if part[2] > 0.0 and part[1].any()}
-    if not parts:
+    # The smoothed velocity may prove a set better even where it has no weight in the score.
+    parts = {name: part for name, part in parts.items() if (part[2] > 0.0 or name == SMOOTHED) and part[1].any()}
+    if not any(part[2] > 0.0 for part in parts.values()):
         return None
     total = sum(weight for _, _, weight in parts.values())
     sets = [name for name in next(iter(parts.values()))[0].sets if all(name in part[0].sets for part in parts.values())]

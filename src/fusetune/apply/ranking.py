@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
+from fusetune.apply.evidence import AIMS, SMOOTHED, UNAIDED, AnalyzedFlight, FlightEvidence
 from fusetune.apply.evidence_cost import evidence_lost_percent
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.bootstrap import (
@@ -44,6 +44,9 @@ class RankedSet:
     difference, lower, upper : score less that of the present set, and its interval; below 0 is better
     p_value, p_holm : of the difference against 0, alone and by Holm's correction for all candidates
     p_family : that the best of the candidates is so much better by luck, see `fusetune.apply.statistics.sign_flips`
+    bound : upper end of the wider interval of the difference by which a change is decided
+    velocity_bound, p_velocity : the same two of the difference in the smoothed velocity alone; None where it is not
+        known on all flights
     p_best : share of bootstrap draws in which no set that may be flown scores lower; not known with few units, of which
         the draws are so much alike that a set which is best on all of them would be best for sure
     flights, flights_better : flights behind the score, and on how many of them it beats the present set
@@ -66,6 +69,9 @@ class RankedSet:
     p_value: float | None = None
     p_holm: float | None = None
     p_family: float | None = None
+    bound: float | None = None
+    velocity_bound: float | None = None
+    p_velocity: float | None = None
     p_best: float | None = None
     flights: int = 0
     flights_better: int = 0
@@ -102,22 +108,44 @@ class RankedSet:
 def proved_sets(ranked: Sequence[RankedSet], settings: DecisionSettings) -> list[RankedSet]:
     """Sets that are better than the present one beyond doubt, in the order of the ranking.
 
-    That a change helps at all is shown for all candidates together: the best of those whose interval lies beyond the
-    smallest gain must be better than luck makes the best of many. Once that is shown, any of these may be chosen.
+    A set is so in its whole score, or in the smoothed velocity if it is not worse in the others; either is held to half
+    of the error that is allowed. That a change helps at all is shown for all candidates together: one of these must be
+    better by more than the luck of the best of many. Once that is shown, any of them may be chosen.
     """
-    beyond = [one for one in ranked if one.is_eligible and gains_enough(one, settings)]
-    return beyond if any(is_no_luck(one, settings) for one in beyond) else []
+    beyond = [one for one in ranked if one.is_eligible and (gains_enough(one, settings) or is_nearer(one, settings))]
+    return beyond if any(_is_no_luck(one, settings) for one in beyond) else []
 
 
 def gains_enough(candidate: RankedSet, settings: DecisionSettings) -> bool:
     """Whether the whole interval of its difference lies beyond the smallest gain for which a change is made."""
-    return candidate.upper is not None and candidate.upper < settings.smallest_gain
+    return candidate.bound is not None and candidate.bound < settings.smallest_gain
 
 
-def is_no_luck(candidate: RankedSet, settings: DecisionSettings) -> bool:
-    """Whether the set is better by more than the luck of the best of all candidates."""
-    p_value = {"holm": candidate.p_holm, "sign_flips": candidate.p_family, "none": 0.0}[settings.multiplicity]
-    return p_value is not None and p_value <= 1.0 - settings.confidence
+def is_nearer(candidate: RankedSet, settings: DecisionSettings) -> bool:
+    """Whether its velocity is beyond doubt nearer to the smoothed one, and its predictions are better as well, though
+    not beyond doubt: by what matters in the whole score, and by anything without GNSS."""
+    unaided = candidate.aims.get(UNAIDED)
+    return (
+        candidate.velocity_bound is not None
+        and candidate.velocity_bound < settings.smallest_gain
+        and candidate.difference < settings.smallest_gain
+        and unaided is not None
+        and unaided.difference <= 0.0
+    )
+
+
+def _is_no_luck(candidate: RankedSet, settings: DecisionSettings) -> bool:
+    """Whether what the set is better in is more than the luck of the best of all candidates."""
+    most = 1.0 - settings.confidence
+    if settings.multiplicity == "none":
+        return True
+    if settings.multiplicity == "holm":
+        return candidate.p_holm is not None and candidate.p_holm <= most
+    ways = (
+        (candidate.p_family, gains_enough(candidate, settings)),
+        (candidate.p_velocity, is_nearer(candidate, settings)),
+    )
+    return any(better and p_value is not None and p_value <= most for p_value, better in ways)
 
 
 def rank(
@@ -168,6 +196,7 @@ def _compared(
     names = list(dict.fromkeys((present, *sets)))
     scores = np.array([one.scores[[one.sets.index(name) for name in names]] for one in evidence])
     to_present = mean_differences(evidence, names, settings)
+    bounds, velocity_bounds = (_bounds(evidence, names, settings, aim) for aim in (None, SMOOTHED))
     aims = _aims(names, evidence, settings)
     weights = mean_weights(evidence)
     return [
@@ -182,6 +211,8 @@ def _compared(
             p_value=compared.p_value,
             p_holm=1.0,
             p_family=1.0,
+            bound=bounds[index],
+            velocity_bound=velocity_bounds[index],
             p_best=0.0,
             flights=len(evidence),
             flights_better=int(np.count_nonzero(without_rounding(scores[:, index] - scores[:, 0]) < 0.0)),
@@ -192,6 +223,15 @@ def _compared(
         )
         for index, (name, compared) in enumerate(zip(names, to_present, strict=True))
     ]
+
+
+def _bounds(
+    evidence: Sequence[FlightEvidence], names: Sequence[str], settings: DecisionSettings, aim: str | None
+) -> list[float | None]:
+    """Upper ends of the intervals by which a change is decided; None for a kind that not all flights have."""
+    if aim is not None and any(one.aim(aim) is None for one in evidence):
+        return [None] * len(names)
+    return [one.upper for one in mean_differences(evidence, names, settings.for_a_change, aim)]
 
 
 def _aims(
@@ -225,7 +265,8 @@ def _with_family(
     """Add what depends on the other sets: the corrections for their number, P(best), the distance to the best."""
     candidates = [one for one in ranked if not (one.is_present or one.is_vetoed or one.equal_to_present)]
     adjusted = dict(zip((one.name for one in candidates), holm([one.p_value for one in candidates]), strict=True))
-    family = _family_p_values([one.name for one in candidates if one.is_eligible], present, evidence, settings)
+    eligible = [one.name for one in candidates if one.is_eligible]
+    family, of_velocity = _family_p_values(eligible, present, evidence, settings)
     able = [one.name for one in ranked if one.status != NOT_ELIGIBLE]
     units = units_redrawn(evidence)
     shares = _shares_of_best(able, complete, scores) if units >= FEWEST_REDRAWN else None
@@ -234,6 +275,7 @@ def _with_family(
             one,
             p_holm=adjusted.get(one.name, 1.0),
             p_family=family.get(one.name, 1.0),
+            p_velocity=of_velocity.get(one.name),
             p_best=None if shares is None else shares.get(one.name, 0.0),
         )
         for one in ranked
@@ -267,13 +309,30 @@ def _with_distance_to_the_best(
 
 def _family_p_values(
     names: Sequence[str], present: str, evidence: Sequence[FlightEvidence], settings: DecisionSettings
-) -> dict[str, float | None]:
+) -> tuple[dict[str, float | None], dict[str, float | None]]:
+    """Of the whole scores, and of the smoothed velocities where all flights have them; together one family."""
     if not names:
-        return {}
-    rows = [one.scores[[one.sets.index(name) for name in (present, *names)]] for one in evidence]
-    differences = np.array([row[1:] - row[0] for row in rows])
-    found = family_p_values(differences, settings.seed).tolist()
-    return {name: value if math.isfinite(value) else None for name, value in zip(names, found, strict=True)}
+        return {}, {}
+    differences = [_differences_on_flights(names, present, evidence, None)]
+    if all(one.aim(SMOOTHED) is not None for one in evidence):
+        differences.append(_differences_on_flights(names, present, evidence, SMOOTHED))
+    found = family_p_values(np.hstack(differences), settings.seed).tolist()
+    values = [value if math.isfinite(value) else None for value in found]
+    total, velocity = values[: len(names)], values[len(names) :]
+    return dict(zip(names, total, strict=True)), dict(zip(names, velocity, strict=False))
+
+
+def _differences_on_flights(
+    names: Sequence[str], present: str, evidence: Sequence[FlightEvidence], aim: str | None
+) -> Array:
+    """(F, C) score of each set less that of the present one."""
+    rows = []
+    for flight in evidence:
+        part = flight.aim(aim) if aim is not None else flight
+        assert part is not None, "asked for on flights that have it"
+        rows.append(part.scores[[flight.sets.index(name) for name in (present, *names)]])
+    scores = np.array(rows)
+    return np.asarray(scores[:, 1:] - scores[:, :1])
 
 
 def _never_scored(name: str, present: str, vetoed: Mapping[str, Sequence[str]]) -> RankedSet:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES, WITHHOLDABLE
@@ -104,6 +104,11 @@ class DecisionSettings:
         if span <= 0.0:
             return float(white_share >= self.trust_white_share)
         return min(max((white_share - self.distrust_white_share) / span, 0.0), 1.0)
+
+    @property
+    def for_a_change(self) -> DecisionSettings:
+        """With the level of the intervals by which a change is decided: two kinds of proof share the error."""
+        return replace(self, confidence=0.5 + 0.5 * self.confidence)
 
     @property
     def smallest_gain(self) -> float:

@@ -80,7 +80,7 @@ def _names(names: Sequence[str]) -> str:
 
 
 def _basis(flights: Sequence[AnalyzedFlight]) -> str:
-    aims = {aim.name for flight in flights if flight.evidence is not None for aim in flight.evidence.aims}
+    aims = {aim.name for flight in flights if flight.evidence is not None for aim in flight.evidence.aims if aim.weight}
     ways = []
     if AIDED in aims:
         ways.append("how well the estimator predicted each measurement before it saw it")
@@ -134,6 +134,13 @@ def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) 
     span = _smaller(pick.lower, pick.upper, settings.confidence)
     wins = f"better on {pick.flights_better} of {_count(pick.flights, 'flight')}"
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
+    if not gains_enough(pick, settings):
+        nearer = pick.aims[SMOOTHED]
+        text += (
+            " That alone would not be enough for a change; but its velocity is "
+            f"{improvement_percent(nearer.difference):.1f} % nearer to the one that the whole flight, before and "
+            f"after, makes likely ({_smaller(nearer.lower, nearer.upper, settings.confidence)})."
+        )
     if pick.name != best.name and gains_enough(best, settings):
         text += (
             f" “{best.name}” did no better beyond its standard error ({best.improvement_percent:.1f} %) and lies "

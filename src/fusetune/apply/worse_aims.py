@@ -36,9 +36,12 @@ def worse_aims(
 
     Returns
     -------
-    Those in which the set is worse beyond doubt; where it is better beyond doubt in total, only those with at least
-    `TRUSTED_SHARE` of an equal share of the weight.
+    Those with a weight in which the set is worse beyond doubt; where it is better beyond doubt in total, only those
+    with at least `TRUSTED_SHARE` of an equal share of the weight.
     """
     least = TRUSTED_SHARE / max(sum(weight > 0.0 for weight in weights.values()), 1)
     better = total.is_certain and total.difference < 0.0
-    return tuple(name for name, one in aims.items() if one.is_worse and not (better and weights.get(name, 0.0) < least))
+    asked = least if better else 0.0
+    return tuple(
+        name for name, one in aims.items() if one.is_worse and weights.get(name, 0.0) > 0.0 and weights[name] >= asked
+    )

@@ -9,7 +9,8 @@ import pytest
 from tests.analyze.made_flight import MadeSet
 from tests.report.made_report import make_report
 
-from fusetune.report.comparison import AIM_LABELS, aim_changes, flight_changes
+from fusetune.apply.evidence import AIDED, UNAIDED
+from fusetune.report.comparison import AIM_LABELS, SCORE, aim_changes, flight_changes, told_aims
 from fusetune.report.figures.difference_figures import differences, flights_by_sets, pareto
 from fusetune.report.figures.drawing import figure_style
 from fusetune.report.results import Results, read_results
@@ -37,12 +38,15 @@ def with_decision(results: Results, **changes: object) -> Results:
 
 
 def test_the_forest_plot_has_a_column_for_each_kind_of_prediction(results: Results) -> None:
+    # The made replays have no IMU, and so no smoothed velocity.
+    told = (SCORE, *told_aims(results))
+    assert told == (SCORE, AIDED, UNAIDED)
     with figure_style():
         figure = differences(results)
-    assert [axes.get_title(loc="left") for axes in figure.axes] == list(AIM_LABELS.values())
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [AIM_LABELS[aim] for aim in told]
     names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert names == ["better", "drifting (not eligible)", "<restless> (not eligible)"]
-    for axes, aim in zip(figure.axes, AIM_LABELS, strict=True):
+    for axes, aim in zip(figure.axes, told, strict=True):
         change = aim_changes(results, aim)["change"]
         dots = [line for line in axes.lines if line.get_marker() == "o"]
         drawn = {round(float(line.get_ydata()[0])): float(line.get_xdata()[0]) for line in dots}
@@ -137,11 +141,12 @@ def test_a_choice_that_hangs_on_single_flights_is_said_to(results: Results) -> N
 
 def test_weights_stand_beside_the_whiteness_that_they_come_from(results: Results) -> None:
     head, *rows = cells(weights_section(results))
-    assert head == ["flight", "GNSS velocity, white", "weight aided", "weight unaided"]
-    for flight, white, aided, unaided in rows:
+    assert head == ["flight", "GNSS velocity, white", "weight aided", "weight unaided", "weight smoothed"]
+    for flight, white, aided, unaided, smoothed in rows:
         weights = results.decision["weights"][flight]
         assert aided == f"{100 * weights['aided']:.0f} %"
         assert unaided == f"{100 * weights['unaided']:.0f} %"
+        assert smoothed == "0 %"
         # The made errors are white.
         assert float(white.removesuffix(" %")) > 80.0
 
@@ -149,7 +154,7 @@ def test_weights_stand_beside_the_whiteness_that_they_come_from(results: Results
 def test_unknown_whiteness_is_called_unknown(results: Results) -> None:
     known = results.metrics[results.metrics["metric"] != "white_share"]
     html = weights_section(dataclasses.replace(results, metrics=known))
-    assert cells(html)[0] == ["flight", "weight aided", "weight unaided"]
+    assert cells(html)[0] == ["flight", "weight aided", "weight unaided", "weight smoothed"]
     assert "takes the mean of the others" in html
     without_one = results.metrics[
         (results.metrics["metric"] != "white_share") | (results.metrics["flight"] != "flight_2")
