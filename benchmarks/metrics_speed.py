@@ -34,6 +34,7 @@ PARTS = {
     "windows": ("window_figures", "window_rows", "add_worst_windows"),
     "ground": ("add_ground_metrics",),
     "whiteness of the sources": ("source_whiteness", "add_whiteness"),
+    "smoothed velocity": ("smoothed_velocity",),
     "true errors": ("read_references", "true_errors", "add_true_errors"),
     "gaps": ("paired_gaps", "add_withheld_metrics", "withheld_rows", "add_true_drift"),
     "events and activity": ("filter_events", "scoring_summary"),

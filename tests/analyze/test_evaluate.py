@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from fusetune.analyze.analyze_flight import analyze_flight
+from fusetune.analyze.analyze_flight import AnalysisSettings, analyze_flight, grade_saved_flight
 from fusetune.analyze.evaluate import evaluate
 from fusetune.analyze.flight_files import FLIGHT_FILES, SAMPLES_FILE, SCORE_TABLES, SCORING_FILE
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
@@ -27,7 +27,7 @@ from fusetune.analyze.scoring.score_sets import score_sets, scored_flight
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.ulog.writer import write_ulog
 from fusetune.save.flight_folder import load_flight, write_flight
-from fusetune.storage.documents import write_document
+from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.parquet import write_table
 
 # the delay gives other times to the same measurements, the gate rejects some of them
@@ -86,6 +86,14 @@ def test_scores_in_memory_are_those_of_the_files(
     declared = [written / name for name in FLIGHT_FILES]
     declared += [file for name in replayed for file in replay_files(written, name)]
     assert set(written.iterdir()) == set(declared)
+    # the grade that may be asked for before all this is the same
+    trust = read_document(written / "fidelity.json")["trust"]
+    early = grade_saved_flight(saved, AnalysisSettings())
+    assert (early.grade, early.is_compared, early.figure_grades) == (
+        trust["grade"],
+        trust["is_compared"],
+        trust["figure_grades"],
+    )
 
     monkeypatch.chdir(empty)
     samples: list[pa.Table] = []

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fusetune.apply.candidates import Candidate, candidates_of_vetoed, without_twins, write_candidates
@@ -72,6 +72,7 @@ def test_the_file_is_a_study(tmp_path: Path) -> None:
     assert isinstance(study.set_named("a_halfway").overrides["EKF2_MAG_TYPE"], int)
 
 
+@settings(deadline=None)
 @given(
     st.dictionaries(
         st.sampled_from(("EKF2_GPS_V_NOISE", "EKF2_ACC_NOISE", "EKF2_MAG_NOISE")), st.floats(0.01, 0.99), min_size=1

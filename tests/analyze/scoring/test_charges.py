@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -72,6 +72,7 @@ def test_the_cost_is_a_share_of_the_mask() -> None:
 FINITE = st.floats(-100.0, 100.0)
 
 
+@settings(deadline=None)
 @given(
     own=arrays(np.float64, 12, elements=FINITE),
     hidden=arrays(np.float64, 12, elements=st.floats(0.0, 1.0)),
@@ -91,6 +92,7 @@ def test_whatever_a_reset_hides_does_not_change_what_counts(
         np.testing.assert_array_equal(one.variance, other.variance)
 
 
+@settings(deadline=None)
 @given(
     own=arrays(np.float64, 12, elements=FINITE),
     lacking=arrays(np.bool_, 12),

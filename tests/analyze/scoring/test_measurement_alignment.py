@@ -17,6 +17,8 @@ from fusetune.analyze.replaying.samples import SampleSpool
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.charges import EvidenceCost
 from fusetune.analyze.scoring.measurement_alignment import FIGURES, narrowed, paired_samples
+from fusetune.analyze.scoring.metrics_table import MetricsTable
+from fusetune.analyze.scoring.sample_scores import score_samples
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow
 
@@ -178,3 +180,17 @@ def test_samples_that_are_charged_are_the_same_on_the_disk(tmp_path: Path) -> No
     for one, other in zip(in_memory.each(), on_disk.each(), strict=True):
         assert one.sets == other.sets
         np.testing.assert_array_equal(one.innovation, other.innovation)
+
+
+def test_a_source_that_only_another_set_fuses_has_figures_but_no_say(tmp_path: Path) -> None:
+    """Blocks of it would leave the present set without a score beside that other one."""
+    sets = {name: MadeSet() for name in ("present", "other")}
+    _, folder = make_flight(tmp_path, "flight", sets)
+    now, other = (read_set(folder, name) for name in sets)
+    now = replace(now, samples={key: now.samples[key] for key in now.samples if key[0] != "baro_hgt"})
+    table = MetricsTable("flight")
+    scores = score_samples(table, [now, other], "present", WINDOW, ScoringSettings())
+    assert set(scores.blocks["source"].to_pylist()) == {"gnss_vel", "gnss_pos"}
+    figures = table.finished().to_pylist()
+    assert {row["set"] for row in figures if row["source"] == "baro_hgt"} == {"other"}
+    assert ("baro_hgt", 0) not in scores.costs

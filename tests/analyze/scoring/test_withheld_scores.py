@@ -99,6 +99,13 @@ def test_a_gap_after_a_reset_of_its_own_counts_no_better_than_the_present_set() 
     other = record("other", predicted([10, 20, 30], [0.1, 0.2, 0.3]))
     (group,) = paired_gaps([now, other], "present", window)
     np.testing.assert_allclose(group.error, [[1.0, -2.0, 3.0], [0.1, -2.0, 0.3]])
+    # A set with resets of its own has no say in what is clipped, in gaps after none of them either.
+    assert group.complete == (True, False)
+    assert group.winsor_limit == pytest.approx(5 * 1.4826 * 2.0)
+    early = dataclasses.replace(WINDOW, own_resets={"other": (Cut(3 * SECOND, 6 * SECOND, "reset"),)})
+    (group,) = paired_gaps([now, other], "present", early)
+    np.testing.assert_allclose(group.error[1], [0.1, 0.2, 0.3])
+    assert group.winsor_limit == pytest.approx(5 * 1.4826 * 2.0)
     # What it does worse than the present set stays its own.
     other = record("other", predicted([10, 20, 30], [0.1, 4.0, 0.3]))
     (group,) = paired_gaps([now, other], "present", window)

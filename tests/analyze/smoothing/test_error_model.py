@@ -55,7 +55,7 @@ def found(white: float, correlated: float, tau: float, seed: int, seconds: float
     if tau:
         measured = measured + gauss_markov(generator, steps, correlated, tau)
     model = horizontal_model(Stretch(sums, epoch, measured))
-    return likeliest_errors(lambda one: [model(one)], ErrorModel(0.1, 0.0, 0.0, WALK))
+    return likeliest_errors([model], ErrorModel(0.1, 0.0, 0.0, WALK))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -66,11 +66,11 @@ def test_white_errors_are_found_white(seed: int) -> None:
     assert 0.4 * WALK < errors.walk < 2.5 * WALK
 
 
-@pytest.mark.parametrize(("tau", "near"), [(0.5, (0.5, 1.0)), (2.0, (1.0, 2.0, 4.0)), (4.0, (2.0, 4.0, 8.0))])
-def test_the_time_over_which_errors_wander_is_found(tau: float, near: tuple[float, ...]) -> None:
+@pytest.mark.parametrize("tau", [0.5, 2.0, 4.0])
+def test_the_time_over_which_errors_wander_is_found(tau: float) -> None:
     errors = found(0.05, 0.15, tau, seed=5)
-    assert errors.correlation_time_s in near
-    # how far 240 s of a process that forgets over τ tell its size: 1/√(2 · 240/τ) is 9 % for 4 s; and factors of two
+    assert 0.5 * tau < errors.correlation_time_s < 2.0 * tau
+    # how far 240 s of a process that forgets over τ tell its size: 1/√(2 · 240/τ) is 9 % for 4 s
     assert math.hypot(errors.white, errors.correlated) == pytest.approx(math.hypot(0.05, 0.15), rel=0.4)
 
 
@@ -85,7 +85,7 @@ def test_measurements_twice_as_large_have_noises_twice_as_large() -> None:
     epoch = np.arange(UPDATES_PER_STEP, sums.time.size, UPDATES_PER_STEP)
     measured = 0.1 * np.random.default_rng(2).normal(size=(epoch.size, 3))
     models = [horizontal_model(Stretch(sums, epoch, scale * measured)) for scale in (1.0, 2.0)]
-    one, two = (likeliest_errors(lambda e, m=m: [m(e)], ErrorModel(0.1, 0.0, 0.0, WALK)) for m in models)  # type: ignore[misc]
+    one, two = (likeliest_errors([m], ErrorModel(0.1, 0.0, 0.0, WALK)) for m in models)
     assert two.white == pytest.approx(2.0 * one.white, rel=0.03)
 
 

@@ -1,5 +1,7 @@
 """The smoothed velocity of a made flight: near the truth, and the same whatever filter it is made of."""
 
+import json
+
 import numpy as np
 import pytest
 from tests.analyze.smoothing.made_steps import MadeMotion, motion, replayed
@@ -108,6 +110,15 @@ def test_heights_of_a_barometer_hold_the_vertical_velocity() -> None:
         errors.append(np.sqrt(np.mean(np.square(found.velocity - truth_at(found.time))[:, 2])))
     alone, with_heights = errors
     assert with_heights < 0.3 * alone
+
+
+def test_it_says_how_it_was_made() -> None:
+    heights = np.random.default_rng(3).normal(size=ROWS.size)
+    found = smoothed(record_of(a_replay(), MADE.velocity[ROWS] + NOISE, heights)).document
+    assert (found["source"], found["horizontal"]["positions"], [*found["vertical"]["positions"]]) == (
+        "gnss_vel", {}, ["baro_hgt"],
+    )  # fmt: skip
+    assert json.loads(json.dumps(found)) == found
 
 
 def test_it_is_known_in_the_intervals_alone_and_at_times_in_order() -> None:

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
@@ -36,6 +36,7 @@ def test_without_events_nothing_is_known() -> None:
     assert not rate_ratio(0, 1.0, 0, 1.0, 0.95).is_larger
 
 
+@settings(deadline=None)
 @given(st.integers(0, 60), st.integers(0, 60), st.sampled_from([0.9, 0.95, 0.99]))
 def test_larger_beyond_doubt_is_what_the_exact_binomial_test_rejects(count: int, base: int, confidence: float) -> None:
     if count + base == 0:

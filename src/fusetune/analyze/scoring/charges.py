@@ -12,7 +12,8 @@ cost itself:
   `reset_cut_s` after it, its error counts as no smaller than the present set's at the same measurement, and its
   variance as its usual one, for a reset sets that, too.
 
-So neither what a reset makes small nor what is not there can make a score better.
+So neither what a reset makes small nor what is not there can make a score better. Nor has such a set a say in the limit
+beyond which the errors of all are clipped: with or without it the others' scores are the same.
 """
 
 from __future__ import annotations

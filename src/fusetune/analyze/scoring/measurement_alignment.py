@@ -45,7 +45,7 @@ class PairedSamples:
     """Samples of one source and axis at the same measurements, as they count; calculate with what `each` gives.
 
     `rows` holds the samples of each set, (N,) with the `FIGURES`, in single precision where that is exact, and may read
-    them from the disk. `complete` says of each set whether all of them are its own, so that nothing was charged.
+    them from the disk. `complete` says of each set whether it lacks none and has no reset of its own on the flight.
     `costs` says what each of the sets that were asked for cost itself, also of those that are left out.
     """
 
@@ -177,6 +177,7 @@ class _Matched:
     row: npt.NDArray[np.int32]
     lacking: npt.NDArray[np.bool_]
     after_reset: npt.NDArray[np.bool_]
+    has_own_resets: bool
 
     @property
     def cost(self) -> EvidenceCost:
@@ -184,7 +185,7 @@ class _Matched:
 
     @property
     def is_complete(self) -> bool:
-        return not (self.lacking.any() or self.after_reset.any())
+        return not (self.lacking.any() or self.has_own_resets)
 
 
 def _names(matched: Sequence[_Matched]) -> tuple[str, ...]:
@@ -221,8 +222,9 @@ def _matched(
     time = measurement_time(samples, key[0], record.parameters)
     row = match(scored, time, tolerance)
     lacking = (row < 0) | ~_is_usable(samples)[row] | (scored < time[np.argmax(samples.fused)])
-    after_reset = np.zeros(scored.shape, bool) if is_reference else window.after_own_reset(record.name, scored)
-    return _Matched(record, row.astype(np.int32), lacking, after_reset & ~lacking)
+    resets = record.name in window.own_resets and not is_reference
+    after_reset = window.after_own_reset(record.name, scored) & ~lacking & resets
+    return _Matched(record, row.astype(np.int32), lacking, after_reset, resets)
 
 
 def _figures(matched: _Matched, key: SourceAxis) -> dict[str, npt.NDArray]:

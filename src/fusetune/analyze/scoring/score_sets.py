@@ -51,6 +51,7 @@ SCORE_TOPICS = (
             "vehicle_land_detected",
             *IMU_TOPICS,
             *TRUTH_TOPICS,
+            "vehicle_air_data",
             "estimator_selector_status",
             "estimator_status",
             *INNOVATION_TOPICS,
@@ -167,7 +168,7 @@ def score_sets(
     for record in records:
         add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
     samples, gaps, whiteness = no_sample_scores(), [], {}
-    smoothed = SMOOTHED_SCHEMA.empty_table()
+    smoothed, reference = SMOOTHED_SCHEMA.empty_table(), None
     if window.intervals:
         kept = [record for record in records if record.name not in window.excluded]
         samples = score_samples(table, kept, present, window, settings, take_samples, spool_folder)
@@ -178,7 +179,8 @@ def score_sets(
         add_onboard(table, scored.onboard, window, settings, records[0].parameters)
         fused = {source for record in records for source in record.fused_sources}
         references = read_references(flight, fused, records[0].parameters)
-        differences = SmoothedScores(smoothed_velocity(kept[0], flight, window.intervals, STEP_US))
+        reference = smoothed_velocity(kept[0], flight, window.intervals, STEP_US)
+        differences = SmoothedScores(reference)
         whiteness = _add_state_figures(table, kept, flight, references, window, settings, differences)
         smoothed = differences.rows(flight.name, window.block_edges(settings.block_s))
         for truth in references:
@@ -188,6 +190,7 @@ def score_sets(
     withheld = withheld_rows(flight.name, gaps, edges)
     evidence = set_evidence([record.name for record in records], window, samples.costs, gaps, settings)
     summary = scoring_summary(flight, records, present, window, events, evidence, whiteness, settings)
+    summary["smoothed_reference"] = None if reference is None else reference.document
     return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, smoothed, summary)
 
 

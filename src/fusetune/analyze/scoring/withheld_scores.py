@@ -70,7 +70,7 @@ class PairedGaps:
     @property
     def winsor_limit(self) -> float:
         """See `fusetune.analyze.metrics.likelihood.winsor_limit`; of the complete sets, as others have no say."""
-        return winsor_limit(self.error[list(self.complete)] if self.complete else self.error.copy())
+        return winsor_limit(self.error[list(self.complete)] if self.complete else self.error)
 
 
 WITHHELD_METRICS: tuple[Metric[PairedGaps], ...] = (
@@ -158,6 +158,7 @@ class _Matched:
     lacking: npt.NDArray[np.bool_]
     alone: npt.NDArray[np.bool_]
     after_reset: npt.NDArray[np.bool_]
+    has_own_resets: bool
 
     @property
     def cost(self) -> EvidenceCost:
@@ -165,7 +166,7 @@ class _Matched:
 
     @property
     def is_complete(self) -> bool:
-        return not (self.lacking.any() or self.after_reset.any())
+        return not (self.lacking.any() or self.has_own_resets)
 
 
 def _matched(
@@ -174,10 +175,10 @@ def _matched(
     mask: Mapping[str, npt.NDArray],
     window: ScoringWindow,
 ) -> _Matched:
-    start = mask["start"]
+    start, resets = mask["start"], record.name in window.own_resets
     if not table["key"].size:
         nothing, nowhere = np.zeros(start.shape), np.zeros(start.shape, bool)
-        return _Matched(nothing, nothing + 1.0, ~nowhere, nowhere, nowhere)
+        return _Matched(nothing, nothing + 1.0, ~nowhere, nowhere, nowhere, resets)
     row = np.minimum(np.searchsorted(table["key"], mask["key"]), table["key"].size - 1)
     # Before it was fused once a source is predicted from nothing.
     since = record.first_fused.get((str(mask["source"][0]), 0), np.iinfo(np.int64).max)
@@ -185,7 +186,7 @@ def _matched(
     lacking = absent | ~_is_usable(table)[row] | (start < since)
     alone = absent & (start >= since) & np.isin(mask["key"] // _HORIZONS, table["key"] // _HORIZONS)
     after_reset = window.after_own_reset(record.name, start) & ~lacking
-    return _Matched(table["innovation"][row], table["innovation_variance"][row], lacking, alone, after_reset)
+    return _Matched(table["innovation"][row], table["innovation_variance"][row], lacking, alone, after_reset, resets)
 
 
 def _is_usable(table: Mapping[str, npt.NDArray]) -> npt.NDArray[np.bool_]:

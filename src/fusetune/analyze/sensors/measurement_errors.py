@@ -90,7 +90,7 @@ def _values(
 ) -> Array | None:
     if source == "gnss_pos":
         measured = _gnss_positions(flight, measurement_time(samples[0], source, record.parameters)[first:])
-        return None if measured is None else measured - _travelled(states, time)[:, :2]
+        return None if measured is None else measured - travelled_way(states, time)[:, :2]
     if any(one.observation.size != one.innovation.size for one in samples):
         return None
     observation = np.column_stack([one.observation[first:] for one in samples])
@@ -102,7 +102,7 @@ def _values(
         return -innovation
     if source == "mag":
         return _mag_errors(states, time, observation)
-    travelled = _travelled(states, time)
+    travelled = travelled_way(states, time)
     if source in PLANE_SOURCES:
         return observation - travelled[:, :2]
     return _height_sign(observation + innovation, travelled[:, 2:]) * observation - travelled[:, 2:]
@@ -116,7 +116,7 @@ def _running_freely(innovation: Array, correction: Array) -> Array | None:
     return -innovation + own - np.nan_to_num(correction)
 
 
-def _travelled(states: FilterStates, at: npt.NDArray[np.int64]) -> Array:
+def travelled_way(states: FilterStates, at: npt.NDArray[np.int64]) -> Array:
     """Integral of the estimated velocity (trapezoids), NED m, (N, 3)."""
     step = np.diff(states.time)[:, None] * 1e-6
     way = np.cumsum(0.5 * (states.velocity[1:] + states.velocity[:-1]) * step, axis=0)

@@ -13,14 +13,15 @@ What is known of the latter decides: q is log-normal around what an acceleromete
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-from fusetune.analyze.smoothing.linear_smoother import LinearModel, likelihood
+from fusetune.analyze.smoothing.linear_smoother import Likelihood
 
 Array = npt.NDArray[np.float64]
 
@@ -41,8 +42,7 @@ _SLOPE_STEP = 1e-4
 _TOLERANCE = 3e-6
 """Of −2 ln L, which is some thousands."""
 _MOST_STEPS = 8
-_COARSE = math.log(2.0)
-_ROUNDS = 2
+_COARSE, _REACH = math.log(2.0), math.log(3.0)
 
 
 @dataclass(frozen=True)
@@ -88,18 +88,22 @@ class ErrorModel:
         )
 
 
-Builder = Callable[[ErrorModel], Sequence[LinearModel]]
-"""Models of the stretches of a flight, under given noises."""
+class Likely(Protocol):
+    """A stretch of a flight: how many measurements it has, and how probable they are under given noises."""
+
+    @property
+    def measurements(self) -> int: ...
+
+    def likelihood(self, errors: ErrorModel) -> Likelihood: ...
 
 
-def likeliest_errors(build: Builder, first: ErrorModel) -> ErrorModel:
+def likeliest_errors(stretches: Sequence[Likely], first: ErrorModel) -> ErrorModel:
     """The noises under which the measurements are most probable, from a white first guess."""
-    search = _Search(build)
-    plain = search.climbed(search.at(first))
+    search = _Search(stretches)
+    plain = search.down_the_slope(search.climbed(search.at(first)))
     looked = min((search.at(one) for one in _correlated(plain.errors)), key=lambda one: one.score)
-    correlated = search.climbed(looked)
-    best = correlated if correlated.score < plain.score - NEEDED_GAIN else plain
-    return search.down_the_slope(best).errors
+    correlated = search.down_the_slope(looked)
+    return (correlated if correlated.score < plain.score - NEEDED_GAIN else plain).errors
 
 
 def _correlated(white: ErrorModel) -> Iterator[ErrorModel]:
@@ -120,24 +124,22 @@ class _Found:
 class _Search:
     """Of the most probable ratios of all noises to σ_w, in logarithms."""
 
-    def __init__(self, build: Builder) -> None:
-        self._build = build
+    def __init__(self, stretches: Sequence[Likely]) -> None:
+        self._stretches = stretches
+        self._count = sum(one.measurements for one in stretches)
 
     def at(self, errors: ErrorModel) -> _Found:
         """Noises in these ratios."""
-        models = self._build(errors)
-        found = [likelihood(model) for model in models]
-        count = sum(model.measurements for model in models)
-        scale = sum(one.cost for one in found) / count
+        found = [one.likelihood(errors) for one in self._stretches]
+        scale = sum(one.cost for one in found) / self._count
         errors = errors.scaled(math.sqrt(scale))
-        score = count * math.log(scale) + sum(one.log_determinant for one in found)
+        score = self._count * math.log(scale) + sum(one.log_determinant for one in found)
         return _Found(score + (math.log(errors.walk / USUAL_WALK) / WALK_SPREAD) ** 2, errors)
 
     def climbed(self, best: _Found) -> _Found:
-        """One ratio after the other in factors of two, twice, as long as that helps."""
-        for _ in range(_ROUNDS):
-            for place in reversed(range(_ratios(best.errors).size)):
-                best = self._along(place, best)
+        """One ratio after the other in factors of two, as long as that helps."""
+        for place in reversed(range(_ratios(best.errors).size)):
+            best = self._along(place, best)
         return best
 
     def _along(self, place: int, start: _Found) -> _Found:
@@ -157,13 +159,17 @@ class _Search:
         return best
 
     def down_the_slope(self, start: _Found) -> _Found:
-        """To where all ratios together are best, no further off than the last step."""
+        """To where all ratios together are best, no further off than by a factor."""
         errors, centre = start.errors, _ratios(start.errors)
+
+        def score(ratios: Array) -> float:
+            return self.at(_with_ratios(errors, ratios)).score
+
         found = minimize(
-            lambda ratios: self.at(_with_ratios(errors, ratios)).score,
+            score,
             centre,
             method="L-BFGS-B",
-            bounds=np.column_stack([centre - _COARSE, centre + _COARSE]),
+            bounds=[(float(one) - _REACH, float(one) + _REACH) for one in centre],
             options={"eps": _SLOPE_STEP, "ftol": _TOLERANCE, "maxiter": _MOST_STEPS},
         )
         return self.at(_with_ratios(errors, found.x))

@@ -54,11 +54,6 @@ class LinearModel:
     first_variance: Array
     constant_variance: Array
 
-    @property
-    def measurements(self) -> int:
-        """How many there are, M."""
-        return int(np.count_nonzero(np.isfinite(self.measurement_variance)))
-
 
 @dataclass(frozen=True)
 class Likelihood:
@@ -83,65 +78,88 @@ class Smoothed:
     likelihood: Likelihood
 
 
-def smooth(model: LinearModel) -> Smoothed:
-    """The most probable states and constants, given all measurements, and the likelihood of these."""
-    solved = _Solved(model)
-    return Smoothed(solved.states(), solved.constants, solved.likelihood)
+@dataclass(frozen=True)
+class Equations:
+    """Normal equations of states x, constants g and the number 1, in all of which the residuals are linear.
 
+    They are linear in the inverse variances, so those of several noises add up.
 
-def likelihood(model: LinearModel) -> Likelihood:
-    """The likelihood alone, in half the time."""
-    return _Solved(model).likelihood
-
-
-class _Solved:
-    """Residuals are linear in the states x, the constants g and the number 1, and the cost is a square of all three.
-
-    x is eliminated by the factor A = L Lᵀ of its part, g from what is left; what is left then, of the 1, is the cost.
+    Attributes
+    ----------
+    banded : (2 n, N n) of x, in LAPACK's lower banded form
+    border : (N n, m + 1) between x and the others, the 1 last
+    corner : (m + 1, m + 1) of the others
     """
 
-    def __init__(self, model: LinearModel) -> None:
-        epochs, size = model.measured.shape[0], model.observation.shape[1]
-        self._shape = epochs, size
-        q, r = 1.0 / model.process_variance, 1.0 / model.measurement_variance
-        left = np.swapaxes(model.transition, 1, 2) * q[:, None, :]
-        seen = model.observation.T[None] * r[:, None, :]
+    banded: Array
+    border: Array
+    corner: Array
 
-        diagonal = seen @ model.observation
-        diagonal[0] += np.diag(1.0 / model.first_variance)
-        diagonal[:-1] += left @ model.transition
-        diagonal[1:] += np.eye(size) * q[:, None, :]
-        banded = _banded(diagonal, -np.swapaxes(left, 1, 2))
-        self._factor = cholesky_banded(banded, overwrite_ab=True, lower=True, check_finite=False)
 
-        # columns of the constants, and of the 1
-        moves = np.concatenate([model.of_constants, model.known[:, :, None]], axis=2)
-        sights = np.concatenate([-model.observed_constants, model.measured[:, :, None]], axis=2)
-        border = -(seen @ sights)
-        border[:-1] += left @ moves
-        border[1:] -= q[:, :, None] * moves
-        corner = _summed(sights, r) + _summed(moves, q)
-        flat = border.reshape(epochs * size, -1)
-        self._halved, info = dtbtrs(self._factor, flat, uplo="L")
+def equations(model: LinearModel, process: Array, measurement: Array) -> Equations:
+    """Those of a model's residuals, without what is known of x_0 and g.
+
+    Parameters
+    ----------
+    process, measurement : (N − 1, n) and (N, p) inverse variances, 0 for residuals that do not count
+    """
+    epochs, size = model.measured.shape[0], model.observation.shape[1]
+    left = np.swapaxes(model.transition, 1, 2) * process[:, None, :]
+    seen = model.observation.T[None] * measurement[:, None, :]
+    diagonal = seen @ model.observation
+    diagonal[:-1] += left @ model.transition
+    diagonal[1:] += np.eye(size) * process[:, None, :]
+    moves = np.concatenate([model.of_constants, model.known[:, :, None]], axis=2)
+    sights = np.concatenate([-model.observed_constants, model.measured[:, :, None]], axis=2)
+    border = -(seen @ sights)
+    border[:-1] += left @ moves
+    border[1:] -= process[:, :, None] * moves
+    corner = _summed(sights, measurement) + _summed(moves, process)
+    return Equations(_banded(diagonal, -np.swapaxes(left, 1, 2)), border.reshape(epochs * size, -1), corner)
+
+
+class Solved:
+    """x is eliminated by A = L Lᵀ of its part, g from what is left; what is left then, of the 1, is the cost.
+
+    Attributes
+    ----------
+    constants : (m,)
+    cost : of the most probable course
+    log_determinant : of the equations of x and g
+    """
+
+    def __init__(self, given: Equations) -> None:
+        """`given` is used up."""
+        self._factor = cholesky_banded(given.banded, overwrite_ab=True, lower=True, check_finite=False)
+        self._halved, info = dtbtrs(self._factor, given.border, uplo="L")
         assert info == 0, "a Cholesky factor has no zeros on its diagonal"
         # not by a matrix product: its order of summation could change with the number of cores
-        corner -= np.einsum("ki,kj->ij", self._halved, self._halved)
-        corner[:-1, :-1] += np.diag(1.0 / model.constant_variance)
+        corner = given.corner - np.einsum("ki,kj->ij", self._halved, self._halved)
         schur = cho_factor(corner[:-1, :-1], lower=True, check_finite=False)
         self.constants = -cho_solve(schur, corner[:-1, -1], check_finite=False)
-
-        cost = float(corner[-1, -1] + corner[-1, :-1] @ self.constants)
-        there = model.measurement_variance[np.isfinite(model.measurement_variance)]
-        variances = (model.process_variance, there, model.first_variance, model.constant_variance)
-        information = 2.0 * float(np.sum(np.log(self._factor[0])) + np.sum(np.log(np.diag(schur[0]))))
-        self.likelihood = Likelihood(cost, information + sum(float(np.sum(np.log(one))) for one in variances))
+        self.cost = float(corner[-1, -1] + corner[-1, :-1] @ self.constants)
+        self.log_determinant = 2.0 * float(np.sum(np.log(self._factor[0])) + np.sum(np.log(np.diag(schur[0]))))
 
     def states(self) -> Array:
-        """(N, n) by the other half of the factor."""
+        """(N n,) by the other half of the factor."""
         right = -self._halved[:, -1] - self._halved[:, :-1] @ self.constants
         found, info = dtbtrs(self._factor, right[:, None], uplo="L", trans="T")
         assert info == 0, "a Cholesky factor has no zeros on its diagonal"
-        return np.asarray(found).reshape(self._shape)
+        return np.asarray(found)[:, 0]
+
+
+def smooth(model: LinearModel) -> Smoothed:
+    """The most probable states and constants, given all measurements, and the likelihood of these."""
+    given = equations(model, 1.0 / model.process_variance, 1.0 / model.measurement_variance)
+    size = model.first_variance.size
+    given.banded[0, :size] += 1.0 / model.first_variance
+    given.corner[:-1, :-1] += np.diag(1.0 / model.constant_variance)
+    solved = Solved(given)
+    there = model.measurement_variance[np.isfinite(model.measurement_variance)]
+    variances = (model.process_variance, there, model.first_variance, model.constant_variance)
+    log_determinant = solved.log_determinant + sum(float(np.sum(np.log(one))) for one in variances)
+    states = solved.states().reshape(-1, size)
+    return Smoothed(states, solved.constants, Likelihood(solved.cost, log_determinant))
 
 
 def _summed(columns: Array, weights: Array) -> Array:

@@ -1,4 +1,8 @@
-"""Positions and heights as the smoother takes them: against the integral of the estimated velocity, at its epochs."""
+"""Positions and heights as the smoother takes them: against the integral of the estimated velocity, at its epochs.
+
+Heights are those of the log. As the filter takes them, its own estimate of their bias is subtracted, which is made of
+its state: a reference made of them would lean to the set that is replayed.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.metrics.attitude import interpolate_quaternion
+from fusetune.analyze.replaying.measurement_times import match
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
-from fusetune.analyze.sensors.measurement_errors import ErrorSeries, measurement_errors
+from fusetune.analyze.sensors.measurement_errors import ErrorSeries, measurement_errors, travelled_way
 from fusetune.analyze.smoothing.velocity_models import DOWN, PLANE, PositionSeries
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.quaternions import rotation_matrix
 
@@ -20,6 +26,15 @@ TAKEN = {"gnss_pos": PLANE, "gnss_hgt": DOWN, "baro_hgt": DOWN}
 """Sources beside the velocity, and their axes."""
 WITH_VELOCITY = {"gnss_vel": ("gnss_pos", "gnss_hgt")}
 """Source of velocity → those that stand in the same message."""
+
+
+LOGGED_HEIGHTS = {
+    "gnss_hgt": ("vehicle_gps_position", "timestamp", "altitude_msl_m"),
+    "baro_hgt": ("vehicle_air_data", "timestamp_sample", "baro_alt_meter"),
+}
+"""Source of heights → topic, when a message of it was measured, and the height, m."""
+_MATCH_SHARE = 0.75
+"""Of the time from one message to the next. The filter shifts samples by half of its own interval."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +68,7 @@ def position_series(record: ReplayedSet, flight: Flight, velocity_source: str) -
     Parameters
     ----------
     record : replay; its velocities are integrated
-    flight : canonical; `vehicle_gps_position` gives GNSS positions
+    flight : canonical; gives GNSS positions, and heights as they were logged where it has their topics
     velocity_source : the one that is smoothed
     """
     states = record.states()
@@ -63,9 +78,31 @@ def position_series(record: ReplayedSet, flight: Flight, velocity_source: str) -
         if series is not None and series.time.size:
             if source == "gnss_pos":
                 series = _at_the_imu(series, states, record)
+            if source in LOGGED_HEIGHTS:
+                series = _as_logged(series, source, states, record, flight)
             delayed = source in WITH_VELOCITY.get(velocity_source, ())
             found.append(MeasuredPositions(source, delayed, series.time, series.values))
     return found
+
+
+def _as_logged(
+    series: ErrorSeries, source: str, states: FilterStates, record: ReplayedSet, flight: Flight
+) -> ErrorSeries:
+    """The same measurements as they stand in the log; the series itself where they do not."""
+    topic, stamp, field = LOGGED_HEIGHTS[source]
+    table = flight.topic(topic)
+    if table is None or not {stamp, field} <= set(table) or table[stamp].size < 2:
+        return series
+    logged = table[stamp].astype(np.int64)
+    delay = AID_SOURCES[source].delay_parameter
+    time = series.time + round(record.parameters.get(delay or "", 0.0) * 1e3)
+    row = match(time, logged, _MATCH_SHARE * float(np.median(np.diff(logged))))
+    height = table[field][row].astype(np.float64)
+    usable = (row >= 0) & np.isfinite(height)
+    if not usable.any():
+        return series
+    values = -height - travelled_way(states, series.time)[:, 2]
+    return ErrorSeries(series.time[usable], values[usable, None])
 
 
 def _at_the_imu(series: ErrorSeries, states: FilterStates, record: ReplayedSet) -> ErrorSeries:

@@ -6,9 +6,11 @@ It is made of the replay of one set, which only says around what the errors are 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +24,9 @@ from fusetune.analyze.smoothing.linear_smoother import Smoothed, measurement_res
 from fusetune.analyze.smoothing.measured_positions import MeasuredPositions, position_series
 from fusetune.analyze.smoothing.velocity_models import (
     ACCEL,
+    DOWN,
     GYRO,
+    PLANE,
     Stretch,
     VelocityModel,
     horizontal_model,
@@ -58,6 +62,7 @@ class SmoothedVelocity:
     time : (K,) µs, in order
     velocity : (K, 3) NED, m/s
     horizontal, vertical : noises of the measurements as they were found
+    plane, heights : sources of positions and heights that were smoothed with it
     """
 
     source: str
@@ -65,6 +70,20 @@ class SmoothedVelocity:
     velocity: Array
     horizontal: ErrorModel
     vertical: ErrorModel
+    plane: tuple[str, ...] = ()
+    heights: tuple[str, ...] = ()
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """How it was made, as JSON can hold it."""
+        found: dict[str, Any] = {"source": self.source}
+        for name, errors, sources in (
+            ("horizontal", self.horizontal, self.plane),
+            ("vertical", self.vertical, self.heights),
+        ):
+            noises = asdict(errors)
+            found[name] = noises | {"positions": dict(zip(sources, noises["positions"], strict=True))}
+        return found
 
 
 def smoothed_velocity(
@@ -138,6 +157,8 @@ def _stretch(
     # the measurement is up to one interval older than the update that takes it
     before_s = (sums.time[epoch] - time)[:, None] * 1e-6
     measured = values - (sums.velocity[epoch] - sums.acceleration[epoch] * before_s)
+    if not all(np.isfinite(one).all() for one in (sums.known_velocity_time, sums.turned_force, measured)):
+        return None
     # an observation in another frame than the state's, such as the body's
     if np.median(np.abs(measured)) > max(_IN_OTHER_FRAME, float(np.median(np.abs(values)))):
         return None
@@ -155,7 +176,10 @@ def _smoothed(
     time = np.concatenate([one for one, _ in pieces])
     velocity = np.concatenate([one for _, one in pieces])
     rows = inside(time, intervals)
-    return SmoothedVelocity(source, time[rows], velocity[rows], horizontal, vertical)
+    if not rows.any():
+        return None
+    plane, heights = (tuple(one.source for one in parts[0].positions if one.axes == axes) for axes in (PLANE, DOWN))
+    return SmoothedVelocity(source, time[rows], velocity[rows], horizontal, vertical, plane, heights)
 
 
 def _fitted(models: Sequence[VelocityModel]) -> tuple[ErrorModel, list[Smoothed]]:
@@ -163,7 +187,7 @@ def _fitted(models: Sequence[VelocityModel]) -> tuple[ErrorModel, list[Smoothed]
     axes = models[0].axes
     change = np.concatenate([np.diff(one.measured[:, :axes], axis=0) for one in models])
     # of the difference of two
-    white = max(_spread(change) / np.sqrt(2.0), SMALLEST_NOISE)
+    white = max(_spread(change) / math.sqrt(2.0), SMALLEST_NOISE)
     errors = ErrorModel(white, 0.0, 0.0, USUAL_WALK, (USUAL_POSITION_ERRORS,) * models[0].series)
     for one in models:
         model = one(errors)
@@ -174,7 +198,7 @@ def _fitted(models: Sequence[VelocityModel]) -> tuple[ErrorModel, list[Smoothed]
             off = np.abs(residual[there, column])
             one.excess[there, column] = np.maximum(1.0, off / (OUTLIER_SIGMAS * max(_spread(off), SMALLEST_NOISE)))
     every = max(1, -(-len(models) // SEARCHED_STRETCHES))
-    errors = likeliest_errors(lambda one: [build(one) for build in models[::every]], errors)
+    errors = likeliest_errors(models[::every], errors)
     return errors, [smooth(one(errors)) for one in models]
 
 

@@ -9,14 +9,15 @@ for minutes. Where the error of the velocity measurement is correlated, it is a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.smoothing.error_model import ErrorModel
+from fusetune.analyze.smoothing.error_model import ErrorModel, PositionErrors
 from fusetune.analyze.smoothing.inertial_steps import InertialSteps, Transitions, transitions
-from fusetune.analyze.smoothing.linear_smoother import LinearModel, Smoothed
+from fusetune.analyze.smoothing.linear_smoother import Likelihood, LinearModel, Smoothed
+from fusetune.analyze.smoothing.noise_terms import GaussMarkov, NoiseTerms
 
 Array = npt.NDArray[np.float64]
 
@@ -130,6 +131,36 @@ class VelocityModel:
         self.excess = np.where(np.isfinite(values), 1.0, np.inf)
         self.measured = np.nan_to_num(values)
         self._parts = self._with_positions()
+        self._terms: dict[bool, NoiseTerms] = {}
+
+    @property
+    def measurements(self) -> int:
+        """How many there are of all axes."""
+        return int(np.count_nonzero(np.isfinite(self.excess)))
+
+    def likelihood(self, errors: ErrorModel) -> Likelihood:
+        """Of all measurements under these noises; `excess` must stay from the first call on."""
+        if errors.is_white not in self._terms:
+            self._terms[errors.is_white] = self._noise_terms(errors.is_white)
+        terms = self._terms[errors.is_white]
+        noises = [errors.walk, *(one.walk for one in errors.positions)]
+        noises += [errors.white, *(one.white for one in errors.positions)]
+        markov = None
+        if not errors.is_white:
+            kept = np.exp(-self._motion.step_s / errors.correlation_time_s)
+            markov = GaussMarkov(self.axes, errors.correlated**2, kept)
+        return terms.likelihood(np.square(noises).tolist(), markov)
+
+    def _noise_terms(self, is_white: bool) -> NoiseTerms:
+        unit = ErrorModel(1.0, 1.0, 0.0 if is_white else 1.0, 1.0, (PositionErrors(1.0, 1.0),) * self.series)
+        model, axes, size = self(unit), self.axes, self._motion.walk.size
+        if not is_white:
+            moves = model.transition.copy()
+            moves[:, range(-axes, 0), range(-axes, 0)] = 0.0
+            model = replace(model, transition=moves)
+        states = [slice(0, size), *(slice(size + axes * i, size + axes * (i + 1)) for i in range(self.series))]
+        rows = [slice(axes * i, axes * (i + 1)) for i in range(1 + self.series)]
+        return NoiseTerms(model, states, rows, 0 if is_white else axes)
 
     def _with_positions(self) -> dict[str, Array]:
         """Transition, constants and observation with the states of the series behind those of the motion."""
