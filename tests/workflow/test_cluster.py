@@ -63,10 +63,12 @@ def test_a_changed_present_replays_only_the_present_set_and_jobs_elsewhere_find_
     assert present["flight"] == "second"
     replayed = {
         name: (results / "logs" / name).read_text(encoding="utf-8").splitlines()[-1]
-        for name in ("replay/first.1.log", "analyze/first.log")
+        for name in ("delays/first.log", "replay/first.1.log", "analyze/first.log")
     }
-    assert replayed["replay/first.1.log"] == "replayed: present; up to date: 1"
-    assert replayed["analyze/first.log"] == "replayed: none; up to date: 2"
+    assert replayed["delays/first.log"] == "replayed: present; up to date: 0"
+    # of the first run
+    assert replayed["replay/first.1.log"] == "replayed: low, high; up to date: 0"
+    assert replayed["analyze/first.log"] == "replayed: none; up to date: 1"
     summary = json.loads((results / "analyze" / "first" / "present.json").read_text(encoding="utf-8"))
     assert summary["overrides"] == present["parameters"]
 

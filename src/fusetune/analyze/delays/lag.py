@@ -245,7 +245,7 @@ def _whitened(rows: list[_Rows], solution: Array, axis: int, order: int) -> tupl
     usual = (np.abs(now) < usual_size) & (np.abs(past) < usual_size).all(axis=1)
     if np.count_nonzero(usual) > 3 * order:
         past, now = past[usual], now[usual]
-    makes_white = np.append(-np.linalg.lstsq(past, now, rcond=1e-10)[0], 1.0)
+    makes_white = np.append(-np.linalg.lstsq(past.T @ past, past.T @ now, rcond=1e-12)[0], 1.0)
     makes_white /= max(_size(now + past @ makes_white[:-1]), 1e-12)
     return (
         np.concatenate([_windows(row.left[:, axis], order) @ makes_white for row in rows]),
