@@ -17,6 +17,7 @@ from fusetune.apply.candidates import (
     without_twins,
     write_candidates,
 )
+from fusetune.apply.cautions import cautions
 from fusetune.apply.choice import Choice, choose, choose_after_mending, parameter_distance
 from fusetune.apply.consistency import (
     SourceNoise,
@@ -27,7 +28,7 @@ from fusetune.apply.consistency import (
 )
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.delays import delay_findings, delay_sentences
-from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out
+from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out, white_shares
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
@@ -107,9 +108,11 @@ def decide(
     better = _vetoed_but_better(ranked)
     late = _delay_findings(delays, newest, present)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
+    minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
     sentences = (
         delay_sentences(late),
         paragraph(choice, ranked, flights, settings),
+        *minded,
         sentence_of_largest(findings),
         candidates_sentence(proposed, _gains(better)),
         *vehicle.sentences(),
@@ -117,6 +120,7 @@ def decide(
     )
     text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    decision["cautions"] = list(minded)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
     decision["findings"] = documents((*late, *findings))
@@ -154,6 +158,12 @@ def _among_mended(
     ranked = rank(names, DELAY_MENDED, able, {name: why for name, why in vetoed.items() if why}, settings)
     evidence = [flight.evidence for flight in able if flight.evidence is not None]
     return choose(ranked, DELAY_MENDED, evidence, _distances(newest, DELAY_MENDED), settings)
+
+
+def _whiteness(metrics: pa.Table, flights: Sequence[AnalyzedFlight], present: str) -> dict[str, float]:
+    """How white the error of each source is, the mean over the flights that count."""
+    counted = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
+    return white_shares(metrics.filter(pc.is_in(metrics["flight"], value_set=counted)), present)
 
 
 def _delay_findings(delays: AnyPath | None, newest: AnalyzedFlight | None, present: str) -> tuple[Finding, ...]:
