@@ -26,6 +26,12 @@ FEW_DRAWS = 2
 VERSIONS = 6
 """Of each flight with its blocks drawn anew."""
 
+EQUAL, PERSISTENT, SKEWED = "equal", "persistent", "persistent, skewed"
+NEAR, NOISY = "nearly equal", "nearly equal, noisy"
+MAIN_KINDS = (EQUAL, PERSISTENT, NEAR)
+FEWER = 5
+"""Of the other kinds, and for the old rule, this part of the studies is drawn."""
+
 EvidenceOf = Callable[[World, int, np.random.Generator], list[FlightEvidence | None]]
 """World, number of flights, chance → evidence of the flights of one study."""
 
@@ -51,7 +57,7 @@ def false_changes(
         source = world if name == OURS else _as_old(world)
         rule = rules(quick)[name]
         for kind, make in _kinds(source, generator).items():
-            count = draws if name == OURS else max(draws // 5, 1)
+            count = draws if name == OURS and kind in MAIN_KINDS else max(draws // FEWER, 1)
             changed = sum(_changes(world, rule, name, make(source, flights, generator)) for _ in range(count))
             shares[name, kind] = changed / count
     return shares
@@ -64,15 +70,15 @@ def _kinds(world: World, generator: np.random.Generator) -> dict[str, EvidenceOf
     near = [with_means(_alike(one), HARDLY) for one in (whole, mirrored(whole))]
     noisy = [with_means(blocks_redrawn(whole, generator), HARDLY) for _ in range(VERSIONS)]
     return {
-        "equal": lambda world, flights, chance: [
+        EQUAL: lambda world, flights, chance: [
             None if one is None else dealt_out(one, chance) for one in _drawn([whole], flights, chance)
         ],
-        "persistent": lambda world, flights, chance: [
+        PERSISTENT: lambda world, flights, chance: [
             of_either_sign(*pairs[int(index)], chance) for index in chance.integers(0, len(pairs), flights)
         ],
-        "persistent, skewed": lambda world, flights, chance: _drawn(skewed, flights, chance),
-        "nearly equal": lambda world, flights, chance: _drawn(near, flights, chance),
-        "nearly equal, noisy": lambda world, flights, chance: _drawn_apart(noisy, flights, chance),
+        SKEWED: lambda world, flights, chance: _drawn(skewed, flights, chance),
+        NEAR: lambda world, flights, chance: _drawn(near, flights, chance),
+        NOISY: lambda world, flights, chance: _drawn_apart(noisy, flights, chance),
     }
 
 

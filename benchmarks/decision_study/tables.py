@@ -8,6 +8,7 @@ import numpy as np
 
 from .drawn import JUDGED_SIZES, SIZES, DrawnStudy, power
 from .judge import Verdict, by_rule
+from .nulls import FEWER, MAIN_KINDS
 from .rules import OLD, OURS, SCORE_ONLY
 from .world import TRUTH, World
 
@@ -143,7 +144,10 @@ def false_changes_table(found: Mapping[str, Mapping[tuple[int, str, str], float]
         for flights, kind in keys
     ]
     rows.append(["**all**", *(_pair(*mean) for mean in means)])
-    title = f"{studies} studies per world, kind and number of flights; {OLD} in brackets, a fifth as many:"
+    title = (
+        f"{studies} studies per world and number of flights of the kinds {', '.join(MAIN_KINDS)}, one in {FEWER} of "
+        f"the others and of {OLD}, in brackets:"
+    )
     return title + "\n\n" + _table(["world", *(f"{kind}, {flights} flights %" for flights, kind in keys)], rows)
 
 

@@ -18,3 +18,8 @@ RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, "sets", "scoring
 def mended_name(name: str) -> str:
     """Name of a set with the delays mended; no study can give one with a plus sign."""
     return DELAY_MENDED if name == PRESENT else f"{name}+{DELAY_MENDED}"
+
+
+def is_mended(name: str) -> bool:
+    """Whether a set is one with the delays mended."""
+    return name == DELAY_MENDED or name.endswith(f"+{DELAY_MENDED}")

@@ -5,7 +5,7 @@ import math
 import pytest
 from tests.apply.statistics.test_leave_one_out import flight
 
-from fusetune.apply.choice import choose, parameter_distance
+from fusetune.apply.choice import Choice, choose, choose_after_mending, parameter_distance
 from fusetune.apply.ranking import RankedSet, proved_sets
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.mean_difference import MeanDifference
@@ -97,6 +97,22 @@ def test_the_words_say_why_a_better_score_was_passed_over() -> None:
     assert "“b” are 18.1 % smaller, but not beyond chance" in luck
     far = _for_the_pick(one("c", -0.195, -0.05), one("b", -0.2, -0.1), settings)
     assert "further from what flies now" in far
+
+
+def test_a_proved_delay_is_mended_first_and_the_rest_is_judged_with_it_mended() -> None:
+    """The delay is measured: the predictions need not prove it again, only not contradict."""
+    mended, tuned = one("delay_mended", -0.05, 0.1, p_family=0.4), one("b+delay_mended", -0.15, 0.02, p_family=0.3)
+    ranked = [PRESENT, mended, tuned]
+    first = Choice("keep", "a", tuned, None, False, None)
+    among = Choice("keep", "delay_mended", tuned, None, False, None)
+    found = choose_after_mending(first, ranked, among)
+    assert (found.status, found.chosen, found.pick, found.beyond_mending) == ("change", "delay_mended", mended, None)
+    better = one("b+delay_mended", -0.1, -0.05)
+    among = Choice("change", "b+delay_mended", better, better, False, None)
+    found = choose_after_mending(first, ranked, among)
+    assert (found.chosen, found.pick, found.beyond_mending) == ("b+delay_mended", tuned, better)
+    worse = [PRESENT, one("delay_mended", 0.01, 0.1), tuned]
+    assert choose_after_mending(first, worse, among) is first
 
 
 def test_distance_is_the_size_of_the_logarithms_of_the_ratios() -> None:

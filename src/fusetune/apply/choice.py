@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fusetune.apply.evidence import FlightEvidence
 from fusetune.apply.ranking import RankedSet, proved_sets
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.leave_one_out import LeaveOneOut, leave_one_out
+from fusetune.set_names import DELAY_MENDED, is_mended
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class Choice:
     pick : the candidate that is chosen instead of the present set; None if that is kept
     exploratory : too few flights for a firm statement
     leave_one_out : what choices from all flights but one were worth on that one; None with too few flights
+    beyond_mending : where delays are mended, the chosen set less the present one with no more than that mended; None
+        where the chosen set is that one, and where none is mended
     """
 
     status: str
@@ -30,6 +33,12 @@ class Choice:
     pick: RankedSet | None
     exploratory: bool
     leave_one_out: LeaveOneOut | None
+    beyond_mending: RankedSet | None = None
+
+    @property
+    def mends_delays(self) -> bool:
+        """Whether the chosen set is one with mended delays."""
+        return is_mended(self.chosen)
 
 
 def choose(
@@ -70,6 +79,33 @@ def choose(
     near = [one for one in proved if one.score - first.score <= min(one.behind_best_error or 0.0, hardly)]
     pick = min([first, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
     return Choice("change", pick.name, best, pick, exploratory, validated)
+
+
+def choose_after_mending(choice: Choice, ranked: Sequence[RankedSet], among_mended: Choice) -> Choice:
+    """First the delays that are proved wrong, then all else.
+
+    That a delay is wrong is proved by the sensors, not by how well a set predicts, so the present set with the delays
+    mended needs no further proof; it is enough that it is not worse. What else is to be changed is judged with the
+    delays mended: beside a wrong delay other parameters are tuned to hide it.
+
+    Parameters
+    ----------
+    choice : among all sets, against the present one
+    ranked : all sets against the present one
+    among_mended : among the sets with mended delays, against the present one with these mended
+    """
+    by_name = {one.name: one for one in ranked}
+    mended = by_name.get(DELAY_MENDED)
+    if mended is None or not (mended.is_eligible and mended.difference <= 0.0) or choice.status == "no_evidence":
+        return choice
+    return replace(
+        choice,
+        status="change",
+        chosen=among_mended.chosen,
+        pick=by_name[among_mended.chosen],
+        leave_one_out=among_mended.leave_one_out if among_mended.pick else None,
+        beyond_mending=among_mended.pick,
+    )
 
 
 def parameter_distance(values: Mapping[str, float], present: Mapping[str, float]) -> float:

@@ -17,7 +17,8 @@ from fusetune.apply.candidates import (
     without_twins,
     write_candidates,
 )
-from fusetune.apply.choice import Choice, choose, parameter_distance
+from fusetune.apply.cautions import cautions
+from fusetune.apply.choice import Choice, choose, choose_after_mending, parameter_distance
 from fusetune.apply.consistency import (
     SourceNoise,
     consistency_candidates,
@@ -27,7 +28,7 @@ from fusetune.apply.consistency import (
 )
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.delays import delay_findings, delay_sentences
-from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out
+from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out, white_shares
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
@@ -39,7 +40,7 @@ from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
 from fusetune.finding import Finding, documents
-from fusetune.set_names import PRESENT
+from fusetune.set_names import DELAY_MENDED, PRESENT, is_mended
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
@@ -98,6 +99,8 @@ def decide(
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
     evidence = [flight.evidence for flight in flights if flight.evidence is not None]
     choice = choose(ranked, present, evidence, _distances(newest, present), settings)
+    if DELAY_MENDED in sets:
+        choice = choose_after_mending(choice, ranked, _among_mended(sets, flights, metrics, newest, settings))
     values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present)
     noises = _noises(flights, metrics, newest, present, settings)
@@ -105,9 +108,11 @@ def decide(
     better = _vetoed_but_better(ranked)
     late = _delay_findings(delays, newest, present)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
+    minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
     sentences = (
         delay_sentences(late),
         paragraph(choice, ranked, flights, settings),
+        *minded,
         sentence_of_largest(findings),
         candidates_sentence(proposed, _gains(better)),
         *vehicle.sentences(),
@@ -115,6 +120,7 @@ def decide(
     )
     text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    decision["cautions"] = list(minded)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
     decision["findings"] = documents((*late, *findings))
@@ -136,6 +142,28 @@ def decide(
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
     with atomic_path(output / "decision.json") as temporary:
         write_document(temporary, _rounded(decision), allow_nan=False)
+
+
+def _among_mended(
+    sets: Sequence[str],
+    flights: Sequence[AnalyzedFlight],
+    metrics: pa.Table,
+    newest: AnalyzedFlight | None,
+    settings: DecisionSettings,
+) -> Choice:
+    """What is chosen among the sets with mended delays, against the present one with these mended."""
+    names = [name for name in sets if is_mended(name)]
+    able = [one for one in flights if one.evidence is None or DELAY_MENDED in one.evidence.sets]
+    vetoed = {name: vetoes(name, DELAY_MENDED, able, metrics, settings) for name in names if name != DELAY_MENDED}
+    ranked = rank(names, DELAY_MENDED, able, {name: why for name, why in vetoed.items() if why}, settings)
+    evidence = [flight.evidence for flight in able if flight.evidence is not None]
+    return choose(ranked, DELAY_MENDED, evidence, _distances(newest, DELAY_MENDED), settings)
+
+
+def _whiteness(metrics: pa.Table, flights: Sequence[AnalyzedFlight], present: str) -> dict[str, float]:
+    """How white the error of each source is, the mean over the flights that count."""
+    counted = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
+    return white_shares(metrics.filter(pc.is_in(metrics["flight"], value_set=counted)), present)
 
 
 def _delay_findings(delays: AnyPath | None, newest: AnalyzedFlight | None, present: str) -> tuple[Finding, ...]:

@@ -98,6 +98,8 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
         if same and len(same) == len(ranked) - 1:
             return "All other sets gave the same results as these."
         return "No other set was eligible for comparison." if len(ranked) > 1 else "There was no other set to compare."
+    if choice.pick is not None and choice.mends_delays:
+        return _for_the_mended(choice, choice.pick, settings)
     if choice.pick is not None:
         return _for_the_pick(choice.pick, best, settings)
     if best.difference >= 0.0:
@@ -127,6 +129,21 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
     return (
         f"{found}but the best of several candidates is favoured by chance, and after allowing for that "
         f"(p = {p_value:.2g}) the difference is not certain enough for a change."
+    )
+
+
+def _for_the_mended(choice: Choice, pick: RankedSet, settings: DecisionSettings) -> str:
+    """Why a set with mended delays is chosen: what is measured is proof enough if the predictions do not contradict."""
+    wins = f"better on {pick.flights_better} of {_count(pick.flights, 'flight')}"
+    span = _smaller(pick.lower, pick.upper, settings.confidence)
+    text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
+    beyond = choice.beyond_mending
+    if beyond is None:
+        return f"{text} With the delay mended, no other set is proved better still."
+    span = _smaller(beyond.lower, beyond.upper, settings.confidence)
+    return (
+        f"{text} They are {beyond.improvement_percent:.1f} % smaller than with nothing but the delay mended ({span}; "
+        f"better on {beyond.flights_better} of {_count(beyond.flights, 'flight')})."
     )
 
 
