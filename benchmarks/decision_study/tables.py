@@ -189,8 +189,16 @@ def truth_tables(tables: Mapping[str, str]) -> str:
 
 
 def between_marks(text: str, name: str, content: str) -> str:
-    """Replace what stands between `<!-- name -->` and `<!-- /name -->`."""
+    """Replace what stands between `<!-- name -->` and `<!-- /name -->`.
+
+    Raises
+    ------
+    ValueError
+        The text has no such place.
+    """
     first, last = f"<!-- {name} -->", f"<!-- /{name} -->"
+    if not 0 <= text.find(first) < text.find(last):
+        raise ValueError(f"no place for the table: {first} and {last} are missing")
     before, rest = text.split(first, 1)
     after = rest.split(last, 1)[1]
     return f"{before}{first}\n{content}\n{last}{after}"

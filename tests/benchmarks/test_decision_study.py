@@ -135,6 +135,8 @@ def test_tables_hold_every_rule_and_study(worlds) -> None:
     assert choices_table(verdicts).count("\n") == 2 * 3 + 1
     assert truth_table(worlds["aggressive"]).count("\n") == len(SETS) + 2
     assert between_marks("a <!-- x --> old <!-- /x --> b", "x", "new") == "a <!-- x -->\nnew\n<!-- /x --> b"
+    with pytest.raises(ValueError, match="no place for the table: <!-- y -->"):
+        between_marks("a <!-- x --> old <!-- /x --> b", "y", "new")
 
 
 def test_studies_are_drawn_and_their_power_told(worlds, tmp_path: Path) -> None:
