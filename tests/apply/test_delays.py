@@ -10,7 +10,7 @@ from tests.apply.study import make_study
 
 from fusetune.analyze.delays.wrong_delays import JoinedDelay
 from fusetune.apply.decide import decide
-from fusetune.apply.delays import SINGLE, WRONG, delay_findings, delay_sentences
+from fusetune.apply.delays import SINGLE, UNTRIED, WRONG, delay_findings, delay_sentences
 from fusetune.apply.evidence import AIDED, read_flights
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.parameters.params_file import read_params
@@ -42,6 +42,14 @@ def test_a_delay_beyond_the_buffers_asks_for_longer_ones() -> None:
 def test_one_flight_alone_is_worth_a_note() -> None:
     (found,) = delay_findings([joined(205.0, None, ("a",))], {})
     assert (found.id, found.severity) == (SINGLE, "note")
+    assert delay_sentences([found]) == ""
+
+
+def test_a_way_of_estimating_that_was_not_tried_mends_nothing_but_is_told() -> None:
+    flow = JoinedDelay("optical_flow", "EKF2_OF_DELAY", 20.0, 60.0, 50.0, 70.0, ("a", "b"), None)
+    (found,) = delay_findings([flow], {})
+    assert (found.id, found.severity) == (UNTRIED, "note")
+    assert "Compare sets with other values of EKF2_OF_DELAY" in found.remedy
     assert delay_sentences([found]) == ""
 
 

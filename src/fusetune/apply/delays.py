@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from fusetune.analyze.delays.wrong_delays import STEP_MS, JoinedDelay
+from fusetune.analyze.delays.wrong_delays import STEP_MS, TRIED_SENSORS, JoinedDelay
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.set_names import DELAY_MENDED
 
-WRONG, SINGLE = "sensor_delay_wrong", "sensor_delay_of_one_flight"
+WRONG, SINGLE, UNTRIED = "sensor_delay_wrong", "sensor_delay_of_one_flight", "sensor_delay_to_be_checked"
 BUFFERS = "EKF2_DELAY_MAX"
 
 
 def delay_findings(delays: Iterable[JoinedDelay], parameters: Mapping[str, float]) -> tuple[Finding, ...]:
-    """Findings about delays: warnings where one is proved wrong, notes where a single flight says so.
+    """Findings about delays: warnings where one is proved wrong, notes where a single flight says so, or estimates that
+    have not been held against the truth.
 
     Parameters
     ----------
@@ -26,6 +27,8 @@ def delay_findings(delays: Iterable[JoinedDelay], parameters: Mapping[str, float
             found.append(_wrong(one, parameters))
         elif len(one.flights) == 1 and _off_ms(one) > STEP_MS:
             found.append(_of_one_flight(one))
+        elif one.sensor not in TRIED_SENSORS and _off_ms(one) > STEP_MS:
+            found.append(_untried(one))
     return tuple(found)
 
 
@@ -59,6 +62,19 @@ def _of_one_flight(one: JoinedDelay) -> Finding:
         severity="note",
         found=f"{_measured(one)}, as far as one flight can tell",
         remedy="Fly and add another flight with brisk accelerations",
+        figure=one.value_ms,
+        threshold=one.told_ms,
+        unit="ms",
+        evidence=_evidence(one),
+    )
+
+
+def _untried(one: JoinedDelay) -> Finding:
+    return Finding(
+        id=UNTRIED,
+        severity="note",
+        found=f"{_measured(one)}, by an estimate that has not been held against known delays of this sensor",
+        remedy=f"Compare sets with other values of {one.parameter} in a study before it is changed",
         figure=one.value_ms,
         threshold=one.told_ms,
         unit="ms",

@@ -27,6 +27,9 @@ from fusetune.storage.parquet import read_table
 STEP_MS = 10.0
 """A delay acts in steps of an update of the filter."""
 FEWEST_FLIGHTS = 2
+TRIED_SENSORS = ("gnss",)
+"""Whose estimates were held against the truth (docs/delays.md); those of others are told, but nothing is mended by
+them."""
 LEAST_ERROR_MS = 2.0
 """Standard error that one flight has at least: stamps, and the update that takes a sample, are no finer."""
 
@@ -80,7 +83,7 @@ def join_delays(
         if len(of_sensor) == 1:
             lower, upper = now.lower_ms, now.upper_ms
         mended = None
-        if len(of_sensor) >= FEWEST_FLIGHTS:
+        if len(of_sensor) >= FEWEST_FLIGHTS and sensor in TRIED_SENSORS:
             mended = _mended(now, value, max(lower - now.told_ms, now.told_ms - upper), settings)
         value, lower, upper = (round(one, 1) for one in (value, lower, upper))
         found.append(JoinedDelay(sensor, now.parameter, now.told_ms, value, lower, upper, tuple(of_sensor), mended))
