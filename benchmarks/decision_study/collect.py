@@ -14,6 +14,7 @@ from typing import Any
 
 import yaml
 
+from fusetune.analyze.delays.flight_delays import write_delays
 from fusetune.analyze.replaying.replay_flight import replay_saved_flight
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings, WithholdingSettings
 from fusetune.analyze.scoring.score_flight import score_saved_flight
@@ -30,7 +31,7 @@ from .raw_data import write_raw
 from .second_simulator import fly, second_world
 
 HERE = Path(__file__).parent
-KEPT = ("scoring.json", "scores.parquet", "withheld.parquet", "smoothed.parquet", "metrics.parquet")
+KEPT = ("delays.json", "scoring.json", "scores.parquet", "withheld.parquet", "smoothed.parquet", "metrics.parquet")
 FIRST_SEED = 1000
 # Only gaps without GNSS decide; the others would cost as much again.
 GNSS_GAPS = WithholdingSettings(baro_s=0.0, mag_s=0.0)
@@ -126,8 +127,10 @@ def _fly_and_score(files: StudyFiles, folders: Folders, world: str, number: int)
     target.mkdir(parents=True)
     with tempfile.TemporaryDirectory() as scratch:
         analyzed = Path(scratch, "analyzed")
-        replay_saved_flight(saved, sets, analyzed, _replay_settings(files.worlds_by_name()[world]))
+        settings = _replay_settings(files.worlds_by_name()[world])
+        replay_saved_flight(saved, sets, analyzed, settings)
         score_saved_flight(saved, analyzed, list(sets), present=PRESENT)
+        write_delays(saved, analyzed, {}, settings)
         for name in KEPT:
             shutil.copy(analyzed / name, target / name)
         if raw is not None:

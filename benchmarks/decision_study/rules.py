@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from fusetune.apply.choice import choose, parameter_distance
+from fusetune.analyze.delays.settings import DelaySettings
+from fusetune.analyze.delays.wrong_delays import STEP_MS, join_delays, mended_values
+from fusetune.apply.choice import Choice, choose, choose_after_mending, parameter_distance
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.settings import DecisionSettings
@@ -99,7 +101,27 @@ def decide(
     ranked = rank(names, names[0], chosen, world.vetoed, settings)
     distances = {name: parameter_distance(world.overrides[name], DEFAULTS) for name in names}
     choice = choose(ranked, names[0], [one.evidence for one in chosen if one.evidence], distances, settings)
+    mended = _mended_set(world, flights, names)
+    if mended is not None:
+        # No set of the study has a mended delay and another change.
+        alone = Choice("keep", mended, None, None, choice.exploratory, None)
+        choice = choose_after_mending(choice, ranked, alone, mended)
     return world.sets.index(choice.chosen), ranked
+
+
+def _mended_set(world: World, flights: Sequence[int], names: Sequence[str]) -> str | None:
+    """The set that does nothing but mend the delays that these flights prove wrong, as the product would add it."""
+    told = {str(number): world.delays[index] for number, index in enumerate(flights)}
+    wanted = mended_values(join_delays(told, None, DelaySettings()))
+    if not wanted:
+        return None
+    return next((name for name in names if _mends(world.overrides[name], wanted)), None)
+
+
+def _mends(overrides: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
+    return overrides.keys() == wanted.keys() and all(
+        abs(overrides[name] - value) <= STEP_MS for name, value in wanted.items()
+    )
 
 
 def _named(flight: AnalyzedFlight, name: str) -> AnalyzedFlight:

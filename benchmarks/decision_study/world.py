@@ -10,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from fusetune.analyze.delays.sensor_delays import SensorDelay, read_delays
 from fusetune.apply.criteria import criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AimEvidence, AnalyzedFlight, FlightEvidence, read_flights
 from fusetune.apply.paper_mode import paper_ranking
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
+from fusetune.storage.documents import read_document
 
 from .old_rule import AIDED, UNAIDED, old_vetoes, read_old_aims, read_old_evidence
 
@@ -66,6 +68,7 @@ class World:
     settings : by which the flights were weighed and vetoed
     folders : where the flights are
     flights : what the decision reads
+    delays : of the sensors, as each flight tells them
     old_flights : what that of version 0.1 read of the same flights
     vetoed, old_vetoed : reasons against a set, from these flights
     figures : criteria of the innovations and scores of single aims, lower is better
@@ -78,6 +81,7 @@ class World:
     settings: DecisionSettings
     folders: tuple[Path, ...]
     flights: tuple[AnalyzedFlight, ...]
+    delays: tuple[tuple[SensorDelay, ...], ...]
     old_flights: tuple[FlightEvidence | None, ...]
     vetoed: Mapping[str, Sequence[str]]
     old_vetoed: Mapping[str, str]
@@ -105,6 +109,7 @@ class World:
             self,
             folders=folders,
             flights=flights,
+            delays=self.delays[:count],
             old_flights=self.old_flights[:count],
             vetoed=_vetoed(self.sets, flights, self.settings),
             old_vetoed=old_vetoes(self.sets, folders, self.sets[0]),
@@ -154,6 +159,7 @@ def read_world(
         settings=settings,
         folders=ordered,
         flights=tuple(flights),
+        delays=tuple(read_delays(read_document(folder / "delays.json")["delays"]) for folder in ordered),
         old_flights=tuple(old),
         vetoed=_vetoed(sets, flights, settings),
         old_vetoed=old_vetoes(sets, ordered, present),

@@ -28,7 +28,9 @@ def world(errors: dict[str, list[float]], **more):
         "old_vetoed": {},
         "figures": {},
     }
-    return World(name="made", sets=NAMES, folders=(), flights=(), old_flights=(), truth=truth, **(usual | more))
+    return World(
+        name="made", sets=NAMES, folders=(), flights=(), delays=(), old_flights=(), truth=truth, **(usual | more)
+    )
 
 
 def verdict(chosen: int, **errors: list[float]):

@@ -81,7 +81,9 @@ def choose(
     return Choice("change", pick.name, best, pick, exploratory, validated)
 
 
-def choose_after_mending(choice: Choice, ranked: Sequence[RankedSet], among_mended: Choice) -> Choice:
+def choose_after_mending(
+    choice: Choice, ranked: Sequence[RankedSet], among_mended: Choice, name: str = DELAY_MENDED
+) -> Choice:
     """First the delays that are proved wrong, then all else.
 
     That a delay is wrong is proved by the sensors, not by how well a set predicts, so the present set with the delays
@@ -93,9 +95,10 @@ def choose_after_mending(choice: Choice, ranked: Sequence[RankedSet], among_mend
     choice : among all sets, against the present one
     ranked : all sets against the present one
     among_mended : among the sets with mended delays, against the present one with these mended
+    name : of the present set with the delays mended
     """
     by_name = {one.name: one for one in ranked}
-    mended = by_name.get(DELAY_MENDED)
+    mended = by_name.get(name)
     if mended is None or not (mended.is_eligible and mended.difference <= 0.0) or choice.status == "no_evidence":
         return choice
     return replace(
