@@ -15,6 +15,7 @@ from fusetune.apply.wording import _for_the_pick
 def one(name: str, difference: float, upper: float, p_family: float = 0.01, **changes) -> RankedSet:
     values = {
         "name": name, "is_present": False, "reasons": (), "score": difference, "difference": difference,
+        "expected": difference,
         "lower": 2 * difference - upper, "upper": upper, "bound": upper,
         "p_value": 0.01, "p_holm": 0.2, "p_family": p_family, "p_best": 0.5,
         "flights": 6, "flights_better": 6, "equal_to_present": False,
@@ -40,6 +41,10 @@ def test_that_a_change_helps_is_shown_once_then_the_one_that_predicts_best_is_ta
     """c alone is more than the luck of many; b gains twice as much, and its own interval is clear of 0 as well."""
     assert chosen(one("b", -0.2, -0.1, p_family=0.07), one("c", -0.1, -0.05)) == "b"
     assert chosen(one("b", -0.2, -0.1, p_family=0.07), one("c", -0.1, -0.05, p_family=0.06)) == "a"
+
+
+def test_of_two_that_gain_alike_the_surer_one_is_chosen() -> None:
+    assert chosen(one("b", -0.1, -0.02, expected=-0.08), one("c", -0.095, -0.06, expected=-0.09)) == "c"
 
 
 def test_a_better_score_that_may_be_chance_does_not_stand_before_a_proved_one() -> None:
@@ -79,6 +84,8 @@ def test_a_set_that_is_worse_in_one_kind_of_prediction_is_not_eligible() -> None
 
 def test_of_two_sets_that_predict_alike_the_nearer_one_is_chosen() -> None:
     near, far = one("c", -0.195, -0.1, behind_best_error=0.02), one("b", -0.2, -0.1)
+    # at worst it must be hardly worse as well
+    assert chosen(far, one("c", -0.195, -0.05, behind_best_error=0.02), distances={"b": 3.0, "c": 1.0}) == "b"
     assert chosen(far, near, distances={"b": 3.0, "c": 1.0}) == "c"
     # More than a standard error or one percent behind is not alike.
     assert chosen(far, one("c", -0.195, -0.1, behind_best_error=0.004), distances={"b": 3.0, "c": 1.0}) == "b"

@@ -60,9 +60,9 @@ def choose(
     -----
     Eligible is a candidate that is not worse than the present set, beyond doubt, in any kind of prediction. Proved
     better are those whose interval lies wholly beyond the smallest gain, if one of them is better in spite of the
-    number of candidates (`fusetune.apply.ranking.proved_sets`). The proved set with the lowest score is chosen, or one
-    that is proved, within one standard error of it, hardly worse (`DecisionSettings.equivalence_percent`) and nearer
-    to the present parameters.
+    number of candidates (`fusetune.apply.ranking.proved_sets`). The proved set of which most is to be expected is
+    chosen, or one that is proved, within one standard error of it, hardly worse in expectation and at worst
+    (`DecisionSettings.equivalence_percent`) and nearer to the present parameters.
     """
     exploratory = len(evidence) < settings.minimum_flights
     eligible = [one for one in ranked if one.is_eligible]
@@ -74,10 +74,15 @@ def choose(
     proved = proved_sets(ranked, settings)
     if not proved:
         return Choice("keep", present, best, None, exploratory, validated)
-    first = min(proved, key=lambda one: (one.score, one.name))
+    first = min(proved, key=lambda one: (one.expected, one.name))
     hardly = math.log1p(0.01 * settings.equivalence_percent)
-    near = [one for one in proved if one.score - first.score <= min(one.behind_best_error or 0.0, hardly)]
-    pick = min([first, *near], key=lambda one: (distances.get(one.name, math.inf), one.score, one.name))
+    near = [
+        one
+        for one in proved
+        if one.expected - first.expected <= min(one.behind_best_error or 0.0, hardly)
+        and (one.bound or 0.0) - (first.bound or 0.0) <= hardly
+    ]
+    pick = min([first, *near], key=lambda one: (distances.get(one.name, math.inf), one.expected, one.name))
     return Choice("change", pick.name, best, pick, exploratory, validated)
 
 

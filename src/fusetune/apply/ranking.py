@@ -20,6 +20,7 @@ from fusetune.apply.statistics.bootstrap import (
 )
 from fusetune.apply.statistics.mean_difference import MeanDifference, mean_differences
 from fusetune.apply.statistics.rounding import EQUAL_WITHIN, without_rounding
+from fusetune.apply.statistics.shrinkage import expected_differences
 from fusetune.apply.statistics.sign_flips import family_p_values
 from fusetune.apply.worse_aims import mean_weights, worse_aims
 
@@ -42,6 +43,8 @@ class RankedSet:
     reasons : what is held against it, or why it was not scored
     score : mean over the flights, nat; lower is better
     difference, lower, upper : score less that of the present set, and its interval; below 0 is better
+    error : standard error of the difference
+    expected : the difference that is to be expected, see `fusetune.apply.statistics.shrinkage`
     p_value, p_holm : of the difference against 0, alone and by Holm's correction for all candidates
     p_family : that the best of the candidates is so much better by luck, see `fusetune.apply.statistics.sign_flips`
     bound : upper end of the wider interval of the difference by which a change is decided
@@ -66,6 +69,8 @@ class RankedSet:
     difference: float = math.nan
     lower: float | None = None
     upper: float | None = None
+    error: float | None = None
+    expected: float = math.nan
     p_value: float | None = None
     p_holm: float | None = None
     p_family: float | None = None
@@ -208,6 +213,8 @@ def _compared(
             difference=compared.difference,
             lower=compared.lower,
             upper=compared.upper,
+            error=compared.error,
+            expected=compared.difference,
             p_value=compared.p_value,
             p_holm=1.0,
             p_family=1.0,
@@ -266,6 +273,8 @@ def _with_family(
     candidates = [one for one in ranked if not (one.is_present or one.is_vetoed or one.equal_to_present)]
     adjusted = dict(zip((one.name for one in candidates), holm([one.p_value for one in candidates]), strict=True))
     eligible = [one.name for one in candidates if one.is_eligible]
+    worth = expected_differences([one.difference for one in candidates], [one.error for one in candidates])
+    expected = dict(zip((one.name for one in candidates), worth, strict=True))
     family, of_velocity = _family_p_values(eligible, present, evidence, settings)
     able = [one.name for one in ranked if one.status != NOT_ELIGIBLE]
     units = units_redrawn(evidence)
@@ -276,6 +285,7 @@ def _with_family(
             p_holm=adjusted.get(one.name, 1.0),
             p_family=family.get(one.name, 1.0),
             p_velocity=of_velocity.get(one.name),
+            expected=expected.get(one.name, one.difference),
             p_best=None if shares is None else shares.get(one.name, 0.0),
         )
         for one in ranked
@@ -296,7 +306,8 @@ def _with_distance_to_the_best(
     ranked: list[RankedSet], complete: Sequence[str], scores: Array, units: int, settings: DecisionSettings
 ) -> list[RankedSet]:
     able = [one for one in ranked if one.is_present or one.is_eligible]
-    lead = min(proved_sets(ranked, settings) or able, key=lambda one: (one.score, one.name))
+    proved = proved_sets(ranked, settings)
+    lead = min(proved or able, key=lambda one: (one.expected if proved else one.score, one.name))
 
     def error(name: str) -> float | None:
         if name == lead.name:

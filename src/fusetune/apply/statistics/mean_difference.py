@@ -26,7 +26,8 @@ Array = npt.NDArray[np.float64]
 class MeanDifference:
     """Mean difference of two sets over flights, and its interval, which is None where nothing shows its spread.
 
-    `p_value` is two-sided, against no difference; None where it is not known.
+    `p_value` is two-sided, against no difference; None where it is not known. `error` is the standard error of the mean
+    over several flights; None where it is not known.
     """
 
     difference: float
@@ -34,6 +35,7 @@ class MeanDifference:
     upper: float | None
     flights: int
     p_value: float | None = None
+    error: float | None = None
 
     @property
     def is_certain(self) -> bool:
@@ -66,7 +68,7 @@ def mean_differences(
     found = []
     for one in moderated(differences):
         lower, upper = one.interval(settings.confidence) or (None, None)
-        found.append(MeanDifference(one.mean, lower, upper, len(flights), one.p_value))
+        found.append(MeanDifference(one.mean, lower, upper, len(flights), one.p_value, one.error))
     return found
 
 
