@@ -7,10 +7,12 @@ import pyarrow.compute as pc
 import pytest
 from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
+from tests.apply.test_choice import one
 
 from fusetune.analyze.delays.wrong_delays import JoinedDelay
+from fusetune.apply.choice import Choice
 from fusetune.apply.decide import decide
-from fusetune.apply.delays import SINGLE, UNTRIED, WRONG, delay_findings, delay_sentences
+from fusetune.apply.delays import SINGLE, UNCONFIRMED, UNTRIED, WRONG, confirmed, delay_findings, delay_sentences
 from fusetune.apply.evidence import AIDED, read_flights
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.parameters.params_file import read_params
@@ -31,6 +33,17 @@ def test_a_wrong_delay_is_told_with_the_value_to_set() -> None:
     )
 
 
+def test_a_delay_that_the_predictions_speak_against_is_told_but_not_set() -> None:
+    findings = delay_findings([joined(195.0, 200.0)], {})
+    mended = one("delay_mended", 0.02, 0.1, worse_aims=("smoothed",))
+    keep = Choice("keep", "present", mended, None, False, None)
+    (found,) = confirmed(findings, keep, [mended])
+    assert (found.id, found.severity) == (UNCONFIRMED, "note")
+    assert "not set, as the present parameters are worse with it beyond doubt in one way" in delay_sentences([found])
+    change = Choice("change", "delay_mended", mended, mended, False, None)
+    assert confirmed(findings, change, [mended]) == findings
+
+
 def test_a_delay_beyond_the_buffers_asks_for_longer_ones() -> None:
     (found,) = delay_findings([joined(231.0, 230.0)], {"EKF2_DELAY_MAX": 200.0})
     assert (
@@ -46,7 +59,7 @@ def test_one_flight_alone_is_worth_a_note() -> None:
 
 
 def test_a_way_of_estimating_that_was_not_tried_mends_nothing_but_is_told() -> None:
-    flow = JoinedDelay("optical_flow", "EKF2_OF_DELAY", 20.0, 60.0, 50.0, 70.0, ("a", "b"), None)
+    flow = JoinedDelay("flow", "EKF2_OF_DELAY", 20.0, 60.0, 50.0, 70.0, ("a", "b"), None)
     (found,) = delay_findings([flow], {})
     assert (found.id, found.severity) == (UNTRIED, "note")
     assert "Compare sets with other values of EKF2_OF_DELAY" in found.remedy

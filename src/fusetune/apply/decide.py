@@ -27,7 +27,7 @@ from fusetune.apply.consistency import (
     source_noises,
 )
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
-from fusetune.apply.delays import delay_findings, delay_sentences
+from fusetune.apply.delays import confirmed, delay_findings, delay_sentences
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out, white_shares
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
@@ -106,7 +106,7 @@ def decide(
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
-    late = _delay_findings(delays, newest, present)
+    late = confirmed(_delay_findings(delays, newest, present), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
     sentences = (

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from fusetune.analyze.delays.wrong_delays import STEP_MS, TRIED_SENSORS, JoinedDelay
+from fusetune.apply.choice import Choice
+from fusetune.apply.ranking import RankedSet
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.set_names import DELAY_MENDED
 
-WRONG, SINGLE, UNTRIED = "sensor_delay_wrong", "sensor_delay_of_one_flight", "sensor_delay_to_be_checked"
+WRONG, UNCONFIRMED = "sensor_delay_wrong", "sensor_delay_not_confirmed"
+SINGLE, UNTRIED = "sensor_delay_of_one_flight", "sensor_delay_to_be_checked"
 BUFFERS = "EKF2_DELAY_MAX"
 
 
@@ -34,8 +38,35 @@ def delay_findings(delays: Iterable[JoinedDelay], parameters: Mapping[str, float
 
 def delay_sentences(findings: Sequence[Finding]) -> str:
     """What the paragraph of the decision begins with; empty where no delay is proved wrong."""
-    wrong = [one for one in findings if one.id == WRONG]
+    wrong = [one for one in findings if one.id in (WRONG, UNCONFIRMED)]
     return " ".join(f"{one.found}: {one.remedy[0].lower()}{one.remedy[1:]}." for one in wrong)
+
+
+def confirmed(findings: Sequence[Finding], choice: Choice, ranked: Sequence[RankedSet]) -> tuple[Finding, ...]:
+    """The findings, with no advice to set a delay that the predictions with it mended speak against.
+
+    Parameters
+    ----------
+    choice, ranked : the decision with the delays mended among its sets
+    """
+    mended = next((one for one in ranked if one.name == DELAY_MENDED), None)
+    if choice.mends_delays or mended is None:
+        return tuple(findings)
+    return tuple(_unconfirmed(one, mended) if one.id == WRONG else one for one in findings)
+
+
+def _unconfirmed(one: Finding, mended: RankedSet) -> Finding:
+    value = f"{one.evidence['parameter']} = {one.evidence['mended_ms']:g}"
+    against = f"ruled out with it ({mended.reasons[0]})" if mended.reasons else "no better with it"
+    if mended.worse_aims:
+        against = "worse with it beyond doubt in one way of predicting"
+    return replace(
+        one,
+        id=UNCONFIRMED,
+        severity="note",
+        remedy=f"Not set, as the present parameters are {against}: compare {value} with values between in a study, on "
+        "logs that hold every GNSS sample",
+    )
 
 
 def _wrong(one: JoinedDelay, parameters: Mapping[str, float]) -> Finding:
