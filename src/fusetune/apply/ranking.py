@@ -201,8 +201,8 @@ def _compared(
     names = list(dict.fromkeys((present, *sets)))
     scores = np.array([one.scores[[one.sets.index(name) for name in names]] for one in evidence])
     to_present = mean_differences(evidence, names, settings)
-    bounds, velocity_bounds = (_bounds(evidence, names, settings, aim) for aim in (None, SMOOTHED))
     aims = _aims(names, evidence, settings)
+    of_velocity = aims[SMOOTHED] if all(one.aim(SMOOTHED) is not None for one in evidence) else None
     weights = mean_weights(evidence)
     return [
         RankedSet(
@@ -218,8 +218,8 @@ def _compared(
             p_value=compared.p_value,
             p_holm=1.0,
             p_family=1.0,
-            bound=bounds[index],
-            velocity_bound=velocity_bounds[index],
+            bound=compared.upper_at(settings.confidence_of_a_change),
+            velocity_bound=of_velocity[index].upper_at(settings.confidence_of_a_change) if of_velocity else None,
             p_best=0.0,
             flights=len(evidence),
             flights_better=int(np.count_nonzero(without_rounding(scores[:, index] - scores[:, 0]) < 0.0)),
@@ -230,15 +230,6 @@ def _compared(
         )
         for index, (name, compared) in enumerate(zip(names, to_present, strict=True))
     ]
-
-
-def _bounds(
-    evidence: Sequence[FlightEvidence], names: Sequence[str], settings: DecisionSettings, aim: str | None
-) -> list[float | None]:
-    """Upper ends of the intervals by which a change is decided; None for a kind that not all flights have."""
-    if aim is not None and any(one.aim(aim) is None for one in evidence):
-        return [None] * len(names)
-    return [one.upper for one in mean_differences(evidence, names, settings.for_a_change, aim)]
 
 
 def _aims(

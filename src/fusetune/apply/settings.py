@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES, WITHHOLDABLE
@@ -106,9 +106,9 @@ class DecisionSettings:
         return min(max((white_share - self.distrust_white_share) / span, 0.0), 1.0)
 
     @property
-    def for_a_change(self) -> DecisionSettings:
-        """With the level of the intervals by which a change is decided: two kinds of proof share the error."""
-        return replace(self, confidence=0.5 + 0.5 * self.confidence)
+    def confidence_of_a_change(self) -> float:
+        """Level of the intervals by which a change is decided: two kinds of proof share the error."""
+        return 0.5 + 0.5 * self.confidence
 
     @property
     def smallest_gain(self) -> float:

@@ -16,7 +16,7 @@ from fusetune.apply.statistics.bootstrap import (
     spread_of_flights,
     units_redrawn,
 )
-from fusetune.apply.statistics.moderated import moderated
+from fusetune.apply.statistics.moderated import Moderated, moderated
 from fusetune.apply.statistics.rounding import without_rounding
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +27,7 @@ class MeanDifference:
     """Mean difference of two sets over flights, and its interval, which is None where nothing shows its spread.
 
     `p_value` is two-sided, against no difference; None where it is not known. `error` is the standard error of the mean
-    over several flights; None where it is not known.
+    over several flights, None where it is not known, and `freedom` its degrees of freedom.
     """
 
     difference: float
@@ -36,6 +36,13 @@ class MeanDifference:
     flights: int
     p_value: float | None = None
     error: float | None = None
+    freedom: float | None = None
+
+    def upper_at(self, confidence: float) -> float | None:
+        """Upper end of the interval at another level; None where it is not known, as of a single flight."""
+        if self.error is None or self.freedom is None:
+            return None
+        return self.difference + Moderated(0.0, self.error, self.freedom).reach(confidence)
 
     @property
     def is_certain(self) -> bool:
@@ -68,7 +75,7 @@ def mean_differences(
     found = []
     for one in moderated(differences):
         lower, upper = one.interval(settings.confidence) or (None, None)
-        found.append(MeanDifference(one.mean, lower, upper, len(flights), one.p_value, one.error))
+        found.append(MeanDifference(one.mean, lower, upper, len(flights), one.p_value, one.error, one.freedom))
     return found
 
 

@@ -11,7 +11,6 @@ Smyth, "Linear models and empirical Bayes methods for assessing differential exp
 Statistical Applications in Genetics and Molecular Biology 3(1), 2004 (the moderated t).
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -46,8 +45,12 @@ class Moderated:
         """Two-sided interval of the mean; None where nothing shows its spread."""
         if self.error is None:
             return None
-        reach = -float(stdtrit(self.freedom, 0.5 * (1.0 - confidence))) * self.error
+        reach = self.reach(confidence)
         return self.mean - reach, self.mean + reach
+
+    def reach(self, confidence: float) -> float:
+        """Half the width of the interval, 0 where nothing shows its spread."""
+        return -float(stdtrit(self.freedom, 0.5 * (1.0 - confidence))) * (self.error or 0.0)
 
     @property
     def p_value(self) -> float | None:
@@ -69,23 +72,35 @@ def moderated(differences: Array) -> list[Moderated]:
     """
     differences = without_rounding(differences)
     flights = len(differences)
-    variance = differences.var(axis=0, ddof=1)
+    mean, variance = differences.mean(axis=0), differences.var(axis=0, ddof=1)
     size = np.square(differences).mean(axis=0)
     share = np.minimum(np.divide(variance, size, out=np.ones_like(size), where=size > 0.0), 1.0)
-    twin_of = _first_twins(differences)
-    found = []
-    for index, own in enumerate(twin_of):
-        others = [other for other in np.unique(twin_of) if other != own and size[other] > 0.0]
-        weight = min(PRIOR_FLIGHTS, len(others))
-        steadied = variance[index]
-        if weight and steadied > EQUAL_WITHIN**2:
-            expected = float(np.median(share[others])) * size[index]
-            steadied = (weight * expected + (flights - 1) * steadied) / (weight + flights - 1)
-        error = math.sqrt(steadied / flights)
-        known = error > EQUAL_WITHIN
-        mean = float(differences[:, index].mean())
-        found.append(Moderated(mean, error if known else None, float(flights - 1 + weight)))
-    return found
+    usual, others = _medians_of_others(share, size > 0.0, np.asarray(_first_twins(differences)))
+    weight = np.minimum(PRIOR_FLIGHTS, others)
+    steadied = (weight * usual * size + (flights - 1) * variance) / (weight + flights - 1)
+    error = np.sqrt(np.where(variance > EQUAL_WITHIN**2, steadied, variance) / flights)
+    return [
+        Moderated(value, one if one > EQUAL_WITHIN else None, flights - 1 + freedom)
+        for value, one, freedom in zip(mean.tolist(), error.tolist(), weight.astype(float).tolist(), strict=True)
+    ]
+
+
+def _medians_of_others(
+    values: Array, counts: npt.NDArray[np.bool_], twin_of: npt.NDArray[np.int64]
+) -> tuple[Array, npt.NDArray[np.int64]]:
+    """(C,) median of the values of each candidate's others, 0 where it has none, and the number of these.
+
+    Twins count once, and only candidates that differ from the present set at all.
+    """
+    rivals = np.unique(twin_of[counts[twin_of]])
+    apart = rivals != twin_of[:, None]
+    number = apart.sum(axis=1)
+    if not rivals.size:
+        return np.zeros(twin_of.size), number
+    ordered = np.sort(np.where(apart, values[rivals], np.inf), axis=1)
+    rows, last = np.arange(twin_of.size), np.maximum(number - 1, 0)
+    median = 0.5 * (ordered[rows, last // 2] + ordered[rows, np.minimum(number // 2, last)])
+    return np.where(number > 0, median, 0.0), number
 
 
 def _first_twins(differences: Array) -> Sequence[int]:
