@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fusetune.apply.evidence import AimEvidence, FlightEvidence
+from fusetune.apply.evidence import SMOOTHED, AimEvidence, FlightEvidence
 from fusetune.apply.settings import DecisionSettings
 from fusetune.set_names import PRESENT
 
@@ -102,8 +102,10 @@ def _changes(world: World, rule: Rule, name: str, evidence: Sequence[FlightEvide
     if name == OLD:
         study = replace(world, old_flights=tuple(made), old_vetoed={})
     else:
-        template = world.flights[0]
-        study = replace(world, flights=tuple(replace(template, evidence=one) for one in made), vetoed={})
+        # A delay that is wrong is wrong whatever the sets are worth.
+        template, no_delays = world.flights[0], ((),) * len(made)
+        flights = tuple(replace(template, evidence=one) for one in made)
+        study = replace(world, flights=flights, delays=no_delays, vetoed={})
     return rule(study, range(len(made)), range(len(world.sets))) != 0
 
 
@@ -203,34 +205,41 @@ def _present_first(
 def with_means(flights: Sequence[FlightEvidence | None], difference: float) -> list[FlightEvidence | None]:
     """Sets whose mean difference to the present one over the flights is, in turn, -`difference` and +`difference`.
 
-    Each aim of each set is shifted as a whole, so what differs between flights and blocks stays. The means are weighted
-    by the aims' weights; so is then that of the whole score.
+    Each aim of each set is shifted as a whole, so what differs between flights and blocks stays. The plain mean of each
+    aim is so, for each may prove something; as the weights of the flights differ, the whole score takes a further shift
+    of the aim that has most of its weight, the smoothed one apart.
     """
-    shifts: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for one in flights:
-        for aim in one.aims if one is not None else ():
-            assert one is not None
-            found = aim.scores - aim.scores[one.sets.index(PRESENT)]
-            for name, value in zip(one.sets, found, strict=True):
-                shifts.setdefault((aim.name, name), []).append((aim.weight, float(value)))
-    names = sorted({name for _, name in shifts} - {PRESENT})
+    told = [one for one in flights if one is not None]
+    names = sorted({name for one in told for name in one.sets} - {PRESENT})
     target = {name: difference * (-1.0) ** (1 + place) for place, name in enumerate(names)} | {PRESENT: 0.0}
-    move = {}
-    for key, pairs in shifts.items():
-        weights, values = zip(*pairs, strict=True)
-        move[key] = target[key[1]] - float(np.average(values, weights=weights))
+    move = {name: _moves([one for one in told if name in one.sets], name, goal) for name, goal in target.items()}
 
     def shifted(one: FlightEvidence) -> FlightEvidence:
         aims = tuple(
-            replace(
-                aim,
-                sum_nis=aim.sum_nis * np.exp([2.0 * move[aim.name, name] for name in one.sets])[:, None, None],
-            )
+            replace(aim, sum_nis=aim.sum_nis * np.exp([2.0 * move[name][aim.name] for name in one.sets])[:, None, None])
             for aim in one.aims
         )
         return kept(replace(one, aims=aims))
 
     return [None if one is None else shifted(one) for one in flights]
+
+
+def _moves(flights: Sequence[FlightEvidence], name: str, goal: float) -> dict[str, float]:
+    """By how much each aim of a set is to be shifted."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for one in flights:
+        for aim in one.aims:
+            value = aim.scores[one.sets.index(name)] - aim.scores[one.sets.index(PRESENT)]
+            found.setdefault(aim.name, []).append((aim.weight, float(value)))
+    move = {aim: goal - float(np.mean([value for _, value in pairs])) for aim, pairs in found.items()}
+    total = sum(weight * (value + move[aim]) for aim, pairs in found.items() for weight, value in pairs) - goal * len(
+        flights
+    )
+    weights = {aim: sum(weight for weight, _ in pairs) for aim, pairs in found.items() if aim != SMOOTHED}
+    if weights and max(weights.values()) > 0.0:
+        first = max(weights, key=lambda aim: weights[aim])
+        move[first] -= total / weights[first]
+    return move
 
 
 def coverage(

@@ -40,5 +40,11 @@ def test_a_source_that_wanders_is_not_trusted_more_unsaid() -> None:
 
 def test_less_trust_or_trust_in_a_white_source_is_no_cause() -> None:
     for one_change in (change("EKF2_BARO_NOISE", 3.5, 7.0), change("EKF2_MAG_NOISE", 0.05, 0.01),
-                       change("EKF2_GPS_V_NOISE", 0.3, 0.1), change("EKF2_ACC_NOISE", 0.35, 0.1)):  # fmt: skip
+                       change("EKF2_ACC_NOISE", 0.35, 0.1)):  # fmt: skip
         assert said(one_change) == "Attitude and heading are judged only by what they do to velocity and position."
+
+
+def test_what_turns_the_attitude_more_readily_is_said() -> None:
+    assert "Mind its attitude (EKF2_GPS_V_NOISE 0.3 → 0.1)" in said(change("EKF2_GPS_V_NOISE", 0.3, 0.1))
+    assert "Mind its attitude (EKF2_GYR_NOISE 0.015 → 0.005)" in said(change("EKF2_GYR_NOISE", 0.015, 0.005))
+    assert "Mind its attitude" not in said(change("EKF2_GPS_V_NOISE", 0.3, 0.6))

@@ -26,6 +26,10 @@ _WAYS = {
 }
 
 
+def _noises(source: AidSource) -> tuple[str, ...]:
+    return (*source.noise_parameters, *(floor.parameter for floor in source.noise_floors))
+
+
 def cautions(
     pick: RankedSet, changes: Sequence[ParameterChange], whiteness: Mapping[str, float], settings: DecisionSettings
 ) -> tuple[str, ...]:
@@ -36,10 +40,25 @@ def cautions(
     changes : parameters in which it differs from what flies now
     whiteness : how white the error of each source is, the mean over the flights
     """
-    return (*_worse_kinds(pick), *_followed(changes, whiteness, settings), _ATTITUDE)
+    return (*_worse_kinds(pick), *_followed(changes, whiteness, settings), *_attitude(changes), _UNSEEN)
 
 
-_ATTITUDE = "Attitude and heading are judged only by what they do to velocity and position."
+_UNSEEN = "Attitude and heading are judged only by what they do to velocity and position."
+
+
+def _attitude(changes: Sequence[ParameterChange]) -> list[str]:
+    """What turns the attitude more readily: velocities that are trusted more, and gyros that are trusted less or more."""
+    trusted = [one for one in changes if 0.0 < one.value < one.previous and one.name in _VELOCITY_NOISES]
+    gyros = [one for one in changes if one.name == "EKF2_GYR_NOISE"]
+    values = ", ".join(f"{one.name} {one.previous:g} → {one.value:g}" for one in (*trusted, *gyros))
+    if not values:
+        return []
+    return [f"Mind its attitude ({values}): it may be less exact though velocity and position are better."]
+
+
+_VELOCITY_NOISES = tuple(
+    name for source in AID_SOURCES.values() if source.quantity == "velocity" for name in _noises(source)
+)
 
 
 def _worse_kinds(pick: RankedSet) -> list[str]:
@@ -71,7 +90,3 @@ def _followed(
             "follow them, which nothing here measures."
         )
     return sentences
-
-
-def _noises(source: AidSource) -> tuple[str, ...]:
-    return (*source.noise_parameters, *(floor.parameter for floor in source.noise_floors))
