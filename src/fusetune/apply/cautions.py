@@ -47,7 +47,7 @@ _UNSEEN = "Attitude and heading are judged only by what they do to velocity and 
 
 
 def _attitude(changes: Sequence[ParameterChange]) -> list[str]:
-    """What turns the attitude more readily: velocities that are trusted more, and gyros that are trusted less or more."""
+    """What turns the attitude more readily: velocities that are trusted more, and gyros that are told otherwise."""
     trusted = [one for one in changes if 0.0 < one.value < one.previous and one.name in _VELOCITY_NOISES]
     gyros = [one for one in changes if one.name == "EKF2_GYR_NOISE"]
     values = ", ".join(f"{one.name} {one.previous:g} → {one.value:g}" for one in (*trusted, *gyros))
