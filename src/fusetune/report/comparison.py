@@ -18,7 +18,7 @@ AIM_LABELS = {
     SCORE: "the score that decides",
     AIDED: "aided: one step ahead",
     UNAIDED: "unaided: seconds without GNSS",
-    SMOOTHED: "smoothed: against the smoothed velocity",
+    SMOOTHED: "smoothed: velocity",
 }
 """What is compared → its label."""
 
