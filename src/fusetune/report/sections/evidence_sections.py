@@ -43,18 +43,19 @@ def evidence_section(results: Results, figures: AnyPath) -> str:
     return section(
         title,
         paragraph(
-            "Every set was replayed on every flight, so the sets saw the same samples. They are judged in three "
-            "ways. Aided: predictions of each measurement, one step ahead, before it was used. Unaided: of velocity and "
-            "position, after seconds without GNSS. Smoothed: its velocity against the one that the whole flight, before "
-            "and after, makes likely. A set is better when its errors are smaller; how large it sets the uncertainty "
-            "that it claims does not count."
+            "Every set was replayed on every flight, so the sets saw the same samples. They are judged in three ways. "
+            "Aided: predictions of each measurement, one step ahead, before it was used. Unaided: of velocity and "
+            "position, after seconds without GNSS. Smoothed: its velocity against the one that the whole flight, "
+            "before and after, makes likely. A set is better when its errors are smaller; how large it sets the "
+            "uncertainty that it claims does not count."
         ),
         figure(
             figures / "differences.svg",
-            f"Dot: mean over the flights; bar: {rule['confidence']:.0%} interval from what differs between flights "
-            "(of a single one, between its blocks of about 10 s). A set replaces the present one only if its bar in the "
+            f"Dot: mean over the flights; bar: {rule['confidence']:.0%} interval from what differs between flights (of "
+            "a single one, between its blocks of about 10 s). A set replaces the present one only if its bar in the "
             "first column, or in that of the smoothed velocity, lies clearly left of the line, and none of its other "
-            "bars wholly right of it. A dot without a bar: how far chance could do that is not known. The columns have scales of their own; arrows point at what lies outside.",
+            "bars wholly right of it. A dot without a bar: how far chance could do that is not known. The columns "
+            "have scales of their own; arrows point at what lies outside.",
         ),
         objections_table(results),
         figure(
