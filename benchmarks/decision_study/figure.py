@@ -13,7 +13,7 @@ from fusetune.report.figures.drawing import figure_style, new_figure, save_svg
 from .drawn import JUDGED_SIZES, SIZES, DrawnStudy, power
 from .rules import OLD, OURS
 
-MEASURE = "all four"
+MEASURE = "velocity"
 COLOURS = {OURS: "#0072B2", OLD: "#999999"}
 STYLES = {0.2: "-", 0.1: "--"}
 MARKERS = dict(zip(JUDGED_SIZES, ("o", "s"), strict=True))
@@ -34,7 +34,7 @@ def _by_flights(axes: Axes, drawn: Sequence[DrawnStudy]) -> None:
         own = [one for one in drawn if one.rule == rule]
         for gain, style in STYLES.items():
             shares = [100.0 * power(own, flights, gain, MEASURE)[0] for flights in SIZES]
-            axes.plot(SIZES, shares, style, color=colour, marker=".", label=f"{rule}, true gain ≥ {100 * gain:.0f} %")
+            axes.plot(SIZES, shares, style, color=colour, marker=".", label=f"{rule}, gain ≥ {100 * gain:.0f} %")
     axes.set(xlabel="flights", ylabel="share of studies in which it is found, %", ylim=(-3, 103))
     axes.legend(loc="lower right")
 
@@ -54,5 +54,5 @@ def _by_gain(axes: Axes, drawn: Sequence[DrawnStudy]) -> None:
             axes.plot(
                 100.0 * np.array(x), [100.0 * points[one] for one in x], marker, color=colour, label=label, markersize=4
             )
-    axes.set(xlabel="true gain of the best set, %", ylabel="share of it that is gained, %", ylim=(-30, 103))
+    axes.set(xlabel="true gain of the best set in velocity, %", ylabel="share of it that is gained, %", ylim=(-30, 103))
     axes.legend(loc="lower right")
