@@ -1,8 +1,3 @@
-def in_chunks(names):
-    """So many sets as one job replays, at a time."""
-    return [names[first : first + SETTINGS.sets_per_job] for first in range(0, len(names), SETTINGS.sets_per_job)]
-
-
 # The present set is replayed by the job that estimates delays, where there is one.
 REPLAY_CHUNKS = in_chunks([name for name in SETS.replayed if name != PRESENT or not MENDS_DELAYS])
 

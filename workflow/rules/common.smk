@@ -24,6 +24,11 @@ def replay_files(names):
     return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=PARTS)
 
 
+def in_chunks(names):
+    """So many sets as one job replays, at a time."""
+    return [names[first : first + SETTINGS.sets_per_job] for first in range(0, len(names), SETTINGS.sets_per_job)]
+
+
 def read_csv(path):
     told_in_one_line(check_checksum, path, RUN_AGAIN)
     with open(path, encoding="utf-8", newline="") as file:
