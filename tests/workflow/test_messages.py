@@ -82,7 +82,7 @@ def test_no_set_can_be_named_so_that_its_files_replace_others(demonstration: Wor
     """Of every file that the rooms write beside those of sets, each part up to a dot is tried as the name of a set."""
     results = demonstration.folder / "results"
     names = ("present", "as_flown", "low", "high")
-    folders = [results / "design", *(results / "analyze").iterdir()]
+    folders = [results / "design", *(one for one in (results / "analyze").iterdir() if one.is_dir())]
     files = {file.name for folder in folders for file in folder.iterdir() if file.suffix != ".plan"}
     of_sets = {file for file in files if file.split(".")[0] in names}
     endings = {file.partition(".")[2] for file in of_sets}
