@@ -142,6 +142,9 @@ def test_a_set_that_is_ruled_out_and_predicts_better_leads_to_candidates(tmp_pat
         "Ruled out, though better than now beyond doubt by its predictions: “bold” (errors 4" in decision["paragraph"]
     )
     assert "bold_halfway (EKF2_ACC_NOISE 0.187, EKF2_GPS_V_NOISE 0.173)" in decision["paragraph"]
+    # one matter each, as the page shows them
+    assert " ".join(decision["paragraphs"]) == decision["paragraph"]
+    assert any(one.startswith("Ruled out, though better") for one in decision["paragraphs"])
     study = load_study(tmp_path / "apply" / "candidates.yaml")
     assert {one.name: one.overrides for one in study.sets} == proposed
 

@@ -120,6 +120,7 @@ def decide(
     )
     text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    decision["paragraphs"] = [one for one in sentences if one]
     decision["cautions"] = list(minded)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present

@@ -17,7 +17,8 @@ def decision_section(results: Results) -> str:
     status = decision["status"]
     heading = escape(_HEADINGS[status].format(chosen=decision["chosen"]))
     tag = '<span class="tag">exploratory</span>' if decision["exploratory"] else ""
-    parts = [f'<section class="decision {escape(status)}"><h2>{heading}{tag}</h2>', paragraph(decision["paragraph"])]
+    parts = [f'<section class="decision {escape(status)}"><h2>{heading}{tag}</h2>']
+    parts += [paragraph(matter) for matter in decision["paragraphs"]]
     parts.append(_vehicle(decision["vehicle"]))
     if decision["changes"]:
         rows = [_change_row(change) for change in decision["changes"]]
