@@ -46,7 +46,7 @@ def test_where_nothing_is_known_there_is_no_section() -> None:
 
 def decided(vehicle: dict[str, Any] | None) -> str:
     return decision_section(
-        results(status="keep", chosen="present", exploratory=False, paragraph="Keep.", changes=[], vehicle=vehicle)
+        results(status="keep", chosen="present", exploratory=False, paragraphs=["Keep."], changes=[], vehicle=vehicle)
     )
 
 
