@@ -132,8 +132,8 @@ def _wider_gates(overrides: Mapping[str, float], present: Mapping[str, float]) -
         gate = source.gate_parameter
         if gate is None or gate not in present or gate in overrides:
             continue
-        noises = (*source.noise_parameters, *(floor.parameter for floor in source.noise_floors))
-        ratios = [present[one] / overrides[one] for one in noises if overrides.get(one, 0.0) > 0.0 and one in present]
+        noises = [one for one in source.noises if one in present]
+        ratios = [present[one] / overrides[one] for one in noises if overrides.get(one, 0.0) > 0.0]
         wider = min(max(ratios, default=1.0), _WIDEST)
         if wider > 1.0:
             gates[gate] = max(gates.get(gate, 0.0), rounded(present[gate] * wider))

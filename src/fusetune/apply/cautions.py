@@ -14,7 +14,7 @@ from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
 from fusetune.apply.parameter_changes import ParameterChange
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
-from fusetune.px4.aid_sources import AID_SOURCES, AidSource
+from fusetune.px4.aid_sources import AID_SOURCES
 
 WORTH_SAYING = math.log(1.01)
 """A mean difference, nat, from which on a kind of prediction is said to be worse, proved or not."""
@@ -24,10 +24,6 @@ _WAYS = {
     UNAIDED: "after seconds without GNSS",
     SMOOTHED: "of the velocity, against the one that the whole flight makes likely,",
 }
-
-
-def _noises(source: AidSource) -> tuple[str, ...]:
-    return (*source.noise_parameters, *(floor.parameter for floor in source.noise_floors))
 
 
 def cautions(
@@ -57,7 +53,7 @@ def _attitude(changes: Sequence[ParameterChange]) -> list[str]:
 
 
 _VELOCITY_NOISES = tuple(
-    name for source in AID_SOURCES.values() if source.quantity == "velocity" for name in _noises(source)
+    name for source in AID_SOURCES.values() if source.quantity == "velocity" for name in source.noises
 )
 
 
@@ -78,7 +74,7 @@ def _followed(
         for change in changes
         if 0.0 < change.value < change.previous
         for source in AID_SOURCES.values()
-        if change.name in _noises(source) and whiteness.get(source.name, 1.0) < settings.distrust_white_share
+        if change.name in source.noises and whiteness.get(source.name, 1.0) < settings.distrust_white_share
     ]
     sentences = []
     for quantity, group in groupby(sorted(found, key=lambda one: one[0]), key=lambda one: one[0]):

@@ -295,7 +295,7 @@ def _source_noise(
     lower = white - _reach([one.white for one in used], confidence) if math.isfinite(white) else -math.inf
     wanted = _root_mean_square(used)
     wandering = [one.wanders_s for one in used if one.wanders_s is not None and wanted > size + _MOSTLY]
-    parameter = next(iter((*source.noise_parameters, *(floor.parameter for floor in source.noise_floors))), None)
+    parameter = next(iter(source.noises), None)
     now = parameters.get(parameter) if parameter is not None else None
     return SourceNoise(
         source=source.name,

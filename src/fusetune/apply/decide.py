@@ -95,12 +95,12 @@ def decide(
     others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
     newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
-    vetoed = {name: vetoes(name, present, flights, metrics, settings) for name in sets if name != present}
-    ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
-    evidence = [flight.evidence for flight in flights if flight.evidence is not None]
-    choice = choose(ranked, present, evidence, _distances(newest, present), settings)
+    ranked, choice = _ranked_and_chosen(sets, present, flights, metrics, newest, settings)
     if DELAY_MENDED in sets:
-        choice = choose_after_mending(choice, ranked, _among_mended(sets, flights, metrics, newest, settings))
+        mended = [name for name in sets if is_mended(name)]
+        able = [one for one in flights if one.evidence is None or DELAY_MENDED in one.evidence.sets]
+        _, among_mended = _ranked_and_chosen(mended, DELAY_MENDED, able, metrics, newest, settings)
+        choice = choose_after_mending(choice, ranked, among_mended)
     values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present)
     noises = _noises(flights, metrics, newest, present, settings)
@@ -145,20 +145,19 @@ def decide(
         write_document(temporary, _rounded(decision), allow_nan=False)
 
 
-def _among_mended(
+def _ranked_and_chosen(
     sets: Sequence[str],
+    present: str,
     flights: Sequence[AnalyzedFlight],
     metrics: pa.Table,
     newest: AnalyzedFlight | None,
     settings: DecisionSettings,
-) -> Choice:
-    """What is chosen among the sets with mended delays, against the present one with these mended."""
-    names = [name for name in sets if is_mended(name)]
-    able = [one for one in flights if one.evidence is None or DELAY_MENDED in one.evidence.sets]
-    vetoed = {name: vetoes(name, DELAY_MENDED, able, metrics, settings) for name in names if name != DELAY_MENDED}
-    ranked = rank(names, DELAY_MENDED, able, {name: why for name, why in vetoed.items() if why}, settings)
-    evidence = [flight.evidence for flight in able if flight.evidence is not None]
-    return choose(ranked, DELAY_MENDED, evidence, _distances(newest, DELAY_MENDED), settings)
+) -> tuple[list[RankedSet], Choice]:
+    """Sets against one of them, and what is chosen among them."""
+    vetoed = {name: vetoes(name, present, flights, metrics, settings) for name in sets if name != present}
+    ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
+    evidence = [flight.evidence for flight in flights if flight.evidence is not None]
+    return ranked, choose(ranked, present, evidence, _distances(newest, present), settings)
 
 
 def _whiteness(metrics: pa.Table, flights: Sequence[AnalyzedFlight], present: str) -> dict[str, float]:

@@ -78,6 +78,13 @@ class FlightEvidence:
         """(S,) score of the flight: the logarithm of a typical prediction error, nat; lower is better."""
         return np.asarray(sum(aim.weight * aim.scores for aim in self.aims))
 
+    def differences(self, names: Sequence[str], aim: str | None = None) -> Array:
+        """(N,) scores of some sets less that of the first of them; in one of its aims, which it then must have."""
+        part = self if aim is None else self.aim(aim)
+        assert part is not None, "only flights that have the aim are asked for it"
+        scores = part.scores[[self.sets.index(name) for name in names]]
+        return np.asarray(scores - scores[0])
+
     def aim(self, name: str) -> AimEvidence | None:
         """One of the aims, None where this flight has no evidence of it or gives it no weight."""
         return next((aim for aim in self.aims if aim.name == name), None)
@@ -316,9 +323,7 @@ def _aided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
         "sum_nis": table["sum_nis_winsorised"].to_numpy(),
         "sum_log_variance": table["sum_log_variance"].to_numpy(),
     }
-    axis = np.array(AXES)[table["axis"].to_numpy()]
-    source = np.asarray(table["source"].to_pylist())
-    return _block_sums(np.asarray(table["set"].to_pylist()), source, axis, table["block"].to_numpy(), columns)
+    return _block_sums(table, _axis_names(table), columns)
 
 
 def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
@@ -329,11 +334,9 @@ def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
         return None
     error = table["error_winsorised"].to_numpy()
     columns = {"n": np.ones(error.size), "sum_nis": np.square(error), "sum_log_variance": np.zeros(error.size)}
-    axis = np.array(AXES)[table["axis"].to_numpy()]
     horizon = table["horizon_s"].to_pylist()
-    label = np.array([f"{name} after {seconds:g} s" for name, seconds in zip(axis, horizon, strict=True)])
-    source = np.asarray(table["source"].to_pylist())
-    return _block_sums(np.asarray(table["set"].to_pylist()), source, label, table["block"].to_numpy(), columns)
+    labels = [f"{name} after {seconds:g} s" for name, seconds in zip(_axis_names(table), horizon, strict=True)]
+    return _block_sums(table, labels, columns)
 
 
 def _smoothed(table: pa.Table) -> _Sums | None:
@@ -342,9 +345,7 @@ def _smoothed(table: pa.Table) -> _Sums | None:
         return None
     squares = table["sum_squares_winsorised"].to_numpy()
     columns = {"n": table["n"].to_numpy(), "sum_nis": squares, "sum_log_variance": np.zeros(squares.size)}
-    axis = np.array(AXES)[table["axis"].to_numpy()]
-    source = np.asarray(table["source"].to_pylist())
-    return _block_sums(np.asarray(table["set"].to_pylist()), source, axis, table["block"].to_numpy(), columns)
+    return _block_sums(table, _axis_names(table), columns)
 
 
 def _axes_of(sums: _Sums) -> list[tuple[str, str]]:
@@ -357,17 +358,15 @@ def _weighted(weights: Mapping[str, float]) -> list[str]:
     return sorted({key.partition(".")[0] for key, weight in weights.items() if weight > 0.0})
 
 
-def _block_sums(
-    sets: npt.NDArray[Any],
-    source: npt.NDArray[Any],
-    label: npt.NDArray[Any],
-    block: npt.NDArray[Any],
-    values: Mapping[str, npt.NDArray[Any]],
-) -> _Sums | None:
-    """Add up rows by set, block and column."""
-    names, set_index = np.unique(sets, return_inverse=True)
-    blocks, block_index = np.unique(block, return_inverse=True)
-    pairs = list(zip(source.tolist(), label.tolist(), strict=True))
+def _axis_names(table: pa.Table) -> list[str]:
+    return [AXES[axis] for axis in table["axis"].to_pylist()]
+
+
+def _block_sums(table: pa.Table, labels: Sequence[str], values: Mapping[str, npt.NDArray[Any]]) -> _Sums:
+    """Add up rows by set, block and column: a source and what the rows are labelled."""
+    names, set_index = np.unique(np.asarray(table["set"].to_pylist()), return_inverse=True)
+    blocks, block_index = np.unique(table["block"].to_numpy(), return_inverse=True)
+    pairs = list(zip(table["source"].to_pylist(), labels, strict=True))
     columns = sorted(set(pairs))
     position = {pair: index for index, pair in enumerate(columns)}
     column_index = np.array([position[pair] for pair in pairs])

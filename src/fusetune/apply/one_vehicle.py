@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fusetune.apply.evidence import OTHER_VEHICLE, AnalyzedFlight, NoEvidence
+from fusetune.apply.wording import named
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
@@ -61,7 +62,8 @@ class DecidedVehicle:
         if self.others:
             groups = _by_vehicle(self.others)
             left_out = [
-                f"{_listed(flights)} ({vehicle.in_words})" for vehicle, flights in groups[:_MOST_VEHICLES_NAMED]
+                f"{named(flights, _MOST_FLIGHTS_NAMED)} ({vehicle.in_words})"
+                for vehicle, flights in groups[:_MOST_VEHICLES_NAMED]
             ]
             which, more = " or ".join(vehicle.name for vehicle, _ in groups), ""
             if len(groups) > _MOST_VEHICLES_NAMED:
@@ -129,8 +131,3 @@ def _by_vehicle(others: Mapping[str, VehicleIdentity]) -> list[tuple[VehicleIden
         else:
             found.append((vehicle, [flight]))
     return found
-
-
-def _listed(flights: Sequence[str]) -> str:
-    more = len(flights) - _MOST_FLIGHTS_NAMED
-    return f"{', '.join(flights[:_MOST_FLIGHTS_NAMED])} and {more} more" if more > 1 else ", ".join(flights)

@@ -315,26 +315,12 @@ def _family_p_values(
     """Of the whole scores, and of the smoothed velocities where all flights have them; together one family."""
     if not names:
         return {}, {}
-    differences = [_differences_on_flights(names, present, evidence, None)]
-    if all(one.aim(SMOOTHED) is not None for one in evidence):
-        differences.append(_differences_on_flights(names, present, evidence, SMOOTHED))
-    found = family_p_values(np.hstack(differences), settings.seed).tolist()
+    aims = (None, SMOOTHED) if all(one.aim(SMOOTHED) is not None for one in evidence) else (None,)
+    kinds = [np.array([one.differences((present, *names), aim)[1:] for one in evidence]) for aim in aims]
+    found = family_p_values(np.hstack(kinds), settings.seed).tolist()
     values = [value if math.isfinite(value) else None for value in found]
     total, velocity = values[: len(names)], values[len(names) :]
     return dict(zip(names, total, strict=True)), dict(zip(names, velocity, strict=False))
-
-
-def _differences_on_flights(
-    names: Sequence[str], present: str, evidence: Sequence[FlightEvidence], aim: str | None
-) -> Array:
-    """(F, C) score of each set less that of the present one."""
-    rows = []
-    for flight in evidence:
-        part = flight.aim(aim) if aim is not None else flight
-        assert part is not None, "asked for on flights that have it"
-        rows.append(part.scores[[flight.sets.index(name) for name in (present, *names)]])
-    scores = np.array(rows)
-    return np.asarray(scores[:, 1:] - scores[:, :1])
 
 
 def _never_scored(name: str, present: str, vetoed: Mapping[str, Sequence[str]]) -> RankedSet:

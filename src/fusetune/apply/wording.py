@@ -47,13 +47,13 @@ def paragraph(
 def _not_eligible(ranked: Sequence[RankedSet]) -> Iterator[str]:
     worse = [one.name for one in ranked if one.worse_aims and not one.is_vetoed]
     if worse:
-        yield f"Worse than now beyond doubt in one of these ways, and so not eligible: {_names(worse)}."
+        yield f"Worse than now beyond doubt in one of these ways, and so not eligible: {named(worse)}."
     vetoed = [one.name for one in ranked if one.is_vetoed]
     if vetoed:
-        yield f"Ruled out, and so not eligible: {_names(vetoed)} (the table says why)."
+        yield f"Ruled out, and so not eligible: {named(vetoed)} (the table says why)."
     never = [one.name for one in ranked if not one.flights]
     if never:
-        yield f"Scored on no flight: {_names(never)} (the table says why)."
+        yield f"Scored on no flight: {named(never)} (the table says why)."
 
 
 def _not_counted(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) -> Iterator[str]:
@@ -74,9 +74,10 @@ def _not_counted(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) 
             yield f"{_count(count, 'replayed flight')} {one if count == 1 else more}."
 
 
-def _names(names: Sequence[str]) -> str:
-    more = len(names) - _MOST_NAMES
-    return f"{', '.join(names[:_MOST_NAMES])} and {more} more" if more > 1 else ", ".join(names)
+def named(names: Sequence[str], most: int = _MOST_NAMES) -> str:
+    """Names in a sentence, of many the first."""
+    more = len(names) - most
+    return f"{', '.join(names[:most])} and {more} more" if more > 1 else ", ".join(names)
 
 
 def _basis(flights: Sequence[AnalyzedFlight]) -> str:

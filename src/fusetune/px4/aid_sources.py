@@ -151,6 +151,11 @@ class AidSource:
         return AID_SOURCE_TOPIC + self.name
 
     @property
+    def noises(self) -> tuple[str, ...]:
+        """Parameters of its noise, those that are floors, too."""
+        return (*self.noise_parameters, *(floor.parameter for floor in self.noise_floors))
+
+    @property
     def delay_parameter(self) -> str | None:
         """By which the estimator shifts the time of its measurements, ms."""
         return SENSORS[self.sensor].delay_parameter if self.sensor else None

@@ -28,6 +28,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import stdtrit
 
+from fusetune.analyze.metrics.likelihood import NORMAL_CONSISTENCY
+
 Array = npt.NDArray[np.float64]
 
 LARGEST_CHANGE_S = 0.3
@@ -47,7 +49,6 @@ _RATE_OVER_S = 0.04
 _PROBE_S = 0.015
 _LEAST_SLOPE = 0.25
 _HUBER = 2.0
-_NORMAL_MAD = 1.4826
 _GAP_STEPS = 1.5
 
 
@@ -261,4 +262,4 @@ def _windows(values: Array, order: int) -> Array:
 
 def _size(values: Array) -> float:
     """Robust standard deviation."""
-    return _NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
+    return NORMAL_CONSISTENCY * float(np.median(np.abs(values - np.median(values))))

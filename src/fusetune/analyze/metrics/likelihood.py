@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 STUDENT_T_DOF = 5.0
 WINSOR_STANDARD_DEVIATIONS = 5.0
-_NORMAL_CONSISTENCY = 1.4826
+NORMAL_CONSISTENCY = 1.4826
 """Median absolute value → standard deviation, for a normal distribution."""
 
 
@@ -45,7 +45,7 @@ def winsor_limit(innovation: Array) -> float:
     It must not depend on S: clipping ν/√S would let a set win by making S small.
     """
     median = float(np.median(np.abs(innovation), overwrite_input=True))
-    return WINSOR_STANDARD_DEVIATIONS * _NORMAL_CONSISTENCY * median if median > 0.0 else math.inf
+    return WINSOR_STANDARD_DEVIATIONS * NORMAL_CONSISTENCY * median if median > 0.0 else math.inf
 
 
 def winsorised(innovation: Array, limit: float) -> Array:

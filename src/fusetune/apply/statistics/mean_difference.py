@@ -68,8 +68,7 @@ def mean_differences(
     names : of sets that were scored on all of them, the present one first
     aim : in this kind of prediction alone; all flights have it
     """
-    scores = np.array([_scores(one, aim)[[one.sets.index(name) for name in names]] for one in flights])
-    differences = without_rounding(scores - scores[:, :1])
+    differences = without_rounding([one.differences(names, aim) for one in flights])
     if len(flights) == 1:
         return _of_blocks(flights, names, differences[0], settings, aim)
     found = []
@@ -77,14 +76,6 @@ def mean_differences(
         lower, upper = one.interval(settings.confidence) or (None, None)
         found.append(MeanDifference(one.mean, lower, upper, len(flights), one.p_value, one.error, one.freedom))
     return found
-
-
-def _scores(flight: FlightEvidence, aim: str | None) -> Array:
-    if aim is None:
-        return flight.scores
-    part = flight.aim(aim)
-    assert part is not None, "only flights that have the aim are asked for it"
-    return part.scores
 
 
 def _of_blocks(
@@ -101,8 +92,7 @@ def _of_blocks(
     for index, difference in enumerate(differences):
         draws = scores[:, index] - scores[:, 0]
         one = mean_difference(draws, np.array([difference]), units, settings.confidence)
-        spread = spread_of_flights(draws, np.array([difference]))
-        known = p_value(one.difference, spread, units)
+        known = p_value(one.difference, draws, units)
         found.append(MeanDifference(one.difference, one.lower, one.upper, 1, known))
     return found
 
