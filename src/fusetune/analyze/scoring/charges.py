@@ -52,6 +52,30 @@ class EvidenceCost:
         return 100.0 * (self.lacking + self.after_reset) / self.mask if self.mask else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class OwnEvidence:
+    """What of N measurements, or gaps, of the mask a set has itself.
+
+    Attributes
+    ----------
+    lacking, after_reset : (N,) where the set lacks one, and where one that it has follows a reset of its own
+    has_own_resets : whether it has any on the flight
+    """
+
+    lacking: Flags
+    after_reset: Flags
+    has_own_resets: bool
+
+    @property
+    def cost(self) -> EvidenceCost:
+        return EvidenceCost(self.lacking.size, int(self.lacking.sum()), int(self.after_reset.sum()))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it lacks none and has no reset of its own: such sets say what counts for the others."""
+        return not (self.lacking.any() or self.has_own_resets)
+
+
 @dataclass(frozen=True)
 class Charged:
     """Errors and variances (N,) as they count."""

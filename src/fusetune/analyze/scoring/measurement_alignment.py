@@ -14,7 +14,7 @@ from fusetune.analyze.metrics.metric import Innovations
 from fusetune.analyze.replaying.measurement_times import match, measurement_time
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis, SpooledRows, gate_of
-from fusetune.analyze.scoring.charges import EvidenceCost, charged, passed_over
+from fusetune.analyze.scoring.charges import EvidenceCost, OwnEvidence, charged, passed_over
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow
 
@@ -170,22 +170,11 @@ def paired_samples(
 
 
 @dataclass(frozen=True, eq=False)
-class _Matched:
-    """Which of a set's samples are those of the mask: row of each, and where it is lacking or follows a reset."""
+class _Matched(OwnEvidence):
+    """Which of a set's samples are those of the mask: row of each."""
 
     record: ReplayedSet
     row: npt.NDArray[np.int32]
-    lacking: npt.NDArray[np.bool_]
-    after_reset: npt.NDArray[np.bool_]
-    has_own_resets: bool
-
-    @property
-    def cost(self) -> EvidenceCost:
-        return EvidenceCost(self.row.size, int(self.lacking.sum()), int(self.after_reset.sum()))
-
-    @property
-    def is_complete(self) -> bool:
-        return not (self.lacking.any() or self.has_own_resets)
 
 
 def _names(matched: Sequence[_Matched]) -> tuple[str, ...]:
@@ -224,7 +213,7 @@ def _matched(
     lacking = (row < 0) | ~_is_usable(samples)[row] | (scored < time[np.argmax(samples.fused)])
     resets = record.name in window.own_resets and not is_reference
     after_reset = window.after_own_reset(record.name, scored) & ~lacking & resets
-    return _Matched(record, row.astype(np.int32), lacking, after_reset, resets)
+    return _Matched(lacking, after_reset, resets, record, row.astype(np.int32))
 
 
 def _figures(matched: _Matched, key: SourceAxis) -> dict[str, npt.NDArray]:

@@ -13,7 +13,7 @@ from fusetune.analyze.metrics.innovation_metrics import rms_innovation
 from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, winsorised
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
-from fusetune.analyze.scoring.charges import EvidenceCost, charged
+from fusetune.analyze.scoring.charges import EvidenceCost, OwnEvidence, charged
 from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.settings import ScoringSettings
@@ -148,25 +148,14 @@ def _paired(
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Matched:
+@dataclass(frozen=True, eq=False)
+class _Matched(OwnEvidence):
     """A set's predictions in gaps of the present one; where it is lacking its error and variance mean nothing. `alone`
     is true where the set predicted in the gap, but no measurement fell into the second before this horizon."""
 
     error: Array
     variance: Array
-    lacking: npt.NDArray[np.bool_]
     alone: npt.NDArray[np.bool_]
-    after_reset: npt.NDArray[np.bool_]
-    has_own_resets: bool
-
-    @property
-    def cost(self) -> EvidenceCost:
-        return EvidenceCost(self.error.size, int(self.lacking.sum()), int(self.after_reset.sum()))
-
-    @property
-    def is_complete(self) -> bool:
-        return not (self.lacking.any() or self.has_own_resets)
 
 
 def _matched(
@@ -178,7 +167,7 @@ def _matched(
     start, resets = mask["start"], record.name in window.own_resets
     if not table["key"].size:
         nothing, nowhere = np.zeros(start.shape), np.zeros(start.shape, bool)
-        return _Matched(nothing, nothing + 1.0, ~nowhere, nowhere, nowhere, resets)
+        return _Matched(~nowhere, nowhere, resets, nothing, nothing + 1.0, nowhere)
     row = np.minimum(np.searchsorted(table["key"], mask["key"]), table["key"].size - 1)
     # Before it was fused once a source is predicted from nothing.
     since = record.first_fused.get((str(mask["source"][0]), 0), np.iinfo(np.int64).max)
@@ -186,7 +175,7 @@ def _matched(
     lacking = absent | ~_is_usable(table)[row] | (start < since)
     alone = absent & (start >= since) & np.isin(mask["key"] // _HORIZONS, table["key"] // _HORIZONS)
     after_reset = window.after_own_reset(record.name, start) & ~lacking
-    return _Matched(table["innovation"][row], table["innovation_variance"][row], lacking, alone, after_reset, resets)
+    return _Matched(lacking, after_reset, resets, table["innovation"][row], table["innovation_variance"][row], alone)
 
 
 def _is_usable(table: Mapping[str, npt.NDArray]) -> npt.NDArray[np.bool_]:

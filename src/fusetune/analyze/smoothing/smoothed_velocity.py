@@ -104,9 +104,9 @@ def smoothed_velocity(
     """
     if record.steps is None or not intervals:
         return None
-    source = next((one for one in VELOCITY_SOURCES if measured_velocities(record, one) is not None), None)
-    measured = measured_velocities(record, source) if source is not None else None
-    if source is None or measured is None:
+    of_sources = ((one, measured_velocities(record, one)) for one in VELOCITY_SOURCES)
+    source, measured = next((one for one in of_sources if one[1] is not None), ("", None))
+    if measured is None:
         return None
     positions = position_series(record, flight, source)
     steps = record.steps()
