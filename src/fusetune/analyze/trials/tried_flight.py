@@ -1,9 +1,9 @@
-"""A flight on which sets are tried, thousands of them: replayed and compared in memory, with no more than is asked for.
+"""A flight on which sets are tried, thousands of them: replayed and compared in memory, no more than is asked for.
 
-What is compared follows from a *base* set alone: the part of the flight that is scored, its samples and gaps, the limits
-beyond which errors are clipped, the smoothed velocity, and how white the sources are. So the figures of a set do not
-depend on which others are tried, and none can hide an error: `fusetune.analyze.scoring.charges` says what counts where
-it has nothing of its own.
+What is compared follows from a *base* set alone: the part of the flight that is scored, its samples and gaps, the
+limits beyond which errors are clipped, the smoothed velocity, and how white the sources are. So the figures of a set
+do not depend on which others are tried, and none can hide an error: `fusetune.analyze.scoring.charges` says what
+counts where it has nothing of its own.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from fusetune.analyze.scoring.withheld_scores import paired_gaps
 from fusetune.analyze.sensors.source_whiteness import source_whiteness
 from fusetune.analyze.smoothing.smoothed_velocity import SmoothedVelocity, smoothed_velocity
 from fusetune.analyze.trials.tried_set import ONE_STEP, SMOOTHED, WITHHELD, Column, Rejections, Sums, TriedSet
-from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES, SENSORS, WITHHOLDABLE
+from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES, WITHHOLDABLE
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
 
@@ -68,8 +68,8 @@ class TrialSettings:
         if given is None:
             return self.replay
         asked = {sensor for sensor, sources in WITHHOLDABLE.items() if {*sources} & {*self.withheld_sources}}
-        unasked = {f"{sensor}_s": 0.0 for sensor in SENSORS if hasattr(given, f"{sensor}_s") and sensor not in asked}
-        return replace(self.replay, withholding=replace(given, **unasked))
+        lengths = {f"{sensor}_s": given.length_s(sensor) if sensor in asked else 0.0 for sensor in WITHHOLDABLE}
+        return replace(self.replay, withholding=replace(given, **lengths))  # type: ignore[arg-type]
 
 
 def prepare_trials(flight_folder: AnyPath, settings: TrialSettings) -> PreparedFlight:
