@@ -106,7 +106,7 @@ _ROWS = (
     TunableParameter("EKF2_ACC_NOISE", "process noise", 0.02, 1.0, "a MEMS sensor's own noise; PX4's limit"),
     TunableParameter("EKF2_GYR_NOISE", "process noise", 0.001, 0.1, "a MEMS sensor's own noise; PX4's limit"),
     TunableParameter("EKF2_MAG_E_NOISE", "process noise", 1e-5, 0.01, "a constant field; one that follows all"),
-    TunableParameter("EKF2_TERR_NOISE", "process noise", 0.5, 20.0, "PX4's limit; terrain that no range finder follows"),
+    TunableParameter("EKF2_TERR_NOISE", "process noise", 0.5, 20.0, "PX4's limit; a terrain that nothing follows"),
     TunableParameter("EKF2_WIND_NSD", "process noise", 0.005, 0.5, "wind that never changes; gusts taken for wind"),
     TunableParameter("EKF2_ACC_B_NOISE", "bias noise", 1e-4, 0.01, "a bias that never changes; PX4's limit"),
     TunableParameter("EKF2_GYR_B_NOISE", "bias noise", 3e-5, 0.01, "a bias that never changes; PX4's limit"),

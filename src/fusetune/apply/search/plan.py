@@ -42,7 +42,7 @@ class Plan:
 def plan_of(space: Space, settings: SearchSettings) -> Plan:
     """Share the evaluations out; putting back takes those that are left."""
     first = tuple(name for name in space.parameters if name.endswith(FIRST_SUFFIXES))
-    spent = 2 * len(space.parameters) + (start_size(len(first)) + _FIRST_SIZE * _FIRST_GENERATIONS if first else 0)
+    spent = 3 * len(space.parameters) + (start_size(len(first)) + _FIRST_SIZE * _FIRST_GENERATIONS if first else 0)
     left = max(settings.evaluations - spent, 16)
     start = max(round(_START_SHARE * left), 8)
     size = max((left - start) // _GENERATIONS, 1)

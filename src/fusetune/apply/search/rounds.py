@@ -14,7 +14,7 @@ from fusetune.apply.search.folds import folds
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask, Asking, Found, search_stages
+from fusetune.apply.search.stages import PUTTING_BACK_ROUNDS, Ask, Asking, Found, search_stages
 
 ON_ALL = "all flights"
 
@@ -104,7 +104,7 @@ def _next(search: Asking, answer: Comparison) -> Ask | Found:
 
 
 def rounds_of(space: Space, settings: SearchSettings) -> int:
-    """How many generations a search has: as many as are planned, two of putting back among them."""
+    """How many generations a search has: as many as are planned, those of putting back among them."""
     plan = plan_of(space, settings)
     first = 1 + len(plan.first_generations) if plan.first else 0
-    return first + 1 + len(plan.generations) + 2
+    return first + 1 + len(plan.generations) + PUTTING_BACK_ROUNDS

@@ -25,9 +25,10 @@ Array = npt.NDArray[np.float64]
 
 DELAYS, ALL, PUTTING_BACK = "delays", "all", "putting back"
 STAGES = (DELAYS, ALL, PUTTING_BACK)
+PUTTING_BACK_ROUNDS = 3
 
 _NEAR = 0.35
-"""After the first stage its parameters move no farther from what it found, in half ranges."""
+"""After the first stage delays move no farther from what it found, in half ranges."""
 
 _MATTERS = 0.01
 """What the first stage finds is taken where it makes errors smaller by 1 %."""
@@ -57,8 +58,7 @@ class Found:
     values : all factors; those that are put back have the present value
     changed : names of those that differ from the present ones
     before_putting_back : the values before
-    costs : of each parameter that was changed before putting back, by how much the score was worse with it alone put
-        back, nat
+    costs : of each parameter that is changed, by how much the score is worse with it alone put back, nat
     base : what all but the first stage was compared with
     """
 
@@ -90,7 +90,7 @@ def search_stages(space: Space, plan: Plan, settings: SearchSettings) -> Asking:
     """Search; the origin of the space is the present set."""
     present = space.values(np.zeros(len(space.factors)))
     base = yield from _first_stage(space, plan, settings, present)
-    around = _near(space.around(base), space, plan.first)
+    around = _second_space(space, base, plan.first)
     best = yield from _stage(
         around, ALL, base, _start(around, plan.start, settings.seed), plan.generations, RADIUS, settings.seed
     )
@@ -135,15 +135,16 @@ def _stage(
     return best if min(tried.scores) < (-_MATTERS if stage == DELAYS else 0.0) else base
 
 
-def _near(space: Space, whole: Space, first: Sequence[str]) -> Space:
-    """The factors of the first stage held near what it found."""
+def _second_space(space: Space, base: dict[str, float], first: Sequence[str]) -> Space:
+    """What the second stage moves: all but lever arms, and delays near what the first found."""
     found = []
-    for factor, one in zip(space.factors, whole.factors, strict=True):
-        if factor.parameter in first:
-            reach = _NEAR * max(map(abs, one.bounds)) * one.unit_step
+    for factor, whole in zip(space.around(base).factors, space.factors, strict=True):
+        if factor.parameter not in first:
+            found.append(factor)
+        elif factor.parameter.endswith("_DELAY"):
+            reach = _NEAR * max(map(abs, whole.bounds)) * whole.unit_step
             low, high = max(factor.low, factor.origin - reach), min(factor.high, factor.origin + reach)
-            factor = replace(factor, low=low, high=high)
-        found.append(factor)
+            found.append(replace(factor, low=low, high=high))
     return Space(tuple(found))
 
 
@@ -175,13 +176,16 @@ def _putting_back(
     ask = [best, *(best | {name: present[name]} for name in changed)]
     alone = yield Ask(PUTTING_BACK, values_of(base), tuple(map(values_of, ask)))
     scores = objective(alone)
-    costs = {name: float(cost) for name, cost in zip(changed, scores[1:] - scores[0], strict=True)}
-    order = sorted(changed, key=lambda name: costs[name])
+    alone_costs = dict(zip(changed, (scores[1:] - scores[0]).tolist(), strict=True))
+    order = sorted(changed, key=lambda name: alone_costs[name])
     nested = [best | {name: present[name] for name in order[: count + 1]} for count in range(len(order))]
     together = yield Ask(PUTTING_BACK, values_of(base), tuple(map(values_of, [best, *nested])))
     values = _fewest_changes(together, [best, *nested], settings)
     kept = tuple(name for name in best if values[name] != present[name])
-    return Found(values, kept, best, costs, base)
+    without = [values | {name: present[name]} for name in kept]
+    last = yield Ask(PUTTING_BACK, values_of(base), tuple(map(values_of, [values, *without])))
+    steps = objective(last)
+    return Found(values, kept, best, dict(zip(kept, (steps[1:] - steps[0]).tolist(), strict=True)), base)
 
 
 def _fewest_changes(
