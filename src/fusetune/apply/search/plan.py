@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fusetune.apply.search.settings import SearchSettings
-from fusetune.apply.search.space import Space
+from fusetune.apply.search.space import DELAY_SUFFIX, Space
 
-FIRST_SUFFIXES = ("_DELAY", "_POS_X", "_POS_Y", "_POS_Z")
+FIRST_SUFFIXES = (DELAY_SUFFIX, "_POS_X", "_POS_Y", "_POS_Z")
 """Delays and lever arms come first: where they are wrong, a sensor's errors look as if they wandered, and all else is
 tuned to hide it."""
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 from cmaes import CMA
+from threadpoolctl import threadpool_limits
 
 from fusetune.apply.search.space import Space
 from fusetune.apply.search.surrogate import FEWEST, Surrogate, fit_surrogate
@@ -37,6 +38,13 @@ def propose(
     The first set is that of the lowest expected score, the others those that may be lowest, each as if those before had
     scored as expected (a batch by "kriging believer", Ginsbourger et al. 2010).
     """
+    with threadpool_limits(1):  # small matrices: threads cost time, and change the last bits
+        return _propose(space, points, scores, number, radius, seed)
+
+
+def _propose(
+    space: Space, points: Array, scores: Array, number: int, radius: float, seed: Sequence[int]
+) -> list[dict[str, float]]:
     best = points[np.argmin(scores)]
     box = _box(space, best, radius)
     known = {tuple(space.values(point).values()) for point in points}

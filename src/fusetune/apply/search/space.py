@@ -6,19 +6,26 @@ searched, tried and written with the same values. The present value stays as it 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from fusetune.design.factors import Factor
+from fusetune.design.tunable_parameters import DELAY_LIMIT
 from fusetune.px4.parameters.ekf2_parameters import as_float32
 
 Array = npt.NDArray[np.float64]
 
 _DIGITS = 2
+
+DELAY_SUFFIX = "_DELAY"
+
+_STEP_MS, _SHORTEST_UPDATES = 10.0, 1.25
+"""A delay needs one update more than itself, and updates are at the least 10 ms / 1.25 long."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +36,8 @@ class Space:
     """
 
     factors: tuple[Factor, ...]
+    delay_max: float = math.inf
+    """EKF2_DELAY_MAX of the vehicle, ms; infinite where nothing is searched that it bounds."""
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -58,20 +67,26 @@ class Space:
 
     def only(self, parameters: Sequence[str]) -> Space:
         """The space of some of the factors."""
-        return Space(tuple(factor for factor in self.factors if factor.parameter in parameters))
+        return replace(self, factors=tuple(one for one in self.factors if one.parameter in parameters))
 
     def around(self, values: Mapping[str, float]) -> Space:
         """The same factors, with other present values; a value beyond a bound moves the bound."""
         found = []
         for factor in self.factors:
             value = values.get(factor.parameter, factor.origin)
-            found.append(
-                Factor(
-                    factor.parameter, factor.scale, min(factor.low, value), max(factor.high, value), value,
-                    factor.unit_step, factor.grid,
-                )
-            )  # fmt: skip
-        return Space(tuple(found))
+            low, high = min(factor.low, value), max(factor.high, value)
+            found.append(replace(factor, low=low, high=high, origin=value))
+        return replace(self, factors=tuple(found))
+
+    def whole(self, values: Mapping[str, float]) -> dict[str, float]:
+        """A set with what goes along with it: a longer EKF2_DELAY_MAX where one of its delays asks for it.
+
+        PX4 keeps samples for EKF2_DELAY_MAX, counted in updates of 10 ms (`Ekf::initialise_interface`); where the IMU's
+        rate makes updates shorter (8 ms at 250 Hz), a delay acts as that shorter time.
+        """
+        delays = [value for name, value in values.items() if name.endswith(DELAY_SUFFIX)]
+        needed = 10.0 * math.ceil((max(delays, default=0.0) + _STEP_MS) * _SHORTEST_UPDATES / 10.0)
+        return {**values, DELAY_LIMIT: needed} if needed > self.delay_max else dict(values)
 
 
 def _written(factor: Factor, coordinate: float) -> float:

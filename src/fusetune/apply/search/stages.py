@@ -19,7 +19,7 @@ from fusetune.apply.search.plan import FIRST_RADIUS, RADIUS, SHRINKS, Plan
 from fusetune.apply.search.proposals import propose
 from fusetune.apply.search.requests import Values, values_of
 from fusetune.apply.search.settings import SearchSettings
-from fusetune.apply.search.space import Space
+from fusetune.apply.search.space import DELAY_SUFFIX, Space
 
 Array = npt.NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def search_stages(space: Space, plan: Plan, settings: SearchSettings) -> Asking:
     best = yield from _stage(
         around, ALL, base, _start(around, plan.start, settings.seed), plan.generations, RADIUS, settings.seed
     )
-    return (yield from _putting_back(best, base, present, settings))
+    return (yield from _putting_back(space, best, base, present, settings))
 
 
 def _first_stage(
@@ -124,7 +124,7 @@ def _stage(
     tried.add([base], np.zeros(1))
     asked: Sequence[dict[str, float]] = start
     for generation, size in enumerate((*generations, 0)):
-        compared = yield Ask(stage, values_of(base), tuple(values_of(one) for one in asked))
+        compared = yield _ask(stage, space, base, asked)
         tried.add(asked, objective(compared))
         if size:
             chance = (seed, STAGES.index(stage), generation)
@@ -141,11 +141,11 @@ def _second_space(space: Space, base: dict[str, float], first: Sequence[str]) ->
     for factor, whole in zip(space.around(base).factors, space.factors, strict=True):
         if factor.parameter not in first:
             found.append(factor)
-        elif factor.parameter.endswith("_DELAY"):
+        elif factor.parameter.endswith(DELAY_SUFFIX):
             reach = _NEAR * max(map(abs, whole.bounds)) * whole.unit_step
             low, high = max(factor.low, factor.origin - reach), min(factor.high, factor.origin + reach)
             found.append(replace(factor, low=low, high=high))
-    return Space(tuple(found))
+    return replace(space, factors=tuple(found))
 
 
 def _star(space: Space) -> list[dict[str, float]]:
@@ -169,23 +169,28 @@ def _start(space: Space, number: int, seed: int) -> list[dict[str, float]]:
 
 
 def _putting_back(
-    best: dict[str, float], base: dict[str, float], present: dict[str, float], settings: SearchSettings
+    space: Space, best: dict[str, float], base: dict[str, float], present: dict[str, float], settings: SearchSettings
 ) -> Asking:
     """Put parameters back to the present value, the one that costs least first, as long as that costs little."""
     changed = [name for name in best if best[name] != present[name]]
     ask = [best, *(best | {name: present[name]} for name in changed)]
-    alone = yield Ask(PUTTING_BACK, values_of(base), tuple(map(values_of, ask)))
+    alone = yield _ask(PUTTING_BACK, space, base, ask)
     scores = objective(alone)
     alone_costs = dict(zip(changed, (scores[1:] - scores[0]).tolist(), strict=True))
     order = sorted(changed, key=lambda name: alone_costs[name])
     nested = [best | {name: present[name] for name in order[: count + 1]} for count in range(len(order))]
-    together = yield Ask(PUTTING_BACK, values_of(base), tuple(map(values_of, [best, *nested])))
+    together = yield _ask(PUTTING_BACK, space, base, [best, *nested])
     values = _fewest_changes(together, [best, *nested], settings)
     kept = tuple(name for name in best if values[name] != present[name])
     without = [values | {name: present[name]} for name in kept]
-    last = yield Ask(PUTTING_BACK, values_of(base), tuple(map(values_of, [values, *without])))
+    last = yield _ask(PUTTING_BACK, space, base, [values, *without])
     steps = objective(last)
-    return Found(values, kept, best, dict(zip(kept, (steps[1:] - steps[0]).tolist(), strict=True)), base)
+    costs = dict(zip(kept, (steps[1:] - steps[0]).tolist(), strict=True))
+    return Found(space.whole(values), kept, space.whole(best), costs, space.whole(base))
+
+
+def _ask(stage: str, space: Space, base: dict[str, float], sets: Sequence[dict[str, float]]) -> Ask:
+    return Ask(stage, values_of(space.whole(base)), tuple(values_of(space.whole(one)) for one in sets))
 
 
 def _fewest_changes(
