@@ -94,7 +94,8 @@ def decide(
     folders = [Path(folder) for folder in analyze_folders]
     newest_flight = newest_flight or max((folder.name for folder in folders), default=None)
     vehicle = decided_vehicle(flights_table, [folder.name for folder in folders], newest_flight)
-    flights = read_flights([one for one in folders if one.name not in vehicle.others], settings, present)
+    seen_by = DELAY_MENDED if recommended is None else recommended.name
+    flights = read_flights([one for one in folders if one.name not in vehicle.others], settings, present, seen_by)
     others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
     newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)

@@ -147,8 +147,10 @@ def _searched(given: FlightSearch, trier: WorkerTrier, target: Path, told: Calla
         ground.know(batch, tried)
     found, asked = run_searches(studied, given.space, given.search, _Watched(ground, progress), progress.begin)
     present = values_of(given.present)
-    asks = [(one.aside, Ask(ALL, present, (values_of(what.values),))) for one, what in zip(studied, found, strict=True)]
-    on_all, *others = ground.compare([(studied[0].flights, asks[0][1]), *asks[1:]])
+    whats = [values_of(one.values) for one in found]
+    asks = [Ask(ALL, present, (what,), seen_by=what) for what in whats]
+    flights = [one.aside or one.flights for one in studied]
+    on_all, *others = ground.compare(list(zip(flights, asks, strict=True)))
     differences = [
         (name, value)
         for one, compared in zip(studied[1:], others, strict=True)

@@ -64,6 +64,9 @@ class ReplayGround:
 
     def _compared(self, flights: Sequence[str], ask: Ask) -> Comparison:
         bases = [self._bases[flight, ask.base] for flight in flights]
+        if ask.seen_by is not None:
+            seen = [self._bases[flight, ask.seen_by].whiteness for flight in flights]
+            bases = [replace(base, whiteness=one or base.whiteness) for base, one in zip(bases, seen, strict=True)]
         tried = [[self._tried[Request(flight, ask.base, one)] for flight in flights] for one in ask.sets]
         return compare(bases, tried, self._weighed_by(ask.stage))
 
@@ -100,6 +103,8 @@ def _batches(
             new = {one: None for one in ask.sets if Request(flight, ask.base, one) not in tried}
             if new or (flight, ask.base) not in bases:
                 wanted.setdefault((flight, ask.base), {}).update(new)
+            if ask.seen_by is not None and (flight, ask.seen_by) not in bases:
+                wanted.setdefault((flight, ask.seen_by), {})
     batches: list[Batch] = []
     for (flight, base), sets in wanted.items():
         ordered = tuple(sets)

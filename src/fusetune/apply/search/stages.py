@@ -35,11 +35,17 @@ _SHARE_OF_GAIN = 0.1
 
 @dataclass(frozen=True)
 class Ask:
-    """Sets to be compared with a base on the flights of a search."""
+    """Sets to be compared with a base on the flights of a search.
+
+    Attributes
+    ----------
+    seen_by : the set that says how white the sources are; None where it is the base
+    """
 
     stage: str
     base: Values
     sets: tuple[Values, ...]
+    seen_by: Values | None = None
 
 
 Asking = Generator[Ask, Comparison, "Found"]
