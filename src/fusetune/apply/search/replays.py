@@ -68,9 +68,9 @@ class ReplayGround:
             seen = [self._bases[flight, ask.seen_by].whiteness for flight in flights]
             bases = [replace(base, whiteness=one or base.whiteness) for base, one in zip(bases, seen, strict=True)]
         tried = [[self._tried[Request(flight, ask.base, one)] for flight in flights] for one in ask.sets]
-        return compare(bases, tried, self._weighed_by(ask.stage))
+        return compare(bases, tried, self.weighed_by(ask.stage))
 
-    def _weighed_by(self, stage: str) -> DecisionSettings:
+    def weighed_by(self, stage: str) -> DecisionSettings:
         """Before the delays are right, the sources' errors look as if they wandered, and are trusted all the same."""
         if stage == DELAYS:
             return replace(self._decision, distrust_white_share=0.0, trust_white_share=0.0)
