@@ -10,7 +10,8 @@ SIGNIFICANT_DIGITS = 9
 
 
 def rounded(value: Any, digits: int = SIGNIFICANT_DIGITS) -> Any:
-    """Round every float to so many significant digits: the last bits may differ between machines. None where none is."""
+    """Round every float to so many significant digits, as the last bits may differ between machines; None where none
+    is."""
     if isinstance(value, float):
         return float(f"{value:.{digits}g}") if math.isfinite(value) else None
     if isinstance(value, Mapping):

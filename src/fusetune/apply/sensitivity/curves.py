@@ -25,7 +25,7 @@ class Course:
 
     Attributes
     ----------
-    coordinates : (G,) from end to end of what was tried
+    coordinates : (G,) from end to end of what was tried, the incumbent's and the ends of the neighbourhood among them
     to_present : (G,) mean differences to the present set, nat
     to_centre : differences to the incumbent
     others_at_best : (G,) mean difference to the present set with all others at their best; None where the surface has
@@ -42,7 +42,9 @@ class Course:
 
 def course_along(surface: Surface, region: Region, index: int, compared: Array, confidence: float) -> Course:
     """The course along factor `index`."""
-    coordinates = np.linspace(region.low[index], region.high[index], CURVE_POINTS)
+    even = np.linspace(region.low[index], region.high[index], CURVE_POINTS)
+    marks = (region.near_low[index], region.centre[index], region.near_high[index])
+    coordinates = np.unique(np.concatenate([even, marks]))
     places = region.along(index, coordinates)
     centre, values = region.centre, surface.at(places)
     from_centre = values - surface.at(centre[None, :])

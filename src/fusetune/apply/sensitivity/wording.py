@@ -72,13 +72,13 @@ def _what_matters(matter: Sequence[ParameterSensitivity]) -> str:
 
 
 def _what_is_flat(flat: Sequence[ParameterSensitivity]) -> str:
-    ranges = [f"{one.parameter} between {_number(one.same_within[0])} and {_number(one.same_within[1])}"
-              for one in flat[:_MOST_RANGES] if one.same_within]  # fmt: skip
-    more = len(flat) - len(ranges)
-    rest = f" (and {more} more, see the table)" if more else ""
+    told = [(one.parameter, one.same_within) for one in flat if one.same_within is not None]
+    ranges = [f"{name} between {_number(ends[0])} and {_number(ends[1])}" for name, ends in told[:_MOST_RANGES]]
+    more = len(told) - len(ranges)
+    rest = f"; likewise {more} more, see the table" if more else ""
     return (
-        f"{listed([one.parameter for one in flat])} could be anything near what flies now: the errors change by less "
-        f"than 1 % or less than one standard error with {listed(ranges)}{rest}."
+        f"Could be anything in this range: {listed(ranges)} (the errors change by less than 1 % there, or by less than "
+        f"one standard error){rest}."
     )
 
 
