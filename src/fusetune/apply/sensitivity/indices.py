@@ -57,10 +57,10 @@ def indices_of(
 
     Returns
     -------
-    None where no factor is told or the surface is level
+    None where fewer than two factors are told, as one brings all, and where the surface is level
     """
     varied = np.flatnonzero(told)
-    if not varied.size:
+    if varied.size < 2:
         return None
     drawn = qmc.Sobol(2 * varied.size, seed=np.random.default_rng(seed)).random(_SAMPLES)
     low, high = region.near_low[varied], region.near_high[varied]
@@ -83,9 +83,7 @@ def indices_of(
         "f_AB": of_mixed.reshape(varied.size, _SAMPLES, -1).transpose(0, 2, 1),
     }
     found = sobol_indices(func=outputs, n=_SAMPLES)
-    # one factor's indices come without an axis for it
-    first = np.clip(found.first_order, 0.0, 1.0).reshape(-1, varied.size)
-    total = np.maximum(found.total_order, 0.0).reshape(-1, varied.size)
+    first, total = np.clip(found.first_order, 0.0, 1.0), np.maximum(found.total_order, 0.0)
     ends = (0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence)) if flights >= _FEWEST_FLIGHTS else (math.nan, math.nan)
     figures = (first[0], total[0], _between(first[1:], ends), _between(total[1:], ends))
     return Indices(spread, *(_spread_out(figure, varied, len(told)) for figure in figures))

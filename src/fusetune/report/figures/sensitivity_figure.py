@@ -136,10 +136,16 @@ def _tried_sets(axes: Axes, one: ParameterSensitivity, found: Sensitivity) -> No
     varied = ~np.all(np.isclose(values, present, rtol=1e-5), axis=1)
     values, gains = values[varied], gains[varied]
     alone = np.all(np.isclose(values[:, others], present[others], rtol=1e-5), axis=1)
-    axes.plot(values[~alone, index], gains[~alone], ".", color=VETOED_COLOUR, markersize=3, alpha=0.55, zorder=1,
-              label="sets tried")  # fmt: skip
-    axes.plot(values[alone, index], gains[alone], "o", color=PRESENT_COLOUR, markersize=3.5, fillstyle="none", zorder=4,
-              label="set that changes this alone" if alone.any() else None)  # fmt: skip
+    if not alone.all():
+        axes.plot(
+            values[~alone, index], gains[~alone], ".", color=VETOED_COLOUR, markersize=3, alpha=0.55, zorder=1,
+            label="sets tried",
+        )  # fmt: skip
+    if alone.any():
+        axes.plot(
+            values[alone, index], gains[alone], "o", color=PRESENT_COLOUR, markersize=3.5, fillstyle="none", zorder=4,
+            label="sets that change this alone",
+        )  # fmt: skip
 
 
 def _ticks(axes: Axes, one: ParameterSensitivity, curve: Curve) -> None:
