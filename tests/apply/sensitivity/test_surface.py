@@ -122,3 +122,16 @@ def test_kernels_vanish_at_the_present_set_and_are_covariances(name: str) -> Non
     assert kernel(places, np.zeros((1, 2))) == pytest.approx(np.zeros((12, 1)), abs=1e-12)
     assert np.linalg.eigvalsh(matrix).min() > -1e-9
     assert kernel.variance(places) == pytest.approx(np.diag(matrix))
+
+
+def test_sets_that_contradict_a_sum_of_effects_are_not_gone_through() -> None:
+    """Three sets and the same with another delay, which does 0.05 beside one of them and nothing beside the others:
+    no sum of effects does that, and what is left over is not taken for a precise answer."""
+    group = np.array([[-1.0, -1.1], [0.5, 0.55], [1.0, 1.1]])
+    without, mended = np.column_stack([group, np.zeros(3)]), np.column_stack([group, np.ones(3)])
+    effect = np.array([0.02, -0.01, -0.02, 0.02, -0.01, 0.03, 0.0])
+    places = np.vstack([without, mended, [[0.0, 0.0, 1.0]]])
+    surface = fitted(made_trials(places, [lambda at: effect, lambda at: 1.1 * effect]))
+    assert not surface.quality.goes_through
+    along = surface.uncertainty(np.array([[0.0, 0.0, 1.0]]), np.zeros(3))[0]
+    assert 0.003 < along < 0.1

@@ -21,12 +21,14 @@ class FitQuality:
     sets : different sets that it was made of, without the present one
     error : RMS error of the predicted mean difference of a set that was left out, nat
     explained : share of the variance between sets that it predicts; 0 or less is no better than their mean
+    goes_through : it goes through what was tried, for the sets are too few to be left out
     """
 
     kernel: str
     sets: int
     error: float
     explained: float
+    goes_through: bool
 
 
 @dataclass(frozen=True)
@@ -79,12 +81,13 @@ class ParameterSensitivity:
     present, incumbent : its values
     tried : lowest and highest value that was tried
     verdict : "matters": within the neighbourhood the errors change by more than 1 % beyond doubt; "flat": they do not
-        change by more than 1 %, or by more than one standard error and 3 %; "unsure": neither; "not told": the sets
-        do not tell its effect from that of others
+        change by more than 1 % or one standard error, and surely not by more than 5 %; "unsure": neither; "not told":
+        the sets do not tell its effect from that of others
     same_within : values around the incumbent's between which the errors change by less than 1 %, or less than one
         standard error; None where nothing is told
     at_bound : the best lies at the end of what was tried, and not at the present value, so that it is not determined
     change : the largest mean change of the score in the neighbourhood against the incumbent, nat
+    possible : the largest that its interval holds; None where nothing shows that
     resolution : share of what could be along the parameter that the sets tell, 0 … 1
     first, total : Sobol indices in the neighbourhood, and their intervals; None where there are none
     curve : the score along it; None where nothing is told
@@ -99,6 +102,7 @@ class ParameterSensitivity:
     same_within: Ends | None
     at_bound: bool
     change: float
+    possible: float | None
     resolution: float
     first: float | None
     total: float | None

@@ -32,8 +32,11 @@ Array = npt.NDArray[np.float64]
 SMALLEST = math.log1p(0.01)
 """Nat. Changes of the prediction errors by less than 1 % do not matter."""
 
-LARGEST_FLAT = math.log1p(0.03)
-"""Nat. A larger change is not called flat, however large its standard error is."""
+LARGEST_SAME = math.log1p(0.03)
+"""Nat. Values whose errors differ by more do not count as the same, however large the standard error is."""
+
+LARGEST_FLAT = math.log1p(0.05)
+"""Nat. Where larger changes are possible nothing is called flat, however small the mean change is."""
 
 TOLD = 0.75
 """Share of what could be along a parameter that the sets must tell, for anything to be said of it."""
@@ -92,7 +95,7 @@ def _tried_sets(trials: Trials) -> tuple[TriedSet, ...]:
 def _not_told(trials: Trials, region: Region, index: int, resolution: float) -> ParameterSensitivity:
     factor = trials.factors[index]
     now, ends = _value(factor, region.centre[index]), _ends(factor, region, index)
-    nothing = (None, False, 0.0, resolution, None, None, None, None, None)
+    nothing = (None, False, 0.0, None, resolution, None, None, None, None, None)
     return ParameterSensitivity(factor.parameter, factor.scale, factor.origin, now, ends, NOT_TOLD, *nothing)
 
 
@@ -113,6 +116,7 @@ def _parameter(
         same_within=_same_within(factor, course, region.centre[index]),
         at_bound=_is_at_bound(course),
         change=float(np.abs(course.to_centre.mean[near]).max(initial=0.0)),
+        possible=_possible(course.to_centre, near),
         resolution=course.resolution,
         first=_index(indices.first[index]) if indices else None,
         total=_index(indices.total[index]) if indices else None,
@@ -124,17 +128,23 @@ def _parameter(
 
 def _verdict(course: Course, near: npt.NDArray[np.bool_]) -> str:
     change = course.to_centre
-    if not np.isfinite(change.reach).all():
-        return FLAT if np.all(_hardly(change)[near]) else UNSURE
+    possible = _possible(change, near)
+    if possible is None:
+        return UNSURE
     if np.any((change.lower[near] > SMALLEST) | (change.upper[near] < -SMALLEST)):
         return MATTERS
-    return FLAT if np.all(_hardly(change)[near]) else UNSURE
+    return FLAT if np.all(_hardly(change)[near]) and possible < LARGEST_FLAT else UNSURE
+
+
+def _possible(change: Spread, near: npt.NDArray[np.bool_]) -> float | None:
+    """The largest change that the interval holds; None where it is not known."""
+    reach = change.reach[near]
+    return float(np.max(np.abs(change.mean[near]) + reach, initial=0.0)) if np.isfinite(reach).all() else None
 
 
 def _hardly(change: Spread) -> npt.NDArray[np.bool_]:
-    """Where the score changes by less than 1 % or, up to `LARGEST_FLAT`, one standard error."""
-    error = np.where(np.isfinite(change.error), change.error, 0.0)
-    return np.asarray(np.abs(change.mean) <= np.clip(error, SMALLEST, LARGEST_FLAT))
+    """Where the score changes by less than 1 % or one standard error, and by less than `LARGEST_SAME`."""
+    return np.asarray(np.abs(change.mean) <= np.clip(np.nan_to_num(change.error), SMALLEST, LARGEST_SAME))
 
 
 def _same_within(factor: Factor, course: Course, centre: float) -> Ends:

@@ -30,6 +30,8 @@ HOPELESS = 0.25
 hopeless set is must not shape the surface where it matters."""
 
 _OF_ONE_FACTOR = 0.05
+_NO_DIRECTION = 1e-4
+"""Of the largest eigenvalue: differences in such a direction are none that the kernel can follow."""
 _WORTH = 1.05
 _NUGGETS = np.geomspace(1e-6, 1.0, 13)
 _ROUNDS = 2
@@ -181,8 +183,8 @@ def _likeliest_smooth(places: Array, scales: Array, mean: Array) -> Kernel:
 def _fitted(kernel: Kernel, places: Array, mean: Array, tried: npt.NDArray[np.bool_]) -> Surface:
     """The surface of the mean with the nugget that predicts left-out sets best.
 
-    With no more sets than a parabola in each factor has terms a left-out set cannot be predicted, and that tells
-    nothing: the surface then goes through what was tried.
+    With no more sets than the kernel can follow, whatever their differences are, a left-out set cannot be predicted,
+    and that tells nothing: the surface then goes through what was tried.
     """
     matrix = kernel(places, places)
     size = float(np.trace(matrix)) / len(places)
@@ -190,14 +192,16 @@ def _fitted(kernel: Kernel, places: Array, mean: Array, tried: npt.NDArray[np.bo
     if kernel.name == MAIN_EFFECTS:
         # what it lacks most are interactions, and a set that changes one factor has none
         thin = np.where(np.count_nonzero(places, axis=1) == 1, _OF_ONE_FACTOR * thin, thin)
-    tells = len(places) > 2 * places.shape[1]
-    fits = [
-        _with_nugget(kernel, places, matrix, mean, size * one * thin) for one in (_NUGGETS if tells else _NUGGETS[:1])
-    ]
+    size_of_directions = np.linalg.eigvalsh(matrix)
+    tells = kernel.name != MAIN_EFFECTS or bool(size_of_directions[0] < _NO_DIRECTION * size_of_directions[-1])
+    nuggets = _NUGGETS if tells else _NUGGETS[:1]
+    fits = [_with_nugget(kernel, places, matrix, mean, size * one * thin, not tells) for one in nuggets]
     return min(fits, key=lambda one: one.quality.error)
 
 
-def _with_nugget(kernel: Kernel, places: Array, matrix: Array, mean: Array, nugget: Array) -> Surface:
+def _with_nugget(
+    kernel: Kernel, places: Array, matrix: Array, mean: Array, nugget: Array, goes_through: bool
+) -> Surface:
     inverse: Array = np.linalg.inv(matrix + np.diag(nugget)).astype(np.float64)
     solved = inverse @ mean
     left_out = solved / np.diag(inverse)
@@ -207,7 +211,7 @@ def _with_nugget(kernel: Kernel, places: Array, matrix: Array, mean: Array, nugg
     error = float(np.sqrt(np.mean(np.square(left_out))))
     variance = float(np.var(mean))
     explained = 1.0 - error**2 / variance if variance > 0.0 else 0.0
-    quality = FitQuality(kernel.name, len(mean), error, explained)
+    quality = FitQuality(kernel.name, len(mean), error, explained, goes_through)
     roughness = float(np.sqrt(amplitude * np.median(nugget)))
     return Surface(kernel, places, solved[:, None], inverse, amplitude, roughness, quality)
 

@@ -66,7 +66,7 @@ def _what_matters(matter: Sequence[ParameterSensitivity]) -> str:
         return "No parameter is shown to matter near what flies now."
     largest = matter[0]
     verb = "matters" if len(matter) == 1 else "matter"
-    size = _size(largest)
+    size = _percent(largest.change)
     each = "" if len(matter) == 1 else f", most of all {largest.parameter}"
     return f"On these flights {listed([one.parameter for one in matter])} {verb}{each} (errors change by up to {size})."
 
@@ -85,7 +85,15 @@ def _what_is_flat(flat: Sequence[ParameterSensitivity]) -> str:
 def _what_is_unsure(unsure: Sequence[ParameterSensitivity]) -> str:
     names = listed([one.parameter for one in unsure])
     verb = "matters" if len(unsure) == 1 else "matter"
-    return f"Whether {names} {verb} is not sure: errors change by up to {_size(unsure[0])}, but not beyond doubt."
+    possible = [one.possible for one in unsure if one.possible is not None]
+    if not possible:
+        return (
+            f"Whether {names} {verb} one flight cannot show: errors change there by up to {_percent(unsure[0].change)}."
+        )
+    return (
+        f"Whether {names} {verb} is not sure: errors change by up to {_percent(unsure[0].change)}, but for all that is "
+        f"known it may be nothing, or as much as {_percent(max(possible))}."
+    )
 
 
 def _at_bounds(found: Sensitivity) -> Iterator[str]:
@@ -120,16 +128,13 @@ def trade_off_sentence(one: TradeOff) -> str:
 def _trust(found: Sensitivity) -> str:
     quality = found.quality
     assert quality is not None, "what is told of parameters comes from a surface"
-    error = 100.0 * math.expm1(quality.error)
-    text = f"A set that was left out is predicted to within {error:.1f} % (RMS; from {quality.sets} sets)."
-    if quality.kernel == MAIN_EFFECTS and quality.sets <= 2 * len(found.parameters):
-        return (
-            f"From {quality.sets} sets each curve is a parabola through what was tried; how parameters act together "
-            "is not seen."
-        )
+    apart = " How parameters act together is not seen." if quality.kernel == MAIN_EFFECTS else ""
+    if quality.goes_through:
+        return f"From {quality.sets} sets each curve is a parabola through what was tried.{apart}"
+    text = f"A set that was left out is predicted to within {_percent(quality.error)} (RMS; from {quality.sets} sets)."
     if quality.explained < 0.5:
         text += " That is little better than the mean of the others, so take the curves for a rough picture."
-    return text
+    return text + apart
 
 
 def listed(names: Sequence[str]) -> str:
@@ -139,8 +144,8 @@ def listed(names: Sequence[str]) -> str:
     return f"{head} and {last}" if comma and " and " not in last else text
 
 
-def _size(one: ParameterSensitivity) -> str:
-    return f"{100.0 * math.expm1(one.change):.0f} %"
+def _percent(change: float) -> str:
+    return f"{100.0 * math.expm1(change):.2g} %" if change < 1.0 else "more than 100 %"
 
 
 def _number(value: float) -> str:

@@ -64,8 +64,8 @@ def pareto_figure(trials: Trials, chosen: str | None = None) -> Figure:
     if chosen in trials.names:
         here = gains[trials.names.index(chosen)]
         axes.plot(*here, "D", color=CHOSEN_COLOUR, markersize=8, label="chosen", linestyle="none", zorder=6)
-    axes.annotate("better in both", (right, 0.0), (-4, 4), textcoords="offset points", color=_FRONT_COLOUR, fontsize=8,
-                  ha="right", va="bottom")  # fmt: skip
+    axes.annotate("better in both", (0.0, 0.0), (8, 4), textcoords="offset points", color=_FRONT_COLOUR, fontsize=8,
+                  ha="left", va="bottom")  # fmt: skip
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     axes.set_xlabel(_ACCURACY.get(accuracy, _MIXED))

@@ -127,13 +127,13 @@ def _panel(axes: Axes, one: ParameterSensitivity, found: Sensitivity, limits: tu
 
 
 def _tried_sets(axes: Axes, one: ParameterSensitivity, found: Sensitivity) -> None:
-    """Sets that were tried: those that change this parameter alone as circles, the others pale."""
+    """Sets that change this parameter: those that change it alone as circles, the others pale."""
     index = [other.parameter for other in found.parameters].index(one.parameter)
     present = np.array([other.present for other in found.parameters])
     others = np.arange(len(present)) != index
     values = np.array([tried.values for tried in found.tried])
     gains = _gain([tried.difference for tried in found.tried])
-    varied = ~np.all(np.isclose(values, present, rtol=1e-5), axis=1)
+    varied = ~np.isclose(values[:, index], present[index], rtol=1e-5)
     values, gains = values[varied], gains[varied]
     alone = np.all(np.isclose(values[:, others], present[others], rtol=1e-5), axis=1)
     if not alone.all():

@@ -29,7 +29,7 @@ def sensitivity_section(results: Results, figures: AnyPath) -> str:
             "Each curve moves one parameter and holds the others; above the line is better. The shade says how sure "
             "the change from the chosen (or present) value is: what the flights differ by, and what the sets leave "
             "open. Green: values between which the errors hardly change. Circles: sets that change this parameter "
-            "alone; dots: the others."
+            "alone; dots: sets that change others, too."
         )
         parts += [figure(Path(figures) / "sensitivity.svg", caption), _table(told.found)]
     return section(title, *parts)
@@ -37,9 +37,17 @@ def sensitivity_section(results: Results, figures: AnyPath) -> str:
 
 def _table(found: Sensitivity) -> str:
     head = (
-        "parameter", "now", "chosen", "", "errors change by up to %", "hardly change between", "best, as far as tried",
-        "share of the change %", "together with others %",
-    )  # fmt: skip
+        "parameter",
+        "now",
+        "chosen",
+        "",
+        "errors change by up to %",
+        "at most, as far as known %",
+        "hardly change between",
+        "best, as far as tried",
+        "share of the change %",
+        "together with others %",
+    )
     rows = [_row(one) for verdict in _VERDICTS for one in found.of_verdict(verdict)]
     return table(
         head,
@@ -57,6 +65,7 @@ def _row(one: ParameterSensitivity) -> tuple[Cell | str, ...]:
         number(one.incumbent, _DIGITS),
         Cell(_VERDICTS[one.verdict], "" if known else "quiet"),
         number(float(percent_change(one.change)), 2) if known else number(None),
+        number(float(percent_change(one.possible)), 2) if one.possible is not None else number(None),
         _between(one.same_within),
         number(best_value(one), _DIGITS, "number quiet" if one.at_bound else "number") if known else number(None),
         _share(one.first, one.first_interval),
