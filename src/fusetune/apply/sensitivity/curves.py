@@ -16,7 +16,7 @@ from fusetune.apply.sensitivity.surface import Surface
 Array = npt.NDArray[np.float64]
 
 CURVE_POINTS = 41
-_BEST_EVERY = 4
+_BEST_EVERY = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +66,7 @@ def _others_at_best(surface: Surface, region: Region, index: int, coordinates: A
     starts = {-1.0: region.centre, 1.0: region.centre}
     for row in nearest:
         side = float(np.sign(coordinates[row] - region.centre[index])) or 1.0
-        tried = [
-            _lowest(surface, region, others, index, coordinates[row], one) for one in (region.centre, starts[side])
-        ]
-        found[row], starts[side] = min(tried, key=lambda one: one[0])
+        found[row], starts[side] = _lowest(surface, region, others, index, coordinates[row], starts[side])
     return np.interp(coordinates, coordinates[rows], [round(found[row], 4) for row in rows.tolist()])
 
 
@@ -77,7 +74,7 @@ def _lowest(
     surface: Surface, region: Region, others: npt.NDArray[np.bool_], index: int, coordinate: float, start: Array
 ) -> tuple[float, Array]:
     """The lowest mean difference with one factor held, and where it is."""
-    step = 1e-3 * (region.high - region.low)[others]
+    step = np.maximum(1e-3 * (region.high - region.low)[others], 1e-6)
 
     def value_and_slope(free: Array) -> tuple[float, Array]:
         places = np.tile(start, (1 + 2 * len(free), 1))

@@ -29,6 +29,7 @@ from fusetune.apply.trials import Trials
 from fusetune.design.factors import Factor
 
 Array = npt.NDArray[np.float64]
+
 SMALLEST = math.log1p(0.01)
 """Nat. Changes of the prediction errors by less than 1 % do not matter."""
 
@@ -54,7 +55,7 @@ def sensitivity(
 
     Notes
     -----
-    The surface is smooth and its intervals hold what flights differ by and what it does not know (`Surface`).
+    The intervals hold what flights differ by and what the surface leaves open (docs/sensitivity.md).
     """
     present = [factor.origin for factor in trials.factors]
     values = present if incumbent is None else [float(value) for value in incumbent]

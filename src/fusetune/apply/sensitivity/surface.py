@@ -30,9 +30,17 @@ HOPELESS = 0.25
 hopeless set is must not shape the surface where it matters."""
 
 _OF_ONE_FACTOR = 0.05
+"""Nugget of a set that changes one factor, in a sum of effects: against that of sets that change several."""
+
 _NO_DIRECTION = 1e-4
 """Of the largest eigenvalue: differences in such a direction are none that the kernel can follow."""
+
 _WORTH = 1.05
+"""A richer kernel has to predict better by this."""
+
+_MOST_FOR_LENGTHS = 250
+"""Lengths are found on so many of the sets, evenly among them: the time goes with the cube of their number."""
+
 _NUGGETS = np.geomspace(1e-6, 1.0, 13)
 _ROUNDS = 2
 
@@ -89,7 +97,7 @@ class Surface:
         prior = self.kernel.variance(coordinates) + self.kernel.variance(origin)
         prior -= 2.0 * self.kernel(coordinates, origin)[:, 0]
         columns = self.kernel(coordinates, self.places) - self.kernel(origin, self.places)
-        taken = np.einsum("mn,nk,mk->m", columns, self.inverse, columns)
+        taken = np.sum(columns @ self.inverse * columns, axis=1)
         return np.maximum(prior - taken, 0.0), prior
 
 
@@ -107,7 +115,8 @@ def fit_surface(trials: Trials) -> Surface | None:
     places, differences = _different_sets(trials)
     if not len(places):
         return None
-    scales = np.maximum(np.abs(places).max(axis=0), 1e-9)
+    reach = np.abs(places).max(axis=0)
+    scales = np.where(reach > 1e-9, reach, 1.0)
     tried = np.isfinite(differences)
     mean = np.nanmean(differences, axis=1)
     candidates = [_fitted(kernel, places, mean, tried) for kernel in _kernels(places, scales, mean)]
@@ -131,14 +140,15 @@ def _different_sets(trials: Trials) -> tuple[Array, Array]:
 
 
 def _kernels(places: Array, scales: Array, mean: Array) -> list[Kernel]:
-    """The assumptions that so many sets can tell apart, by the number of terms of a full quadratic."""
+    """The assumptions that so many sets can tell apart: interactions from twice as many sets as a full quadratic has
+    terms."""
     sets, factors = places.shape
-    terms = factors * (factors + 3) // 2
     kernels = [Kernel(MAIN_EFFECTS, scales)]
-    if factors > 1 and sets >= terms:
+    if factors > 1 and sets >= factors * (factors + 3):
         kernels.append(Kernel(QUADRATIC, scales))
-    if sets >= 2 * terms:
-        kernels.append(_likeliest_smooth(places, scales, mean))
+    if sets >= factors * (factors + 3) and float(np.ptp(mean)) > 0.0:
+        some = np.unique(np.linspace(0, sets - 1, min(sets, _MOST_FOR_LENGTHS)).round().astype(int))
+        kernels.append(_likeliest_smooth(places[some], scales, mean[some]))
     return kernels
 
 
@@ -187,33 +197,38 @@ def _fitted(kernel: Kernel, places: Array, mean: Array, tried: npt.NDArray[np.bo
     and that tells nothing: the surface then goes through what was tried.
     """
     matrix = kernel(places, places)
-    size = float(np.trace(matrix)) / len(places)
     thin = tried.shape[1] / tried.sum(axis=1)
     if kernel.name == MAIN_EFFECTS:
         # what it lacks most are interactions, and a set that changes one factor has none
         thin = np.where(np.count_nonzero(places, axis=1) == 1, _OF_ONE_FACTOR * thin, thin)
-    size_of_directions = np.linalg.eigvalsh(matrix)
-    tells = kernel.name != MAIN_EFFECTS or bool(size_of_directions[0] < _NO_DIRECTION * size_of_directions[-1])
-    nuggets = _NUGGETS if tells else _NUGGETS[:1]
-    fits = [_with_nugget(kernel, places, matrix, mean, size * one * thin, not tells) for one in nuggets]
-    return min(fits, key=lambda one: one.quality.error)
-
-
-def _with_nugget(
-    kernel: Kernel, places: Array, matrix: Array, mean: Array, nugget: Array, goes_through: bool
-) -> Surface:
-    inverse: Array = np.linalg.inv(matrix + np.diag(nugget)).astype(np.float64)
-    solved = inverse @ mean
-    left_out = solved / np.diag(inverse)
-    amplitude = float(mean @ solved) / len(mean)
-    # What it says of its own errors is made to agree with the errors that it made.
-    amplitude *= max(float(np.mean(np.square(left_out) * np.diag(inverse))) / max(amplitude, 1e-300), 1.0)
-    error = float(np.sqrt(np.mean(np.square(left_out))))
+    sizes = np.linalg.eigvalsh(matrix)
+    tells = kernel.name != MAIN_EFFECTS or bool(sizes[0] < _NO_DIRECTION * sizes[-1])
+    nuggets = sizes.mean() * (_NUGGETS if tells else _NUGGETS[:1])
+    # (K + n T)⁻¹ = T^-½ Q (Λ + n)⁻¹ Qᵀ T^-½, with T^-½ K T^-½ = Q Λ Qᵀ: decomposed once for all nuggets
+    root = 1.0 / np.sqrt(thin)
+    decomposed, directions = np.linalg.eigh(root[:, None] * matrix * root)
+    inverses = (_inverse(root[:, None] * directions, np.maximum(decomposed, 0.0) + nugget) for nugget in nuggets)
+    fits = [_left_out_fit(inverse, mean) for inverse in inverses]
+    index = int(np.argmin([fit[0] for fit in fits]))
+    error, amplitude = fits[index]
     variance = float(np.var(mean))
     explained = 1.0 - error**2 / variance if variance > 0.0 else 0.0
-    quality = FitQuality(kernel.name, len(mean), error, explained, goes_through)
-    roughness = float(np.sqrt(amplitude * np.median(nugget)))
-    return Surface(kernel, places, solved[:, None], inverse, amplitude, roughness, quality)
+    quality = FitQuality(kernel.name, len(mean), error, explained, not tells)
+    inverse = _inverse(root[:, None] * directions, np.maximum(decomposed, 0.0) + nuggets[index])
+    roughness = float(np.sqrt(amplitude * nuggets[index] * np.median(thin)))
+    return Surface(kernel, places, (inverse @ mean)[:, None], inverse, amplitude, roughness, quality)
+
+
+def _inverse(directions: Array, sizes: Array) -> Array:
+    return np.asarray(directions / sizes @ directions.T)
+
+
+def _left_out_fit(inverse: Array, mean: Array) -> tuple[float, float]:
+    """RMS error of left-out sets, and the amplitude: what it says of its own errors agrees with those that it made."""
+    solved, precision = inverse @ mean, np.diag(inverse)
+    left_out = solved / precision
+    amplitude = max(float(mean @ solved) / len(mean), float(np.mean(np.square(left_out) * precision)))
+    return float(np.sqrt(np.mean(np.square(left_out)))), amplitude
 
 
 def _with_flights(surface: Surface, differences: Array, tried: npt.NDArray[np.bool_]) -> Surface:
@@ -233,21 +248,19 @@ def _with_flights(surface: Surface, differences: Array, tried: npt.NDArray[np.bo
 
 def _departure_weights(matrix: Array, departures: Array, tried: npt.NDArray[np.bool_]) -> Array:
     """(N, F) weights of each flight's departures, with the one nugget that predicts left-out ones best."""
-    size = float(np.trace(matrix)) / len(matrix)
-    best, lowest = np.zeros(departures.shape), np.inf
-    for nugget in size * _NUGGETS[2:]:
-        weights, squares = np.zeros(departures.shape), 0.0
-        inverses: dict[bytes, Array] = {}
-        for flight in range(departures.shape[1]):
-            rows = tried[:, flight]
-            if not rows.any():
-                continue
-            key = rows.tobytes()
-            if key not in inverses:
-                inverses[key] = np.linalg.inv(matrix[np.ix_(rows, rows)] + nugget * np.eye(int(rows.sum())))
-            solved = inverses[key] @ departures[rows, flight]
-            squares += float(np.sum(np.square(solved / np.diag(inverses[key]))))
-            weights[rows, flight] = solved
-        if squares < lowest:
-            best, lowest = weights, squares
-    return best
+    nuggets = float(np.trace(matrix)) / len(matrix) * _NUGGETS[2:]
+    weights, squares = np.zeros((len(nuggets), *departures.shape)), np.zeros(len(nuggets))
+    decomposed: dict[bytes, tuple[Array, Array]] = {}
+    for flight, rows in enumerate(tried.T):
+        if not rows.any():
+            continue
+        if rows.tobytes() not in decomposed:
+            decomposed[rows.tobytes()] = np.linalg.eigh(matrix[np.ix_(rows, rows)])
+        sizes, directions = decomposed[rows.tobytes()]
+        along = directions.T @ departures[rows, flight]
+        for index, nugget in enumerate(nuggets):
+            shrunk = 1.0 / (np.maximum(sizes, 0.0) + nugget)
+            solved = directions @ (shrunk * along)
+            squares[index] += np.sum(np.square(solved / (np.square(directions) @ shrunk)))
+            weights[index, rows, flight] = solved
+    return np.asarray(weights[np.argmin(squares)])
