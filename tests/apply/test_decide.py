@@ -26,6 +26,7 @@ OUTPUTS = (
     "best_params.params",
     "rollback.params",
     "candidates.yaml",
+    "sensitivity.json",
 )
 QUIET = {"EKF2_ACC_NOISE": 0.2, "EKF2_GYR_NOISE": 0.015}
 PRESENT = {"EKF2_ACC_NOISE": 0.35, "EKF2_GYR_NOISE": 0.015}

@@ -33,6 +33,7 @@ rule decide:
         ),
         "results/apply/rollback.params",
         "results/apply/candidates.yaml",
+        "results/apply/sensitivity.json",
     log:
         "results/logs/decide.log",
     conda:

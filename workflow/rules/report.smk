@@ -3,6 +3,7 @@ SUMMARY_FIGURES = {
     "flights_by_sets.svg": "flights and sets",
     "pareto.svg": "two aims",
     "drift.svg": "drift without GNSS",
+    "sensitivity.svg": "what matters",
     "rms.svg": "RMS of innovations",
     "innovations.svg": "innovations",
     "normalised_innovations.svg": "normalised innovations",
@@ -43,6 +44,7 @@ rule plot_summary:
     input:
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
         decision="results/apply/decision.json",
+        sensitivity="results/apply/sensitivity.json",
     output:
         [
             report(
@@ -75,6 +77,7 @@ rule build_report:
         figures=of_replayable_flights("results/report/flights/{flight}.png"),
         summary=rules.plot_summary.output,
         decision="results/apply/decision.json",
+        sensitivity="results/apply/sensitivity.json",
     output:
         report(
             "results/report.html",

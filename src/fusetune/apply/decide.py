@@ -36,7 +36,12 @@ from fusetune.apply.parameter_changes import ParameterChange, parameter_changes,
 from fusetune.apply.provenance import file_hash, flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.recommended import Recommended
+from fusetune.apply.rounded import rounded
+from fusetune.apply.sensitivity.files import SENSITIVITY_FILE, write_sensitivity
+from fusetune.apply.sensitivity.result import Sensitivity
+from fusetune.apply.sensitivity.sensitivity import sensitivity
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.study_trials import trials_of_study
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
@@ -46,8 +51,6 @@ from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
 from fusetune.storage.parquet import write_table
-
-_SIGNIFICANT_DIGITS = 9
 
 
 def decide(
@@ -66,7 +69,8 @@ def decide(
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
-    `decision.json`, `best_params.params`, `rollback.params` and `candidates.yaml` to `output_folder`.
+    `decision.json`, `best_params.params`, `rollback.params`, `candidates.yaml` and `sensitivity.json` to
+    `output_folder`.
 
     Parameters
     ----------
@@ -142,11 +146,12 @@ def decide(
     _write_ranking(output, ranked, values)
     _write_per_flight(output, flights)
     write_candidates(output / "candidates.yaml", proposed)
+    write_sensitivity(output / SENSITIVITY_FILE, _sensitivity(flights, newest, present, choice, ranked, settings))
     firmware = newest.summary["firmware"] if newest else "unknown"
     written = write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
     with atomic_path(output / "decision.json") as temporary:
-        write_document(temporary, _rounded(decision), allow_nan=False)
+        write_document(temporary, rounded(decision), allow_nan=False)
 
 
 def _ranked_and_chosen(
@@ -205,6 +210,22 @@ def _noises(
     deciding = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
     parameters = newest.summary["sets"].get(present, {}).get("parameters", {}) if newest is not None else {}
     return source_noises(metrics.filter(pc.is_in(metrics["flight"], deciding)), present, parameters, settings)
+
+
+def _sensitivity(
+    flights: Sequence[AnalyzedFlight],
+    newest: AnalyzedFlight | None,
+    present: str,
+    choice: Choice,
+    ranked: Sequence[RankedSet],
+    settings: DecisionSettings,
+) -> Sensitivity | None:
+    """What the sets tell of the parameters, around the set that is chosen."""
+    trials = trials_of_study(flights, newest, present, [one.name for one in ranked if one.is_vetoed])
+    if trials is None:
+        return None
+    incumbent = trials.values[trials.names.index(choice.chosen)] if choice.chosen in trials.names else None
+    return sensitivity(trials, incumbent, confidence=settings.confidence, seed=settings.seed)
 
 
 def _vetoed_but_better(ranked: Sequence[RankedSet]) -> list[RankedSet]:
@@ -327,7 +348,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
         del row["aims"], row["is_present"]
         row["reasons"] = "; ".join(one.reasons)
         row["worse_aims"] = " ".join(one.worse_aims)
-        rows.append(_rounded(row))
+        rows.append(rounded(row))
     table = pa.Table.from_pylist(rows)
     # A column in which nothing is known is one of figures all the same.
     schema = [pa.field(one.name, pa.float64()) if pa.types.is_null(one.type) else one for one in table.schema]
@@ -381,14 +402,3 @@ def _file_origin(choice: Choice, decision: dict[str, Any], newest: AnalyzedFligh
     if choice.exploratory:
         lines.append(f"exploratory: flights in the decision: {decision['flights_scored']}")
     return tuple(lines)
-
-
-def _rounded(value: Any) -> Any:
-    """Round every float to nine significant digits: the last bits may differ between machines. None where none is."""
-    if isinstance(value, float):
-        return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(item) for item in value]
-    return value

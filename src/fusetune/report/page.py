@@ -22,6 +22,7 @@ from fusetune.report.sections.flight_sections import (
     single_flights_section,
     truth_section,
 )
+from fusetune.report.sections.sensitivity_section import sensitivity_section
 from fusetune.report.sections.trust_section import trust_section
 from fusetune.storage.files import AnyPath, atomic_path
 
@@ -58,6 +59,7 @@ def build_report(
         evidence_section(results, figures),
         withheld_section(results, figures),
         holds_section(results),
+        sensitivity_section(results, figures),
         weights_section(results),
         paper_section(results),
         sets_section(results),
