@@ -75,7 +75,7 @@ def moderated(differences: Array) -> list[Moderated]:
     mean, variance = differences.mean(axis=0), differences.var(axis=0, ddof=1)
     size = np.square(differences).mean(axis=0)
     share = np.minimum(np.divide(variance, size, out=np.ones_like(size), where=size > 0.0), 1.0)
-    usual, others = _medians_of_others(share, size > 0.0, np.asarray(_first_twins(differences)))
+    usual, others = _medians_of_others(share, size > 0.0, np.asarray(first_twins(differences)))
     weight = np.minimum(PRIOR_FLIGHTS, others)
     steadied = (weight * usual * size + (flights - 1) * variance) / (weight + flights - 1)
     error = np.sqrt(np.where(variance > EQUAL_WITHIN**2, steadied, variance) / flights)
@@ -103,7 +103,7 @@ def _medians_of_others(
     return np.where(number > 0, median, 0.0), number
 
 
-def _first_twins(differences: Array) -> Sequence[int]:
+def first_twins(differences: Array) -> Sequence[int]:
     """(C,) index of the first candidate that has the same differences on every flight."""
     _, first, group = np.unique(np.round(differences / EQUAL_WITHIN), axis=1, return_index=True, return_inverse=True)
     return np.asarray(first[np.ravel(group)]).tolist()

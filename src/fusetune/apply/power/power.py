@@ -1,0 +1,162 @@
+"""The chance that the decision finds a set that truly gains so much, by the number and the length of flights.
+
+Flights are drawn: a planted set that gains so much and varies as sets of that size do here (`Spread`), beside the sets
+that were tried, and the decision's own rule looks for it: the upper end of its moderated interval beyond the smallest
+gain, and its place among flipped signs. The second way to be proved better, by the smoothed velocity alone, and vetoes
+are left out. The sets that were tried are drawn with their means and covariances over the flights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.apply.power.spread import MOST_RIVALS, Spread
+from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.statistics.moderated import moderated
+from fusetune.apply.statistics.sign_flips import family_p_values
+
+Array = npt.NDArray[np.float64]
+
+GAINS_PERCENT = (5.0, 10.0, 20.0)
+FLIGHTS = (4, 5, 6, 8, 10, 12, 16, 20, 30)
+"""Numbers of flights that are tried; fewer than four can show nothing (`sign_flips`)."""
+
+ENOUGH = 0.8
+"""Chance of being found that is asked for."""
+
+DRAWS = 100
+FLIPS = 512
+"""Of signs, at most, in each draw: whether p is below 0.05 they tell well enough for a share of `DRAWS`."""
+
+_CERTAIN = 0.995
+_HOPELESS = 3
+"""More flights are not tried where so many numbers of them in a row found nothing."""
+
+
+@dataclass(frozen=True)
+class PowerCurve:
+    """Chance that a gain is found, by the number of flights.
+
+    Attributes
+    ----------
+    gain_percent : by how much its prediction errors are smaller
+    minutes : of each flight, scored; None where flights are as long as the present ones
+    flights, chance : (N,) number of flights, and the chance, never falling
+    """
+
+    gain_percent: float
+    minutes: float | None
+    flights: tuple[int, ...]
+    chance: tuple[float, ...]
+
+    @property
+    def needed(self) -> int | None:
+        """Fewest flights that find it with `ENOUGH`; None where more than the largest number tried are."""
+        for index, chance in enumerate(self.chance):
+            if chance >= ENOUGH:
+                if not index:
+                    return self.flights[0]
+                before, low = self.flights[index - 1], self.chance[index - 1]
+                return before + math.ceil((self.flights[index] - before) * (ENOUGH - low) / (chance - low))
+        return None
+
+    def at(self, flights: int) -> float:
+        """Chance with a number of flights, interpolated; 0 with fewer than the fewest tried."""
+        return float(np.interp(flights, self.flights, self.chance, left=0.0))
+
+
+def power_curve(
+    spread: Spread,
+    gain_percent: float,
+    settings: DecisionSettings,
+    *,
+    minutes: float | None = None,
+    block_s: float = 10.0,
+    draws: int = DRAWS,
+    numbers: Sequence[int] = FLIGHTS,
+) -> PowerCurve:
+    """The chance for each number of flights; the same draws for all, the first flights of each.
+
+    Parameters
+    ----------
+    minutes : of each flight, scored; None for flights as long as the present ones
+    block_s : length of the blocks of the evidence
+    """
+    difference = math.log1p(-0.01 * gain_percent)
+    factor = spread.factor(None if minutes is None else 60.0 * minutes / block_s)
+    generator = np.random.Generator(np.random.PCG64(settings.seed))
+    rivals = _rivals(spread)
+    own = generator.standard_normal((draws, max(numbers)))
+    mixed = generator.standard_normal((draws, max(numbers), len(rivals)))
+    deviations = factor * spread.of_gain(difference, draws)
+    planted = difference + deviations[:, None] * own
+    # mixing the flights' deviations by normal weights gives their covariances, whatever the number of sets
+    others = rivals.mean(axis=0) + factor * (mixed @ (rivals - rivals.mean(axis=0))) / math.sqrt(len(rivals) - 1)
+    chances: list[float] = []
+    for number in numbers:
+        if chances and (chances[-1] >= _CERTAIN or (len(chances) > _HOPELESS and chances[-1] == 0.0)):
+            chances.append(chances[-1])
+            continue
+        found = sum(_is_found(planted[i, :number], others[i, :number], settings) for i in range(draws))
+        chances.append(max(found / draws, *chances, 0.0))
+    return PowerCurve(gain_percent, minutes, tuple(numbers), tuple(chances))
+
+
+def _rivals(spread: Spread) -> Array:
+    best = np.argsort(spread.differences.mean(axis=0), kind="stable")[:MOST_RIVALS]
+    return spread.differences[:, np.sort(best)]
+
+
+def _is_found(planted: Array, others: Array, settings: DecisionSettings) -> bool:
+    """Whether the rule finds the set with these differences on the flights (F,) beside others (F, C)."""
+    differences = np.column_stack([planted, others])
+    one = moderated(differences)[0]
+    if one.mean + one.reach(settings.confidence_of_a_change) >= settings.smallest_gain:
+        return False
+    return bool(family_p_values(differences, settings.seed, FLIPS)[0] <= 1.0 - settings.confidence)
+
+
+@dataclass(frozen=True)
+class Power:
+    """What the flights so far say of how many more it takes.
+
+    Attributes
+    ----------
+    flights : that decide now
+    minutes : of each that are scored, the mean
+    within_share : share of the variance between flights that longer ones would lessen; None where not known
+    curves : for flights as long as now, by gain
+    longer : the same for flights of `minutes`, where these are longer than now
+    """
+
+    flights: int
+    minutes: float
+    within_share: float | None
+    curves: tuple[PowerCurve, ...]
+    longer: tuple[PowerCurve, ...] = ()
+
+    def curve(self, gain_percent: float) -> PowerCurve:
+        """For flights as long as now."""
+        return next(one for one in self.curves if one.gain_percent == gain_percent)
+
+
+LONGER_MINUTES = 3.0
+"""Flights shorter than this are told what as many of this length would show."""
+
+
+def power_of(spread: Spread | None, minutes: float, settings: DecisionSettings, block_s: float) -> Power | None:
+    """Power from the flights so far; None where they show no spread."""
+    if spread is None:
+        return None
+    curves = tuple(power_curve(spread, gain, settings) for gain in GAINS_PERCENT)
+    longer: tuple[PowerCurve, ...] = ()
+    if spread.within_share is not None and minutes <= 0.7 * LONGER_MINUTES:
+        longer = tuple(
+            power_curve(spread, gain, settings, minutes=LONGER_MINUTES, block_s=block_s) for gain in GAINS_PERCENT
+        )
+    return Power(len(spread.differences), minutes, spread.within_share, curves, longer)
