@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -45,12 +46,12 @@ class PowerCurve:
     Attributes
     ----------
     gain_percent : by how much its prediction errors are smaller
-    minutes : of each flight, scored; None where flights are as long as the present ones
+    times_longer : how much longer than those so far the flights are
     flights, chance : (N,) number of flights, and the chance, never falling
     """
 
     gain_percent: float
-    minutes: float | None
+    times_longer: float
     flights: tuple[int, ...]
     chance: tuple[float, ...]
 
@@ -75,8 +76,7 @@ def power_curve(
     gain_percent: float,
     settings: DecisionSettings,
     *,
-    minutes: float | None = None,
-    block_s: float = 10.0,
+    times_longer: float = 1.0,
     draws: int = DRAWS,
     numbers: Sequence[int] = FLIGHTS,
 ) -> PowerCurve:
@@ -84,11 +84,10 @@ def power_curve(
 
     Parameters
     ----------
-    minutes : of each flight, scored; None for flights as long as the present ones
-    block_s : length of the blocks of the evidence
+    times_longer : how much longer than those so far the flights are
     """
     difference = math.log1p(-0.01 * gain_percent)
-    factor = spread.factor(None if minutes is None else 60.0 * minutes / block_s)
+    factor = spread.factor(times_longer)
     generator = np.random.Generator(np.random.PCG64(settings.seed))
     rivals = _rivals(spread)
     own = generator.standard_normal((draws, max(numbers)))
@@ -104,7 +103,7 @@ def power_curve(
             continue
         found = sum(_is_found(planted[i, :number], others[i, :number], settings) for i in range(draws))
         chances.append(max(found / draws, *chances, 0.0))
-    return PowerCurve(gain_percent, minutes, tuple(numbers), tuple(chances))
+    return PowerCurve(gain_percent, times_longer, tuple(numbers), tuple(chances))
 
 
 def _rivals(spread: Spread) -> Array:
@@ -131,7 +130,8 @@ class Power:
     minutes : of each that are scored, the mean
     within_share : share of the variance between flights that longer ones would lessen; None where not known
     curves : for flights as long as now, by gain
-    longer : the same for flights of `minutes`, where these are longer than now
+    longer : the same for flights of `LONGER_MINUTES`, where these are so short that it helps
+    longer_factor : of the standard deviations, on such longer flights
     """
 
     flights: int
@@ -139,24 +139,61 @@ class Power:
     within_share: float | None
     curves: tuple[PowerCurve, ...]
     longer: tuple[PowerCurve, ...] = ()
+    longer_factor: float = 1.0
 
-    def curve(self, gain_percent: float) -> PowerCurve:
-        """For flights as long as now."""
-        return next(one for one in self.curves if one.gain_percent == gain_percent)
+    @property
+    def next_minutes(self) -> float:
+        """How long flights to come should be, in scored minutes."""
+        return LONGER_MINUTES if self.longer else self.minutes
+
+    def more(self, gain_percent: float) -> int | None:
+        """Flights of `next_minutes` to be added until a gain is found with `ENOUGH`; 0 where those so far would do.
+
+        None where more than the largest number tried are needed. Where the ones to come are longer, so many that the
+        mean over all varies no more than over long ones alone: (F r + k) / (F + k)² ≤ 1 / N, for F short flights, whose
+        variance is r times that of a long one, k long ones beside them and N that would do alone.
+        """
+        so_far = next(one for one in self.curves if one.gain_percent == gain_percent).needed
+        if so_far is not None and so_far <= self.flights:
+            return 0
+        curves = self.longer or self.curves
+        alone = next(one for one in curves if one.gain_percent == gain_percent).needed
+        if alone is None:
+            return None
+        ratio = self.longer_factor**-2 if self.longer else 1.0
+        enough = (k for k in range(1, 10 * alone) if alone * (self.flights * ratio + k) <= (self.flights + k) ** 2)
+        return next(enough, None)
+
+    def document(self) -> dict[str, Any]:
+        """As `decision.json` holds it."""
+        return {
+            "flights": self.flights,
+            "minutes": self.minutes,
+            "within_share": self.within_share,
+            "chance_asked_for": ENOUGH,
+            "next_minutes": self.next_minutes,
+            "more": {f"{gain:g}": self.more(gain) for gain in GAINS_PERCENT},
+            "curves": [asdict(one) | {"needed": one.needed} for one in (*self.curves, *self.longer)],
+        }
 
 
 LONGER_MINUTES = 3.0
-"""Flights shorter than this are told what as many of this length would show."""
+"""Where flights are shorter it is told what flights of this length would show."""
+_LONG_ENOUGH = 0.7
 
 
-def power_of(spread: Spread | None, minutes: float, settings: DecisionSettings, block_s: float) -> Power | None:
-    """Power from the flights so far; None where they show no spread."""
+def power_of(spread: Spread | None, minutes: float, settings: DecisionSettings) -> Power | None:
+    """Power from the flights so far; None where they show no spread.
+
+    Parameters
+    ----------
+    minutes : scored of each flight, the mean
+    """
     if spread is None:
         return None
     curves = tuple(power_curve(spread, gain, settings) for gain in GAINS_PERCENT)
-    longer: tuple[PowerCurve, ...] = ()
-    if spread.within_share is not None and minutes <= 0.7 * LONGER_MINUTES:
-        longer = tuple(
-            power_curve(spread, gain, settings, minutes=LONGER_MINUTES, block_s=block_s) for gain in GAINS_PERCENT
-        )
-    return Power(len(spread.differences), minutes, spread.within_share, curves, longer)
+    if spread.within_share is None or minutes > _LONG_ENOUGH * LONGER_MINUTES or minutes <= 0.0:
+        return Power(len(spread.differences), minutes, spread.within_share, curves)
+    times = LONGER_MINUTES / minutes
+    longer = tuple(power_curve(spread, gain, settings, times_longer=times) for gain in GAINS_PERCENT)
+    return Power(len(spread.differences), minutes, spread.within_share, curves, longer, spread.factor(times))

@@ -10,6 +10,7 @@ the air.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -45,14 +46,12 @@ class Spread:
     sizes, deviations : (C,) root mean square over the flights, and standard deviation between them, steadied by those
         of the other sets as in the rule (`moderated`)
     within_share : share of the variance that blocks within the flights account for; None where flights have one block
-    blocks : of about 10 s, mean over the flights
     """
 
     differences: Array
     sizes: Array
     deviations: Array
     within_share: float | None
-    blocks: float
 
     def of_gain(self, difference: float, draws: int) -> Array:
         """(D,) standard deviations that a set of this true mean difference may have, ascending.
@@ -72,11 +71,10 @@ class Spread:
         wanted = (np.arange(draws) + 0.5) / draws
         return np.asarray(deviation[order][np.minimum(np.searchsorted(reached, wanted), order.size - 1)])
 
-    def factor(self, blocks: float | None) -> float:
-        """Of the standard deviations, on flights of another number of blocks; 1 where that is not known."""
-        if blocks is None or self.within_share is None:
-            return 1.0
-        return float(np.sqrt(1.0 - self.within_share + self.within_share * self.blocks / max(blocks, 1.0)))
+    def factor(self, times_longer: float) -> float:
+        """Of the standard deviations, on flights so many times longer; 1 where what blocks account for is not known."""
+        share = self.within_share or 0.0
+        return math.sqrt(1.0 - share + share / times_longer)
 
 
 def spread_of(evidence: Sequence[FlightEvidence], names: Sequence[str]) -> Spread | None:
@@ -109,7 +107,6 @@ def spread_of(evidence: Sequence[FlightEvidence], names: Sequence[str]) -> Sprea
         np.sqrt(np.square(differences).mean(axis=0)),
         errors * np.sqrt(len(evidence)),
         share,
-        float(np.mean([max(aim.n.shape[0] for aim in one.aims) for one in evidence])),
     )
 
 
