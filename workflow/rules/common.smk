@@ -100,4 +100,6 @@ def closing_words():
         flights = f"Changed while the run was at work: {', '.join(changed)}. Run the pipeline again.\n{flights}"
     if not os.path.exists("results/report.html"):
         return flights
-    return f"{flights} The decision and its evidence: results/report.html"
+    steps = read_document("results/apply/decision.json")["next_steps"]
+    first = f"\nNext: {steps[0]['text']}" if steps else ""
+    return f"{flights} The decision and its evidence: results/report.html{first}"

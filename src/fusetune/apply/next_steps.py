@@ -145,7 +145,7 @@ def _after_a_change(now: Situation, settings: DecisionSettings) -> list[NextStep
     count = _flights_to_confirm(now, settings)
     confirm = NextStep(
         CONFIRM,
-        f"Then {careful}fly {counted(count, 'flight')} with it{_length(now.power)}, add the logs and run again: they "
+        f"Then {careful}fly {counted(count, 'flight')}{_length(now.power)} with it, add the logs and run again: they "
         "confirm the change, or not.",
     )
     back = NextStep(LOAD, "If the vehicle flies worse, load rollback.params: it brings the old values back.")
@@ -172,7 +172,7 @@ def _after_keeping(now: Situation, settings: DecisionSettings) -> list[NextStep]
     if late:
         return [_delay_step(late[0]), *study, *_fly_otherwise(now)]
     if open_sets:
-        text = f"{_parameters_that_could_matter(open_sets, now)}: search around them."
+        text = f"{_parameters_that_could_matter(open_sets, now)}: search around the present values."
         return [*_fly_for_power(now), *study, NextStep(SEARCH, text, SEARCH_COMMAND)]
     if study:
         return [*study, *_fly_otherwise(now)]

@@ -30,7 +30,8 @@ class Excitation:
     ----------
     seconds : looked at
     horizontal_acceleration_m_s2, vertical_acceleration_m_s2 : RMS of the change of velocity over a second
-    roll_pitch_rate_deg_s, yaw_rate_deg_s : RMS of the turning rate about the body's x and y axes together, and its z axis
+    roll_pitch_rate_deg_s, yaw_rate_deg_s : RMS of the turning rate about the body's x and y axes together, and its z
+        axis
     turned_deg : heading changes, added up whatever their direction
     climbed_m : height gained and lost, added up, while faster than `CLIMB_M_S`
     hover_share : of the time, slower than `HOVER_M_S` in all axes
@@ -82,7 +83,7 @@ def excitation(
 def _piece(
     time: npt.NDArray[np.int64], velocity: Array, quaternion: Array, start: int, stop: int
 ) -> tuple[Array, Array, Array, Array] | None:
-    """Accelerations (m/s², N, 3), turning rates (rad/s, body, N, 3), velocities and changes of heading over a second."""
+    """Accelerations (N, 3) m/s², turning rates (N, 3) rad/s, velocities, and changes of heading over a second."""
     wanted = np.arange(start, stop, int(STEP_S * 1e6))
     wanted = wanted[(wanted >= time[0]) & (wanted <= time[-1])] if time.size else wanted[:0]
     over = round(_OVER_S / STEP_S)

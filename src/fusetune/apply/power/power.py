@@ -35,6 +35,7 @@ FLIPS = 512
 """Of signs, at most, in each draw: whether p is below 0.05 they tell well enough for a share of `DRAWS`."""
 
 _CERTAIN = 0.995
+_ROUNDING = 1e-9
 _HOPELESS = 3
 """More flights are not tried where so many numbers of them in a row found nothing."""
 
@@ -63,7 +64,8 @@ class PowerCurve:
                 if not index:
                     return self.flights[0]
                 before, low = self.flights[index - 1], self.chance[index - 1]
-                return before + math.ceil((self.flights[index] - before) * (ENOUGH - low) / (chance - low))
+                share = (ENOUGH - low) / (chance - low)
+                return before + math.ceil((self.flights[index] - before) * share - _ROUNDING)
         return None
 
     def at(self, flights: int) -> float:
