@@ -113,15 +113,6 @@ def decide(
     late = confirmed(_delay_findings(delays, newest, present), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
-    sentences = (
-        delay_sentences(late),
-        paragraph(choice, ranked, flights, settings),
-        *minded,
-        sentence_of_largest(findings),
-        candidates_sentence(proposed, _gains(better)),
-        *vehicle.sentences(),
-        *unsure_of_present(flights, newest),
-    )
     power = _power(ranked, present, flights, settings)
     missing = missing_motion(flights, present, read_joined(delays) if delays is not None else ())
     steps = next_steps(
@@ -140,7 +131,17 @@ def decide(
         ),
         settings,
     )
-    text = " ".join(filter(None, (*sentences, steps_sentence(steps))))
+    sentences = (
+        delay_sentences(late),
+        paragraph(choice, ranked, flights, settings),
+        *minded,
+        sentence_of_largest(findings),
+        candidates_sentence(proposed, _gains(better)),
+        *vehicle.sentences(),
+        *unsure_of_present(flights, newest),
+        steps_sentence(steps),
+    )
+    text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["paragraphs"] = [one for one in sentences if one]
     decision["next_steps"] = [asdict(one) for one in steps]

@@ -23,6 +23,7 @@ from fusetune.finding import Finding, from_documents
 MOST_STEPS = 3
 MOST_FLIGHTS = 20
 """More flights than this nobody flies for one question."""
+_CANDIDATES_NAMED = 2
 
 LOG, LOAD, CONFIRM, FLY, STUDY, SEARCH, STOP, OWN_LOGS = (
     "log", "load", "confirm", "fly", "study", "search", "stop", "own_logs",
@@ -182,7 +183,9 @@ def _after_keeping(now: Situation, settings: DecisionSettings) -> list[NextStep]
 
 
 def _study(candidates: Sequence[Candidate]) -> NextStep:
-    ways = named([_values(one) for one in candidates], 2)
+    ways = "; ".join(_values(one) for one in candidates[:_CANDIDATES_NAMED])
+    if len(candidates) > _CANDIDATES_NAMED:
+        ways += f"; and {len(candidates) - _CANDIDATES_NAMED} more"
     return NextStep(STUDY, f"Compare what these flights ask for, ready in candidates.yaml: {ways}.", STUDY_COMMAND)
 
 
