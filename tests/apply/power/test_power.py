@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import nct
+from scipy.stats import nct, t
 
-from fusetune.apply.power.power import FLIGHTS, Power, PowerCurve, power_curve, power_of
+from fusetune.apply.power.power import FLIGHTS, Power, PowerCurve, _gain_surely, power_curve, power_of
 from fusetune.apply.power.spread import Spread
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.statistics.moderated import moderated
 
 SETTINGS = DecisionSettings(seed=1)
 
@@ -35,8 +36,6 @@ def test_the_chance_is_that_of_a_noncentral_t() -> None:
 
 def nct_bound(freedom: int) -> float:
     """Student's quantile of the rule: two-sided at `confidence_of_a_change`."""
-    from scipy.stats import t
-
     return float(t.ppf(0.5 * (1.0 - SETTINGS.confidence_of_a_change), freedom))
 
 
@@ -87,3 +86,15 @@ def test_flights_that_are_long_or_of_one_block_are_not_asked_to_be_longer() -> N
 def test_the_same_seed_gives_the_same_curve(seed: int) -> None:
     settings = DecisionSettings(seed=seed)
     assert power_curve(spread(0.05, 3), 10.0, settings) == power_curve(spread(0.05, 3), 10.0, settings)
+
+
+def test_all_draws_at_once_are_judged_as_the_rule_judges_each() -> None:
+    generator = np.random.default_rng(4)
+    planted = -0.1 + 0.05 * generator.standard_normal((50, 6))
+    others = 0.05 * generator.standard_normal((50, 6, 5))
+    one_by_one = []
+    for own, rest in zip(planted, others, strict=True):
+        rule = moderated(np.column_stack([own, rest]))[0]
+        one_by_one.append(rule.mean + rule.reach(SETTINGS.confidence_of_a_change) < SETTINGS.smallest_gain)
+    assert _gain_surely(planted, others, SETTINGS).tolist() == one_by_one
+    assert 5 < sum(one_by_one) < 45

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from fusetune.apply.power.spread import MOST_RIVALS, Spread
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.statistics.moderated import moderated
+from fusetune.apply.statistics.moderated import PRIOR_FLIGHTS, Moderated, shares, steadied
 from fusetune.apply.statistics.sign_flips import family_p_values
 
 Array = npt.NDArray[np.float64]
@@ -30,14 +30,13 @@ FLIGHTS = (4, 5, 6, 8, 10, 12, 16, 20, 30)
 ENOUGH = 0.8
 """Chance of being found that is asked for."""
 
-DRAWS = 100
+DRAWS = 300
+TRIED = 40
+"""Of the draws in which the gain is sure, so many are tried for luck."""
 FLIPS = 512
-"""Of signs, at most, in each draw: whether p is below 0.05 they tell well enough for a share of `DRAWS`."""
+"""Of signs, at most, in each of these: whether p is below 0.05 they tell well enough for a share."""
 
-_CERTAIN = 0.995
 _ROUNDING = 1e-9
-_HOPELESS = 3
-"""More flights are not tried where so many numbers of them in a row found nothing."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +98,14 @@ def power_curve(
     # mixing the flights' deviations by normal weights gives their covariances, whatever the number of sets
     others = rivals.mean(axis=0) + factor * (mixed @ (rivals - rivals.mean(axis=0))) / math.sqrt(len(rivals) - 1)
     chances: list[float] = []
+    no_luck = 0.0
     for number in numbers:
-        if chances and (chances[-1] >= _CERTAIN or (len(chances) > _HOPELESS and chances[-1] == 0.0)):
-            chances.append(chances[-1])
-            continue
-        found = sum(_is_found(planted[i, :number], others[i, :number], settings) for i in range(draws))
-        chances.append(max(found / draws, *chances, 0.0))
+        surely = _gain_surely(planted[:, :number], others[:, :number], settings)
+        if no_luck < 1.0:
+            # more flights are less often favoured by luck: once none of these is, none is any more
+            tried = [np.column_stack([planted[i, :number], others[i, :number]]) for i in np.flatnonzero(surely)[:TRIED]]
+            no_luck = float(np.mean([_is_no_luck(one, settings) for one in tried])) if tried else 0.0
+        chances.append(max(float(surely.mean()) * no_luck, *chances, 0.0))
     return PowerCurve(gain_percent, times_longer, tuple(numbers), tuple(chances))
 
 
@@ -113,12 +114,24 @@ def _rivals(spread: Spread) -> Array:
     return spread.differences[:, np.sort(best)]
 
 
-def _is_found(planted: Array, others: Array, settings: DecisionSettings) -> bool:
-    """Whether the rule finds the set with these differences on the flights (F,) beside others (F, C)."""
-    differences = np.column_stack([planted, others])
-    one = moderated(differences)[0]
-    if one.mean + one.reach(settings.confidence_of_a_change) >= settings.smallest_gain:
-        return False
+def _gain_surely(planted: Array, others: Array, settings: DecisionSettings) -> npt.NDArray[np.bool_]:
+    """(D,) in which of the draws the planted set's interval, moderated by those of the others, lies beyond the smallest
+    gain.
+
+    Parameters
+    ----------
+    planted, others : (D, F) and (D, F, C) differences on the flights
+    """
+    flights, weight = planted.shape[1], min(PRIOR_FLIGHTS, others.shape[2])
+    usual = np.median(shares(others.var(axis=1, ddof=1), np.square(others).mean(axis=1)), axis=1)
+    variance, size = planted.var(axis=1, ddof=1), np.square(planted).mean(axis=1)
+    error = np.sqrt(steadied(variance, size, usual, weight, flights) / flights)
+    reach = Moderated(0.0, 1.0, flights - 1 + weight).reach(settings.confidence_of_a_change)
+    return np.asarray(planted.mean(axis=1) + reach * error < settings.smallest_gain)
+
+
+def _is_no_luck(differences: Array, settings: DecisionSettings) -> bool:
+    """Whether the first of the sets (F, C) is better than the best of all by luck."""
     return bool(family_p_values(differences, settings.seed, FLIPS)[0] <= 1.0 - settings.confidence)
 
 
