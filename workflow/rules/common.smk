@@ -100,6 +100,9 @@ def closing_words():
         flights = f"Changed while the run was at work: {', '.join(changed)}. Run the pipeline again.\n{flights}"
     if not os.path.exists("results/report.html"):
         return flights
-    steps = read_document("results/apply/decision.json")["next_steps"]
-    first = f"\nNext: {steps[0]['text']}" if steps else ""
-    return f"{flights} The decision and its evidence: results/report.html{first}"
+    words = f"{flights} The decision and its evidence: results/report.html"
+    # a run for other targets leaves an older decision as it is, or none
+    if os.path.exists("results/apply/decision.json"):
+        for step in read_document("results/apply/decision.json").get("next_steps", ())[:1]:
+            words += f"\nNext: {step['text']}"
+    return words

@@ -11,6 +11,9 @@ from fusetune.report.markup import Cell, bullets, figure, paragraph, section, ta
 from fusetune.report.results import Results
 from fusetune.storage.files import AnyPath
 
+ROUGH = 5
+"""With fewer flights their spread is hardly known."""
+
 
 def next_steps_section(results: Results, figures: AnyPath) -> str:
     """Steps first, then what they rest on."""
@@ -46,14 +49,15 @@ def _missing(one: dict[str, Any]) -> str:
 
 
 def _power_text(power: dict[str, Any]) -> str:
+    rough = " From so few flights this is rough." if power["flights"] < ROUGH else ""
     now = f"{power['flights']} flights of {power['minutes']:.1f} scored minutes decide now"
     share = power["within_share"]
     if share is None:
-        return f"How many flights it takes: {now}; they are too short to show what longer ones would bring."
+        return f"How many flights it takes: {now}; they are too short to show what longer ones would bring.{rough}"
     longer = "longer flights help" if share > 0.5 else "more flights help more than longer ones"
     return (
         f"How many flights it takes: {now}. Of what varies between them, what varies within them accounts for "
-        f"{100 * share:.0f} %: {longer}."
+        f"{100 * share:.0f} %: {longer}.{rough}"
     )
 
 
