@@ -59,10 +59,11 @@ class Situation:
     Attributes
     ----------
     is_simulated : whether the flights are of a simulated vehicle
-    replayable : logs that were replayed
-    refused : remedies for the logs that were refused, one for each finding, in any order
+    candidates : sets that the evidence asks for
     delays : findings about them, as confirmed or not by the decision
-    overrides : what each set changes, name → values that differ from the present ones
+    missing : what the flights cannot tell by how they moved
+    overrides : name of each set → parameters to which it gives other values than the present ones
+    refused : remedies for the logs that were refused, one for each finding, in any order
     """
 
     choice: Choice

@@ -93,7 +93,8 @@ def power_curve(
     rivals = _rivals(spread)
     own = generator.standard_normal((draws, max(numbers)))
     mixed = generator.standard_normal((draws, max(numbers), len(rivals)))
-    deviations = factor * spread.of_gain(difference, draws)
+    # in any order, so that the first of the draws stand for all
+    deviations = factor * generator.permutation(spread.of_gain(difference, draws))
     planted = difference + deviations[:, None] * own
     # mixing the flights' deviations by normal weights gives their covariances, whatever the number of sets
     others = rivals.mean(axis=0) + factor * (mixed @ (rivals - rivals.mean(axis=0))) / math.sqrt(len(rivals) - 1)
