@@ -166,7 +166,7 @@ def _row_mm(cards: FlightCards) -> float:
     return min(max(_ROWS_MM / (cards.flights + len(cards.blocks)), _LEAST_MM), _MOST_MM)
 
 
-_ROWS_MM, _LEAST_MM, _MOST_MM = 212.0, 6.4, 11.0
+_ROWS_MM, _LEAST_MM, _MOST_MM = 230.0, 6.4, 11.0
 _COLUMNS = "".join(f'<col style="width:{width}%">' for width in (4, 24, 7, 7, 6, 10, 10, 14, 18))
 _STYLE = """@page { size: A4 portrait; margin: 11mm; }
 * { box-sizing: border-box; } body { font: 11px/1.35 "Helvetica Neue", Arial, "DejaVu Sans", sans-serif; color: #000;
