@@ -55,6 +55,8 @@ def test_a_clearly_better_set_is_chosen_and_written(tmp_path: Path) -> None:
     assert entry.value == pytest.approx(0.2, abs=1e-7)
     assert "previous value 0.35 m/s^2, new value 0.2 m/s^2" in entry.comments[0]
     assert "better on 6 of 6 flights" in entry.comments[1]
+    assert [one["kind"] for one in decision["next_steps"]] == ["load", "confirm", "load"]
+    assert decision["paragraphs"][-1].startswith("Next: (1) Load best_params.params")
     (back,) = read_params(tmp_path / "apply" / "rollback.params")
     assert (back.name, back.value) == ("EKF2_ACC_NOISE", pytest.approx(0.35, abs=1e-7))
 
@@ -74,6 +76,10 @@ def test_a_difference_of_chance_keeps_the_present_set(tmp_path: Path) -> None:
     decision = run(tmp_path, sets)
     assert decision["status"] == "keep"
     assert "Keep the parameters that fly now." in decision["paragraph"]
+    # how the flights moved is told by the analysis: they stand still
+    assert next(one["kind"] for one in decision["missing_motion"]) == "delays"
+    assert decision["power"]["flights"] == 6
+    assert {one["gain_percent"] for one in decision["power"]["curves"]} == {5.0, 10.0, 20.0}
 
 
 def test_inflated_noise_is_not_chosen_though_its_mean_nis_is_least(tmp_path: Path) -> None:

@@ -75,3 +75,11 @@ def test_a_command_that_is_not_run_loads_no_room(project_root: Path) -> None:
     loaded = done.stdout.split()
     assert "numpy" not in loaded
     assert {name.split(".")[1] for name in loaded if name.startswith("fusetune.")} == {"cli", "errors"}
+
+
+def test_cards_are_written_and_told(tmp_path: Path, project_root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study = project_root / "config" / "studies" / "paper_table11.yaml"
+    out = tmp_path / "cards.html"
+    assert main(["cards", str(study), "--flights", "10", "--out", str(out)]) == 0
+    assert capsys.readouterr().out == f"{out}: 12 flights in blocks of 6\n"
+    assert "paper6.params" in out.read_text(encoding="utf-8")

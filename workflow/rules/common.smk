@@ -100,4 +100,9 @@ def closing_words():
         flights = f"Changed while the run was at work: {', '.join(changed)}. Run the pipeline again.\n{flights}"
     if not os.path.exists("results/report.html"):
         return flights
-    return f"{flights} The decision and its evidence: results/report.html"
+    words = f"{flights} The decision and its evidence: results/report.html"
+    # a run for other targets leaves an older decision as it is, or none
+    if os.path.exists("results/apply/decision.json"):
+        for step in read_document("results/apply/decision.json").get("next_steps", ())[:1]:
+            words += f"\nNext: {step['text']}"
+    return words

@@ -9,6 +9,7 @@ SUMMARY_FIGURES = {
     "normalised_innovations.svg": "normalised innovations",
     "consistency.svg": "consistency",
     "breaks.svg": "fusion breaks",
+    "power.svg": "what more flights would find",
 }
 
 

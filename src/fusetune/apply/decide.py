@@ -29,10 +29,14 @@ from fusetune.apply.consistency import (
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.delays import confirmed, delay_findings, delay_sentences
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out, white_shares
+from fusetune.apply.missing_motion import missing_motion
+from fusetune.apply.next_steps import Situation, next_steps, refused_remedies, steps_sentence
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
+from fusetune.apply.power.power import Power, power_of
+from fusetune.apply.power.spread import spread_of
 from fusetune.apply.provenance import file_hash, flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.recommended import Recommended
@@ -50,7 +54,7 @@ from fusetune.set_names import DELAY_MENDED, PRESENT, is_mended
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
-from fusetune.storage.parquet import write_table
+from fusetune.storage.parquet import read_table, write_table
 
 
 def decide(
@@ -117,6 +121,24 @@ def decide(
     late = confirmed(_delay_findings(delays, newest, present), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
+    power = _power(ranked, present, flights, settings)
+    missing = missing_motion(flights, present, read_joined(delays) if delays is not None else ())
+    steps = next_steps(
+        Situation(
+            choice,
+            ranked,
+            flights,
+            changes,
+            proposed,
+            late,
+            missing,
+            power,
+            _changed_parameters(newest, present),
+            refused_remedies(read_table(flights_table).to_pylist()),
+            is_simulated=vehicle.identity is not None and not vehicle.identity.is_real,
+        ),
+        settings,
+    )
     sentences = (
         delay_sentences(late),
         paragraph(choice, ranked, flights, settings),
@@ -125,10 +147,14 @@ def decide(
         candidates_sentence(proposed, _gains(better)),
         *vehicle.sentences(),
         *unsure_of_present(flights, newest),
+        steps_sentence(steps),
     )
     text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["paragraphs"] = [one for one in sentences if one]
+    decision["next_steps"] = [asdict(one) for one in steps]
+    decision["missing_motion"] = [asdict(one) for one in missing]
+    decision["power"] = None if power is None else power.document()
     decision["cautions"] = list(minded)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
@@ -176,6 +202,27 @@ def _whiteness(metrics: pa.Table, flights: Sequence[AnalyzedFlight], present: st
     """How white the error of each source is, the mean over the flights that count."""
     counted = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
     return white_shares(metrics.filter(pc.is_in(metrics["flight"], value_set=counted)), present)
+
+
+def _power(
+    ranked: Sequence[RankedSet], present: str, flights: Sequence[AnalyzedFlight], settings: DecisionSettings
+) -> Power | None:
+    """How many flights a gain takes, from the sets that nothing but their score speaks against."""
+    counted = [one for one in flights if one.evidence is not None]
+    evidence = [one.evidence for one in counted if one.evidence is not None]
+    sets = [one.name for one in ranked if one.flights == len(evidence) and not (one.is_present or one.is_vetoed)]
+    minutes = sum(one.summary["scored_s"] for one in counted) / 60.0 / max(len(counted), 1)
+    return power_of(spread_of(evidence, [present, *sorted(sets)]), minutes, settings)
+
+
+def _changed_parameters(newest: AnalyzedFlight | None, present: str) -> dict[str, list[str]]:
+    """Of each set the parameters that it gives another value than the vehicle has."""
+    sets = newest.summary["sets"] if newest is not None else {}
+    now = sets.get(present, {}).get("parameters", {})
+    return {
+        name: sorted(key for key, value in one["overrides"].items() if value != now.get(key))
+        for name, one in sets.items()
+    }
 
 
 def _delay_findings(delays: AnyPath | None, newest: AnalyzedFlight | None, present: str) -> tuple[Finding, ...]:

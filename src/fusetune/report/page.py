@@ -22,6 +22,7 @@ from fusetune.report.sections.flight_sections import (
     single_flights_section,
     truth_section,
 )
+from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.sensitivity_section import sensitivity_section
 from fusetune.report.sections.trust_section import trust_section
 from fusetune.storage.files import AnyPath, atomic_path
@@ -55,6 +56,7 @@ def build_report(
     pictures = flight_figure_paths([Path(folder).name for folder in analyze_folders], flight_figures)
     sections = (
         decision_section(results),
+        next_steps_section(results, figures),
         findings_section(results),
         evidence_section(results, figures),
         withheld_section(results, figures),

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from fusetune.report.figures.difference_figures import differences, flights_by_sets, pareto
 from fusetune.report.figures.drawing import empty_figure, figure_style, save_svg
 from fusetune.report.figures.innovation_figures import boxes, breaks, consistency, rms_by_variable
+from fusetune.report.figures.power_figure import power_figure
 from fusetune.report.figures.sensitivity_figure import sensitivity_figure
 from fusetune.report.figures.unaided_figures import drift_figure
 from fusetune.report.results import pooled_samples, read_results
@@ -24,6 +25,7 @@ SUMMARY_FIGURES = (
     "normalised_innovations.svg",
     "consistency.svg",
     "breaks.svg",
+    "power.svg",
 )
 """Files that `plot_summary` writes."""
 
@@ -49,6 +51,7 @@ def plot_summary(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath, figu
         "normalised_innovations.svg": lambda: boxes(results, pooled, normalised=True),
         "consistency.svg": lambda: consistency(results),
         "breaks.svg": lambda: breaks(results),
+        "power.svg": lambda: power_figure(results),
     }
     with figure_style():
         for name in SUMMARY_FIGURES:

@@ -18,7 +18,8 @@ def decision_section(results: Results) -> str:
     heading = escape(_HEADINGS[status].format(chosen=decision["chosen"]))
     tag = '<span class="tag">exploratory</span>' if decision["exploratory"] else ""
     parts = [f'<section class="decision {escape(status)}"><h2>{heading}{tag}</h2>']
-    parts += [paragraph(matter) for matter in decision["paragraphs"]]
+    # the last one is the next steps, which have a section of their own
+    parts += [paragraph(matter) for matter in decision["paragraphs"][:-1]]
     parts.append(_vehicle(decision["vehicle"]))
     if decision["changes"]:
         rows = [_change_row(change) for change in decision["changes"]]
