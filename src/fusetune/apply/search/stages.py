@@ -165,7 +165,8 @@ def _start(space: Space, number: int, seed: int) -> list[dict[str, float]]:
     """A scrambled Sobol sequence over the space."""
     from scipy.stats import qmc
 
-    drawn = qmc.Sobol(len(space.factors), rng=np.random.default_rng([seed, len(space.factors)])).random(number)
+    sequence = qmc.Sobol(len(space.factors), rng=np.random.default_rng([seed, len(space.factors)]))
+    drawn = sequence.random_base2(max(number - 1, 1).bit_length())[:number]
     low, high = space.bounds[:, 0], space.bounds[:, 1]
     return [space.values(low + row * (high - low)) for row in drawn]
 
