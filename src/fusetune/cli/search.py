@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     import os
 
     from fusetune.apply.search.log_search import search_logs
-    from fusetune.apply.search.settings import SearchSettings
+    from fusetune.design.search_settings import SearchSettings
     from fusetune.settings.checking import checked
     from fusetune.settings.yaml_reader import read_yaml
 

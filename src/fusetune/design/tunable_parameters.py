@@ -18,7 +18,7 @@ from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 Kind = Literal["process noise", "bias noise", "measurement noise", "gate", "delay", "lever arm"]
 Scale = Literal["log", "linear"]
 
-DELAY_LIMIT = "EKF2_DELAY_MAX"
+DELAY_LIMIT, DELAY_SUFFIX = "EKF2_DELAY_MAX", "_DELAY"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from tests.apply.search.made_ground import SPACE
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.progress import Progress
 from fusetune.apply.search.rounds import searches
-from fusetune.apply.search.settings import SearchSettings
+from fusetune.design.search_settings import SearchSettings
 
 
 def test_lines_say_the_round_the_best_so_far_and_the_time_left() -> None:

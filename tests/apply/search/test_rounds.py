@@ -10,8 +10,8 @@ from tests.apply.search.made_ground import PRESENT, SPACE, MadeGround
 
 from fusetune.apply.search.plan import DELAYS, plan_of
 from fusetune.apply.search.rounds import ON_ALL, run_searches, searches
-from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.stages import Found
+from fusetune.design.search_settings import SearchSettings
 
 FLIGHTS = [str(number) for number in range(8)]
 SETTINGS = SearchSettings(evaluations=80, seed=3)

@@ -27,12 +27,12 @@ from fusetune.apply.search.replays import ReplayGround
 from fusetune.apply.search.requests import values_of
 from fusetune.apply.search.result import candidate_documents, gain_percent, parameter_documents, search_documents
 from fusetune.apply.search.rounds import AskedRound, Searched, run_searches, searches
-from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.space import Space
 from fusetune.apply.search.stages import Ask, Found
 from fusetune.apply.search.words import alone_sentences, search_sentences
 from fusetune.apply.search.workers import WorkerTrier
 from fusetune.apply.settings import DecisionSettings
+from fusetune.design.search_settings import SearchSettings
 from fusetune.save.flight_folder import read_metadata
 from fusetune.set_names import AS_FLOWN, FOUND, PRESENT
 from fusetune.storage.digest import source_digest

@@ -12,10 +12,10 @@ from typing import Any
 from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.apply.one_vehicle import decided_vehicle
 from fusetune.apply.search.flight_search import FlightSearch, search_flights, trusted_flights
-from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.space import Space
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.factors import Factor, factors_around
+from fusetune.design.search_settings import SearchSettings
 from fusetune.design.tunable_parameters import DELAY_LIMIT
 from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_value

@@ -5,10 +5,15 @@ So the whole search is planned before the first set is tried.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from fusetune.apply.search.settings import SearchSettings
-from fusetune.apply.search.space import DELAY_SUFFIX, Space
+from fusetune.design.search_settings import SearchSettings
+from fusetune.design.tunable_parameters import DELAY_SUFFIX
+
+if TYPE_CHECKING:
+    from fusetune.apply.search.space import Space
 
 FIRST_SUFFIXES = (DELAY_SUFFIX, "_POS_X", "_POS_Y", "_POS_Z")
 """Delays and lever arms come first: where they are wrong, a sensor's errors look as if they wandered, and all else is
@@ -53,8 +58,20 @@ class Plan:
 
 def plan_of(space: Space, settings: SearchSettings) -> Plan:
     """Share the evaluations out; putting back takes those that are left."""
-    first = tuple(name for name in space.parameters if name.endswith(FIRST_SUFFIXES))
-    spent = 3 * len(space.parameters) + (start_size(len(first)) + _FIRST_SIZE * _FIRST_GENERATIONS if first else 0)
+    return _plan(space.parameters, settings)
+
+
+def planned_rounds(settings: SearchSettings) -> int:
+    """Number of rounds that the searches of a study take at the most, whatever its flights turn out to tell.
+
+    The last one tries what was found on the flights that were kept aside.
+    """
+    return len(_plan(settings.searched, settings).rounds) + 1
+
+
+def _plan(parameters: Sequence[str], settings: SearchSettings) -> Plan:
+    first = tuple(name for name in parameters if name.endswith(FIRST_SUFFIXES))
+    spent = 3 * len(parameters) + (start_size(len(first)) + _FIRST_SIZE * _FIRST_GENERATIONS if first else 0)
     left = max(settings.evaluations - spent, 16)
     start = max(round(_START_SHARE * left), 8)
     size = max((left - start) // _GENERATIONS, 1)
@@ -63,7 +80,7 @@ def plan_of(space: Space, settings: SearchSettings) -> Plan:
         (_FIRST_SIZE,) * _FIRST_GENERATIONS if first else (),
         start,
         (size,) * _GENERATIONS,
-        len(space.parameters),
+        len(parameters),
     )
 
 

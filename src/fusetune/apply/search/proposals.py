@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,16 @@ _DARING = 1.0
 
 _DRAWN, _POPULATION, _GENERATIONS = 512, 16, 15
 """CMA-ES on the surrogate starts at the best of so many points that are drawn; its population and generations."""
+
+
+class Proposing(Protocol):
+    """`propose`, or what gives the same."""
+
+    def __call__(
+        self, space: Space, points: Array, scores: Array, number: int, radius: float, seed: Sequence[int]
+    ) -> list[dict[str, float]]:
+        """Sets to try after those at some points."""
+        ...
 
 
 def propose(

@@ -16,10 +16,11 @@ import numpy.typing as npt
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.objective import objective
 from fusetune.apply.search.plan import ALL, DELAYS, FIRST_RADIUS, PUTTING_BACK, RADIUS, SHRINKS, STAGES, Plan
-from fusetune.apply.search.proposals import propose
+from fusetune.apply.search.proposals import Proposing, propose
 from fusetune.apply.search.requests import Values, values_of
-from fusetune.apply.search.settings import SearchSettings
-from fusetune.apply.search.space import DELAY_SUFFIX, Space
+from fusetune.apply.search.space import Space
+from fusetune.design.search_settings import SearchSettings
+from fusetune.design.tunable_parameters import DELAY_SUFFIX
 
 Array = npt.NDArray[np.float64]
 
@@ -88,27 +89,28 @@ class _Tried:
         return self.points[int(np.argmin(self.scores))]
 
 
-def search_stages(space: Space, plan: Plan, settings: SearchSettings) -> Asking:
+def search_stages(space: Space, plan: Plan, settings: SearchSettings, proposing: Proposing = propose) -> Asking:
     """Search; the origin of the space is the present set."""
     present = space.values(np.zeros(len(space.factors)))
-    base = yield from _first_stage(space, plan, settings, present)
+    base = yield from _first_stage(space, plan, settings, present, proposing)
     around = _second_space(space, base, plan.first)
     best = yield from _stage(
-        around, ALL, base, _start(around, plan.start, settings.seed), plan.generations, RADIUS, settings.seed
+        around, ALL, base, _start(around, plan.start, settings.seed), plan.generations, RADIUS, settings.seed, proposing
     )
     return (yield from _putting_back(space, best, base, present, settings))
 
 
 def _first_stage(
-    space: Space, plan: Plan, settings: SearchSettings, present: dict[str, float]
+    space: Space, plan: Plan, settings: SearchSettings, present: dict[str, float], proposing: Proposing
 ) -> Generator[Ask, Comparison, dict[str, float]]:
     if not plan.first:
         return present
     first = space.only(plan.first)
     star = [values for values in _star(first) if values != {name: present[name] for name in plan.first}]
     best = yield from _stage(
-        first, DELAYS, present, [present | one for one in star], plan.first_generations, FIRST_RADIUS, settings.seed
-    )
+        first, DELAYS, present, [present | one for one in star], plan.first_generations, FIRST_RADIUS, settings.seed,
+        proposing,
+    )  # fmt: skip
     return best
 
 
@@ -120,6 +122,7 @@ def _stage(
     generations: Sequence[int],
     radius: float,
     seed: int,
+    proposing: Proposing,
 ) -> Generator[Ask, Comparison, dict[str, float]]:
     """The best set of the factors of a space; all others as in the base, the origin of the space."""
     tried = _Tried(space)
@@ -130,7 +133,7 @@ def _stage(
         tried.add(asked, objective(compared))
         if size:
             chance = (seed, STAGES.index(stage), generation)
-            new = propose(space, np.array(tried.points), np.array(tried.scores), size, radius, chance)
+            new = proposing(space, np.array(tried.points), np.array(tried.scores), size, radius, chance)
             asked = [base | one for one in new]
             radius *= SHRINKS
     best = base | space.values(tried.best)
