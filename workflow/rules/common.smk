@@ -46,13 +46,38 @@ def of_replayable_flights(patterns):
     return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
-def present_values():
-    return told_in_one_line(read_present, checkpoints.list_flights.get().output.present).parameters
+def present_found():
+    """What flies now and, of a study around it, the sets."""
+    return told_in_one_line(read_present, checkpoints.list_flights.get().output.present)
+
+
+def sets_found():
+    """All sets: of a study around the present values they are known when the flights are listed."""
+    return SETS.found(present_found()) if SETS.around else SETS
 
 
 def overrides_of(names):
     """Params function: the values of some sets, so that only sets whose values change are replayed again."""
-    return lambda wildcards: SETS.overrides(names, present_values() if PRESENT in names else {})
+    return lambda wildcards: SETS.overrides(names, present_found().parameters if PRESENT in names else {})
+
+
+def sets_of_analysis(names):
+    """Params function: the values of the sets that the job which scores a flight replays.
+
+    Beside its share of the sets with known names these are all around the present values: how many there are is known
+    too late for rules of their own.
+    """
+
+    def values(wildcards):
+        known = overrides_of(names)(wildcards)
+        if not SETS.around:
+            return known
+        all_sets, mended = sets_found(), mended_delays()
+        around = [name for name in all_sets.study if name not in SETS.study]
+        mendable = [name for name in around if mended and name in all_sets.mendable]
+        return {**known, **all_sets.overrides(around, {}), **all_sets.mended(mendable, {}, mended)}
+
+    return values
 
 
 MENDS_DELAYS = SETTINGS.delays.mend
@@ -65,14 +90,26 @@ def mended_delays():
     return told_in_one_line(read_document, checkpoints.join_delays.get().output[0])["mended"]
 
 
-def mended_sets():
+def mended_sets(sets=SETS):
     """Names of the sets with mended delays; none where no delay is proved wrong."""
-    return [mended_name(name) for name in SETS.mendable] if mended_delays() else []
+    return [mended_name(name) for name in sets.mendable] if mended_delays() else []
 
 
 def scored_sets(wildcards):
     """Params function: names of all sets that are scored."""
-    return [*SETS.scored, *mended_sets()]
+    sets = sets_found()
+    return [*sets.scored, *mended_sets(sets)]
+
+
+def drawn_sets(wildcards):
+    """Params function: names of the sets that the picture of a flight chooses from."""
+    return sets_found().scored
+
+
+def set_descriptions(wildcards):
+    """Params function: a line about each set."""
+    around = present_found().sets if SETS.around else ()
+    return sets_found().described({pset.name: pset.description for pset in (*INPUTS.study.sets, *around)})
 
 
 def of_mended_sets(pattern):
@@ -85,7 +122,7 @@ def of_mended_sets(pattern):
 
 def mended_overrides_of(names):
     """Params function: the values of some sets with the delays mended, by the names that they have then."""
-    return lambda wildcards: SETS.mended(names, present_values(), mended_delays())
+    return lambda wildcards: SETS.mended(names, present_found().parameters, mended_delays())
 
 
 def closing_words():

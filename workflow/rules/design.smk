@@ -1,7 +1,9 @@
 rule design:
     input:
-        study=SETTINGS.study,
+        study=INPUTS.study_file,
         mission=SETTINGS.mission,
+        # what it says comes in as a parameter, so that only other sets make anything again
+        present=ancient("results/save/present.json") if SETS.around else [],
     output:
         plan=f"results/design/{INPUTS.mission.name}.plan",
         sets=report(
@@ -11,6 +13,7 @@ rule design:
             labels={"table": "parameter sets"},
         ),
         params=expand("results/design/{pset}.params", pset=list(SETS.study)),
+        around=[directory("results/design/around_present")] if SETS.around else [],
     log:
         "results/logs/design.log",
     conda:
@@ -19,7 +22,8 @@ rule design:
         mem_mb=of_its_logs(LIBRARIES_MB),
         runtime=of_its_logs(5),
     params:
-        contents=contents(SETTINGS.study, SETTINGS.mission),
+        contents=contents(INPUTS.study_file, SETTINGS.mission),
+        around=lambda wildcards: asdict(present_found())["sets"] if SETS.around else (),
         code=DIGEST["design"],
     message:
         "Design: write the mission plan and {INPUTS.study.name}'s parameter sets"

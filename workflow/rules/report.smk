@@ -30,7 +30,7 @@ rule plot_flight:
         mem_mb=of_its_logs(LIBRARIES_MB, 1.5),
         runtime=of_its_logs(5, 0.05),
     params:
-        sets=SETS.scored,
+        sets=drawn_sets,
         present=PRESENT,
         code=DIGEST["report"],
     message:

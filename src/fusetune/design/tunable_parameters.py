@@ -106,7 +106,7 @@ _ROWS = (
     TunableParameter("EKF2_ACC_NOISE", "process noise", 0.02, 1.0, "a MEMS sensor's own noise; PX4's limit"),
     TunableParameter("EKF2_GYR_NOISE", "process noise", 0.001, 0.1, "a MEMS sensor's own noise; PX4's limit"),
     TunableParameter("EKF2_MAG_E_NOISE", "process noise", 1e-5, 0.01, "a constant field; one that follows all"),
-    TunableParameter("EKF2_TERR_NOISE", "process noise", 0.5, 20.0, "PX4's limit; terrain that no range finder follows"),
+    TunableParameter("EKF2_TERR_NOISE", "process noise", 0.5, 20.0, "PX4's limit; a terrain that nothing follows"),
     TunableParameter("EKF2_WIND_NSD", "process noise", 0.005, 0.5, "wind that never changes; gusts taken for wind"),
     TunableParameter("EKF2_ACC_B_NOISE", "bias noise", 1e-4, 0.01, "a bias that never changes; PX4's limit"),
     TunableParameter("EKF2_GYR_B_NOISE", "bias noise", 3e-5, 0.01, "a bias that never changes; PX4's limit"),
@@ -147,3 +147,21 @@ _ROWS = (
 TUNABLE_PARAMETERS: Mapping[str, TunableParameter] = {row.name: row for row in _ROWS}
 """By name, in the order in which studies vary them. EKF2_IMU_POS_* is not among them: to move the IMU is to move all
 other sensors, which are. Switches, checks and limits are decisions of the pilot, not figures to tune."""
+
+_SELDOM_SEEN = frozenset({
+    "EKF2_MAG_E_NOISE", "EKF2_MAG_B_NOISE", "EKF2_TERR_NOISE", "EKF2_WIND_NSD", "EKF2_HEAD_NOISE", "EKF2_OF_N_MAX",
+    "EKF2_BETA_NOISE", "EKF2_DRAG_NOISE", "EKF2_GRAV_NOISE",
+})  # fmt: skip
+
+
+def _is_usual(one: TunableParameter) -> bool:
+    if one.kind == "gate":
+        return one.name == "EKF2_GPS_V_GATE"
+    if one.kind == "lever arm":
+        return one.name.startswith("EKF2_GPS_")
+    return one.name not in _SELDOM_SEEN
+
+
+USUALLY_VARIED = tuple(one.name for one in TUNABLE_PARAMETERS.values() if _is_usual(one))
+"""Those that a study around the present values varies where it names none: the others are seldom seen in the evidence,
+and each set more makes it harder for the others to stand out from chance."""
