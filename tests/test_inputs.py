@@ -22,7 +22,11 @@ def settings(project_root: Path, tmp_path: Path) -> Configuration:
         study=str(project_root / default.study),
         mission=str(project_root / default.mission),
         flights_dir=str(tmp_path),
-        demonstration=Demonstration(vehicle=str(project_root / default.demonstration.vehicle)),
+        demonstration=replace(
+            default.demonstration,
+            study=str(project_root / default.demonstration.study),
+            vehicle=str(project_root / default.demonstration.vehicle),
+        ),
     )
 
 
@@ -30,7 +34,7 @@ def test_the_demonstration_flies_every_set_in_turn(settings: Configuration) -> N
     once = read_inputs(settings, "config.yaml")
     assert once.is_demonstration
     assert once.flights == [f"flight_{number}_{name}" for number, name in enumerate(PAPER_SETS, 1)]
-    twice = read_inputs(replace(settings, demonstration=Demonstration(flights_per_set=2)), "config.yaml")
+    twice = read_inputs(replace(settings, demonstration=replace(settings.demonstration, flights_per_set=2)), "config.yaml")
     assert [twice.simulated[flight] for flight in twice.flights] == PAPER_SETS * 2
     assert twice.flights[0] == "flight_01_paper1"
     assert twice.flights == sorted(twice.flights)

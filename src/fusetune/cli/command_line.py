@@ -9,12 +9,13 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import design, fidelity, replay, save, simulate
+from fusetune.cli import design, fidelity, replay, save, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
 COMMANDS: Mapping[str, Command] = {
     "design": design,
+    "study": study,
     "simulate": simulate,
     "save": save,
     "replay": replay,

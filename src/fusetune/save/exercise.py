@@ -25,7 +25,7 @@ def exercise_of(folder: AnyPath) -> Exercise:
         The folder is not one of a saved flight, or a file in it is damaged.
     """
     metadata = read_metadata(folder)
-    figures = {one["id"]: one["figure"] for one in metadata["findings"]}
+    figures = {one["id"]: one["figure"] for one in metadata["verdict"]["findings"]}
     reported = {field: figures[check] for field, check in _REPORTED.items() if figures.get(check) is not None}
     topics = frozenset(entry["topic"] for entry in metadata["topics"] if entry["rows"])
     return Exercise(topics, metadata["ekf2_parameters"], reported, _turning(folder))
