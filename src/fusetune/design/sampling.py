@@ -15,7 +15,7 @@ Sampling = Literal["latin_hypercube", "sobol"]
 Point = tuple[float, ...]
 """One number in [0, 1) for each factor."""
 
-MOST_POINTS = 2**17
+MOST_POINTS = 2**14
 """So many are looked at before the constraints count as ones that leave nothing."""
 
 
