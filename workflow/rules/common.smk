@@ -101,11 +101,6 @@ def scored_sets(wildcards):
     return [*sets.scored, *mended_sets(sets)]
 
 
-def drawn_sets(wildcards):
-    """Params function: names of the sets that the picture of a flight chooses from."""
-    return sets_found().scored
-
-
 def set_descriptions(wildcards):
     """Params function: a line about each set."""
     around = present_found().sets if SETS.around else ()
