@@ -80,5 +80,6 @@ def test_without_logs_the_papers_sets_are_flown_and_compared_with_logs_what_is_a
     (tmp_path / "a.ulg").write_bytes(b"")
     flown = read_inputs(settings, "config.yaml")
     assert (flown.study.name, flown.study_file, flown.study.sets) == ("around_present", settings.study, ())
+    (tmp_path / "a.ulg").unlink()
     with pytest.raises(UserError, match=r"demonstration\.study.*around the values of flights"):
         read_inputs(replace(settings, demonstration=replace(settings.demonstration, study=settings.study)), "c.yaml")

@@ -57,18 +57,16 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
     """
     found = _discovered(settings.flights_dir, file)
     study, study_file = load_study(settings.study), settings.study
-    flown = study
-    if study.around:
-        flown = load_study(settings.demonstration.study)
-        if flown.around:
-            reason = f"demonstration.study is {settings.demonstration.study!r}, which is around the values of flights"
+    if study.around and not (found.logs or found.refused):
+        study, study_file = load_study(settings.demonstration.study), settings.demonstration.study
+        if study.around:
+            reason = f"demonstration.study is {study_file!r}, which is around the values of flights"
             raise UserError(file, reason, "Name a study with sets of its own")
-        if not (found.logs or found.refused):
-            study, study_file = flown, settings.demonstration.study
     mission = load_mission(settings.mission)
-    simulated = dict(_simulated_flights(flown, settings.demonstration.flights_per_set))
+    simulated = dict(_simulated_flights(study, settings.demonstration.flights_per_set))
     for flight in settings.demonstration.faults:
-        if flight not in simulated:
+        # with logs, a study around their values names no flights of the demonstration
+        if flight not in simulated and not study.around:
             reason = f"demonstration.faults names the flight {flight!r}; expected one of {', '.join(simulated)}"
             raise UserError(file, reason, "Mend the name")
     inputs = Inputs(study, study_file, mission, found, simulated)

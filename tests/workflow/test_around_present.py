@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 from tests.workflow.conftest import CONFIG, Workspace
 
@@ -25,7 +24,7 @@ def params(workspace: Workspace) -> set[str]:
     return {file.stem for file in (workspace.folder / "results/design/around_present").glob("*.params")}
 
 
-def test_sets_follow_from_the_flights_and_a_factor_more_makes_its_own(flown: Workspace, project_root: Path) -> None:
+def test_sets_follow_from_the_flights_and_a_factor_more_makes_its_own(flown: Workspace) -> None:
     flown.write("near.yaml", NEAR)
     flown.write("config.yaml", CONFIG | {"study": "config/near.yaml"})
     flown.run_ok("--cores", "2")
