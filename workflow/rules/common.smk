@@ -69,13 +69,8 @@ def sets_of_analysis(names):
     """
 
     def values(wildcards):
-        known = overrides_of(names)(wildcards)
-        if not SETS.around:
-            return known
-        all_sets, mended = sets_found(), mended_delays()
-        around = [name for name in all_sets.study if name not in SETS.study]
-        mendable = [name for name in around if mended and name in all_sets.mendable]
-        return {**known, **all_sets.overrides(around, {}), **all_sets.mended(mendable, {}, mended)}
+        around = {pset.name: pset.overrides for pset in present_found().sets} if SETS.around else {}
+        return {**overrides_of(names)(wildcards), **around}
 
     return values
 
@@ -90,15 +85,18 @@ def mended_delays():
     return told_in_one_line(read_document, checkpoints.join_delays.get().output[0])["mended"]
 
 
-def mended_sets(sets=SETS):
-    """Names of the sets with mended delays; none where no delay is proved wrong."""
-    return [mended_name(name) for name in sets.mendable] if mended_delays() else []
+def mended_sets():
+    """Names of the sets with mended delays; none where no delay is proved wrong.
+
+    Of a study around the present values the present set alone is mended: a delay comes before all else, and twice as
+    many sets would be harder to tell from chance, and to read.
+    """
+    return [mended_name(name) for name in SETS.mendable] if mended_delays() else []
 
 
 def scored_sets(wildcards):
     """Params function: names of all sets that are scored."""
-    sets = sets_found()
-    return [*sets.scored, *mended_sets(sets)]
+    return [*sets_found().scored, *mended_sets()]
 
 
 def set_descriptions(wildcards):

@@ -2,8 +2,9 @@ rule design:
     input:
         study=INPUTS.study_file,
         mission=SETTINGS.mission,
-        # what it says comes in as a parameter, so that only other sets make anything again
-        present=ancient("results/save/present.json") if SETS.around else [],
+        # what it says comes in as a parameter, so that only other sets make anything again; asked for by a function, as
+        # Snakemake plans a job anew behind a checkpoint only where its input waits for that
+        present=ancient(lambda wildcards: checkpoints.list_flights.get().output.present if SETS.around else []),
     output:
         plan=f"results/design/{INPUTS.mission.name}.plan",
         sets=report(
