@@ -80,6 +80,8 @@ def test_half_of_a_logarithmic_scale_lies_below_the_geometric_mean(tmp_path: Pat
     """As many of 64 points of a Latin hypercube in each half: by hand, √(0.01 · 1) = 0.1."""
     factor = {"EKF2_ACC_NOISE": {"low": 0.01, "high": 1.0}}
     logarithmic = study(tmp_path, kind="latin_hypercube", number=64, factors=factor)
+    factor["EKF2_ACC_NOISE"]["scale"] = None  # left empty, as the catalogue says
+    assert study(tmp_path, kind="latin_hypercube", number=64, factors=factor) == logarithmic
     factor["EKF2_ACC_NOISE"]["scale"] = "linear"
     linear = study(tmp_path, kind="latin_hypercube", number=64, factors=factor)
     assert sum(one.overrides["EKF2_ACC_NOISE"] < 0.1 for one in logarithmic.sets) == 32

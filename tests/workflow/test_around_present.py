@@ -37,7 +37,8 @@ def test_sets_follow_from_the_flights_and_a_factor_more_makes_its_own(flown: Wor
     assert first <= {name.partition(".")[0] for name in before}
 
     flown.write("near.yaml", NEAR | {"parameters": [*NEAR["parameters"], "EKF2_BARO_NOISE"]})
-    flown.run_ok("--cores", "2")
+    targets = ("results/apply/decision.json", "results/design/sets.parquet")
+    flown.run_ok("--cores", "2", *targets)
     more = {"baro_noise_down", "baro_noise_up"}
     assert set(compared(flown)) == {"present", *first, *more}
     assert params(flown) == first | more
@@ -45,4 +46,4 @@ def test_sets_follow_from_the_flights_and_a_factor_more_makes_its_own(flown: Wor
     assert {name: after[name] for name in before if not name.startswith("present.")} == {
         name: made for name, made in before.items() if not name.startswith("present.")
     }
-    assert flown.planned_jobs() == {}
+    assert flown.planned_jobs(*targets) == {}

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fusetune.design.factors import Factor, factors_around
 from fusetune.design.parameter_sets import ParameterSet, short_name
 from fusetune.design.tunable_parameters import TUNABLE_PARAMETERS
-from fusetune.px4.aid_sources import AID_SOURCES, SENSORS
+from fusetune.px4.aid_sources import AID_SOURCES, SENSORS, NoiseFloor
 from fusetune.px4.parameter_sources import required_sources, switched_off
 
 UP, DOWN = "up", "down"
@@ -147,5 +147,5 @@ def _below_what_is_reported(parameter: str, larger: float, flights: Iterable[Exe
     return ""
 
 
-def _floors(parameter: str) -> Iterator:
+def _floors(parameter: str) -> Iterator[NoiseFloor]:
     return (floor for source in AID_SOURCES.values() for floor in source.noise_floors if floor.parameter == parameter)

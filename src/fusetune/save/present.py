@@ -282,7 +282,7 @@ def read_present(file: str | os.PathLike[str]) -> Present:
     """
     document = read_document(file)
     try:
-        sets = tuple(ParameterSet(**one) for one in document["sets"])
+        sets = tuple(ParameterSet(**one) for one in document.get("sets", ()))
         return Present(**document | {"same": tuple(document["same"]), "sets": sets})
     except (TypeError, KeyError) as error:
         reason = f"does not say what the vehicle flies now ({error})"
