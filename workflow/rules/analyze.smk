@@ -133,8 +133,8 @@ rule analyze_flight:
     priority: 1
     conda:
         "../envs/fusetune.yaml"
+    # around the present values each parameter makes two sets at the most
     resources:
-        # around the present values each parameter makes two sets at the most
         **replay_resources(len(REPLAY_CHUNKS[-1]) + 2 * len(SETS.around), len(SETS.scored) + 2 * len(SETS.around)),
     params:
         sets=sets_of_analysis(REPLAY_CHUNKS[-1]),
