@@ -75,7 +75,7 @@ def study_around(
     """
     sets, left_out = [], {}
     for factor in factors_around(present, parameters):
-        why = _not_exercised(factor.parameter, flights)
+        why = not_exercised(factor.parameter, flights)
         if why:
             left_out[factor.parameter] = why
             continue
@@ -96,7 +96,7 @@ def _stepped(factor: Factor, coordinate: float) -> float:
     return rounded if factor.low <= rounded <= factor.high else value
 
 
-def _not_exercised(parameter: str, flights: Sequence[Exercise]) -> str:
+def not_exercised(parameter: str, flights: Sequence[Exercise]) -> str:
     """Why a parameter does nothing on any flight, or an empty text."""
     sources = [AID_SOURCES[name] for name in required_sources(parameter) if AID_SOURCES[name].is_replayed]
     reasons: dict[str, None] = {}
