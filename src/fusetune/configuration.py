@@ -30,6 +30,12 @@ from fusetune.storage.files import AnyPath
 class Demonstration:
     """What is simulated while there are no logs."""
 
+    study: str = setting(
+        "config/studies/paper_table11.yaml",
+        "file of the parameter sets that are flown and compared where `study` needs flights, as one around the present "
+        "values does",
+        at_least=1,
+    )
     vehicle: str = setting("config/vehicles/quadrotor.yaml", "file of the simulated vehicle", at_least=1)
     seed: int = setting(1, "seed of wind and sensor errors; the same seed gives the same logs", low=0)
     flights_per_set: int = setting(1, "flights that are simulated with each set of the study", low=1, high=100)
@@ -50,7 +56,9 @@ class Configuration:
         at_least=1,
     )
     study: str = setting(
-        "config/studies/paper_table11.yaml", "file of the parameter sets that are compared", at_least=1
+        "config/studies/around_present.yaml",
+        "file of the parameter sets that are compared, see [docs/studies.md](../docs/studies.md)",
+        at_least=1,
     )
     mission: str = setting(
         "config/missions/survey.yaml",

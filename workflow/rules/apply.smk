@@ -44,7 +44,7 @@ rule decide:
     params:
         sets=scored_sets,
         present=PRESENT,
-        descriptions=SETS.described({pset.name: pset.description for pset in INPUTS.study.sets}),
+        descriptions=set_descriptions,
         decision=asdict(SETTINGS.decision) | {"seed": SETTINGS.seed},
         contents=contents(*CONFIGURATION_FILES),
         code=DIGEST["apply"],

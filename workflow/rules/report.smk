@@ -32,6 +32,7 @@ rule plot_flight:
         mem_mb=of_its_logs(LIBRARIES_MB, 1.5),
         runtime=of_its_logs(5, 0.05),
     params:
+        # of a study around the present values that set alone: the others hardly differ to the eye
         sets=SETS.scored,
         present=PRESENT,
         code=DIGEST["report"],

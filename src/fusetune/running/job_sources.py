@@ -23,9 +23,10 @@ BASE = (
 JOB_SOURCES = {
     "design": (*BASE, "design"),
     "execute": (*BASE, "ekf2", "design", "execute"),
-    "save": (*BASE, "ekf2/feed", "save"),
+    "save": (*BASE, "design", "ekf2/feed", "save"),
     "replay": (
         *BASE,
+        "design",
         "ekf2",
         "save",
         "analyze/flight",

@@ -14,12 +14,14 @@ from fusetune.apply.one_vehicle import decided_vehicle
 from fusetune.apply.search.flight_search import FlightSearch, search_flights, trusted_flights
 from fusetune.apply.search.space import Space
 from fusetune.apply.settings import DecisionSettings
+from fusetune.design.around_present import not_exercised
 from fusetune.design.factors import Factor, factors_around
 from fusetune.design.search_settings import SearchSettings
 from fusetune.design.tunable_parameters import DELAY_LIMIT
 from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_value
 from fusetune.px4.ulog.reader import file_checksum
+from fusetune.save.exercise import exercise_of
 from fusetune.save.flight_folder import METADATA_FILE, read_metadata
 from fusetune.save.flights_table import write_flights_table
 from fusetune.save.log_folder import demand_own_folders, save_log
@@ -38,8 +40,15 @@ SEARCHED = (
     "EKF2_GYR_NOISE",
     "EKF2_BARO_NOISE",
     "EKF2_MAG_NOISE",
+    "EKF2_EV_DELAY",
+    "EKF2_EVP_NOISE",
+    "EKF2_EVV_NOISE",
+    "EKF2_OF_DELAY",
+    "EKF2_OF_N_MIN",
+    "EKF2_RNG_NOISE",
 )
-"""What is searched by default: what flights of simulated vehicles could tell (docs/search.md)."""
+"""What is searched by default, as far as the flights exercise it: what flights of simulated vehicles could tell
+(docs/search.md), and the like of other sensors."""
 
 _LONGEST_DELAY_MS = 300.0
 
@@ -96,6 +105,9 @@ def search_logs(
             told(f"{name}: left out, {why}")
     if not trusted:
         raise UserError(target, "no flight is replayed well enough to search on", "The lines above say why, log by log")
+    if not settings.parameters:
+        exercises = [exercise_of(own[name]) for name in trusted]
+        names = tuple(name for name in SEARCHED if not not_exercised(name, exercises))
     values = read_metadata(folders[present.flight])["ekf2_parameters"]
     given = FlightSearch(
         flights={name: own[name] for name in trusted},
@@ -103,7 +115,7 @@ def search_logs(
         flights_table=table,
         present_flight=present.flight,
         same_present=present.same,
-        space=search_space(values, settings),
+        space=search_space(values, names, settings),
         search=settings,
         decision=decision,
         analysis=analysis,
@@ -111,19 +123,19 @@ def search_logs(
     return search_flights(given, target, processes, told)
 
 
-def search_space(present: Mapping[str, float], settings: SearchSettings) -> Space:
+def search_space(present: Mapping[str, float], names: Sequence[str], settings: SearchSettings) -> Space:
     """What is searched around what the vehicle flies.
 
     Parameters
     ----------
     present : its EKF2 parameters, name → value
+    names : of those that are searched
 
     Raises
     ------
     UserError
         A parameter is none of those that are tuned, or a bound is out of its range.
     """
-    names = settings.parameters or SEARCHED
     try:
         # a longer delay brings a longer EKF2_DELAY_MAX along
         factors = factors_around({**present, DELAY_LIMIT: _LONGEST_DELAY_MS}, names, ratio=settings.ratio)
