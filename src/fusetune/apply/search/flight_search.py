@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, replace
@@ -230,7 +231,7 @@ def _decide(given: FlightSearch, outcome: _Outcome, target: Path) -> None:
         [target / "analyze" / name for name in given.flights],
         given.flights_table,
         target,
-        sets=[PRESENT, FOUND] if outcome.aside else [PRESENT],
+        sets=[PRESENT, FOUND] if outcome.aside and found.changed else [PRESENT],
         present=PRESENT,
         newest_flight=given.present_flight,
         same_present=given.same_present,
@@ -250,7 +251,7 @@ def _document(given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any
             name: found.values[name] for name in found.values if found.values[name] != given.present.get(name)
         },
         "parameters_kept": [name for name in given.space.parameters if name not in found.changed],
-        "expected_gain": _expected(row),
+        "expected_gain": _expected(row) if found.changed else None,
         "gain_in_search_percent": gain_percent(outcome.on_all.differences[0].tolist()),
         "gain_kept_aside_percent": gain_percent(list(outcome.aside.values())),
         "kept_aside": {name: gain_percent([value]) for name, value in outcome.aside.items()},
@@ -271,12 +272,18 @@ def _document(given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any
     return json.loads(json.dumps(_rounded(document)))  # type: ignore[no-any-return]
 
 
-def _expected(row: Mapping[str, Any] | None) -> dict[str, float] | None:
-    """Gain to be expected on flights to come, percent, and its interval; None where nothing was kept aside."""
+def _expected(row: Mapping[str, Any] | None) -> dict[str, float | None] | None:
+    """Gain to be expected on as many flights again, percent, and its interval; None where nothing was kept aside.
+
+    The interval of the decision is one of the mean over all flights to come. That of the mean over as many flights as
+    were searched on is wider by √2, for these vary as much again.
+    """
     if row is None or row["difference"] is None:
         return None
-    lower, upper = (None if row[name] is None else improvement_percent(row[name]) for name in ("upper", "lower"))
-    return {"percent": improvement_percent(row["difference"]), "lower_percent": lower, "upper_percent": upper}  # type: ignore[dict-item]
+    middle = row["difference"]
+    ends = [None if row[one] is None else middle + math.sqrt(2.0) * (row[one] - middle) for one in ("upper", "lower")]
+    lower, upper = (None if one is None else improvement_percent(one) for one in ends)
+    return {"percent": improvement_percent(middle), "lower_percent": lower, "upper_percent": upper}
 
 
 def _rounded(value: Any) -> Any:
