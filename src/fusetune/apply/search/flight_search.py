@@ -19,6 +19,7 @@ from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.decide import decide
 from fusetune.apply.ranking import improvement_percent
 from fusetune.apply.recommended import Recommended
+from fusetune.apply.rounded import rounded
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.kept_pairs import KeptPairs
 from fusetune.apply.search.objective import objective
@@ -43,8 +44,6 @@ from fusetune.storage.ledger import key_of
 
 FEWEST_FLIGHTS = 6
 """With fewer flights what is kept aside shows too little: the decision is called exploratory."""
-
-_SIGNIFICANT_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -269,7 +268,7 @@ def _document(given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any
         "candidates": candidate_documents(outcome.asked),
     }
     document["paragraphs"] = [*decision["paragraphs"], *search_sentences(document)]
-    return json.loads(json.dumps(_rounded(document)))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(rounded(document)))  # type: ignore[no-any-return]
 
 
 def _expected(row: Mapping[str, Any] | None) -> dict[str, float | None] | None:
@@ -284,14 +283,3 @@ def _expected(row: Mapping[str, Any] | None) -> dict[str, float | None] | None:
     ends = [None if row[one] is None else middle + math.sqrt(2.0) * (row[one] - middle) for one in ("upper", "lower")]
     lower, upper = (None if one is None else improvement_percent(one) for one in ends)
     return {"percent": improvement_percent(middle), "lower_percent": lower, "upper_percent": upper}
-
-
-def _rounded(value: Any) -> Any:
-    """Floats with nine significant digits: the last bits may differ between machines."""
-    if isinstance(value, float):
-        return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if np.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(item) for item in value]
-    return value
