@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, replace
@@ -18,6 +19,7 @@ from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.decide import decide
 from fusetune.apply.ranking import improvement_percent
 from fusetune.apply.recommended import Recommended
+from fusetune.apply.rounded import rounded
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.kept_pairs import KeptPairs
 from fusetune.apply.search.objective import objective
@@ -42,8 +44,6 @@ from fusetune.storage.ledger import key_of
 
 FEWEST_FLIGHTS = 6
 """With fewer flights what is kept aside shows too little: the decision is called exploratory."""
-
-_SIGNIFICANT_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ def _decide(given: FlightSearch, outcome: _Outcome, target: Path) -> None:
         [target / "analyze" / name for name in given.flights],
         given.flights_table,
         target,
-        sets=[PRESENT, FOUND] if outcome.aside else [PRESENT],
+        sets=[PRESENT, FOUND] if outcome.aside and found.changed else [PRESENT],
         present=PRESENT,
         newest_flight=given.present_flight,
         same_present=given.same_present,
@@ -250,7 +250,7 @@ def _document(given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any
             name: found.values[name] for name in found.values if found.values[name] != given.present.get(name)
         },
         "parameters_kept": [name for name in given.space.parameters if name not in found.changed],
-        "expected_gain": _expected(row),
+        "expected_gain": _expected(row) if found.changed else None,
         "gain_in_search_percent": gain_percent(outcome.on_all.differences[0].tolist()),
         "gain_kept_aside_percent": gain_percent(list(outcome.aside.values())),
         "kept_aside": {name: gain_percent([value]) for name, value in outcome.aside.items()},
@@ -268,23 +268,18 @@ def _document(given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any
         "candidates": candidate_documents(outcome.asked),
     }
     document["paragraphs"] = [*decision["paragraphs"], *search_sentences(document)]
-    return json.loads(json.dumps(_rounded(document)))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(rounded(document)))  # type: ignore[no-any-return]
 
 
-def _expected(row: Mapping[str, Any] | None) -> dict[str, float] | None:
-    """Gain to be expected on flights to come, percent, and its interval; None where nothing was kept aside."""
+def _expected(row: Mapping[str, Any] | None) -> dict[str, float | None] | None:
+    """Gain to be expected on as many flights again, percent, and its interval; None where nothing was kept aside.
+
+    The interval of the decision is one of the mean over all flights to come. That of the mean over as many flights as
+    were searched on is wider by √2, for these vary as much again.
+    """
     if row is None or row["difference"] is None:
         return None
-    lower, upper = (None if row[name] is None else improvement_percent(row[name]) for name in ("upper", "lower"))
-    return {"percent": improvement_percent(row["difference"]), "lower_percent": lower, "upper_percent": upper}  # type: ignore[dict-item]
-
-
-def _rounded(value: Any) -> Any:
-    """Floats with nine significant digits: the last bits may differ between machines."""
-    if isinstance(value, float):
-        return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if np.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(item) for item in value]
-    return value
+    middle = row["difference"]
+    ends = [None if row[one] is None else middle + math.sqrt(2.0) * (row[one] - middle) for one in ("upper", "lower")]
+    lower, upper = (None if one is None else improvement_percent(one) for one in ends)
+    return {"percent": improvement_percent(middle), "lower_percent": lower, "upper_percent": upper}
