@@ -81,5 +81,5 @@ def test_without_logs_the_papers_sets_are_flown_and_compared_with_logs_what_is_a
     flown = read_inputs(settings, "config.yaml")
     assert (flown.study.name, flown.study_file, flown.study.sets) == ("around_present", settings.study, ())
     (tmp_path / "a.ulg").unlink()
-    with pytest.raises(UserError, match=r"demonstration\.study.*around the values of flights"):
+    with pytest.raises(UserError, match=r"demonstration\.study.*sets follow from flights"):
         read_inputs(replace(settings, demonstration=replace(settings.demonstration, study=settings.study)), "c.yaml")

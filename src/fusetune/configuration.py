@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
@@ -80,6 +80,11 @@ class Configuration:
         "its own number",
         low=1,
         high=1000,
+    )
+    search_job: Literal["round", "flight"] = setting(
+        "round",
+        "what one job of a search takes: all flights of a `round`, on all cores, or one `flight` of it; the files are the "
+        "same; the profile for Slurm says `flight`",
     )
     demonstration: Demonstration = section(Demonstration)
     reading: ReadingLimits = section(ReadingLimits)

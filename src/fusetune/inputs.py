@@ -57,16 +57,16 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
     """
     found = _discovered(settings.flights_dir, file)
     study, study_file = load_study(settings.study), settings.study
-    if study.around and not (found.logs or found.refused):
+    if study.needs_flights and not (found.logs or found.refused):
         study, study_file = load_study(settings.demonstration.study), settings.demonstration.study
-        if study.around:
-            reason = f"demonstration.study is {study_file!r}, which is around the values of flights"
+        if study.needs_flights:
+            reason = f"demonstration.study is {study_file!r}, whose sets follow from flights"
             raise UserError(file, reason, "Name a study with sets of its own")
     mission = load_mission(settings.mission)
     simulated = dict(_simulated_flights(study, settings.demonstration.flights_per_set))
     for flight in settings.demonstration.faults:
-        # with logs, a study around their values names no flights of the demonstration
-        if flight not in simulated and not study.around:
+        # with logs, a study whose sets follow from them names no flights of the demonstration
+        if flight not in simulated and not study.needs_flights:
             reason = f"demonstration.faults names the flight {flight!r}; expected one of {', '.join(simulated)}"
             raise UserError(file, reason, "Mend the name")
     inputs = Inputs(study, study_file, mission, found, simulated)

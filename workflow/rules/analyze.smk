@@ -122,6 +122,7 @@ rule analyze_flight:
         delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
         present_replay=replay_files([PRESENT]) if MENDS_DELAYS else [],
         mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
+        found="results/search/found.json" if SEARCH else [],
     output:
         update(replay_files(REPLAY_CHUNKS[-1])),
         expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),

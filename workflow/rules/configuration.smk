@@ -10,7 +10,10 @@ CONFIG_FILE = configuration_files()[-1]
 
 INPUTS = told_in_one_line(read_inputs, SETTINGS, CONFIG_FILE)
 DEMONSTRATED = INPUTS.is_demonstration
-SETS = FlightSets({pset.name: pset.overrides for pset in INPUTS.study.sets}, INPUTS.study.around)
+SEARCH = INPUTS.study.search
+SETS = FlightSets(
+    {pset.name: pset.overrides for pset in INPUTS.study.sets}, INPUTS.study.around, SEARCH.varied if SEARCH else ()
+)
 FLOWN_LOGS = {log.flight: log for log in INPUTS.found.logs}
 LOGS = {flight: log.path for flight, log in FLOWN_LOGS.items()}
 if DEMONSTRATED:

@@ -40,6 +40,8 @@ def run(options: argparse.Namespace) -> int:
         raise UserError("the command line", "names neither a study nor a log", "Name a study, or a log with --around")
     around_usual = Study("around_present", "around_present", (), around=USUALLY_VARIED)
     study = around_usual if options.study is None else load_study(options.study)
+    if study.search:
+        raise UserError(options.study, "it is a search, whose sets are found on flights", "Run fusetune search LOG…")
     if bool(study.around) != (options.around is not None):
         reason = f"the study is {'' if study.around else 'not '}around the values of a flight"
         remedy = "Name its log with --around" if study.around else "Leave --around out, or take a study that is"

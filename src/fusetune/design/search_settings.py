@@ -20,8 +20,15 @@ SEARCHED = (
     "EKF2_GYR_NOISE",
     "EKF2_BARO_NOISE",
     "EKF2_MAG_NOISE",
+    "EKF2_EV_DELAY",
+    "EKF2_EVP_NOISE",
+    "EKF2_EVV_NOISE",
+    "EKF2_OF_DELAY",
+    "EKF2_OF_N_MIN",
+    "EKF2_RNG_NOISE",
 )
-"""What is searched by default: what flights of simulated vehicles could tell (docs/search.md)."""
+"""What is searched by default, as far as the flights exercise it: what flights of simulated vehicles could tell
+(docs/search.md), and the like of other sensors."""
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,13 @@ from fusetune.design.names import NAME_PATTERN, name_problem, one_line
 from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
 from fusetune.design.parameter_sets import ParameterSet, short_name
 from fusetune.design.sampling import points
+from fusetune.design.search_settings import SEARCHED, SearchSettings
 from fusetune.design.tunable_parameters import TUNABLE_PARAMETERS, USUALLY_VARIED, Scale
 from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.set_names import RESERVED_SET_NAMES
 from fusetune.settings.checking import raise_problems, validate
-from fusetune.settings.declaration import required, setting
+from fusetune.settings.declaration import built, required, section, setting
 from fusetune.settings.schema import schema_of
 from fusetune.settings.yaml_reader import read_yaml
 
@@ -40,9 +41,9 @@ REMEDY = "Mend the named keys; the examples in config/studies/ show studies of e
 
 @dataclass(frozen=True)
 class _StudyKind:
-    kind: Literal["list", "one_at_a_time", "grid", "latin_hypercube", "sobol", "around_present"] = required(
+    kind: Literal["list", "one_at_a_time", "grid", "latin_hypercube", "sobol", "around_present", "search"] = required(
         "explicit sets, one parameter changed at a time, all combinations, two ways to fill the space between bounds, "
-        "or one step up and down from what the vehicle flies"
+        "one step up and down from what the vehicle flies, or a search"
     )
 
 
@@ -111,6 +112,13 @@ class _AroundFile(_StudyKind):
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class _SearchFile(_StudyKind):
+    name: str = required("name of the study", pattern=NAME_PATTERN)
+    description: str = setting("", "what the study asks, in a sentence")
+    search: SearchSettings = section(SearchSettings)
+
+
 _FILE_OF_KIND: Mapping[str, type] = {
     "list": _ListFile,
     "one_at_a_time": _VariedFile,
@@ -118,6 +126,7 @@ _FILE_OF_KIND: Mapping[str, type] = {
     "latin_hypercube": _SampledFile,
     "sobol": _SampledFile,
     "around_present": _AroundFile,
+    "search": _SearchFile,
 }
 
 
@@ -131,6 +140,13 @@ class Study:
     description: str = ""
     around: tuple[str, ...] = ()
     """Parameters that are varied around the present values, which the flights tell; such a study has no sets yet."""
+    search: SearchSettings | None = None
+    """How a study searches; its sets are found on the flights."""
+
+    @property
+    def needs_flights(self) -> bool:
+        """Whether what it compares follows from flights."""
+        return bool(self.around or self.search)
 
     def set_named(self, name: str) -> ParameterSet:
         """The set of that name; raises `KeyError` where the study has none."""
@@ -152,11 +168,12 @@ def load_study(path: str | os.PathLike[str]) -> Study:
     if len(sets) < document.get("number", 0):
         reason = f"only {len(sets)} sets of {document['number']} keep the constraints"
         raise UserError(path, reason, "Loosen the constraints or widen the bounds")
-    if not sets and document["kind"] != "around_present":
+    if not sets and document["kind"] not in ("around_present", "search"):
         raise UserError(path, "no set keeps the constraints", "Loosen them")
     around = (*document.get("parameters", ()),) or USUALLY_VARIED if document["kind"] == "around_present" else ()
     description = one_line(document.get("description", ""))
-    return Study(document["name"], document["kind"], sets, description, around)
+    search = built(SearchSettings, document.get("search", {})) if document["kind"] == "search" else None
+    return Study(document["name"], document["kind"], sets, description, around, search)
 
 
 def _listed_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
@@ -241,6 +258,7 @@ _SETS_OF_KIND = {
     "latin_hypercube": _sampled_sets,
     "sobol": _sampled_sets,
     "around_present": _sets_of_flights,
+    "search": _sets_of_flights,
 }
 
 
@@ -277,13 +295,32 @@ def _parameter_problems(document: Mapping[str, Any]) -> Iterable[str]:
     for name, entry in document.get("factors", {}).items():
         yield from _factor_problems(name, entry)
     for name in document.get("parameters", ()):
-        if name not in TUNABLE_PARAMETERS:
-            problem = parameter_problem(name, 0.0) if name not in PARAMETERS else None
-            yield f"parameters: {problem or f'{name} is none of those that are tuned, see docs/studies.md'}"
+        yield from _untunable(name, "parameters")
+    yield from _search_problems(document.get("search", {}))
     known = {*document.get("fixed", {}), *document.get("vary", {}), *document.get("factors", {})}
     for text in document.get("constraints", ()):
         for name in {Constraint.of(text).smaller, Constraint.of(text).larger} - known:
             yield f"constraints ({text}): {name} is neither varied nor fixed, so its value is not known"
+
+
+def _untunable(name: str, place: str) -> Iterable[str]:
+    if name not in TUNABLE_PARAMETERS:
+        problem = parameter_problem(name, 0.0) if name not in PARAMETERS else None
+        yield f"{place}: {problem or f'{name} is none of those that are tuned, see docs/studies.md'}"
+
+
+def _search_problems(search: Mapping[str, Any]) -> Iterable[str]:
+    for name in search.get("parameters", ()):
+        yield from _untunable(name, "search.parameters")
+    searched = search.get("parameters") or SEARCHED
+    for name, values in search.get("bounds", {}).items():
+        place = f"search.bounds.{name}"
+        if name not in searched:
+            yield f"{place}: the parameter is not searched; expected one of {', '.join(searched)}"
+        elif len(values) != 2 or not values[0] < values[1]:
+            yield f"{place}: {', '.join(f'{one:g}' for one in values)}; expected the lowest value and the highest"
+        else:
+            yield from (f"{place}: {problem}" for one in values if (problem := parameter_problem(name, one)))
 
 
 def _factor_problems(name: str, entry: Mapping[str, Any]) -> Iterable[str]:

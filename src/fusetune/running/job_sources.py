@@ -45,6 +45,7 @@ JOB_SOURCES = {
     ),
     "score": (*BASE, "ekf2", "save", "analyze"),
     "apply": (*BASE, "design", "apply"),
+    "search": (*BASE, "design", "ekf2", "save", "analyze", "apply"),
     "report": (*BASE, "design", "apply", "report"),
 }
 """Kind of job → files and folders of the package."""

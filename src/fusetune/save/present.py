@@ -20,13 +20,12 @@ from typing import Any
 
 from fusetune.design.around_present import AroundPresent, study_around
 from fusetune.design.parameter_sets import ParameterSet
+from fusetune.design.tunable_parameters import DELAY_SUFFIX
 from fusetune.errors import UserError
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.set_names import AS_FLOWN, PRESENT, mended_name
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import atomic_path
-
-_DELAY = "_DELAY"
 
 
 @dataclass(frozen=True)
@@ -37,10 +36,12 @@ class FlightSets:
     ----------
     study : sets of the study, name → values of the parameters that it varies
     around : parameters that are varied around the present values; the sets are known when the flights are listed
+    searched : parameters that a set of a search may change; the sets are known when it has ended
     """
 
     study: Mapping[str, Mapping[str, float]]
     around: Collection[str] = ()
+    searched: Collection[str] = ()
 
     def found(self, present: Present) -> FlightSets:
         """The same with the sets around the present values that the flights led to."""
@@ -59,7 +60,9 @@ class FlightSets:
     @property
     def varied(self) -> list[str]:
         """Names of the parameters that the study varies, sorted."""
-        return sorted({name for overrides in self.study.values() for name in overrides}.union(self.around))
+        return sorted(
+            {name for overrides in self.study.values() for name in overrides}.union(self.around, self.searched)
+        )
 
     def overrides(self, names: Collection[str], present: Mapping[str, float]) -> dict[str, dict[str, float]]:
         """The values that some of the sets give to parameters, by set.
@@ -73,8 +76,13 @@ class FlightSets:
 
     @property
     def mendable(self) -> list[str]:
-        """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves."""
-        study = [name for name, values in self.study.items() if not any(one.endswith(_DELAY) for one in values)]
+        """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves.
+
+        None beside a search that finds delays as well: what is mended is found with all else.
+        """
+        if any(name.endswith(DELAY_SUFFIX) for name in self.searched):
+            return []
+        study = [name for name, values in self.study.items() if not any(one.endswith(DELAY_SUFFIX) for one in values)]
         return [PRESENT, *study]
 
     def mended(

@@ -62,6 +62,14 @@ class ReplayGround:
         self._try_all(asks)
         return [self._compared(flights, ask) for flights, ask in asks]
 
+    def pairs(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[tuple[Batch, Tried]]:
+        """All that some asks need to be compared, in batches; what is not known is replayed first."""
+        self._try_all(asks)
+        return [
+            (batch, (self._bases[batch[:2]], tuple(self._tried[Request(batch[0], batch[1], one)] for one in batch[2])))
+            for batch in _batches(asks, {}, {})
+        ]
+
     def _compared(self, flights: Sequence[str], ask: Ask) -> Comparison:
         bases = [self._bases[flight, ask.base] for flight in flights]
         if ask.seen_by is not None:
