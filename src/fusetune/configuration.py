@@ -83,8 +83,8 @@ class Configuration:
     )
     search_job: Literal["round", "flight"] = setting(
         "round",
-        "what one job of a search takes: all flights of a `round`, on all cores, or one `flight` of it; the files are the "
-        "same; the profile for Slurm says `flight`",
+        "what one job of a search takes: all flights of a `round`, on all cores, or one `flight` of it; the files are "
+        "the same; the profile for Slurm says `flight`",
     )
     demonstration: Demonstration = section(Demonstration)
     reading: ReadingLimits = section(ReadingLimits)

@@ -31,6 +31,7 @@ def search_logs(
     settings: SearchSettings | None = None,
     *,
     decision: DecisionSettings | None = None,
+    analysis: AnalysisSettings | None = None,
     processes: int = 1,
     told: Callable[[str], None] = print,
 ) -> dict[str, Any]:
@@ -42,6 +43,7 @@ def search_logs(
     folder : takes all files; a search that was stopped goes on from them
     settings : of the search
     decision : how sets are compared, and when one is better
+    analysis : how flights are replayed and scored
     processes : that replay
     told : is given lines about how far it is
 
@@ -54,7 +56,8 @@ def search_logs(
     UserError
         No log can be used, or a parameter cannot be searched.
     """
-    settings, decision, analysis = settings or SearchSettings(), decision or DecisionSettings(), AnalysisSettings()
+    settings, decision = settings or SearchSettings(), decision or DecisionSettings()
+    analysis = analysis or AnalysisSettings()
     target = Path(folder)
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         folders = _saved(logs, target / "save", pool, told)

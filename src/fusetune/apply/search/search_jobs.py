@@ -35,6 +35,9 @@ from fusetune.design.search_settings import SearchSettings
 from fusetune.errors import RUN_AGAIN, UserError
 from fusetune.storage.files import AnyPath
 
+_FEWEST_FOR_A_PROCESS = 24
+"""Sets on flights for which another process is started: that takes about as long as to replay so many."""
+
 
 def tried_files(answers: Sequence[AnyPath], flights: Sequence[str]) -> list[Path]:
     """Files of what flights answered: given themselves, or the folders of their rounds."""
@@ -170,7 +173,8 @@ class _LateTrier:
         self._folders, self._settings, self._processes = folders, settings, processes
 
     def try_batches(self, batches: Sequence[Batch]) -> Iterator[tuple[Batch, Tried]]:
-        processes = min(self._processes, len(batches))
+        sets = sum(len(batch[2]) for batch in batches)
+        processes = min(self._processes, sets // _FEWEST_FOR_A_PROCESS)
         if processes <= 1:
             yield from FlightTrier(self._folders, self._settings).try_batches(batches)
             return
