@@ -46,8 +46,8 @@ class SearchSettings:
     )
     ratio: float = setting(8.0, "by how much a value may be larger or smaller than the present one", above=1, high=1000)
     evaluations: int = setting(
-        120,
-        "parameter sets that the search on all flights tries, and each with a part of them kept aside",
+        400,
+        "parameter sets that are tried in all: by the search on all flights, and by those with a part kept aside",
         low=FEWEST_EVALUATIONS,
         high=5000,
     )

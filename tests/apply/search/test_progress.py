@@ -12,7 +12,7 @@ from fusetune.design.search_settings import SearchSettings
 
 def test_lines_say_the_round_the_best_so_far_and_the_time_left() -> None:
     seconds, lines = [0.0], []
-    settings = SearchSettings(evaluations=80)
+    settings = SearchSettings(evaluations=300)
     plan, studied = plan_of(SPACE, settings), searches(["a"], settings)
     progress = Progress(plan, studied, lines.append, lambda: seconds[0])
     progress.begin(1)

@@ -24,7 +24,7 @@ STAGES = (DELAYS, ALL, PUTTING_BACK)
 PUTTING_BACK_ROUNDS = 3
 
 _FIRST_SIZE, _FIRST_GENERATIONS = 6, 2
-_START_SHARE = 0.35
+_START_SHARE = 0.2
 _GENERATIONS = 6
 FIRST_RADIUS, RADIUS, SHRINKS = 0.5, 0.6, 0.75
 """How far from the best set the first generation of a stage looks, in half ranges, and what share of that the next."""
@@ -57,7 +57,7 @@ class Plan:
 
 
 def plan_of(space: Space, settings: SearchSettings) -> Plan:
-    """Share the evaluations out; putting back takes those that are left."""
+    """Share the evaluations out among the searches: what they start with is the same, and counts once."""
     return _plan(space.parameters, settings)
 
 
@@ -71,17 +71,13 @@ def planned_rounds(settings: SearchSettings) -> int:
 
 def _plan(parameters: Sequence[str], settings: SearchSettings) -> Plan:
     first = tuple(name for name in parameters if name.endswith(FIRST_SUFFIXES))
-    spent = 3 * len(parameters) + (start_size(len(first)) + _FIRST_SIZE * _FIRST_GENERATIONS if first else 0)
-    left = max(settings.evaluations - spent, 16)
-    start = max(round(_START_SHARE * left), 8)
-    size = max((left - start) // _GENERATIONS, 1)
-    return Plan(
-        first,
-        (_FIRST_SIZE,) * _FIRST_GENERATIONS if first else (),
-        start,
-        (size,) * _GENERATIONS,
-        len(parameters),
-    )
+    generations = (_FIRST_SIZE,) * _FIRST_GENERATIONS if first else ()
+    searches = settings.folds + 1
+    left = settings.evaluations - start_size(len(first))
+    left -= searches * (sum(generations) + PUTTING_BACK_ROUNDS * len(parameters))
+    start = max(round(_START_SHARE * left), 2 * len(parameters))
+    size = max((left - start) // (searches * _GENERATIONS), 1)
+    return Plan(first, generations, start, (size,) * _GENERATIONS, len(parameters))
 
 
 def start_size(factors: int) -> int:
