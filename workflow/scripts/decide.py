@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.decide import decide
-from fusetune.apply.search.found_sets import DESCRIPTION, read_found_sets, search_decision, write_search_document
 from fusetune.apply.settings import DecisionSettings
 from fusetune.save import read_present
 from fusetune.set_names import FOUND
@@ -17,11 +16,19 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    now = read_present(snakemake.input.present)
-    found = read_found_sets(snakemake.input.found) if snakemake.input.found else None
+    now, found = read_present(snakemake.input.present), None
     sets, descriptions = snakemake.params.sets, snakemake.params.descriptions
     settings, folder = DecisionSettings(**snakemake.params.decision), Path(snakemake.output[0]).parent
-    if found is not None:
+    if snakemake.input.found:
+        # it brings what searches think with
+        from fusetune.apply.search.found_sets import (
+            DESCRIPTION,
+            read_found_sets,
+            search_decision,
+            write_search_document,
+        )
+
+        found = read_found_sets(snakemake.input.found)
         sets, descriptions = [*dict.fromkeys([*sets, *found.decided])], {**descriptions, FOUND: DESCRIPTION}
         settings = search_decision(settings)
     decide(
@@ -35,7 +42,7 @@ with logged_job(snakemake.log[0]):
         descriptions=descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
         delays=Path(snakemake.input.delays) if snakemake.input.delays else None,
-        recommended=found.recommended if found is not None and FOUND in sets else None,
+        recommended=found.recommended if found is not None else None,
         settings=settings,
     )
     if found is not None:

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.search.round_files import write_round
-from fusetune.apply.search.search_jobs import SearchedSoFar, tried_files
 from fusetune.apply.search.searched_flights import read_searched_flights
+from fusetune.apply.search.searched_so_far import SearchedSoFar, tried_files
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.settings.declaration import built

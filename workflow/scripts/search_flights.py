@@ -10,7 +10,8 @@ from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.settings import TrustSettings
-from fusetune.apply.search.searched_flights import searched_flights, write_searched_flights
+from fusetune.apply.search.flights_to_search import flights_to_search
+from fusetune.apply.search.searched_flights import write_searched_flights
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.save import read_present
@@ -36,7 +37,7 @@ if __name__ == "__main__":
         mapping = map
         if processes > 1:
             mapping = stack.enter_context(ProcessPoolExecutor(processes, get_context("spawn"))).map
-        found = searched_flights(
+        found = flights_to_search(
             folders,
             snakemake.input.flights,
             read_present(snakemake.input.present).flight,

@@ -7,8 +7,8 @@ from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.apply.search.round_files import read_round
-from fusetune.apply.search.search_jobs import try_round
 from fusetune.apply.search.searched_flights import read_searched_flights
+from fusetune.apply.search.tried_round import try_round
 from fusetune.apply.settings import DecisionSettings
 from fusetune.settings.declaration import built
 

@@ -38,7 +38,7 @@ class FoundSets:
 
     Attributes
     ----------
-    recommended : what was found on all flights; None where that is nothing new, or there was none to search on
+    recommended : what was found on all flights; None where that is nothing new, or no flight could be kept aside
     on_flights : the set that stands for it on each flight, which is what was found without that flight, by parameter;
         empty where nothing is recommended
     document : the part of `search.json` that no decision changes
@@ -70,7 +70,9 @@ def found_sets(
     """
     found = outcome.found[0]
     objections = tuple(outcome.on_all.objections[0])
-    recommended = Recommended(FOUND, found.values, alone_sentences(found), objections) if found.changed else None
+    recommended = None
+    if found.changed and outcome.aside:
+        recommended = Recommended(FOUND, found.values, alone_sentences(found), objections)
     present = space.values(np.zeros(len(space.factors)))
     document = {
         "parameters_found": {

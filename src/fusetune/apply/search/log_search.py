@@ -10,8 +10,8 @@ from typing import Any
 
 from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.apply.search.flight_search import FlightSearch, search_flights
+from fusetune.apply.search.flights_to_search import flights_to_search
 from fusetune.apply.search.search_space import search_space
-from fusetune.apply.search.searched_flights import searched_flights
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.errors import UserError
@@ -69,7 +69,7 @@ def search_logs(
         present = find_present(rows, folders, settings.varied, None)
         if present.flight is None:
             raise UserError(target, "none of the logs can be replayed", "The lines above say why, log by log")
-        searched = searched_flights(folders, table, present.flight, settings, decision, analysis, pool.map)
+        searched = flights_to_search(folders, table, present.flight, settings, decision, analysis, pool.map)
         for name, why in searched.left_out.items():
             told(f"{name}: left out, {why}")
     if not searched.flights:
