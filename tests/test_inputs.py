@@ -83,3 +83,10 @@ def test_without_logs_the_papers_sets_are_flown_and_compared_with_logs_what_is_a
     (tmp_path / "a.ulg").unlink()
     with pytest.raises(UserError, match=r"demonstration\.study.*sets follow from flights"):
         read_inputs(replace(settings, demonstration=replace(settings.demonstration, study=settings.study)), "c.yaml")
+
+
+def test_a_search_waits_for_logs_too(settings: Configuration, project_root: Path, tmp_path: Path) -> None:
+    searching = replace(settings, study=str(project_root / "config/studies/search.yaml"))
+    assert [one.name for one in read_inputs(searching, "config.yaml").study.sets] == PAPER_SETS
+    (tmp_path / "a.ulg").write_bytes(b"")
+    assert read_inputs(searching, "config.yaml").study.search is not None
