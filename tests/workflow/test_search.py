@@ -82,6 +82,8 @@ def test_a_killed_search_goes_on_and_leaves_what_one_in_a_single_process_does(
     assert replayed(searched, 1) <= 8 * (3 - len(left))
     assert left.items() <= when_made(results / "tried").items()
     assert searched.planned_jobs(TOLD) == {}
+    # flight by flight the jobs are others, and so is what those ask for that come after them
+    assert searched.planned_jobs(TOLD, "--config", "search_job=flight")["search_try_2"] == 3
 
     monkeypatch.chdir(searched.folder)
     settings = read_configuration(["config/config.yaml"])
