@@ -65,8 +65,16 @@ class FlightSets:
 
     @property
     def mendable(self) -> list[str]:
-        """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves."""
-        study = [name for name, values in self.study.items() if not any(one.endswith(_DELAY) for one in values)]
+        """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves.
+
+        Of sets with equal values the first alone: the others would be it once more.
+        """
+        first = {tuple(sorted(values.items())): name for name, values in reversed(self.study.items())}
+        study = [
+            name
+            for name, values in self.study.items()
+            if first[tuple(sorted(values.items()))] == name and not any(one.endswith(_DELAY) for one in values)
+        ]
         return [PRESENT, *study]
 
     def mended(
