@@ -69,13 +69,11 @@ class FlightSets:
 
         Of sets with equal values the first alone: the others would be it once more.
         """
-        first = {tuple(sorted(values.items())): name for name, values in reversed(self.study.items())}
-        study = [
-            name
-            for name, values in self.study.items()
-            if first[tuple(sorted(values.items()))] == name and not any(one.endswith(_DELAY) for one in values)
-        ]
-        return [PRESENT, *study]
+        first: dict[tuple[tuple[str, float], ...], str] = {}
+        for name, values in self.study.items():
+            if not any(one.endswith(_DELAY) for one in values):
+                first.setdefault(tuple(sorted(values.items())), name)
+        return [PRESENT, *first.values()]
 
     def mended(
         self, names: Collection[str], present: Mapping[str, float], delays: Mapping[str, float]

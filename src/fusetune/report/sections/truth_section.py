@@ -62,7 +62,8 @@ def truth_sentence(results: Results) -> str:
         verdict = "speaks against the change"
     flights = len(_true_errors(results, "flight"))
     whose = f"of {flights} of the flights" if flights < len(results.flights) else "of these flights"
-    return f"The truth {whose} is known; the decision never looks at it. It {verdict}: true error of {', '.join(known)}."
+    said = f"The truth {whose} is known; the decision never looks at it."
+    return f"{said} It {verdict}: true error of {', '.join(known)}."
 
 
 def truth_section(results: Results) -> str:
