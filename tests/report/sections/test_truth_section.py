@@ -19,7 +19,7 @@ def results(made: tuple[Path, str]) -> Results:
 
 
 def with_truth(results: Results, velocity: list[float], attitude: list[float], flights: int = 5) -> Results:
-    """The results with true errors of 0.2 m/s and 1° of the present set, and those given, by flight, of the chosen one."""
+    """The results with true errors: 0.2 m/s and 1° of the present set; of the chosen one those given, by flight."""
     rows = []
     for flight in results.flights[:flights]:
         for source, present, chosen in (("truth_velocity", 0.2, velocity), ("truth_attitude_deg", 1.0, attitude)):
