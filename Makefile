@@ -46,8 +46,9 @@ types: $(READY)
 
 demonstration: all
 	@for file in $(MADE); do [ -s "$$file" ] || { echo "$$file is missing or empty" >&2; exit 1; }; done
-	@grep -q "It confirms the change" results/report.html || { echo "no change that the truth confirms" >&2; exit 1; }
-	@for name in EKF2_GPS_DELAY EKF2_ACC_NOISE EKF2_GYR_NOISE; do \
+	@[ -n "$$(find -L flights -name '*.ulg')" ] || grep -q "It confirms the change" results/report.html || \
+		{ echo "no change that the truth confirms" >&2; exit 1; }
+	@[ -n "$$(find -L flights -name '*.ulg')" ] || for name in EKF2_GPS_DELAY EKF2_ACC_NOISE EKF2_GYR_NOISE; do \
 		grep -q "$$name" results/apply/best_params.params || { echo "$$name is left wrong" >&2; exit 1; }; \
 	done
 	@$(BIN)/snakemake --cores 1 --dry-run | grep -q "Nothing to be done" || { echo "a second run would not be idle" >&2; exit 1; }
