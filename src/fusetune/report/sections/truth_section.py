@@ -38,9 +38,11 @@ def truth_sentence(results: Results) -> str:
     smaller: list[str] = []
     larger: list[str] = []
     known: list[str] = []
+    metrics = results.metrics
     for source, axis, words, unit in _CONFIRMING:
-        rows = figure_values(results, source, axis, "rmse")
-        means = rows.groupby("set", observed=True)["value"].mean()
+        # Of all sets: a large study shows only some.
+        wanted = (metrics["source"] == source) & (metrics["axis"] == axis) & (metrics["metric"] == "rmse")
+        means = metrics[wanted].groupby("set", observed=True)["value"].mean()
         if not {decision["chosen"], results.present} <= set(means.index):
             continue
         now, new = float(means[results.present]), float(means[decision["chosen"]])
