@@ -36,7 +36,7 @@ class Demonstration:
         "values does",
         at_least=1,
     )
-    vehicle: str = setting("config/vehicles/quadrotor.yaml", "file of the simulated vehicle", at_least=1)
+    vehicle: str = setting("config/vehicles/mistuned_quadrotor.yaml", "file of the simulated vehicle", at_least=1)
     seed: int = setting(1, "seed of wind and sensor errors; the same seed gives the same logs", low=0)
     flights_per_set: int = setting(1, "flights that are simulated with each set of the study", low=1, high=100)
     faults: Mapping[str, tuple[Mapping[str, Any], ...]] = setting(
@@ -61,7 +61,7 @@ class Configuration:
         at_least=1,
     )
     mission: str = setting(
-        "config/missions/survey.yaml",
+        "config/missions/short_survey.yaml",
         "file of the mission that is planned, and flown by the demonstration",
         at_least=1,
     )

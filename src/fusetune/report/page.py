@@ -20,11 +20,11 @@ from fusetune.report.sections.flight_sections import (
     innovations_section,
     provenance_section,
     single_flights_section,
-    truth_section,
 )
 from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.sensitivity_section import sensitivity_section
 from fusetune.report.sections.trust_section import trust_section
+from fusetune.report.sections.truth_section import truth_section
 from fusetune.storage.files import AnyPath, atomic_path
 
 STYLE_SHEET = Path(__file__).with_name("page.css")

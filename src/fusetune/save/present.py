@@ -78,12 +78,16 @@ class FlightSets:
     def mendable(self) -> list[str]:
         """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves.
 
-        None beside a search that finds delays as well: what is mended is found with all else.
+        Of sets with equal values the first alone: the others would be it once more. None beside a search that finds
+        delays as well: what is mended is found with all else.
         """
         if any(name.endswith(DELAY_SUFFIX) for name in self.searched):
             return []
-        study = [name for name, values in self.study.items() if not any(one.endswith(DELAY_SUFFIX) for one in values)]
-        return [PRESENT, *study]
+        first: dict[tuple[tuple[str, float], ...], str] = {}
+        for name, values in self.study.items():
+            if not any(one.endswith(DELAY_SUFFIX) for one in values):
+                first.setdefault(tuple(sorted(values.items())), name)
+        return [PRESENT, *first.values()]
 
     def mended(
         self, names: Collection[str], present: Mapping[str, float], delays: Mapping[str, float]

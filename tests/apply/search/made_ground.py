@@ -10,9 +10,8 @@ import numpy as np
 
 from fusetune.apply.evidence import AIMS
 from fusetune.apply.search.comparison import Comparison
-from fusetune.apply.search.requests import Values
+from fusetune.apply.search.requests import Ask, Values
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask
 from fusetune.design.factors import factors_around
 
 PRESENT = {"EKF2_GPS_DELAY": 110.0, "EKF2_GPS_V_NOISE": 0.3, "EKF2_ACC_NOISE": 0.35, "EKF2_MAG_NOISE": 0.05}

@@ -10,8 +10,7 @@ from fusetune.analyze.trials.tried_set import ONE_STEP, WITHHELD, Column, Reject
 from fusetune.apply.search.comparison import TriedBase
 from fusetune.apply.search.kept_pairs import KeptPairs
 from fusetune.apply.search.replays import MOST_IN_BATCH, Batch, ReplayGround, Tried
-from fusetune.apply.search.requests import values_of
-from fusetune.apply.search.stages import Ask
+from fusetune.apply.search.requests import Ask, values_of
 from fusetune.apply.settings import DecisionSettings
 
 BASE = values_of({"EKF2_ACC_NOISE": 0.35})

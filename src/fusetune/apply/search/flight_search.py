@@ -25,9 +25,9 @@ from fusetune.apply.search.outcome import Outcome, outcome_rounds
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.progress import Progress
 from fusetune.apply.search.replays import ReplayGround
+from fusetune.apply.search.requests import Ask
 from fusetune.apply.search.rounds import answered, searches
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask
 from fusetune.apply.search.trial_keys import made_of, trial_settings
 from fusetune.apply.search.workers import WorkerTrier
 from fusetune.apply.settings import DecisionSettings
@@ -114,7 +114,7 @@ class _Watched:
 
     def compare(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[Comparison]:
         answers = self._ground.compare(asks)
-        scores = objective(answers[0])
+        scores = objective(answers[0], asks[0][1].stage)
         if scores.size:
             self._progress.better(float(scores.min()))
         return answers

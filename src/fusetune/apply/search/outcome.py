@@ -10,10 +10,10 @@ import numpy as np
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.plan import ALL
 from fusetune.apply.search.proposals import Proposing, propose
-from fusetune.apply.search.requests import values_of
+from fusetune.apply.search.requests import Ask, values_of
 from fusetune.apply.search.rounds import AskedRound, Rounds, Searched, search_rounds, searches
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask, Found
+from fusetune.apply.search.stages import Found
 from fusetune.design.search_settings import SearchSettings
 
 

@@ -8,9 +8,8 @@ from typing import Protocol
 
 from fusetune.analyze.trials.tried_set import TriedSet
 from fusetune.apply.search.comparison import Comparison, TriedBase, compare
-from fusetune.apply.search.plan import DELAYS
-from fusetune.apply.search.requests import Request, Values
-from fusetune.apply.search.stages import Ask
+from fusetune.apply.search.plan import OF_DELAYS
+from fusetune.apply.search.requests import Ask, Request, Values
 from fusetune.apply.settings import DecisionSettings
 
 Batch = tuple[str, Values, tuple[Values, ...]]
@@ -80,7 +79,7 @@ class ReplayGround:
 
     def weighed_by(self, stage: str) -> DecisionSettings:
         """Before the delays are right, the sources' errors look as if they wandered, and are trusted all the same."""
-        if stage == DELAYS:
+        if stage in OF_DELAYS:
             return replace(self._decision, distrust_white_share=0.0, trust_white_share=0.0)
         return self._decision
 

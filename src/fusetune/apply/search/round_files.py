@@ -8,9 +8,8 @@ from typing import Any
 
 from fusetune.apply.search.kept_pairs import batch_document, batch_of
 from fusetune.apply.search.replays import Batch, Tried
-from fusetune.apply.search.requests import values_of
+from fusetune.apply.search.requests import Ask, values_of
 from fusetune.apply.search.rounds import AskedOfFlights
-from fusetune.apply.search.stages import Ask
 from fusetune.errors import RUN_AGAIN, UserError
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import AnyPath, atomic_path

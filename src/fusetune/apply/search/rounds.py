@@ -13,8 +13,9 @@ from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.folds import folds
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.proposals import Proposing, propose
+from fusetune.apply.search.requests import Ask
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask, Asking, Found, search_stages
+from fusetune.apply.search.stages import Asking, Found, search_stages
 from fusetune.design.search_settings import SearchSettings
 
 ON_ALL = "all flights"

@@ -18,12 +18,12 @@ from fusetune.apply.search.outcome import Outcome, outcome_rounds
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.recorded_proposals import RecordedProposals
 from fusetune.apply.search.replays import Batch, ReplayGround, Tried
+from fusetune.apply.search.requests import Ask
 from fusetune.apply.search.round_files import RoundFile, read_round, read_tried
 from fusetune.apply.search.rounds import AskedOfFlights, Rounds
 from fusetune.apply.search.search_space import search_space
 from fusetune.apply.search.searched_flights import SearchedFlights
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.errors import RUN_AGAIN, UserError
@@ -106,7 +106,7 @@ class SearchedSoFar:
 
     def _compared(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[Comparison]:
         answers = self._ground.compare(asks)
-        scores = objective(answers[0])
+        scores = objective(answers[0], asks[0][1].stage)
         self.best = min(self.best, float(scores.min()) if scores.size else 0.0)
         return answers
 

@@ -22,6 +22,9 @@ from fusetune.storage.files import AnyPath
 _FEWEST_FOR_A_PROCESS = 24
 """Sets on flights for which another process is started: that takes about as long as to replay so many."""
 
+_MANY = 2
+"""With so many flights for each process, these have a flight at a time and are done at about the same time."""
+
 
 def try_round(
     asked: RoundFile,
@@ -74,6 +77,8 @@ class _LateTrier:
             return
         trier = WorkerTrier(self._folders, self._settings, processes)
         try:
-            yield from trier.try_batches(batches)
+            flights = len({batch[0] for batch in batches})
+            many = flights >= _MANY * processes
+            yield from trier.try_flight_by_flight(batches) if many else trier.try_batches(batches)
         finally:
             trier.close()

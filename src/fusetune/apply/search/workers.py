@@ -73,10 +73,20 @@ class WorkerTrier:
 
     def try_batches(self, batches: Sequence[Batch]) -> Iterator[tuple[Batch, Tried]]:
         """What the sets of each batch did, as it comes."""
-        running = {self.pool.submit(_try_batch, batch): batch for batch in batches}
+        return self._tried([[batch] for batch in batches])
+
+    def try_flight_by_flight(self, batches: Sequence[Batch]) -> Iterator[tuple[Batch, Tried]]:
+        """The same, a flight a process, which need not be prepared by others then; it comes when the flight is done."""
+        flights: dict[str, list[Batch]] = {}
+        for batch in batches:
+            flights.setdefault(batch[0], []).append(batch)
+        return self._tried(list(flights.values()))
+
+    def _tried(self, groups: Sequence[Sequence[Batch]]) -> Iterator[tuple[Batch, Tried]]:
+        running = [self.pool.submit(_try_batches, group) for group in groups]
         try:
             for one in as_completed(running):
-                yield running[one], one.result()
+                yield from one.result()
         finally:
             for one in running:
                 one.cancel()
@@ -93,5 +103,5 @@ def _begin(folders: Mapping[str, str], settings: TrialSettings) -> None:
     _of_this_process[:] = [FlightTrier(folders, settings)]
 
 
-def _try_batch(batch: Batch) -> Tried:
-    return _of_this_process[0].try_batch(batch)
+def _try_batches(batches: Sequence[Batch]) -> list[tuple[Batch, Tried]]:
+    return list(_of_this_process[0].try_batches(batches))
