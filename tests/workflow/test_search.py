@@ -126,5 +126,14 @@ def go_through(results: Path, settings: Configuration, kept: Path, folder: Path)
     present = read_present(results / "save" / "present.json").parameters
     found = SearchedSoFar(on, search, decision, asked, tried).found(planned_rounds(search), present)
     write_found_sets(folder / "found.json", found)
-    assert read_found_sets(folder / "found.json") == found
+    written = read_found_sets(folder / "found.json")
+    assert (written.recommended, written.on_flights) == (found.recommended, found.on_flights)
+
+    # before the third flight was added the others were asked the same to begin with
+    fewer = replace(on, flights=on.flights[:2])
+    first = SearchedSoFar(fewer, search, decision, (), ()).asked_in(1)
+    answers = {flight: folder.parent / f"{flight}.json" for flight in fewer.flights}
+    saved = {flight: results / "save" / flight for flight in fewer.flights}
+    told = try_round(first, saved, answers, kept, decision, AnalysisSettings(settings.replay, settings.scoring), 1)
+    assert [*told] == ["first: 8 sets", "second: 8 sets", "replayed: 0"]
     return contents(folder)
