@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.flipped_bits import with_flipped_bits
 
 from fusetune.errors import UserError
-from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.documents import read_as, read_document, write_document
 
 DOCUMENT = {"flight": "höhe 7", "grade": "B", "figures": [1.5, None, 1e-300], "deep": {"b": {}, "a": [{}]}}
 JSON_VALUES = st.recursive(
@@ -92,3 +92,11 @@ def test_the_digest_is_no_entry_of_the_document(tmp_path: Path) -> None:
     for document in ({}, {"digest": 1}):
         with pytest.raises(ValueError, match="digest"):
             write_document(tmp_path / "a.json", document)
+
+
+def test_a_document_of_something_else_is_told_by_what_it_lacks(tmp_path: Path) -> None:
+    file = tmp_path / "a.json"
+    write_document(file, {"figures": [2, 3]})
+    assert read_as(file, lambda document: sum(document["figures"]), "how many there are") == 5
+    with pytest.raises(UserError, match=r"a\.json: does not say how many there are \('number'\)"):
+        read_as(file, lambda document: document["number"], "how many there are")

@@ -3,11 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.search.round_files import write_round
-from fusetune.apply.search.searched_flights import read_searched_flights
-from fusetune.apply.search.searched_so_far import SearchedSoFar, tried_files
-from fusetune.apply.settings import DecisionSettings
-from fusetune.design.search_settings import SearchSettings
-from fusetune.settings.declaration import built
+from fusetune.apply.search.searched_so_far import SearchedSoFar
 
 from job import keep_out, logged_job
 
@@ -16,14 +12,8 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    params, on = snakemake.params, read_searched_flights(snakemake.input.on)
-    so_far = SearchedSoFar(
-        on,
-        built(SearchSettings, params.search),
-        DecisionSettings(**params.settings["decision"]),
-        snakemake.input.asked,
-        tried_files(snakemake.input.tried, on.flights),
-    )
+    params, given = snakemake.params, snakemake.input
+    so_far = SearchedSoFar.of_files(given.on, params.search, params.settings["decision"], given.asked, given.tried)
     asked = so_far.asked_in(params.number)
     write_round(snakemake.output[0], asked)
     print(so_far.told(asked))

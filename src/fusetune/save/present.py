@@ -24,7 +24,7 @@ from fusetune.design.tunable_parameters import DELAY_SUFFIX
 from fusetune.errors import UserError
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.set_names import AS_FLOWN, PRESENT, mended_name
-from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.documents import read_as, write_document
 from fusetune.storage.files import atomic_path
 
 
@@ -292,10 +292,9 @@ def read_present(file: str | os.PathLike[str]) -> Present:
     UserError
         There is none, or it cannot be read.
     """
-    document = read_document(file)
-    try:
-        sets = tuple(ParameterSet(**one) for one in document.get("sets", ()))
-        return Present(**document | {"same": tuple(document["same"]), "sets": sets})
-    except (TypeError, KeyError) as error:
-        reason = f"does not say what the vehicle flies now ({error})"
-        raise UserError(file, reason, "Delete it and run the pipeline again") from error
+    return read_as(file, _present_of, "what the vehicle flies now")
+
+
+def _present_of(document: dict[str, Any]) -> Present:
+    sets = tuple(ParameterSet(**one) for one in document.get("sets", ()))
+    return Present(**document | {"same": tuple(document["same"]), "sets": sets})

@@ -9,11 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from fusetune.errors import RUN_AGAIN, UserError
+
+Built = TypeVar("Built")
 
 _DIGEST = "digest"
 _BEFORE, _AFTER = b',\n "digest": "', b'"\n}\n'
@@ -83,6 +85,28 @@ def read_document(path: str | os.PathLike[str], *, remedy: str = RUN_AGAIN, seal
         raise UserError(path, "is no JSON mapping", remedy)
     document.pop(_DIGEST, None)
     return document
+
+
+def read_as(path: str | os.PathLike[str], build: Callable[[dict[str, Any]], Built], what: str) -> Built:
+    """Build something of a JSON file that `write_document` wrote.
+
+    Parameters
+    ----------
+    build
+        Makes it of the mapping; a key that it misses, or does not expect, means that the file holds something else.
+    what
+        Of which the file tells, for the message.
+
+    Raises
+    ------
+    UserError
+        As of `read_document`, or the file holds something else.
+    """
+    document = read_document(path)
+    try:
+        return build(document)
+    except (TypeError, KeyError) as error:
+        raise UserError(path, f"does not say {what} ({error})", RUN_AGAIN) from error
 
 
 def _seal_of(content: bytes) -> bytes:

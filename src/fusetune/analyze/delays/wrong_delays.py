@@ -10,17 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.special import stdtrit
 
 from fusetune.analyze.delays.sensor_delays import CONFIDENCE, SensorDelay, read_delays
 from fusetune.analyze.delays.settings import DelaySettings
-from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.px4.vehicle_identity import VehicleIdentity
-from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.documents import read_as, read_document, write_document
 from fusetune.storage.files import AnyPath, atomic_path
 from fusetune.storage.parquet import read_table
 
@@ -156,9 +155,8 @@ def read_joined(file: AnyPath) -> tuple[JoinedDelay, ...]:
     UserError
         There is none, or it cannot be read.
     """
-    document = read_document(file)
-    try:
-        return tuple(JoinedDelay(**one | {"flights": tuple(one["flights"])}) for one in document["delays"])
-    except (KeyError, TypeError) as error:
-        reason = f"does not say what delays the sensors have ({error})"
-        raise UserError(Path(file), reason, "Delete it and run the pipeline again") from error
+    return read_as(file, _delays_of, "what delays the sensors have")
+
+
+def _delays_of(document: dict[str, Any]) -> tuple[JoinedDelay, ...]:
+    return tuple(JoinedDelay(**one | {"flights": tuple(one["flights"])}) for one in document["delays"])

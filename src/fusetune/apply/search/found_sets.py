@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,8 @@ from fusetune.apply.search.space import Space
 from fusetune.apply.search.words import alone_sentences, search_sentences
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
-from fusetune.errors import UserError
 from fusetune.set_names import FOUND, PRESENT
-from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.documents import read_as, write_document
 from fusetune.storage.files import AnyPath, atomic_path
 
 FEWEST_FLIGHTS = 6
@@ -150,14 +148,13 @@ def read_found_sets(file: AnyPath) -> FoundSets:
     UserError
         There is none, or it cannot be read.
     """
-    document = read_document(file)
-    try:
-        given = document["recommended"]
-        recommended = given and Recommended(**given | {"objections": tuple(given["objections"])})
-        return FoundSets(recommended, document["on_flights"], document["document"])
-    except (TypeError, KeyError) as error:
-        reason = f"does not say what a search found ({error})"
-        raise UserError(Path(file), reason, "Delete it and run the pipeline again") from error
+    return read_as(file, _found_of, "what a search found")
+
+
+def _found_of(document: dict[str, Any]) -> FoundSets:
+    given = document["recommended"]
+    recommended = given and Recommended(**given | {"objections": tuple(given["objections"])})
+    return FoundSets(recommended, document["on_flights"], document["document"])
 
 
 def _expected(row: Mapping[str, Any] | None) -> dict[str, float | None] | None:

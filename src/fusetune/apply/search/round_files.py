@@ -10,8 +10,7 @@ from fusetune.apply.search.kept_pairs import batch_document, batch_of
 from fusetune.apply.search.replays import Batch, Tried
 from fusetune.apply.search.requests import Ask, values_of
 from fusetune.apply.search.rounds import AskedOfFlights
-from fusetune.errors import RUN_AGAIN, UserError
-from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.documents import read_as, write_document
 from fusetune.storage.files import AnyPath, atomic_path
 
 
@@ -47,12 +46,7 @@ def read_round(file: AnyPath) -> RoundFile:
     UserError
         There is none, or it cannot be read.
     """
-    document = read_document(file)
-    try:
-        asks = [(tuple(one["flights"]), _ask_of(one)) for one in document["asks"]]
-        return RoundFile(document["round"], asks, document["proposals"])
-    except (TypeError, KeyError) as error:
-        raise UserError(file, f"does not say what a search asks ({error})", RUN_AGAIN) from error
+    return read_as(file, _round_of, "what a search asks")
 
 
 def write_tried(file: AnyPath, flight: str, pairs: Iterable[tuple[Batch, Tried]]) -> None:
@@ -70,11 +64,12 @@ def read_tried(file: AnyPath) -> list[tuple[Batch, Tried]]:
     UserError
         There is none, or it cannot be read.
     """
-    document = read_document(file)
-    try:
-        return [batch_of(one) for one in document["batches"]]
-    except (TypeError, KeyError) as error:
-        raise UserError(file, f"does not say what was tried ({error})", RUN_AGAIN) from error
+    return read_as(file, lambda document: [batch_of(one) for one in document["batches"]], "what was tried")
+
+
+def _round_of(document: dict[str, Any]) -> RoundFile:
+    asks = [(tuple(one["flights"]), _ask_of(one)) for one in document["asks"]]
+    return RoundFile(document["round"], asks, document["proposals"])
 
 
 def _ask_document(ask: Ask) -> dict[str, Any]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
+from typing import Any
 
-from fusetune.errors import UserError
-from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.documents import read_as, write_document
 from fusetune.storage.files import AnyPath, atomic_path
 
 
@@ -43,11 +42,10 @@ def read_searched_flights(file: AnyPath) -> SearchedFlights:
     UserError
         There is none, or it cannot be read.
     """
-    document = read_document(file)
-    try:
-        return SearchedFlights(
-            tuple(document["flights"]), document["left_out"], document["vehicle"], tuple(document["parameters"])
-        )
-    except (TypeError, KeyError) as error:
-        reason = f"does not say on which flights is searched ({error})"
-        raise UserError(Path(file), reason, "Delete it and run the pipeline again") from error
+    return read_as(file, _flights_of, "on which flights is searched")
+
+
+def _flights_of(document: dict[str, Any]) -> SearchedFlights:
+    return SearchedFlights(
+        tuple(document["flights"]), document["left_out"], document["vehicle"], tuple(document["parameters"])
+    )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from fusetune.apply.ranking import improvement_percent
 from fusetune.apply.search.comparison import Comparison
@@ -22,26 +23,21 @@ from fusetune.apply.search.requests import Ask
 from fusetune.apply.search.round_files import RoundFile, read_round, read_tried
 from fusetune.apply.search.rounds import AskedOfFlights, Rounds
 from fusetune.apply.search.search_space import search_space
-from fusetune.apply.search.searched_flights import SearchedFlights
+from fusetune.apply.search.searched_flights import SearchedFlights, read_searched_flights
 from fusetune.apply.search.space import Space
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.errors import RUN_AGAIN, UserError
+from fusetune.settings.declaration import built
 from fusetune.storage.files import AnyPath
-
-
-def tried_files(answers: Sequence[AnyPath], flights: Sequence[str]) -> list[Path]:
-    """Files of what flights answered: given themselves, or the folders of their rounds."""
-    paths = [Path(one) for one in answers]
-    return [
-        file
-        for path in paths
-        for file in ([path / f"{flight}.json" for flight in flights] if path.is_dir() else [path])
-    ]
 
 
 class SearchedSoFar:
     """A search and the answers of its flights so far.
+
+    Attributes
+    ----------
+    best : the lowest of what the search on all flights makes small, nat
 
     Parameters
     ----------
@@ -64,7 +60,22 @@ class SearchedSoFar:
                 self._ground.know(batch, did)
         self._proposals = RecordedProposals(one for file in asked for one in read_round(file).proposals)
         self.best = 0.0
-        """The lowest of what the search on all flights makes small, nat."""
+
+    @classmethod
+    def of_files(
+        cls,
+        on: AnyPath,
+        search: Mapping[str, Any],
+        decision: Mapping[str, Any],
+        asked: Iterable[AnyPath],
+        answers: Sequence[AnyPath],
+    ) -> SearchedSoFar:
+        """The same from the file of the flights, settings as mappings, and answers as files or folders of rounds."""
+        flights = read_searched_flights(on)
+        files: list[Path] = []
+        for answer in map(Path, answers):
+            files += [answer / f"{flight}.json" for flight in flights.flights] if answer.is_dir() else [answer]
+        return cls(flights, built(SearchSettings, search), DecisionSettings(**decision), asked, files)
 
     def asked_in(self, number: int) -> RoundFile:
         """What is asked in a round, from 1; nothing where the search has come to its end before."""
