@@ -127,7 +127,7 @@ def write_search_document(file: AnyPath, found: FoundSets, decision: Mapping[str
         "paragraphs": [],
         **found.document,
     }
-    document["paragraphs"] = [*decision["paragraphs"], *search_sentences(document)]
+    document["paragraphs"] = [*decision["paragraphs"], *(search_sentences(document) if document["flights"] else ())]
     written: dict[str, Any] = json.loads(json.dumps(rounded(document)))
     with atomic_path(file) as temporary:
         write_document(temporary, written, allow_nan=False)
