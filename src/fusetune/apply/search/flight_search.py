@@ -29,12 +29,18 @@ from fusetune.apply.search.replays import ReplayGround
 from fusetune.apply.search.requests import values_of
 from fusetune.apply.search.result import candidate_documents, gain_percent, parameter_documents, search_documents
 from fusetune.apply.search.rounds import AskedRound, Searched, run_searches, searches
+from fusetune.apply.search.search_trials import search_trials
 from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.space import Space
 from fusetune.apply.search.stages import Ask, Found
 from fusetune.apply.search.words import alone_sentences, search_sentences
 from fusetune.apply.search.workers import WorkerTrier
+from fusetune.apply.sensitivity.files import SENSITIVITY_FILE, write_sensitivity
+from fusetune.apply.sensitivity.sensitivity import sensitivity
+from fusetune.apply.sensitivity.wording import sentences
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.trials import Trials
+from fusetune.apply.trials_file import TRIALS_FILE, write_trials
 from fusetune.save.flight_folder import read_metadata
 from fusetune.set_names import AS_FLOWN, FOUND, PRESENT
 from fusetune.storage.digest import source_digest
@@ -86,13 +92,23 @@ class FlightSearch:
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What the searches found; `aside` has the differences on the flights that each did not see, in order of time."""
+    """What the searches found.
+
+    Attributes
+    ----------
+    on_all : what was found on all flights, there
+    on_seen : of each search, its differences on the flights that it saw
+    aside : differences on the flights that each did not see, by flight, in order of time
+    trials : what the search on all flights tried
+    """
 
     studied: Sequence[Searched]
     found: Sequence[Found]
     asked: Sequence[AskedRound]
     on_all: Comparison
+    on_seen: Sequence[Sequence[float]]
     aside: Mapping[str, float]
+    trials: Trials | None
 
 
 def trusted_flights(
@@ -132,7 +148,8 @@ def search_flights(given: FlightSearch, folder: AnyPath, processes: int, told: C
     finally:
         trier.close()
     _decide(given, outcome, target)
-    document = _document(given, outcome, read_document(target / "decision.json"))
+    told_of_parameters = _write_what_matters(given, outcome, target)
+    document = _document(given, outcome, read_document(target / "decision.json"), told_of_parameters)
     with atomic_path(target / "search.json") as temporary:
         write_document(temporary, document, allow_nan=False)
     return document
@@ -149,14 +166,18 @@ def _searched(given: FlightSearch, trier: WorkerTrier, target: Path, told: Calla
     present = values_of(given.present)
     whats = [values_of(one.values) for one in found]
     asks = [Ask(ALL, present, (what,), seen_by=what) for what in whats]
-    flights = [one.aside or one.flights for one in studied]
-    on_all, *others = ground.compare(list(zip(flights, asks, strict=True)))
+    seen = [(one.flights, ask) for one, ask in zip(studied, asks, strict=True)]
+    kept_aside = [(one.aside, ask) for one, ask in zip(studied, asks, strict=True) if one.aside]
+    compared = ground.compare([*seen, *kept_aside])
+    on_seen, others = compared[: len(seen)], compared[len(seen) :]
     differences = [
         (name, value)
-        for one, compared in zip(studied[1:], others, strict=True)
-        for name, value in zip(one.aside, compared.differences[0].tolist(), strict=True)
+        for (flights, _), one in zip(kept_aside, others, strict=True)
+        for name, value in zip(flights, one.differences[0].tolist(), strict=True)
     ]
-    return _Outcome(studied, found, asked, on_all, dict(differences))
+    trials = search_trials(given.space, asked, found[0], ground)
+    each = [one.differences[0].tolist() for one in on_seen]
+    return _Outcome(studied, found, asked, on_seen[0], each, dict(differences), trials)
 
 
 class _Watched:
@@ -240,7 +261,23 @@ def _decide(given: FlightSearch, outcome: _Outcome, target: Path) -> None:
     )
 
 
-def _document(given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any]) -> dict[str, Any]:
+def _write_what_matters(given: FlightSearch, outcome: _Outcome, target: Path) -> Sequence[str]:
+    """Write all that was tried, and what it tells of the parameters; returns that in words.
+
+    The decision sees two sets, which tell nothing of any one parameter.
+    """
+    trials, found = outcome.trials, None
+    write_trials(target / TRIALS_FILE, trials)
+    if trials is not None:
+        incumbent = [outcome.found[0].values[name] for name in trials.parameters]
+        found = sensitivity(trials, incumbent, confidence=given.decision.confidence, seed=given.decision.seed)
+    write_sensitivity(target / SENSITIVITY_FILE, found)
+    return sentences(found) if found is not None else ()
+
+
+def _document(
+    given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any], told_of_parameters: Sequence[str]
+) -> dict[str, Any]:
     found = outcome.found[0]
     row = next((one for one in decision["ranking"] if one["name"] == FOUND), None)
     figures = {
@@ -261,13 +298,13 @@ def _document(given: FlightSearch, outcome: _Outcome, decision: Mapping[str, Any
         **figures,
         "paragraphs": [],
         "parameters": parameter_documents(found, given.space),
-        "searches": search_documents(outcome.studied, outcome.found),
+        "searches": search_documents(outcome.studied, outcome.found, outcome.on_seen, outcome.aside),
         "flights": list(given.flights),
         "flights_left_out": dict(given.left_out),
         "settings": asdict(given.search),
         "candidates": candidate_documents(outcome.asked),
     }
-    document["paragraphs"] = [*decision["paragraphs"], *search_sentences(document)]
+    document["paragraphs"] = [*decision["paragraphs"], *search_sentences(document), *told_of_parameters]
     return json.loads(json.dumps(rounded(document)))  # type: ignore[no-any-return]
 
 

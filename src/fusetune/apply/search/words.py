@@ -50,8 +50,8 @@ def _gains(document: Mapping[str, Any]) -> Iterator[str]:
     if search is None or aside is None:
         return
     yield (
-        f"On the flights that the search saw, errors are {_smaller(search)} with what it found; on flights that were "
-        f"kept aside from it, {_smaller(aside)}. The second is what to expect."
+        f"On the flights that the search saw, errors are {smaller(search)} with what it found; on flights that were "
+        f"kept aside from it, {smaller(aside)}. The second is what to expect."
     )
     expected = document["expected_gain"]
     if expected is not None and expected["lower_percent"] is not None:
@@ -61,5 +61,6 @@ def _gains(document: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _smaller(percent: float) -> str:
+def smaller(percent: float) -> str:
+    """By how much errors are smaller, or larger."""
     return f"{percent:.1f} % smaller" if percent >= 0.0 else f"{-percent:.1f} % larger"

@@ -1,0 +1,107 @@
+"""The answer of a search in a few lines: what to set, what it is worth, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from fusetune.apply.search.words import smaller
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+
+_MOST_PARAMETERS = 5
+
+
+def headline(document: Mapping[str, Any], decision: Mapping[str, Any]) -> str:
+    """What to do, without a full stop.
+
+    Parameters
+    ----------
+    document : what `search.json` holds
+    decision : what `decision.json` beside it holds
+    """
+    flights = len(document["flights"])
+    on = f"from {flights} flight{'s' if flights != 1 else ''}"
+    if decision["status"] != "change":
+        return f"Keep the parameters that fly now, {on}"
+    count = len(decision["changes"])
+    return f"Change {count} parameter{'s' if count != 1 else ''}, {on}"
+
+
+def answer_lines(document: Mapping[str, Any], decision: Mapping[str, Any], what_matters: Sequence[str]) -> list[str]:
+    """The answer first, then what it rests on, at most ten lines.
+
+    Parameters
+    ----------
+    what_matters : what the sets that were tried tell of the parameters, the answer first
+    """
+    return list(_lines(document, decision, what_matters))
+
+
+def _lines(document: Mapping[str, Any], decision: Mapping[str, Any], what_matters: Sequence[str]) -> Iterator[str]:
+    yield f"{headline(document, decision)}{' (exploratory)' if document['exploratory'] else ''}."
+    if decision["status"] == "change":
+        yield from _changes(document, decision)
+    yield from worth_sentences(document)
+    if decision["status"] != "change":
+        yield from why_kept(document, decision)
+    yield from what_matters[:1]
+    if decision["next_steps"]:
+        yield f"Next: {decision['next_steps'][0]['text']}"
+
+
+def _changes(document: Mapping[str, Any], decision: Mapping[str, Any]) -> Iterator[str]:
+    changes = decision["changes"]
+    for one in changes[:_MOST_PARAMETERS]:
+        alone = document["parameters"].get(one["name"], {}).get("alone_percent")
+        told = f"   (without it errors {alone:.1f} % larger)" if alone is not None else ""
+        yield f"  {one['name']:<17} {one['previous']:.4g} → {one['value']:.4g} {one['unit']}".rstrip() + told
+    if len(changes) > _MOST_PARAMETERS:
+        yield f"  and {len(changes) - _MOST_PARAMETERS} more"
+
+
+def worth_sentences(document: Mapping[str, Any]) -> list[str]:
+    """What was found is worth on the flights that the search saw, and on those that were kept aside from it."""
+    seen, aside = document["gain_in_search_percent"], document["gain_kept_aside_percent"]
+    if not any(one["is_changed"] for one in document["parameters"].values()):
+        return ["The search found nothing that is better than what flies now by as much as would matter."]
+    if seen is None:
+        return ["These flights cannot show what it is worth."]
+    if aside is None:
+        return [
+            f"On the flight that the search saw, prediction errors are {smaller(seen)} with what it found. None was "
+            "kept aside, so nothing shows how much of that is luck."
+        ]
+    expected = document["expected_gain"] or {}
+    lower, upper = expected.get("lower_percent"), expected.get("upper_percent")
+    span = f" On as many again expect {lower:.1f} to {upper:.1f} % (95 %)." if None not in (lower, upper) else ""
+    return [
+        f"Prediction errors are {smaller(aside)} on flights that were kept aside from the search, {smaller(seen)} on "
+        f"those that it saw.{span}"
+    ]
+
+
+def why_kept(document: Mapping[str, Any], decision: Mapping[str, Any]) -> list[str]:
+    """Why what was found is not taken; empty where nothing was found."""
+    found = {name: one for name, one in document["parameters"].items() if one["is_changed"]}
+    if not found:
+        return []
+    values = [f"{name} {one['present']:.4g} → {one['found']:.4g} {unit_of(name)}".rstrip() for name, one in found.items()]
+    more = f" and {len(values) - _MOST_PARAMETERS} more" if len(values) > _MOST_PARAMETERS else ""
+    told = [f"Found, and not taken: {', '.join(values[:_MOST_PARAMETERS])}{more}."]
+    reasons = [*document["objections"], *_reasons(decision)]
+    if reasons:
+        told.append(f"Against it: {'; '.join(reasons[:2])}.")
+    elif document["exploratory"]:
+        told.append("Against it: so few flights show nothing firm.")
+    elif decision["status"] == "keep":
+        told.append("Against it: these flights do not show beyond doubt that it would help on others.")
+    return told
+
+
+def _reasons(decision: Mapping[str, Any]) -> list[str]:
+    return [str(reason) for one in decision["ranking"] if not one["is_present"] for reason in one["reasons"]]
+
+
+def unit_of(parameter: str) -> str:
+    """As the metadata spells it."""
+    return PARAMETERS[parameter].unit if parameter in PARAMETERS else ""
