@@ -30,8 +30,9 @@ def build_search_page(folder: AnyPath) -> Path:
     count = len(results.search["flights"])
     vehicle = decision["vehicle"]["in_words"] if decision["vehicle"] else "unknown vehicle"
     origin = f"{results.search['product']}, {vehicle}, from {count} flight{'s' if count != 1 else ''}"
-    # the last one is the next steps, which have a section of their own
-    words = section("The decision in words", bullets(decision["paragraphs"][:-1]))
+    # the last one is the next steps, which have a section of their own, and cautions stand at the head
+    told = [one for one in decision["paragraphs"][:-1] if one not in decision["cautions"]]
+    words = section("The decision in words", bullets(told))
     output = target / SEARCH_PAGE
     write_page(
         output,

@@ -54,7 +54,7 @@ def _changes(document: Mapping[str, Any], decision: Mapping[str, Any]) -> Iterat
     for one in changes[:_MOST_PARAMETERS]:
         alone = document["parameters"].get(one["name"], {}).get("alone_percent")
         told = f"   (without it errors {alone:.1f} % larger)" if alone is not None else ""
-        yield f"  {one['name']:<17} {one['previous']:.4g} → {one['value']:.4g} {one['unit']}".rstrip() + told
+        yield f"  {one['name']:<17} {_from_to(one['previous'], one['value'], one['unit'])}{told}"
     if len(changes) > _MOST_PARAMETERS:
         yield f"  and {len(changes) - _MOST_PARAMETERS} more"
 
@@ -85,7 +85,7 @@ def why_kept(document: Mapping[str, Any], decision: Mapping[str, Any]) -> list[s
     found = {name: one for name, one in document["parameters"].items() if one["is_changed"]}
     if not found:
         return []
-    values = [f"{name} {one['present']:.4g} → {one['found']:.4g} {unit_of(name)}".rstrip() for name, one in found.items()]
+    values = [f"{name} {_from_to(one['present'], one['found'], unit_of(name))}" for name, one in found.items()]
     more = f" and {len(values) - _MOST_PARAMETERS} more" if len(values) > _MOST_PARAMETERS else ""
     told = [f"Found, and not taken: {', '.join(values[:_MOST_PARAMETERS])}{more}."]
     reasons = [*document["objections"], *_reasons(decision)]
@@ -96,6 +96,10 @@ def why_kept(document: Mapping[str, Any], decision: Mapping[str, Any]) -> list[s
     elif decision["status"] == "keep":
         told.append("Against it: these flights do not show beyond doubt that it would help on others.")
     return told
+
+
+def _from_to(now: float, found: float, unit: str) -> str:
+    return f"{now:.4g} → {found:.4g} {unit}".rstrip()
 
 
 def _reasons(decision: Mapping[str, Any]) -> list[str]:

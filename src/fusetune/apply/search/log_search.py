@@ -12,7 +12,8 @@ from typing import Any
 from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.apply.one_vehicle import decided_vehicle
 from fusetune.apply.search.flight_search import FlightSearch, search_flights, trusted_flights
-from fusetune.apply.search.settings import SearchSettings
+from fusetune.apply.search.plan import PUTTING_BACK_ROUNDS, plan_of
+from fusetune.apply.search.settings import FEWEST_EVALUATIONS, SearchSettings
 from fusetune.apply.search.space import Space
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.around_present import not_exercised
@@ -52,6 +53,9 @@ SEARCHED = (
 
 _LONGEST_DELAY_MS = 300.0
 
+_MARK = ".search.json"
+"""Marks a folder as that of a search."""
+
 
 def search_logs(
     logs: Sequence[AnyPath],
@@ -61,6 +65,7 @@ def search_logs(
     decision: DecisionSettings | None = None,
     processes: int = 1,
     told: Callable[[str], None] = print,
+    asked_in: AnyPath = "search",
 ) -> dict[str, Any]:
     """Search the parameters of the vehicle that flew the newest of some logs.
 
@@ -72,6 +77,7 @@ def search_logs(
     decision : how sets are compared, and when one is better
     processes : that replay
     told : is given lines about how far it is
+    asked_in : file that the settings come from, for errors
 
     Returns
     -------
@@ -80,10 +86,13 @@ def search_logs(
     Raises
     ------
     UserError
-        No log can be used, or a parameter cannot be searched.
+        No log can be used, a parameter cannot be searched, there are fewer evaluations than parameters need, or the
+        folder holds what is no search's.
     """
     settings, decision, analysis = settings or SearchSettings(), decision or DecisionSettings(), AnalysisSettings()
     target = Path(folder)
+    demand_searchable(settings, asked_in)
+    demand_search_folder(target)
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         folders = _saved(logs, target / "save", pool, told)
         table = target / "save" / "flights.parquet"
@@ -95,6 +104,9 @@ def search_logs(
         present = find_present(rows, folders, _varied(names), None)
         if present.flight is None:
             raise UserError(target, "none of the logs can be replayed", "The lines above say why, log by log")
+        values = read_metadata(folders[present.flight])["ekf2_parameters"]
+        if settings.parameters:
+            search_space(values, names, settings, asked_in)  # a mistake is told before it costs time
         replayable = [row["flight"] for row in _in_time_order(rows) if row["status"] == "replayable"]
         others = decided_vehicle(table, replayable, present.flight).others
         own = {name: folders[name] for name in replayable if name not in others}
@@ -108,14 +120,13 @@ def search_logs(
     if not settings.parameters:
         exercises = [exercise_of(own[name]) for name in trusted]
         names = tuple(name for name in SEARCHED if not not_exercised(name, exercises))
-    values = read_metadata(folders[present.flight])["ekf2_parameters"]
     given = FlightSearch(
         flights={name: own[name] for name in trusted},
         left_out=left_out,
         flights_table=table,
         present_flight=present.flight,
         same_present=present.same,
-        space=search_space(values, names, settings),
+        space=search_space(values, names, settings, asked_in),
         search=settings,
         decision=decision,
         analysis=analysis,
@@ -123,28 +134,96 @@ def search_logs(
     return search_flights(given, target, processes, told)
 
 
-def search_space(present: Mapping[str, float], names: Sequence[str], settings: SearchSettings) -> Space:
+def search_space(
+    present: Mapping[str, float], names: Sequence[str], settings: SearchSettings, asked_in: AnyPath = "search"
+) -> Space:
     """What is searched around what the vehicle flies.
 
     Parameters
     ----------
     present : its EKF2 parameters, name → value
     names : of those that are searched
+    asked_in : file that the settings come from, for errors
 
     Raises
     ------
     UserError
-        A parameter is none of those that are tuned, or a bound is out of its range.
+        A parameter is none of those that are tuned, a bound is out of its range or of a parameter that is not searched,
+        or there are fewer evaluations than so many parameters need.
     """
+    idle = [name for name in settings.bounds if name not in names]
+    if idle:
+        raise UserError(
+            asked_in,
+            f"gives bounds of {', '.join(idle)}, of which these flights cannot tell, or which is not to be searched",
+            f"Searched are {', '.join(names)}; leave out the others' bounds",
+        )
     try:
         # a longer delay brings a longer EKF2_DELAY_MAX along
         factors = factors_around({**present, DELAY_LIMIT: _LONGEST_DELAY_MS}, names, ratio=settings.ratio)
         bounded = tuple(_bounded(factor, settings.bounds.get(factor.parameter)) for factor in factors)
     except ParameterError as error:
+        raise _parameter_error(error, asked_in) from error
+    space = Space(bounded, present.get(DELAY_LIMIT, PARAMETERS[DELAY_LIMIT].default))
+    fewest = fewest_evaluations(space, settings)
+    if settings.evaluations < fewest:
         raise UserError(
-            "search", str(error).removesuffix("."), "See docs/studies.md for all that can be searched"
-        ) from error
-    return Space(bounded, present.get(DELAY_LIMIT, PARAMETERS[DELAY_LIMIT].default))
+            asked_in,
+            f"asks for {settings.evaluations} evaluations, too few for {len(names)} parameters",
+            f"Give at least {fewest} (--evaluations), or search fewer parameters",
+        )
+    return space
+
+
+def fewest_evaluations(space: Space, settings: SearchSettings) -> int:
+    """Sets that the smallest search of a space tries."""
+    smallest = plan_of(space, replace(settings, evaluations=FEWEST_EVALUATIONS))
+    # each round of putting back asks once more for a set that is known
+    planned = sum(size for _, size in smallest.rounds) - PUTTING_BACK_ROUNDS
+    return max(planned, FEWEST_EVALUATIONS)
+
+
+def demand_searchable(settings: SearchSettings, asked_in: AnyPath) -> None:
+    """See that all parameters and bounds are of those that can be tuned, before anything is begun.
+
+    Raises
+    ------
+    UserError
+        One is not.
+    """
+    for name in (*settings.parameters, *settings.bounds):
+        try:
+            factors_around({}, [name])
+        except ParameterError as error:
+            raise _parameter_error(error, asked_in) from error
+
+
+def demand_search_folder(folder: Path) -> None:
+    """See that a folder is new, empty, or of a search, and mark it as that.
+
+    Raises
+    ------
+    UserError
+        It holds other files, which the search would mix with its own or overwrite.
+    """
+    mark = folder / _MARK
+    if folder.exists() and not folder.is_dir():
+        raise UserError(folder, "is a file, and the search needs a folder", "Name another folder (--out)")
+    if not mark.exists():
+        other = min((one.name for one in folder.iterdir()), default=None) if folder.is_dir() else None
+        if other is not None:
+            raise UserError(
+                folder,
+                f"holds files that are no search's ({other})",
+                "Name a new or an empty folder, or that of a search which was stopped (--out)",
+            )
+        with atomic_path(mark) as temporary:
+            write_document(temporary, {"holds": "a search of parameters, which goes on from what is kept here"})
+
+
+def _parameter_error(error: ParameterError, asked_in: AnyPath) -> UserError:
+    remedy = f"{error.remedy.removesuffix('.')}; docs/studies.md lists all that can be searched"
+    return UserError(asked_in, f"{error.name}: {error.reason}", remedy)
 
 
 def _bounded(factor: Factor, bounds: Sequence[float] | None) -> Factor:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -22,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Comparing(Protocol):
-    """Compares sets with a base on flights on which both were tried."""
+    """Compares sets with a base on flights."""
 
     def compare(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[Comparison]:
         """Compare the sets of each ask with its base on some flights."""
@@ -30,60 +31,62 @@ class Comparing(Protocol):
 
 
 def search_trials(space: Space, asked: Sequence[AskedRound], found: Found, ground: Comparing) -> Trials | None:
-    """Every set that the search on all flights tried, once, in the order in which it was asked for.
+    """What the search on all flights tried after its first stage, each set once, in the order of the first ask.
 
     Parameters
     ----------
     space : of the search; its origin is the present set
     asked : by all searches
     found : by the one on all flights; the name of its set is `FOUND`
-    ground : where the search was, so that nothing is replayed for this
+    ground : where the search was, so that hardly anything is replayed for this
 
     Returns
     -------
-    The trials; None where no set differs from the present one in what is searched. Factors are those that any set moves.
+    The trials; None where no set differs from the present one in what is searched. Factors are what any set moves.
 
     Notes
     -----
-    The first stage tries beside the present set, and is weighed here as the others are; these try beside the base that
-    it found. How they compare with the base is carried over to the present set by what the base itself is worth beside
-    that, flight by flight.
+    How sets compare with the base that the first stage found is carried over to the present set by what the base itself
+    is worth beside that, flight by flight. The sets of the first stage are left out: they lie far from all others, and
+    would shape what is told of the neighbourhood.
     """
     present, base = values_of(space.whole(space.values(np.zeros(len(space.factors))))), values_of(found.base)
-    rounds = [one for one in asked if one.search.name == ON_ALL and one.ask.sets]
+    rounds = [one for one in asked if one.search.name == ON_ALL and one.ask.stage != DELAYS and one.ask.sets]
     if not rounds:
         return None
     flights = rounds[0].search.flights
-    first = [one for one in rounds if one.ask.stage == DELAYS]
-    asks = [Ask(ALL, present, one.ask.sets, seen_by=base) for one in first]
-    of_base, *of_first = ground.compare([(flights, ask) for ask in (Ask(ALL, present, (base,), seen_by=base), *asks)])
-    again = dict(zip(map(id, first), of_first, strict=True))
+    (of_base,) = ground.compare([(flights, Ask(ALL, present, (base,), seen_by=base))])
     rows = {base: _Row("base", of_base, 0, None)}
     for one in rounds:
-        compared, carried = again.get(id(one), one.compared), None if id(one) in again else of_base
         for place, values in enumerate(one.ask.sets):
-            rows.setdefault(values, _Row(f"{one.ask.stage} {one.number}.{place + 1}", compared, place, carried))
+            rows.setdefault(values, _Row(f"{one.ask.stage} {one.number}.{place + 1}", one.compared, place, of_base))
     rows.pop(present, None)
     return _trials(space, flights, rows, values_of(found.values))
 
 
+@dataclass(frozen=True, eq=False)
 class _Row:
-    """Where a set stands in a comparison; `carried` is what its base is worth, where that is not the present set."""
+    """Where a set stands in a comparison; `of_base` is what its base is worth, where that is not the present set."""
 
-    def __init__(self, name: str, compared: Comparison, place: int, carried: Comparison | None) -> None:
-        self.name, self._compared, self._place, self._carried = name, compared, place, carried
-        self.allowed = not compared.objections[place]
+    name: str
+    compared: Comparison
+    place: int
+    of_base: Comparison | None
+
+    @property
+    def allowed(self) -> bool:
+        return not self.compared.objections[self.place]
 
     @property
     def differences(self) -> Array:
         """(F,) to the present set."""
-        row = self._compared.differences[self._place]
-        return np.asarray(row if self._carried is None else row + self._carried.differences[0])
+        row = self.compared.differences[self.place]
+        return np.asarray(row if self.of_base is None else row + self.of_base.differences[0])
 
     def aim(self, aim: str) -> Array:
         """(F,) the same in one kind of prediction."""
-        row = self._compared.aims[aim][self._place]
-        return np.asarray(row if self._carried is None else row + self._carried.aims[aim][0])
+        row = self.compared.aims[aim][self.place]
+        return np.asarray(row if self.of_base is None else row + self.of_base.aims[aim][0])
 
 
 def _trials(space: Space, flights: Sequence[str], rows: dict[Values, _Row], found: Values) -> Trials | None:

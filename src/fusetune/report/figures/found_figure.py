@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,7 +18,6 @@ from fusetune.report.search_results import SearchResults
 
 _FOLD_COLOUR = "#E69F00"
 _ROW = 0.36
-_STACK = 0.11
 
 
 def found_figure(results: SearchResults) -> Figure:
@@ -38,7 +38,7 @@ def found_figure(results: SearchResults) -> Figure:
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
         entries |= dict(zip(labels, handles, strict=True))
-    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=5)
+    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=5, markerscale=0.85)
     return figure
 
 
@@ -66,20 +66,14 @@ def _row(axes: Axes, place: int, one: Mapping[str, Any], folds: Sequence[float],
     if one["is_changed"]:
         axes.plot(found, place, "D", color=colour, markersize=7, label="found on all flights", linestyle="none",
                   zorder=5)  # fmt: skip
-    seen: dict[float, int] = {}
-    for value in folds:
-        at = position(value)
-        above = seen[at] = seen.get(at, -1) + 1
+    for value, count in Counter(folds).items():
         axes.plot(
-            at, place - 0.24 - _STACK * above * (0.3 if above > 2 else 0.6), "o", color=_FOLD_COLOUR, markersize=4,
-            markeredgecolor="white", markeredgewidth=0.4, linestyle="none", zorder=6,
-            label="found with a part kept aside",
+            position(value), place - 0.3, "o", color=_FOLD_COLOUR, markersize=2.8 + 1.2 * count, linestyle="none",
+            markeredgecolor="white", markeredgewidth=0.4, zorder=6, label="with a part kept aside (larger: several)",
         )  # fmt: skip
 
 
-def _finish(
-    axes: Axes, names: Sequence[str], parameters: Mapping[str, Mapping[str, Any]], unit: str | None
-) -> None:
+def _finish(axes: Axes, names: Sequence[str], parameters: Mapping[str, Mapping[str, Any]], unit: str | None) -> None:
     axes.set_yticks(range(len(names)), names)
     for label, name in zip(axes.get_yticklabels(), names, strict=True):
         label.set_fontweight("bold" if parameters[name]["is_changed"] else "normal")

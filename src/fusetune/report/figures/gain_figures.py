@@ -85,7 +85,13 @@ def kept_aside_figure(results: SearchResults) -> Figure:
         if lower is not None and upper is not None:
             ends = [lower, upper]
             axes.axvspan(lower, upper, color=CHOSEN_COLOUR, alpha=0.12, linewidth=0, label="95 % interval")
-        axes.axvline(expected["percent"], color=PRESENT_COLOUR, linewidth=1.6, zorder=3, label="expected on as many flights again")
+        axes.axvline(
+            expected["percent"],
+            color=PRESENT_COLOUR,
+            linewidth=1.6,
+            zorder=3,
+            label="expected on as many flights again",
+        )
     colours = [CHOSEN_COLOUR if value >= 0.0 else _WORSE_COLOUR for value in values]
     axes.barh(range(len(values)), values, height=0.62, color=colours, alpha=0.85, zorder=2)
     _rows(axes, [_short(name) for name in gains])

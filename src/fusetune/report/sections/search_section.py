@@ -47,7 +47,9 @@ def search_answer(results: SearchResults) -> str:
     search, decision = results.search, results.decision
     tag = '<span class="tag">exploratory</span>' if search["exploratory"] else ""
     parts = [paragraph(one) for one in worth_sentences(search)]
-    if not results.is_change:
+    if results.is_change:
+        parts.append(bullets(decision["cautions"]))
+    else:
         parts += [paragraph(one) for one in why_kept(search, decision)]
     parts.append(
         paragraph(
@@ -90,7 +92,9 @@ def _parameters(results: SearchResults) -> str:
     if results.sensitivity.found is not None:
         verdicts = {one.parameter: one.verdict for one in results.sensitivity.found.parameters}
     parameters: Mapping[str, Mapping[str, Any]] = results.search["parameters"]
-    ordered = sorted(parameters.items(), key=lambda item: (not item[1]["is_changed"], -(item[1]["alone_percent"] or 0.0)))
+    ordered = sorted(
+        parameters.items(), key=lambda item: (not item[1]["is_changed"], -(item[1]["alone_percent"] or 0.0))
+    )
     rows: list[tuple[Cell | str, ...]] = []
     for name, one in ordered:
         rows.append(
@@ -104,12 +108,19 @@ def _parameters(results: SearchResults) -> str:
                 Cell(*_remark(one)),
             )
         )
-    rows += [_goes_along(name, value) for name, value in results.search["parameters_found"].items() if name not in parameters]
+    rows += [
+        _goes_along(name, value) for name, value in results.search["parameters_found"].items() if name not in parameters
+    ]
     return table(
         ("parameter", "now", "found", "unit", "without it errors larger by %", "matters here", ""),
         rows,
         "Found: by the search on all flights. Without it: with this one alone put back to what flies now",
     )
+
+
+def _order(one: Mapping[str, Any]) -> tuple[bool, float]:
+    """What changes first, what brings most before."""
+    return not one["is_changed"], -(one["alone_percent"] or 0.0)
 
 
 def _remark(one: Mapping[str, Any]) -> tuple[str, str]:
@@ -126,7 +137,15 @@ def _remark(one: Mapping[str, Any]) -> tuple[str, str]:
 def _goes_along(name: str, value: float) -> tuple[Cell | str, ...]:
     nothing = number(None)
     along = Cell("goes along with the longer delay", "quiet")
-    return Cell(name, "mono"), nothing, number(value, _DIGITS, "number best"), Cell(unit_of(name), "quiet"), nothing, "", along
+    return (
+        Cell(name, "mono"),
+        nothing,
+        number(value, _DIGITS, "number best"),
+        Cell(unit_of(name), "quiet"),
+        nothing,
+        "",
+        along,
+    )
 
 
 def search_evidence(results: SearchResults, figures: AnyPath) -> str:
@@ -149,7 +168,9 @@ def search_evidence(results: SearchResults, figures: AnyPath) -> str:
             ),
         ]
     else:
-        worth = [paragraph("A single flight leaves none to keep aside: what is luck in the gain cannot be seen. Add logs.")]
+        worth = [
+            paragraph("A single flight leaves none to keep aside: what is luck in the gain cannot be seen. Add logs.")
+        ]
     told = results.sensitivity.sentences
     matters = [paragraph(told[0]), bullets(told[1:])]
     if results.sensitivity.found is not None:
