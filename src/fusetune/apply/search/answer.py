@@ -50,13 +50,29 @@ def _lines(document: Mapping[str, Any], decision: Mapping[str, Any], what_matter
 
 
 def _changes(document: Mapping[str, Any], decision: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each parameter, in columns."""
     changes = decision["changes"]
-    for one in changes[:_MOST_PARAMETERS]:
-        alone = document["parameters"].get(one["name"], {}).get("alone_percent")
-        told = f"   (without it errors {alone:.1f} % larger)" if alone is not None else ""
-        yield f"  {one['name']:<17} {_from_to(one['previous'], one['value'], one['unit'])}{told}"
+    rows = [
+        (
+            one["name"],
+            _from_to(one["previous"], one["value"], one["unit"]),
+            _about(document["parameters"].get(one["name"])),
+        )
+        for one in changes[:_MOST_PARAMETERS]
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    for name, values, about in rows:
+        yield f"  {name:<{widths[0]}}  {values:<{widths[1]}}  {about}".rstrip()
     if len(changes) > _MOST_PARAMETERS:
         yield f"  and {len(changes) - _MOST_PARAMETERS} more"
+
+
+def _about(one: Mapping[str, Any] | None) -> str:
+    """What a parameter brings alone; of what goes along with another nothing is known."""
+    if one is None or one["alone_percent"] is None:
+        return ""
+    bound = f"; not determined: the {one['at_bound']} value that was tried" if one["at_bound"] else ""
+    return f"without it errors {one['alone_percent']:.1f} % larger{bound}"
 
 
 def worth_sentences(document: Mapping[str, Any]) -> list[str]:
