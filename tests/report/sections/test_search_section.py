@@ -28,8 +28,8 @@ def cells(page: str, name: str) -> list[str]:
 def test_the_answer_stands_first_and_says_what_it_is_worth() -> None:
     box = search_answer(made_search())
     assert box.startswith('<section class="decision change"><h2>Change 1 parameter, from 4 flights</h2>')
-    assert "4.0&nbsp;% smaller on flights that were kept aside from the search, 9.0&nbsp;% smaller" in box
-    assert "expect -1.0 to 9.0&nbsp;%" in box
+    assert "4.0&nbsp;% smaller on flights that were kept aside from it, and 9.0&nbsp;% smaller on those" in box
+    assert "expect them from 1.0&nbsp;% larger to 9.0&nbsp;% smaller (95&nbsp;%)" in box
     assert "&lt;attitude&gt;" in box, "cautions stand there, and what files say is escaped"
 
 

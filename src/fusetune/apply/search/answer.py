@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from fusetune.apply.search.words import smaller
+from fusetune.apply.search.words import worth_sentences
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 
 _MOST_PARAMETERS = 5
@@ -73,27 +73,6 @@ def _about(one: Mapping[str, Any] | None) -> str:
         return ""
     bound = f"; not determined: the {one['at_bound']} value that was tried" if one["at_bound"] else ""
     return f"without it errors {one['alone_percent']:.1f} % larger{bound}"
-
-
-def worth_sentences(document: Mapping[str, Any]) -> list[str]:
-    """What was found is worth on the flights that the search saw, and on those that were kept aside from it."""
-    seen, aside = document["gain_in_search_percent"], document["gain_kept_aside_percent"]
-    if not any(one["is_changed"] for one in document["parameters"].values()):
-        return ["The search found nothing that is better than what flies now by as much as would matter."]
-    if seen is None:
-        return ["These flights cannot show what it is worth."]
-    if aside is None:
-        return [
-            f"On the flight that the search saw, prediction errors are {smaller(seen)} with what it found. None was "
-            "kept aside, so nothing shows how much of that is luck."
-        ]
-    expected = document["expected_gain"] or {}
-    lower, upper = expected.get("lower_percent"), expected.get("upper_percent")
-    span = f" On as many again expect {lower:.1f} to {upper:.1f} % (95 %)." if None not in (lower, upper) else ""
-    return [
-        f"Prediction errors are {smaller(aside)} on flights that were kept aside from the search, {smaller(seen)} on "
-        f"those that it saw.{span}"
-    ]
 
 
 def why_kept(document: Mapping[str, Any], decision: Mapping[str, Any]) -> list[str]:

@@ -7,7 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from fusetune.apply.search.answer import headline, unit_of, why_kept, worth_sentences
+from fusetune.apply.search.answer import headline, unit_of, why_kept
+from fusetune.apply.search.words import worth_sentences
 from fusetune.apply.sensitivity.result import FLAT, MATTERS, NOT_TOLD, UNSURE
 from fusetune.report.figures.search_figures import (
     FOUND_VALUES,
