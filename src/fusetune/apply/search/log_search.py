@@ -210,7 +210,9 @@ def demand_search_folder(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise UserError(folder, "is a file, and the search needs a folder", "Name another folder (--out)")
     if not mark.exists():
-        other = min((one.name for one in folder.iterdir()), default=None) if folder.is_dir() else None
+        found = [one.name for one in folder.iterdir()] if folder.is_dir() else []
+        # hidden files: a mark that was being written, what file managers leave
+        other = min((name for name in found if not name.startswith(".")), default=None)
         if other is not None:
             raise UserError(
                 folder,
