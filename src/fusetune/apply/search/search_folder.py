@@ -6,12 +6,12 @@ from pathlib import Path
 
 from fusetune.errors import UserError
 from fusetune.storage.documents import write_document
-from fusetune.storage.files import atomic_path
+from fusetune.storage.files import AnyPath, atomic_path
 
 _MARK = ".search.json"
 
 
-def demand_search_folder(folder: Path) -> None:
+def demand_search_folder(path: AnyPath) -> None:
     """See that a folder is new, empty, or of a search, and mark it as that.
 
     Raises
@@ -19,6 +19,7 @@ def demand_search_folder(folder: Path) -> None:
     UserError
         It holds other files, which the search would mix with its own or overwrite.
     """
+    folder = Path(path)
     mark = folder / _MARK
     if folder.exists() and not folder.is_dir():
         raise UserError(folder, "is a file, and the search needs a folder", "Name another folder (--out)")
