@@ -85,7 +85,7 @@ def test_the_readme_names_every_command(project_root: Path) -> None:
 
 def test_every_file_of_the_folder_is_a_command_under_its_name(project_root: Path) -> None:
     files = {file.stem for file in (project_root / "src" / "fusetune" / "cli").glob("*.py")}
-    assert files - {"__init__", "__main__", "command_line", "command"} == COMMANDS.keys()
+    assert files - {"__init__", "__main__", "command_line", "command", "lines"} == COMMANDS.keys()
 
 
 def test_a_command_that_is_not_run_loads_no_room(project_root: Path) -> None:

@@ -10,6 +10,7 @@ rule decide:
         mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
         found="results/search/found.json" if SEARCH else [],
+        matters="results/search/sensitivity.json" if SEARCH else [],
         configuration=CONFIGURATION_FILES,
     output:
         "results/apply/ranking.parquet",

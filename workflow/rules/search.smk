@@ -151,7 +151,9 @@ if SEARCH:
             asked=asked_before(ROUNDS + 1),
             tried=tried_before(ROUNDS + 1),
         output:
-            "results/search/found.json",
+            found="results/search/found.json",
+            trials="results/search/trials.json",
+            sensitivity="results/search/sensitivity.json",
         log:
             "results/logs/search/found.log",
         localrule: True

@@ -1,5 +1,6 @@
 """Rank the sets over all flights, decide, and write the parameter files."""
 
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,6 +9,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.save import read_present
 from fusetune.set_names import FOUND
 from fusetune.storage.documents import read_document
+from fusetune.storage.files import atomic_path
 
 from job import keep_out, logged_job
 
@@ -47,3 +49,6 @@ with logged_job(snakemake.log[0]):
     )
     if found is not None:
         write_search_document(snakemake.output.search, found, read_document(folder / "decision.json"))
+        # what all sets of the search tell, in place of what these two do
+        with atomic_path(folder / "sensitivity.json") as temporary:
+            shutil.copyfile(snakemake.input.matters, temporary)

@@ -1,5 +1,6 @@
 """What a search found, when all its rounds are done."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.search.found_sets import write_found_sets
@@ -15,6 +16,7 @@ keep_out("pandas")
 with logged_job(snakemake.log[0]):
     params, given = snakemake.params, snakemake.input
     so_far = SearchedSoFar.of_files(given.on, params.search, params.settings["decision"], given.asked, given.tried)
-    found = so_far.found(params.rounds, read_present(given.present).parameters)
-    write_found_sets(snakemake.output[0], found)
+    found, matters = so_far.found(params.rounds, read_present(given.present).parameters)
+    write_found_sets(snakemake.output.found, found)
+    matters.write(Path(snakemake.output.found).parent)
     print(f"found: {found.document['parameters_found'] or 'nothing'}")

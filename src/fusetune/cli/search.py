@@ -18,35 +18,51 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="DIR",
-        help="takes best_params.params, search.json and what is kept for going on: a search that was stopped goes on",
+        help="new folder, or one of a search that was stopped, which goes on; takes best_params.params, search.html, "
+        "search.json and what is kept for going on",
     )
     parser.add_argument(
         "--parameters", type=Path, metavar="FILE", help="YAML file of what to search, and how (docs/search.md)"
     )
-    parser.add_argument("--evaluations", type=int, metavar="N", help="parameter sets that are tried (400)")
+    parser.add_argument("--evaluations", type=int, metavar="N", help="parameter sets that are tried (600)")
     parser.add_argument("--seed", type=int, metavar="N", help="what chance follows from (1)")
-    parser.add_argument("--cores", type=int, metavar="N", help="processes that replay (all cores)")
+    parser.add_argument("--cores", type=_cores, metavar="N", help="processes that replay (all cores)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Search, and tell what was found; always `DONE`."""
     import os
 
+    from fusetune.apply.search.answer import answer_lines
     from fusetune.apply.search.log_search import search_logs
+    from fusetune.cli.lines import Lines
     from fusetune.design.search_settings import SearchSettings
+    from fusetune.report.search_page import build_search_page
+    from fusetune.report.search_results import read_search
     from fusetune.settings.checking import checked
     from fusetune.settings.yaml_reader import read_yaml
 
     document = dict(read_yaml(options.parameters)) if options.parameters else {}
     document |= {name: value for name in ("evaluations", "seed") if (value := getattr(options, name)) is not None}
-    settings = checked(SearchSettings, document, options.parameters or "the command line")
+    asked_in = options.parameters or "the command line"
+    settings = checked(SearchSettings, document, asked_in)
     processes = options.cores or os.cpu_count() or 1
-    found = search_logs(options.logs, options.out, settings, processes=processes, told=_told)
-    print(
-        "", *found["paragraphs"], f"Written: {options.out / 'best_params.params'} and what led to it beside.", sep="\n"
-    )
+    lines = Lines()
+    try:
+        search_logs(options.logs, options.out, settings, processes=processes, told=lines.tell, asked_in=asked_in)
+    finally:
+        lines.end()
+    page = build_search_page(options.out)
+    results = read_search(options.out)
+    lines.tell("")
+    for one in answer_lines(results.search, results.decision, results.sensitivity.sentences):
+        lines.tell(one)
+    lines.tell(f"To load: {options.out / 'best_params.params'}. To look at: {page}.")
     return DONE
 
 
-def _told(line: str) -> None:
-    print(line, flush=True)
+def _cores(text: str) -> int:
+    """A number of processes."""
+    if not text.isascii() or not text.isdigit() or not int(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1")
+    return int(text)

@@ -57,11 +57,11 @@ def write_design(
     write_study(replace(study, sets=(*study.sets, *around)), target, target / AROUND_FOLDER if study.around else target)
 
 
-def write_study(study: Study, folder: Path, params_folder: Path) -> None:
+def write_study(study: Study, folder: str | os.PathLike[str], params_folder: str | os.PathLike[str]) -> None:
     """Write the sets: ``sets.parquet`` and, elsewhere or not, ``<set>.params``."""
     for parameter_set in study.sets:
-        write_set_params(study, parameter_set, params_folder / f"{parameter_set.name}.params")
-    write_sets_table(study, folder / "sets.parquet")
+        write_set_params(study, parameter_set, Path(params_folder) / f"{parameter_set.name}.params")
+    write_sets_table(study, Path(folder) / "sets.parquet")
 
 
 def write_mission_plan(mission: Mission, path: str | os.PathLike[str]) -> None:

@@ -46,7 +46,7 @@ class SearchSettings:
     )
     ratio: float = setting(8.0, "by how much a value may be larger or smaller than the present one", above=1, high=1000)
     evaluations: int = setting(
-        400,
+        600,
         "parameter sets that are tried in all: by the search on all flights, and by those with a part kept aside",
         low=FEWEST_EVALUATIONS,
         high=5000,

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from fusetune.report.html_page import PageHead, write_page
 from fusetune.report.results import read_results
 from fusetune.report.sections.decision_sections import decision_section, sets_section
 from fusetune.report.sections.evidence_sections import (
@@ -25,11 +26,7 @@ from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.sensitivity_section import sensitivity_section
 from fusetune.report.sections.trust_section import trust_section
 from fusetune.report.sections.truth_section import truth_section
-from fusetune.storage.files import AnyPath, atomic_path
-
-STYLE_SHEET = Path(__file__).with_name("page.css")
-
-_PRINT = "addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>d.open=true))"
+from fusetune.storage.files import AnyPath
 
 
 def build_report(
@@ -76,14 +73,5 @@ def build_report(
     product = results.decision["provenance"]["product"]
     count = results.decision["flights_scored"]
     flights = "no flight" if not count else f"{count} flight{'s' if count > 1 else ''}"
-    page = (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>EKF2 parameters: the decision</title><style>{STYLE_SHEET.read_text(encoding='utf-8')}</style>"
-        "</head><body>"
-        f"<header><h1>Which EKF2 parameters to fly</h1><p>{product}, from {flights}</p></header>"
-        + "\n".join(sections)
-        + f"<script>{_PRINT}</script></body></html>\n"
-    )
-    with atomic_path(output) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    head = PageHead("EKF2 parameters: the decision", "Which EKF2 parameters to fly", f"{product}, from {flights}")
+    write_page(output, head, sections)

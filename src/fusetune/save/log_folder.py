@@ -79,7 +79,7 @@ def save_log(
     return verdict
 
 
-def demand_own_folders(logs: Sequence[Path]) -> None:
+def demand_own_folders(logs: Sequence[str | os.PathLike[str]]) -> None:
     """Each log gets a folder by its name.
 
     Raises
@@ -88,7 +88,7 @@ def demand_own_folders(logs: Sequence[Path]) -> None:
         A log has no name, or two have names that some file system takes for the same.
     """
     first: dict[str, Path] = {}
-    for log in logs:
+    for log in map(Path, logs):
         if log.stem in ("", ".", ".."):
             raise UserError(log, "gives no name to a folder", "Rename it")
         other = first.setdefault(log.stem.casefold(), log)

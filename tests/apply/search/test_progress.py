@@ -30,3 +30,20 @@ def test_lines_say_the_round_the_best_so_far_and_the_time_left() -> None:
     seconds[0] = 9.0
     progress.replayed(2, 6)
     assert "2 of 6 replays, errors 10.0 % smaller so far" in lines[1]
+
+
+def test_a_round_is_told_once_when_it_is_done_and_not_where_nothing_is_replayed() -> None:
+    lines: list[str] = []
+    settings = SearchSettings(evaluations=80)
+    progress = Progress(plan_of(SPACE, settings), searches(["a"], settings), lines.append, lambda: 0.0)
+    progress.begin(1)
+    progress.replayed(0, 0)
+    assert not lines
+    progress.replayed(4, 4)
+    # such as what was found, on flights kept aside
+    progress.replayed(2, 2)
+    progress.replayed(0, 0)
+    assert len(lines) == 1
+    progress.begin(2)
+    progress.replayed(6, 6)
+    assert len(lines) == 2

@@ -81,8 +81,8 @@ def test_all_searches_together_try_as_many_sets_as_are_asked_for(evaluations: in
     plan = plan_of(SPACE, settings)
     own = sum(size for _, size in plan.rounds) - plan.start - plan.rounds[0][1]
     together = plan.rounds[0][1] + plan.start + (settings.folds + 1) * own
-    # putting back tries one set more a round than there are parameters, and sizes are whole
-    assert 0.85 * evaluations <= together <= evaluations + 3 * (settings.folds + 1)
+    # the seven rounds of putting back ask once more for the set before, and sizes are whole
+    assert 0.8 * evaluations <= together <= evaluations + 8 * (settings.folds + 1)
 
 
 def test_a_single_flight_keeps_none_aside() -> None:

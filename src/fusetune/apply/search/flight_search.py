@@ -29,6 +29,7 @@ from fusetune.apply.search.requests import Ask
 from fusetune.apply.search.rounds import answered, searches
 from fusetune.apply.search.space import Space
 from fusetune.apply.search.trial_keys import made_of, trial_settings
+from fusetune.apply.search.what_matters import what_matters
 from fusetune.apply.search.workers import WorkerTrier
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
@@ -86,12 +87,14 @@ def search_flights(given: FlightSearch, folder: AnyPath, processes: int, told: C
     trier = WorkerTrier(given.flights, given.trials, processes)
     try:
         outcome = _searched(given, trier, target, told)
-        found = found_sets(outcome, given.space, given.search, given.left_out, given.present_values)
+        matters = what_matters(outcome, given.space, given.decision)
+        found = found_sets(outcome, given.space, given.search, given.left_out, given.present_values, matters.sentences)
         told("judging what was found on the flights that were kept aside")
         _analyze(given, found, target, trier.pool)
     finally:
         trier.close()
     _decide(given, found, target)
+    matters.write(target)
     return write_search_document(target / "search.json", found, read_document(target / "decision.json"))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -58,6 +58,7 @@ def found_sets(
     search: SearchSettings,
     left_out: Mapping[str, str],
     present_values: Mapping[str, float],
+    matters: Sequence[str] = (),
 ) -> FoundSets:
     """What searches found.
 
@@ -65,6 +66,7 @@ def found_sets(
     ----------
     left_out : flights that were not searched on, and why
     present_values : of all that a set of the search may change, as far as the vehicle's log knows them
+    matters : what the search tells of the parameters, in words
     """
     found = outcome.found[0]
     objections = tuple(outcome.on_all.objections[0])
@@ -82,11 +84,12 @@ def found_sets(
         "kept_aside": {name: gain_percent([value]) for name, value in outcome.aside.items()},
         "objections": list(objections),
         "parameters": parameter_documents(found, space),
-        "searches": search_documents(outcome.studied, outcome.found),
+        "searches": search_documents(outcome.studied, outcome.found, outcome.on_seen, outcome.aside),
         "flights": list(outcome.studied[0].flights),
         "flights_left_out": dict(left_out),
         "settings": asdict(search),
         "candidates": candidate_documents(outcome.asked),
+        "matters": list(matters),
     }
     sets = {name: {**present_values, **values} for name, values in outcome.without.items()}
     return FoundSets(recommended, sets if recommended else {}, document)
@@ -107,6 +110,7 @@ def nothing_found(search: SearchSettings, left_out: Mapping[str, str]) -> FoundS
         "flights_left_out": dict(left_out),
         "settings": asdict(search),
         "candidates": [],
+        "matters": [],
     }
     return FoundSets(None, {}, document)
 
@@ -127,7 +131,8 @@ def write_search_document(file: AnyPath, found: FoundSets, decision: Mapping[str
         "paragraphs": [],
         **found.document,
     }
-    document["paragraphs"] = [*decision["paragraphs"], *(search_sentences(document) if document["flights"] else ())]
+    told = [*search_sentences(document), *document["matters"]] if document["flights"] else []
+    document["paragraphs"] = [*decision["paragraphs"], *told]
     written: dict[str, Any] = json.loads(json.dumps(rounded(document)))
     with atomic_path(file) as temporary:
         write_document(temporary, written, allow_nan=False)

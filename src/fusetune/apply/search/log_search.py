@@ -11,7 +11,9 @@ from typing import Any
 from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.apply.search.flight_search import FlightSearch, search_flights
 from fusetune.apply.search.flights_to_search import flights_to_search
-from fusetune.apply.search.search_space import search_space
+from fusetune.apply.search.plan import fewest_sets
+from fusetune.apply.search.search_folder import demand_search_folder
+from fusetune.apply.search.search_space import demand_searchable, search_space
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.errors import UserError
@@ -34,6 +36,7 @@ def search_logs(
     analysis: AnalysisSettings | None = None,
     processes: int = 1,
     told: Callable[[str], None] = print,
+    asked_in: AnyPath = "search",
 ) -> dict[str, Any]:
     """Search the parameters of the vehicle that flew the newest of some logs.
 
@@ -46,6 +49,7 @@ def search_logs(
     analysis : how flights are replayed and scored
     processes : that replay
     told : is given lines about how far it is
+    asked_in : file that the settings come from, for errors
 
     Returns
     -------
@@ -54,11 +58,13 @@ def search_logs(
     Raises
     ------
     UserError
-        No log can be used, or a parameter cannot be searched.
+        No log can be used, a parameter cannot be searched, or the folder holds what is no search's.
     """
     settings, decision = settings or SearchSettings(), decision or DecisionSettings()
     analysis = analysis or AnalysisSettings()
     target = Path(folder)
+    demand_searchable(settings, asked_in)
+    demand_search_folder(target)
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         folders = _saved(logs, target / "save", pool, told)
         table = target / "save" / "flights.parquet"
@@ -74,6 +80,10 @@ def search_logs(
             told(f"{name}: left out, {why}")
     if not searched.flights:
         raise UserError(target, "no flight is replayed well enough to search on", "The lines above say why, log by log")
+    space = search_space(searched.vehicle, searched.parameters, settings, asked_in)
+    fewest = fewest_sets(space, settings)
+    if settings.evaluations < fewest:
+        told(f"{settings.evaluations} sets are too few for {len(space.factors)} parameters: {fewest} are tried")
     given = FlightSearch(
         flights={name: folders[name] for name in searched.flights},
         left_out=searched.left_out,
@@ -81,7 +91,7 @@ def search_logs(
         present_flight=present.flight,
         same_present=present.same,
         present_values=present.parameters,
-        space=search_space(searched.vehicle, searched.parameters, settings),
+        space=space,
         search=settings,
         decision=decision,
         analysis=analysis,

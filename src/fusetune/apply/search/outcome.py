@@ -27,6 +27,8 @@ class Outcome:
     found : what each found
     asked : all that they asked
     on_all : what the first found, on all flights
+    on_seen : of each search, what it found, on the flights that it saw: score less the present set's, nat
+    of_base : the base of the first, beside the present set, on all flights
     aside : what each of the others found, on the flights that it did not see, in order of time: score less the present
         set's, nat; NaN where a flight says nothing
     """
@@ -35,6 +37,8 @@ class Outcome:
     found: Sequence[Found]
     asked: Sequence[AskedRound]
     on_all: Comparison
+    on_seen: Sequence[Sequence[float]]
+    of_base: Comparison
     aside: Mapping[str, float]
 
     @property
@@ -56,10 +60,15 @@ def outcome_rounds(
     present = values_of(space.values(np.zeros(len(space.factors))))
     whats = [values_of(one.values) for one in found]
     asks = [Ask(ALL, present, (what,), seen_by=what) for what in whats]
-    on_all, *others = yield list(zip([one.aside or one.flights for one in studied], asks, strict=True))
+    base = values_of(found[0].base)
+    seen = [(one.flights, ask) for one, ask in zip(studied, asks, strict=True)]
+    aside = [(one.aside, ask) for one, ask in zip(studied, asks, strict=True) if one.aside]
+    of_base, *compared = yield [(studied[0].flights, Ask(ALL, present, (base,), seen_by=base)), *seen, *aside]
+    on_seen, others = compared[: len(seen)], compared[len(seen) :]
     differences = [
         (name, value)
-        for one, compared in zip(studied[1:], others, strict=True)
-        for name, value in zip(one.aside, compared.differences[0].tolist(), strict=True)
+        for (names, _), one in zip(aside, others, strict=True)
+        for name, value in zip(names, one.differences[0].tolist(), strict=True)
     ]
-    return Outcome(studied, found, asked, on_all, dict(differences))
+    each = [one.differences[0].tolist() for one in on_seen]
+    return Outcome(studied, found, asked, on_seen[0], each, of_base, dict(differences))

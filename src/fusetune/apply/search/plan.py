@@ -65,7 +65,7 @@ class Plan:
     def rounds(self) -> tuple[tuple[str, int], ...]:
         """Stage and number of sets of every generation; none asks for more than this."""
         count = len(self.first)
-        first = [start_size(count), *self.first_generations]
+        first = [start_size(count), *self.first_generations, *(1 + count,) * _PUTTING_DELAYS_BACK_ROUNDS]
         again = [again_size(count), *self.again_generations, *(1 + count,) * _PUTTING_DELAYS_BACK_ROUNDS]
         rest = 1 + len(self.parameters) - count
         back = (rest, rest, 1 + len(self.parameters))
@@ -92,15 +92,35 @@ def planned_rounds(settings: SearchSettings) -> int:
     return len(_plan(settings.searched, settings).rounds) + 1
 
 
+def fewest_sets(space: Space, settings: SearchSettings) -> int:
+    """How many sets the smallest plan for a space tries, about."""
+    own, shared = _fixed_sets(space.parameters), _shared_sets(space.parameters)
+    return shared + 2 * len(space.parameters) + (settings.folds + 1) * (own + _GENERATIONS)
+
+
 def _plan(parameters: Sequence[str], settings: SearchSettings) -> Plan:
-    first = tuple(name for name in parameters if name.endswith(FIRST_SUFFIXES))
     searches = settings.folds + 1
-    fixed = Plan(tuple(parameters), first, 0, ()).rounds
-    shared = start_size(len(first)) if first else 0
-    left = settings.evaluations - shared - searches * (sum(size for _, size in fixed) - shared)
+    left = settings.evaluations - _shared_sets(parameters) - searches * _fixed_sets(parameters)
     start = max(round(_START_SHARE * left), 2 * len(parameters))
     size = max((left - start) // (searches * _GENERATIONS), 1)
-    return Plan(tuple(parameters), first, start, (size,) * _GENERATIONS)
+    return Plan(tuple(parameters), _first(parameters), start, (size,) * _GENERATIONS)
+
+
+def _first(parameters: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in parameters if name.endswith(FIRST_SUFFIXES))
+
+
+def _shared_sets(parameters: Sequence[str]) -> int:
+    """What all searches begin with."""
+    count = len(_first(parameters))
+    return start_size(count) if count else 0
+
+
+def _fixed_sets(parameters: Sequence[str]) -> int:
+    """Sets of a search beside those of its second stage: as a rule, for what is put back is not known before."""
+    count, rest = len(_first(parameters)), len(parameters) - len(_first(parameters))
+    of_delays = (_FIRST_GENERATIONS + _AGAIN_GENERATIONS) * (1 + count) + again_size(count) + 2 * 2 * count
+    return (of_delays if count else 0) + 2 * rest + len(parameters) // 2
 
 
 def start_size(factors: int) -> int:

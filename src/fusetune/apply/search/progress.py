@@ -10,6 +10,10 @@ from fusetune.apply.search.plan import Plan
 from fusetune.apply.search.rounds import Searched
 
 
+class ProgressLine(str):
+    """A line that takes the place of the one before where it is shown on a terminal."""
+
+
 class Progress:
     """Tells a line when a round begins, and as it goes on, no more often than every few seconds.
 
@@ -37,18 +41,19 @@ class Progress:
         """A round begins."""
         # the last round, on flights kept aside, is not among those planned for a search
         self._number, self._begun = min(number, len(self._rounds)), self._clock()
-        self._before = self._replayed
+        self._before, self._is_done = self._replayed, False
 
     def better(self, objective: float) -> None:
         """The best so far that the search on all flights has, nat."""
         self._best = min(self._best, objective)
 
     def replayed(self, done: int, number: int) -> None:
-        """So many replays of a round are done."""
+        """So many replays of a round are done; what is replayed once a round is done is not told."""
         now = self._clock()
         self._replayed = self._before + done
-        if done < number and now - self._last < self.EVERY_S:
+        if not number or self._is_done or (done < number and now - self._last < self.EVERY_S):
             return
+        self._is_done = done >= number
         self._last = now
         self._replaying_s += now - self._begun
         self._begun = now
@@ -56,10 +61,10 @@ class Progress:
         seconds = self._replaying_s / max(self._replayed, 1) * left
         stage = self._rounds[min(self._number, len(self._rounds)) - 1][0]
         gain = f", errors {improvement_percent(self._best):.1f} % smaller so far" if self._best < 0.0 else ""
-        self._told(
+        self._told(ProgressLine(
             f"round {self._number} of {len(self._rounds)} ({stage}): {done} of {number} replays{gain}, "
             f"{_in_words(seconds)} left at the most"
-        )
+        ))  # fmt: skip
 
 
 def _in_words(seconds: float) -> str:

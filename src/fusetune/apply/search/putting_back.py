@@ -65,7 +65,9 @@ def fewest_changes(compared: Comparison, stage: str, settings: SearchSettings) -
     matters = math.log1p(0.01 * settings.putting_back_percent)
     chosen = 0
     for place in range(1, len(scores)):
-        little = max(matters, min(_error(rows[place] - rows[0]), _SHARE_OF_GAIN * gain))
+        # where a delay or an arm is right, some flights tell it strongly and others not at all: that is no error
+        error = 0.0 if stage in OF_DELAYS else min(_error(rows[place] - rows[0]), _SHARE_OF_GAIN * gain)
+        little = max(matters, error)
         if scores[place] - scores[0] > little:
             continue
         steps = smoothed[place] - smoothed[0]

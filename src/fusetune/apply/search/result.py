@@ -43,6 +43,7 @@ def parameter_documents(found: Found, space: Space) -> dict[str, Any]:
             "is_changed": factor.parameter in found.changed,
             "alone_percent": alone_percent(found, factor.parameter),
             "at_bound": bound_of(factor.parameter, found.values, space),
+            "scale": factor.scale,
             "low": factor.low,
             "high": factor.high,
         }
@@ -70,8 +71,19 @@ def gain_percent(differences: Sequence[float]) -> float | None:
     return improvement_percent(float(np.mean(known))) if known else None
 
 
-def search_documents(studied: Sequence[Searched], found: Sequence[Found]) -> list[dict[str, Any]]:
-    """Of each search: what it saw, what was kept aside, and what it found."""
+def search_documents(
+    studied: Sequence[Searched],
+    found: Sequence[Found],
+    on_seen: Sequence[Sequence[float]],
+    aside: Mapping[str, float],
+) -> list[dict[str, Any]]:
+    """Of each search: what it saw, what was kept aside, what it found, and what that is worth on both.
+
+    Parameters
+    ----------
+    on_seen : of each search, the score differences of what it found on the flights that it saw, nat
+    aside : by flight, those of what was found without it
+    """
     return [
         {
             "search": one.name,
@@ -79,8 +91,10 @@ def search_documents(studied: Sequence[Searched], found: Sequence[Found]) -> lis
             "kept_aside": list(one.aside),
             "values": result.values,
             "changed": list(result.changed),
+            "gain_in_search_percent": gain_percent(seen),
+            "gain_kept_aside_percent": gain_percent([aside[name] for name in one.aside]),
         }
-        for one, result in zip(studied, found, strict=True)
+        for one, result, seen in zip(studied, found, on_seen, strict=True)
     ]
 
 

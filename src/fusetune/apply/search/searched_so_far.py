@@ -25,6 +25,7 @@ from fusetune.apply.search.rounds import AskedOfFlights, Rounds
 from fusetune.apply.search.search_space import search_space
 from fusetune.apply.search.searched_flights import SearchedFlights, read_searched_flights
 from fusetune.apply.search.space import Space
+from fusetune.apply.search.what_matters import WhatMatters, what_matters
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.errors import RUN_AGAIN, UserError
@@ -35,14 +36,14 @@ from fusetune.storage.files import AnyPath
 class SearchedSoFar:
     """A search and the answers of its flights so far.
 
-    Attributes
-    ----------
-    best : the lowest of what the search on all flights makes small, nat
-
     Parameters
     ----------
     asked : files of the rounds before, of `write_round`
     tried : files of what flights answered to them, of `write_tried`
+
+    Attributes
+    ----------
+    best : the lowest of what the search on all flights makes small, nat
     """
 
     def __init__(
@@ -53,7 +54,7 @@ class SearchedSoFar:
         asked: Iterable[AnyPath],
         tried: Iterable[AnyPath],
     ) -> None:
-        self._on, self._search = on, search
+        self._on, self._search, self._decision = on, search, decision
         self._ground = ReplayGround(_Answers(), decision)
         for file in tried:
             for batch, did in read_tried(file):
@@ -82,14 +83,16 @@ class SearchedSoFar:
         asks, _ = self._gone_through(number) if self._on.flights else ([], None)
         return RoundFile(number, asks, self._proposals.new)
 
-    def found(self, rounds: int, present_values: Mapping[str, float]) -> FoundSets:
-        """What was found, after so many rounds; present values as for `found_sets`."""
+    def found(self, rounds: int, present_values: Mapping[str, float]) -> tuple[FoundSets, WhatMatters]:
+        """What was found, after so many rounds, and what matters; present values as for `found_sets`."""
         if not self._on.flights:
-            return nothing_found(self._search, self._on.left_out)
+            return nothing_found(self._search, self._on.left_out), WhatMatters(None, None)
         asks, outcome = self._gone_through(rounds + 1)
         if outcome is None:
             raise RuntimeError(f"a search that was to end after {rounds} rounds asks for {len(asks)} comparisons more")
-        return found_sets(outcome, self._space, self._search, self._on.left_out, present_values)
+        matters = what_matters(outcome, self._space, self._decision)
+        left_out = self._on.left_out
+        return found_sets(outcome, self._space, self._search, left_out, present_values, matters.sentences), matters
 
     def told(self, asked: RoundFile) -> str:
         """How far the search is, in a line."""

@@ -29,9 +29,6 @@ Array = npt.NDArray[np.float64]
 _NEAR = 0.35
 """After the first stage delays move no farther from what it found, in half ranges."""
 
-_MATTERS = 0.01
-"""What the first stage finds is taken where it makes errors smaller by 1 %."""
-
 _AGAIN = 0.2
 """How far around what was found delays and lever arms are looked at again, in half ranges: 20 ms, 0.1 m."""
 
@@ -82,7 +79,9 @@ def search_stages(space: Space, plan: Plan, settings: SearchSettings, proposing:
     first = space.only(plan.first)
     base = present
     if plan.first:
-        base = yield from _first_stage(first, present, _star(first, (1.0 / 3.0, 1.0)), len(plan.first_generations))
+        moved = yield from _first_stage(first, present, _star(first, (1.0 / 3.0, 1.0)), len(plan.first_generations))
+        changed = [name for name in plan.first if moved[name] != present[name]]
+        base = yield from put_back(space, moved, present, present, changed, settings, DELAYS)
     around = _second_space(space, base, plan.first)
     best = yield from _second_stage(around, base, plan, settings, proposing)
     before = best
@@ -119,8 +118,7 @@ def _first_stage(
         if generation < generations:
             new = propose_on_parabola(space, np.array(tried.points), np.array(tried.scores), generation)
             asked = [start | one for one in new]
-    gain = tried.scores[0] - min(tried.scores)
-    return start | space.values(tried.best) if gain > (_MATTERS if stage == DELAYS else 0.0) else start
+    return start | space.values(tried.best) if min(tried.scores) < tried.scores[0] else start
 
 
 def _second_stage(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from fusetune.apply.search.result import alone_percent
@@ -22,9 +22,7 @@ def alone_sentences(found: Found) -> dict[str, str]:
 
 def search_sentences(document: Mapping[str, Any]) -> list[str]:
     """The search in words: what it is worth, and what it could not tell."""
-    if not any(one["is_changed"] for one in document["parameters"].values()):
-        return ["The search found nothing that is better than the present parameters by as much as would matter."]
-    sentences = [*_gains(document)]
+    sentences = worth_sentences(document)
     changed = {name: one for name, one in document["parameters"].items() if one["is_changed"]}
     bounds = [
         f"{name} ({one['at_bound']} value that is tried, {one['found']:g})"
@@ -45,21 +43,38 @@ def search_sentences(document: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def _gains(document: Mapping[str, Any]) -> Iterator[str]:
-    search, aside = document["gain_in_search_percent"], document["gain_kept_aside_percent"]
-    if search is None or aside is None:
-        return
-    yield (
-        f"On the flights that the search saw, errors are {_smaller(search)} with what it found; on flights that were "
-        f"kept aside from it, {_smaller(aside)}. The second is what to expect."
-    )
-    expected = document["expected_gain"]
-    if expected is not None and expected["lower_percent"] is not None:
-        yield (
-            f"On as many flights again, between {expected['lower_percent']:.1f} and {expected['upper_percent']:.1f} % "
-            "smaller (95 %; a minus means larger)."
-        )
+def worth_sentences(document: Mapping[str, Any]) -> list[str]:
+    """What was found is worth on flights that were kept aside, and on those that the search saw.
+
+    Parameters
+    ----------
+    document : what `search.json` holds
+    """
+    seen, aside = document["gain_in_search_percent"], document["gain_kept_aside_percent"]
+    if not any(one["is_changed"] for one in document["parameters"].values()):
+        return ["The search found nothing that is better than what flies now by as much as would matter."]
+    if seen is None:
+        return ["These flights cannot show what the search's find is worth."]
+    if aside is None:
+        return [
+            f"With what the search found, prediction errors are {_smaller(seen)} on the flight that it saw. None was "
+            "kept aside, so nothing shows how much of that is luck."
+        ]
+    return [
+        f"With what the search found, prediction errors are {_smaller(aside)} on flights that were kept aside from it, "
+        f"and {_smaller(seen)} on those that it saw.{_expected(document['expected_gain'])}"
+    ]
+
+
+def _expected(gain: Mapping[str, float | None] | None) -> str:
+    """The interval in words, behind a space; empty where there is none."""
+    lower, upper = (None, None) if gain is None else (gain["lower_percent"], gain["upper_percent"])
+    if lower is None or upper is None:
+        return ""
+    ends = f"{lower:.1f} to {upper:.1f} % smaller" if lower >= 0.0 else f"from {_smaller(lower)} to {_smaller(upper)}"
+    return f" On as many flights again expect them {ends} (95 %)."
 
 
 def _smaller(percent: float) -> str:
+    """By how much errors are smaller, or larger."""
     return f"{percent:.1f} % smaller" if percent >= 0.0 else f"{-percent:.1f} % larger"

@@ -33,12 +33,13 @@ _ACCURACY = {
 _MIXED = "errors of one-step predictions (or smoothed velocity), % less than now"
 
 
-def pareto_figure(trials: Trials, chosen: str | None = None) -> Figure:
+def pareto_figure(trials: Trials, chosen: str | None = None, label: str = "chosen") -> Figure:
     """The front of the sets that may be flown, the present set and the chosen one; what others beat is pale.
 
     Parameters
     ----------
     chosen : name of the set that is chosen; None, or a name that was not tried, marks none
+    label : what it is called
     """
     differences, accuracy = two_aims(trials)
     gains = -percent_change(differences)
@@ -63,7 +64,7 @@ def pareto_figure(trials: Trials, chosen: str | None = None) -> Figure:
     axes.plot(0.0, 0.0, "s", color=PRESENT_COLOUR, markersize=7, label="flies now", linestyle="none", zorder=5)
     if chosen in trials.names:
         here = gains[trials.names.index(chosen)]
-        axes.plot(*here, "D", color=CHOSEN_COLOUR, markersize=8, label="chosen", linestyle="none", zorder=6)
+        axes.plot(*here, "D", color=CHOSEN_COLOUR, markersize=8, label=label, linestyle="none", zorder=6)
     axes.annotate("better in both", (0.0, 0.0), (8, 4), textcoords="offset points", color=_FRONT_COLOUR, fontsize=8,
                   ha="left", va="bottom")  # fmt: skip
     axes.set_xlim(left, right)

@@ -1,0 +1,38 @@
+"""A page that needs no network: its style and pictures are inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+from fusetune.storage.files import AnyPath, atomic_path
+
+STYLE_SHEET = Path(__file__).with_name("page.css")
+
+_PRINT = "addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>d.open=true))"
+
+
+@dataclass(frozen=True)
+class PageHead:
+    """What a page is called in the browser, its first line, and what it was made from."""
+
+    title: str
+    heading: str
+    origin: str
+
+
+def write_page(output: AnyPath, head: PageHead, sections: Sequence[str]) -> None:
+    """Write sections, which are HTML, as a page."""
+    page = (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(head.title)}</title><style>{STYLE_SHEET.read_text(encoding='utf-8')}</style>"
+        "</head><body>"
+        f"<header><h1>{escape(head.heading)}</h1><p>{escape(head.origin)}</p></header>"
+        + "\n".join(sections)
+        + f"<script>{_PRINT}</script></body></html>\n"
+    )
+    with atomic_path(output) as temporary:
+        temporary.write_text(page, encoding="utf-8")

@@ -1,0 +1,239 @@
+"""The part of the page about a search: what to set, what it is worth, and what shows that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from fusetune.apply.search.answer import headline, unit_of, why_kept
+from fusetune.apply.search.words import worth_sentences
+from fusetune.apply.sensitivity.result import FLAT, MATTERS, NOT_TOLD, UNSURE
+from fusetune.report.figures.search_figures import (
+    FOUND_VALUES,
+    KEPT_ASIDE,
+    SEARCH_PARETO,
+    SEARCH_SENSITIVITY,
+    SHRINKAGE,
+)
+from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, table
+from fusetune.report.search_results import SearchResults
+from fusetune.report.sections.next_steps_section import steps_list
+from fusetune.storage.files import AnyPath
+
+_MATTERS_WORDS = {MATTERS: "yes", FLAT: "hardly", UNSURE: "not sure", NOT_TOLD: "not told"}
+_DIGITS = 4
+
+
+def search_section(results: SearchResults, figures: AnyPath) -> str:
+    """Answer, table and evidence of a search.
+
+    Parameters
+    ----------
+    results : of the search's folder (`fusetune.report.search_results.read_search`)
+    figures : folder that holds `fusetune.report.figures.search_figures.SEARCH_FIGURES`
+    """
+    return "\n".join(
+        (
+            search_answer(results),
+            section("What the search found", *_found(results, Path(figures))),
+            search_evidence(results, figures),
+        )
+    )
+
+
+def search_answer(results: SearchResults) -> str:
+    """What to set and what it is worth, in a box."""
+    search, decision = results.search, results.decision
+    tag = '<span class="tag">exploratory</span>' if search["exploratory"] else ""
+    parts = [paragraph(one) for one in worth_sentences(search)]
+    if results.is_change:
+        parts.append(bullets(decision["cautions"]))
+    else:
+        parts += [paragraph(one) for one in why_kept(search, decision)]
+    parts.append(
+        paragraph(
+            "Prediction errors: how far off the estimator was when it predicted a measurement before it saw it, and "
+            "how far velocity and position had drifted after seconds without GNSS. Kept aside: flights that the search "
+            "which found the values had not seen, as it will not have seen the next ones.",
+            "note",
+        )
+    )
+    return (
+        f'<section class="decision {escape(decision["status"])}"><h2>{escape(headline(search, decision))}{tag}</h2>'
+        + "".join(parts)
+        + "</section>"
+    )
+
+
+def _found(results: SearchResults, figures: Path) -> list[str]:
+    parts = [_parameters(results)]
+    if results.is_change:
+        parts.append(
+            paragraph(
+                "best_params.params holds what changes. Load it in QGroundControl (Parameters → Tools → Load from "
+                "file), reboot, and fly a short, safe flight first; rollback.params brings the old values back.",
+                "note",
+            )
+        )
+    else:
+        parts.append(paragraph("There is nothing to load: best_params.params holds no parameter and says so.", "note"))
+    caption = (
+        "Where each parameter is (square) and where the search on all flights took it (diamond), inside the bounds "
+        "that it may move in (grey). Small dots: what the same search found with a part of the flights kept aside. "
+        "Where they lie together the flights determine the value; where they scatter, it could be another as well."
+    )
+    parts.append(figure(figures / FOUND_VALUES, caption))
+    return parts
+
+
+def _parameters(results: SearchResults) -> str:
+    verdicts = {}
+    if results.sensitivity.found is not None:
+        verdicts = {one.parameter: one.verdict for one in results.sensitivity.found.parameters}
+    parameters: Mapping[str, Mapping[str, Any]] = results.search["parameters"]
+    ordered = sorted(
+        parameters.items(), key=lambda item: (not item[1]["is_changed"], -(item[1]["alone_percent"] or 0.0))
+    )
+    rows: list[tuple[Cell | str, ...]] = []
+    for name, one in ordered:
+        rows.append(
+            (
+                Cell(name, "mono"),
+                number(one["present"], _DIGITS),
+                number(one["found"], _DIGITS, "number best") if one["is_changed"] else number(None),
+                Cell(unit_of(name), "quiet"),
+                number(one["alone_percent"], 2),
+                _MATTERS_WORDS.get(verdicts.get(name, NOT_TOLD), ""),
+                Cell(*_remark(one)),
+            )
+        )
+    rows += [
+        _goes_along(name, value) for name, value in results.search["parameters_found"].items() if name not in parameters
+    ]
+    return table(
+        ("parameter", "now", "found", "unit", "without it errors larger by %", "matters here", ""),
+        rows,
+        "Found: by the search on all flights. Without it: with this one alone put back to what flies now",
+    )
+
+
+def _order(one: Mapping[str, Any]) -> tuple[bool, float]:
+    """What changes first, what brings most before."""
+    return not one["is_changed"], -(one["alone_percent"] or 0.0)
+
+
+def _remark(one: Mapping[str, Any]) -> tuple[str, str]:
+    """What there is to say of a parameter, and its class."""
+    if one["at_bound"]:
+        return f"not determined: {one['at_bound']} value that was tried, the best may lie beyond", "bad"
+    if one["is_changed"]:
+        return "", ""
+    if one["before_putting_back"] != one["present"]:
+        return f"put back: {one['before_putting_back']:.3g} gained next to nothing", "quiet"
+    return "nothing better found", "quiet"
+
+
+def _goes_along(name: str, value: float) -> tuple[Cell | str, ...]:
+    nothing = number(None)
+    along = Cell("goes along with the longer delay", "quiet")
+    return (
+        Cell(name, "mono"),
+        nothing,
+        number(value, _DIGITS, "number best"),
+        Cell(unit_of(name), "quiet"),
+        nothing,
+        "",
+        along,
+    )
+
+
+def search_evidence(results: SearchResults, figures: AnyPath) -> str:
+    """What shows that: gains on flights kept aside, luck, what matters, the two aims."""
+    folder = Path(figures)
+    worth: list[str] = []
+    if results.parts:
+        worth = [
+            figure(
+                folder / KEPT_ASIDE,
+                "One bar for each flight, in order of time: what was found without this flight, flown on it, against "
+                "what flies now. To the right is better. Line and shade: the gain to expect on as many flights again, "
+                "and its 95 % interval.",
+            ),
+            figure(
+                folder / SHRINKAGE,
+                "What a search promises (open circle, on the flights it saw) and what is left of it on flights that it "
+                "did not see (full circle). A search always fits some chance of its own flights; the distance is that "
+                "luck. A single part may do better than promised when its flights happen to be easier.",
+            ),
+        ]
+    else:
+        worth = [
+            paragraph("A single flight leaves none to keep aside: what is luck in the gain cannot be seen. Add logs.")
+        ]
+    told = results.sensitivity.sentences
+    matters = [paragraph(told[0]), bullets(told[1:])]
+    if results.sensitivity.found is not None:
+        matters.append(
+            figure(
+                folder / SEARCH_SENSITIVITY,
+                "Each curve moves one parameter and holds the others as the search found them (diamond, “chosen”); "
+                "above the line is better than now (dotted). The shade is the 95 % interval of the change. Green: "
+                "values between which the errors hardly change. Dots: the sets that were tried.",
+            )
+        )
+    aims = figure(
+        folder / SEARCH_PARETO,
+        "Every set that the search on all flights tried: to the right it is better with all sensors, upwards it drifts "
+        "less without GNSS. On the green line (the Pareto front) nothing gains in one without losing in the other. The "
+        "search takes no set that pays for one with the other.",
+    )
+    return "\n".join(
+        (
+            section("What it is worth on flights that the search did not see", *worth),
+            section("What matters", *matters),
+            section("Two aims: accuracy with all sensors, drift without GNSS", aims),
+            section("How it was searched", *_how(results)),
+        )
+    )
+
+
+def _how(results: SearchResults) -> list[str]:
+    search = results.search
+    tried = sum(one["search"] == "all flights" for one in search["candidates"])
+    parts = [
+        paragraph(
+            f"{tried} sets on {len(search['flights'])} flights"
+            + (
+                f", and the same search again without each of {len(results.parts)} parts of them, to judge what it "
+                "finds on flights it did not see."
+                if results.parts
+                else "."
+            )
+            + " Delays and lever arms are searched first, then everything together, then each change that brings less "
+            f"than {search['settings']['putting_back_percent']:g} % is put back. Every set is replayed on the flights' "
+            "recorded sensor data; trials.json and search.json hold all of them."
+        )
+    ]
+    if search["flights_left_out"]:
+        parts.append(bullets([f"{name}: left out, {why}" for name, why in search["flights_left_out"].items()]))
+    rows = [
+        (
+            one["search"],
+            ", ".join(one["kept_aside"]) or "none",
+            number(one["gain_in_search_percent"], 3),
+            number(one["gain_kept_aside_percent"], 3),
+            ", ".join(f"{name} {one['values'][name]:.3g}" for name in one["changed"]) or "nothing",
+        )
+        for one in search["searches"]
+    ]
+    head = ("search", "kept aside", "gain on what it saw %", "gain kept aside %", "found")
+    parts.append(details("What each search found", table(head, rows)))
+    return parts
+
+
+def search_next_steps(results: SearchResults) -> str:
+    """What to do next, as the decision says."""
+    steps = results.decision["next_steps"]
+    return section("What to do next", steps_list(steps)) if steps else ""
