@@ -30,8 +30,10 @@ def test_in_the_last_round_each_search_is_tried_on_what_it_did_not_see() -> None
     settings = SearchSettings(evaluations=24, folds=2)
     ground = MadeGround(BEST, dict.fromkeys(PRESENT, 1.0), spread=0.3)
     outcome = answered(outcome_rounds(FLIGHTS, SPACE, settings), ground)
-    last = ground.asked[-3:]
-    assert [flights for flights, _ in last] == [("0", "1", "2"), *(one.aside for one in outcome.studied[1:])]
-    assert [ask.sets for _, ask in last] == [(values_of(one.values),) for one in outcome.found]
+    seen, aside = ground.asked[-5:-2], ground.asked[-2:]
+    assert [flights for flights, _ in seen] == [one.flights for one in outcome.studied]
+    assert [flights for flights, _ in aside] == [one.aside for one in outcome.studied[1:]]
+    assert [ask.sets for _, ask in seen] == [(values_of(one.values),) for one in outcome.found]
+    assert [ask.sets for _, ask in aside] == [(values_of(one.values),) for one in outcome.found[1:]]
     assert [*outcome.aside] == FLIGHTS
     assert outcome.without["0"] == outcome.found[1].values
