@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from benchmarks.decision_study.collect import stamp
 from benchmarks.decision_study.world import TRUTH
 
 from fusetune.analyze.flight.ground_truth import Truth, read_truth
@@ -38,6 +39,11 @@ class JudgedFlight:
 
     def __init__(self, folder: Path, settings: ReplaySettings) -> None:
         self.folder, self._settings, self._scoring = folder, settings, ScoringSettings()
+
+    @property
+    def name(self) -> str:
+        """World, flight, and what it was made from: a flight that is flown otherwise is another."""
+        return f"{self.folder.parent.name}_{self.folder.name}_{stamp(self.folder).read_text(encoding='utf-8')[:8]}"
 
     @cached_property
     def prepared(self) -> PreparedFlight:
@@ -87,7 +93,7 @@ class KeptFigures:
         """Figures of other sources of the estimator and of its judging are not these: they are kept apart."""
         digest = source_digest("px4", "ekf2", "analyze/replaying", "analyze/flight", "analyze/scoring/window.py")
         self.flights = tuple(flights)
-        self._files = [folder / digest[:12] / f"{one.folder.parent.name}_{one.folder.name}.jsonl" for one in flights]
+        self._files = [folder / digest[:12] / f"{one.name}.jsonl" for one in flights]
         self._known = [self._read(file) for file in self._files]
 
     @staticmethod
