@@ -21,7 +21,7 @@ from tests.apply.test_ranking import analyzed
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.choice import choose
 from fusetune.apply.decide import decide
-from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight, FlightEvidence, _Sums, flight_evidence
+from fusetune.apply.evidence import AIDED, UNAIDED, AnalyzedFlight, BlockSums, FlightEvidence, flight_evidence
 from fusetune.apply.ranking import ELIGIBLE, RankedSet, proved_sets, rank
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.bootstrap import FEWEST_REDRAWN, expanded_interval, holm, p_value, units_redrawn
@@ -140,7 +140,7 @@ def test_draws_that_are_no_numbers_are_left_out() -> None:
 def test_a_set_without_a_score_is_not_ranked_first() -> None:
     """Errors of exactly 0, and such that are no number, have no logarithm."""
     nis = np.array([[[4.0]], [[0.0]], [[np.nan]]])
-    sums = _Sums(("a", "b", "c"), (("gnss_vel", "gnss_vel x"),), np.full((1, 1), 4.0), nis, np.zeros_like(nis))
+    sums = BlockSums(("a", "b", "c"), (("gnss_vel", "gnss_vel x"),), np.full((1, 1), 4.0), nis, np.zeros_like(nis))
     found = flight_evidence("flight", sums, None, {}, DecisionSettings())
     assert found is not None
     assert found.sets == ("a",)

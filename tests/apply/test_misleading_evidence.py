@@ -13,8 +13,8 @@ from fusetune.apply.choice import choose
 from fusetune.apply.evidence import (
     MISLEADING,
     AnalyzedFlight,
+    BlockSums,
     NoEvidence,
-    _Sums,
     _why_misleading,
     flight_evidence,
 )
@@ -23,7 +23,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.wording import paragraph
 
 N = np.full((2, 1), 10.0)
-AIDED_SUMS = _Sums(("a", "b"), (("gnss_vel", "gnss_vel x"),), N, np.stack([N, 0.5 * N]), np.zeros((2, 2, 1)))
+AIDED_SUMS = BlockSums(("a", "b"), (("gnss_vel", "gnss_vel x"),), N, np.stack([N, 0.5 * N]), np.zeros((2, 2, 1)))
 
 
 @pytest.mark.parametrize(("white_share", "has_evidence"), [(0.01, False), (0.6, False), (0.61, True), (0.95, True)])

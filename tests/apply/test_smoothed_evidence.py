@@ -7,17 +7,17 @@ import pyarrow as pa
 import pytest
 
 from fusetune.analyze.scoring.smoothed_scores import SMOOTHED_SCHEMA
-from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED, FlightEvidence, _smoothed, _Sums, flight_evidence
+from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED, BlockSums, FlightEvidence, _smoothed, flight_evidence
 from fusetune.apply.settings import DecisionSettings
 
 SETS = ("a", "b")
 DEFAULTS = DecisionSettings()
 
 
-def sums(labels: tuple[str, ...], source: str = "gnss_vel") -> _Sums:
+def sums(labels: tuple[str, ...], source: str = "gnss_vel") -> BlockSums:
     n = np.full((2, len(labels)), 10.0)
     nis = np.stack([n, 4.0 * n])
-    return _Sums(SETS, tuple((source, f"{source} {label}") for label in labels), n, nis, np.zeros_like(nis))
+    return BlockSums(SETS, tuple((source, f"{source} {label}") for label in labels), n, nis, np.zeros_like(nis))
 
 
 AIDED_SUMS, UNAIDED_SUMS = sums(("x", "y", "z")), sums(("x after 9 s", "y after 9 s"), "gnss_pos")

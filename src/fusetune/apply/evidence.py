@@ -132,7 +132,7 @@ class AnalyzedFlight:
 
 
 @dataclass(frozen=True)
-class _Sums:
+class BlockSums:
     """Block sums of one aim before the sets of all aims are brought together; axes as in `AimEvidence`."""
 
     sets: tuple[str, ...]
@@ -205,7 +205,7 @@ def _evidence_of(
     return evidence
 
 
-def _why_misleading(aided: _Sums, whiteness: Mapping[str, float], settings: DecisionSettings) -> str:
+def _why_misleading(aided: BlockSums, whiteness: Mapping[str, float], settings: DecisionSettings) -> str:
     shares = [
         f"{source} {whiteness[source]:.2f}"
         for source in settings.sources
@@ -244,11 +244,11 @@ def white_shares(metrics: pa.Table, present: str) -> dict[str, float]:
 
 def flight_evidence(
     flight: str,
-    aided: _Sums | None,
-    unaided: _Sums | None,
+    aided: BlockSums | None,
+    unaided: BlockSums | None,
     whiteness: Mapping[str, float],
     settings: DecisionSettings,
-    smoothed: _Sums | None = None,
+    smoothed: BlockSums | None = None,
 ) -> FlightEvidence | None:
     """Weigh the columns and aims of a flight.
 
@@ -287,7 +287,7 @@ def _of_sets(aim: AimEvidence, rows: npt.NDArray[np.bool_]) -> AimEvidence:
     return replace(aim, sum_nis=aim.sum_nis[rows], sum_log_variance=aim.sum_log_variance[rows])
 
 
-def _weights(sums: _Sums, weight_of: Mapping[str, float]) -> Array:
+def _weights(sums: BlockSums, weight_of: Mapping[str, float]) -> Array:
     """Weights of the columns; a key of `weight_of`, a source or one axis of it, shares its weight among its columns."""
     weights = np.zeros(len(sums.columns))
     for key, weight in weight_of.items():
@@ -299,7 +299,7 @@ def _weights(sums: _Sums, weight_of: Mapping[str, float]) -> Array:
 
 
 def _aim(
-    name: str, sums: _Sums, column_weights: Array, weight: float, sets: Sequence[str], total: float
+    name: str, sums: BlockSums, column_weights: Array, weight: float, sets: Sequence[str], total: float
 ) -> AimEvidence:
     used = column_weights > 0.0
     rows = [sums.sets.index(one) for one in sets]
@@ -314,7 +314,7 @@ def _aim(
     )
 
 
-def _aided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
+def _aided(table: pa.Table, weights: Mapping[str, float]) -> BlockSums | None:
     table = table.filter(pc.is_in(table["source"], value_set=pa.array(_weighted(weights))))
     if table.num_rows == 0:
         return None
@@ -326,7 +326,7 @@ def _aided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
     return _block_sums(table, _axis_names(table), columns)
 
 
-def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
+def _unaided(table: pa.Table, weights: Mapping[str, float]) -> BlockSums | None:
     """Sums over the gaps that begin in a block. Of the error alone: the variance that a filter claims after seconds
     follows from its noise settings, and profiling would leave only how it varies between gaps."""
     table = table.filter(pc.is_in(table["source"], value_set=pa.array(_weighted(weights))))
@@ -339,7 +339,7 @@ def _unaided(table: pa.Table, weights: Mapping[str, float]) -> _Sums | None:
     return _block_sums(table, labels, columns)
 
 
-def _smoothed(table: pa.Table) -> _Sums | None:
+def _smoothed(table: pa.Table) -> BlockSums | None:
     """Sums of the squared differences to the smoothed velocity: of the error alone, as no set knows its variance."""
     if table.num_rows == 0:
         return None
@@ -348,7 +348,7 @@ def _smoothed(table: pa.Table) -> _Sums | None:
     return _block_sums(table, _axis_names(table), columns)
 
 
-def _axes_of(sums: _Sums) -> list[tuple[str, str]]:
+def _axes_of(sums: BlockSums) -> list[tuple[str, str]]:
     """Source and axis of each column."""
     return [(source, label.split()[1]) for source, label in sums.columns]
 
@@ -362,7 +362,7 @@ def _axis_names(table: pa.Table) -> list[str]:
     return [AXES[axis] for axis in table["axis"].to_pylist()]
 
 
-def _block_sums(table: pa.Table, labels: Sequence[str], values: Mapping[str, npt.NDArray[Any]]) -> _Sums:
+def _block_sums(table: pa.Table, labels: Sequence[str], values: Mapping[str, npt.NDArray[Any]]) -> BlockSums:
     """Add up rows by set, block and column: a source and what the rows are labelled."""
     names, set_index = np.unique(np.asarray(table["set"].to_pylist()), return_inverse=True)
     blocks, block_index = np.unique(table["block"].to_numpy(), return_inverse=True)
@@ -376,7 +376,7 @@ def _block_sums(table: pa.Table, labels: Sequence[str], values: Mapping[str, npt
     # A set with another number of samples did not share the source with the others; it has no paired score.
     count = sums["n"].sum(axis=(1, 2))
     complete = count == count.max()
-    return _Sums(
+    return BlockSums(
         sets=tuple(str(name) for name in names[complete]),
         columns=tuple((one, f"{one} {text}") for one, text in columns),
         n=sums["n"][complete][0],

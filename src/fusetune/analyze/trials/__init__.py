@@ -1,0 +1,1 @@
+"""Sets tried on a flight for a search: what they did on samples and gaps that a base set alone defines."""
