@@ -11,7 +11,10 @@ DELAY_MENDED = "delay_mended"
 """What the vehicle flies now, with those delays of sensors mended that are proved wrong; behind a set's name, that set
 with them mended."""
 
-RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, "sets", "scoring", "fidelity", "delays")
+FOUND = "found"
+"""What a search found; on a flight, what it found without that flight."""
+
+RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, FOUND, "sets", "scoring", "fidelity", "delays")
 """With the names of `sets.parquet`, `scoring.json` and the like, which a set so called would overwrite."""
 
 

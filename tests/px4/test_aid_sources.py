@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fusetune.analyze.scoring.parameter_sources import observation_noise_of, required_sources, switched_off
 from fusetune.ekf2.feed.taken_samples import AIDING
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_AXES, AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCES as STATUS
@@ -27,6 +26,7 @@ from fusetune.px4.aid_sources import (
     AidSource,
 )
 from fusetune.px4.layouts.estimator_layouts import control_bits
+from fusetune.px4.parameter_sources import observation_noise_of, required_sources, switched_off
 from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 from fusetune.px4.releases import BASELINE
 

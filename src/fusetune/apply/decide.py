@@ -35,6 +35,7 @@ from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
 from fusetune.apply.provenance import file_hash, flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
+from fusetune.apply.recommended import Recommended
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
@@ -61,6 +62,7 @@ def decide(
     descriptions: Mapping[str, str] | None = None,
     configuration_files: Sequence[AnyPath] = (),
     delays: AnyPath | None = None,
+    recommended: Recommended | None = None,
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
@@ -80,6 +82,7 @@ def decide(
     descriptions : a line about each set, from the study
     configuration_files : hashed into the decision
     delays : `results/analyze/delays.json`, what the sensors' delays are; None where they were not estimated
+    recommended : what one of the sets stands for, where that is a search's
 
     Raises
     ------
@@ -95,14 +98,14 @@ def decide(
     others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
     newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
-    ranked, choice = _ranked_and_chosen(sets, present, flights, metrics, newest, settings)
+    ranked, choice = _ranked_and_chosen(sets, present, flights, metrics, newest, settings, recommended)
     if DELAY_MENDED in sets:
         mended = [name for name in sets if is_mended(name)]
         able = [one for one in flights if one.evidence is None or DELAY_MENDED in one.evidence.sets]
         _, among_mended = _ranked_and_chosen(mended, DELAY_MENDED, able, metrics, newest, settings)
         choice = choose_after_mending(choice, ranked, among_mended)
     values = criteria(sets, settings.main_source, flights, metrics)
-    changes = _changes(choice, newest, present)
+    changes = _changes(choice, newest, present, recommended)
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
@@ -152,9 +155,12 @@ def _ranked_and_chosen(
     metrics: pa.Table,
     newest: AnalyzedFlight | None,
     settings: DecisionSettings,
+    recommended: Recommended | None = None,
 ) -> tuple[list[RankedSet], Choice]:
     """Sets against one of them, and what is chosen among them."""
     vetoed = {name: vetoes(name, present, flights, metrics, settings) for name in sets if name != present}
+    if recommended is not None and recommended.name in vetoed:
+        vetoed[recommended.name] += recommended.objections
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
     evidence = [flight.evidence for flight in flights if flight.evidence is not None]
     return ranked, choose(ranked, present, evidence, _distances(newest, present), settings)
@@ -221,11 +227,16 @@ def _gains(better: Sequence[RankedSet]) -> dict[str, float]:
     return {one.name: one.improvement_percent for one in better}
 
 
-def _changes(choice: Choice, newest: AnalyzedFlight | None, present: str) -> tuple[ParameterChange, ...]:
+def _changes(
+    choice: Choice, newest: AnalyzedFlight | None, present: str, recommended: Recommended | None
+) -> tuple[ParameterChange, ...]:
     if choice.status != "change" or newest is None:
         return ()
     sets = newest.summary["sets"]
-    return parameter_changes(sets[choice.chosen]["overrides"], sets[present]["parameters"])
+    now = sets[present]["parameters"]
+    if recommended is not None and choice.chosen == recommended.name:
+        return parameter_changes(recommended.values, now, recommended.alone)
+    return parameter_changes(sets[choice.chosen]["overrides"], now)
 
 
 def _decision(

@@ -1,6 +1,6 @@
 """What changes on the vehicle, and the two files: the new values and the way back."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -22,16 +22,26 @@ class ParameterChange:
     type: Literal["INT32", "FLOAT"]
     unit: str
     reboot_required: bool
+    alone: str = ""
+    """What it brings alone, in words, where that is known."""
 
 
-def parameter_changes(overrides: dict[str, float], previous: dict[str, float]) -> tuple[ParameterChange, ...]:
-    """Parameters of a set whose value differs, as float32, from what the vehicle has now, in order of name."""
+def parameter_changes(
+    overrides: Mapping[str, float], previous: Mapping[str, float], alone: Mapping[str, str] | None = None
+) -> tuple[ParameterChange, ...]:
+    """Parameters of a set whose value differs, as float32, from what the vehicle has now, in order of name.
+
+    `alone` says in words what one brings alone.
+    """
     changes = []
     for name, value in sorted(overrides.items()):
         before = previous[name]
         if np.float32(value) != np.float32(before):
             metadata = PARAMETERS[name]
-            changes.append(ParameterChange(name, before, value, metadata.type, metadata.unit, metadata.reboot_required))
+            told = (alone or {}).get(name, "")
+            changes.append(
+                ParameterChange(name, before, value, metadata.type, metadata.unit, metadata.reboot_required, told)
+            )
     return tuple(changes)
 
 
@@ -51,7 +61,9 @@ def write_parameter_files(
     Where the present set is kept both files hold no parameter, and say so.
     """
     folder = Path(folder)
-    forward = [_entry(change, change.value, (_was(change), reason, *_reboot(change))) for change in changes]
+    forward = [
+        _entry(change, change.value, (_was(change), *_alone(change), reason, *_reboot(change))) for change in changes
+    ]
     back = [_entry(change, change.previous, (f"back from {_number(change.value, change)}",)) for change in changes]
     kept = () if changes else ("The present parameters are kept: there is nothing to load.",)
     written = []
@@ -84,3 +96,7 @@ def _was(change: ParameterChange) -> str:
 
 def _reboot(change: ParameterChange) -> tuple[str, ...]:
     return ("takes effect after a reboot",) if change.reboot_required else ()
+
+
+def _alone(change: ParameterChange) -> tuple[str, ...]:
+    return (change.alone,) if change.alone else ()

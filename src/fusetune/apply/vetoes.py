@@ -36,6 +36,14 @@ that is no longer one, which the filter throws away."""
 _SAME_FOR_ALL = "fs_bad_acc_clipping"
 
 
+EventPairs = Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]
+"""Flight → what its summary says of the set and of the present one: `flight_s`, `significant_resets`, `timeouts`,
+`fault_s`, and `reset_jumps` where these are known."""
+
+BreakRates = Mapping[tuple[str, str, str, str], tuple[float, float]]
+"""Set, source, axis and flight → break rate and number of samples."""
+
+
 def vetoes(
     name: str, present: str, flights: Sequence[AnalyzedFlight], metrics: pa.Table, settings: DecisionSettings
 ) -> list[str]:
@@ -53,13 +61,15 @@ def vetoes(
         for flight in scored
         if (own := flight.summary["sets"].get(name)) is not None
     }
-    reasons += [*_faults(pairs), *_resets(pairs, settings), *_lost_sources(pairs, settings)]
+    reasons += event_reasons(pairs, settings)
     reasons += _out_of_range(name, flights)
-    return reasons + _breaks(name, present, [flight.name for flight in scored], metrics, settings)
+    names = [flight.name for flight in scored]
+    return reasons + break_reasons(name, present, names, _break_rates((name, present), metrics), settings.confidence)
 
 
-_Pairs = Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]
-"""Flight → what its summary says of the set and of the present one."""
+def event_reasons(pairs: EventPairs, settings: DecisionSettings) -> list[str]:
+    """What the filter did beside fusing that speaks against a set."""
+    return [*_faults(pairs), *_resets(pairs, settings), *_lost_sources(pairs, settings)]
 
 
 def _failures(name: str, flights: Sequence[AnalyzedFlight], settings: DecisionSettings) -> list[str]:
@@ -76,7 +86,7 @@ def _failures(name: str, flights: Sequence[AnalyzedFlight], settings: DecisionSe
     return reasons
 
 
-def _resets(pairs: _Pairs, settings: DecisionSettings) -> Iterator[str]:
+def _resets(pairs: EventPairs, settings: DecisionSettings) -> Iterator[str]:
     """Resets that moved the state far; small ones are no worse than a fused measurement."""
     counts = {flight: tuple(one["significant_resets"] for one in both) for flight, both in pairs.items()}
     if _is_more(counts, pairs, settings):
@@ -84,14 +94,14 @@ def _resets(pairs: _Pairs, settings: DecisionSettings) -> Iterator[str]:
         yield f"{own} resets that moved the state far{_largest_jumps(pairs)}, the present set has {base}"
 
 
-def _lost_sources(pairs: _Pairs, settings: DecisionSettings) -> Iterator[str]:
+def _lost_sources(pairs: EventPairs, settings: DecisionSettings) -> Iterator[str]:
     counts = {flight: tuple(sum(one["timeouts"].values()) for one in both) for flight, both in pairs.items()}
     if _is_more(counts, pairs, settings):
         own, base = _totals(counts)
         yield f"{own} lost aid sources, the present set has {base}"
 
 
-def _is_more(counts: Mapping[str, tuple[int, ...]], pairs: _Pairs, settings: DecisionSettings) -> bool:
+def _is_more(counts: Mapping[str, tuple[int, ...]], pairs: EventPairs, settings: DecisionSettings) -> bool:
     """Whether events are more frequent than with the present set, beyond doubt and on enough flights."""
     worse = sum(own > base for own, base in counts.values())
     if worse < min(FEWEST_FLIGHTS, len(counts)) or not worse:
@@ -107,7 +117,7 @@ def _totals(counts: Mapping[str, tuple[int, ...]]) -> tuple[int, int]:
     return sum(own for own, _ in counts.values()), sum(base for _, base in counts.values())
 
 
-def _largest_jumps(pairs: _Pairs) -> str:
+def _largest_jumps(pairs: EventPairs) -> str:
     """The largest jump of the set in each unit, in words."""
     largest: dict[str, float] = {}
     for own, _ in pairs.values():
@@ -118,7 +128,7 @@ def _largest_jumps(pairs: _Pairs) -> str:
     return f" (by up to {told})" if told else ""
 
 
-def _faults(pairs: _Pairs) -> Iterator[str]:
+def _faults(pairs: EventPairs) -> Iterator[str]:
     """Fault flags in flight that the present set has not, or by far not so long."""
     names = sorted({fault for own, _ in pairs.values() for fault in own["fault_s"]} - {_SAME_FOR_ALL})
     for fault in names:
@@ -154,29 +164,32 @@ def _out_of_range(name: str, flights: Sequence[AnalyzedFlight]) -> list[str]:
     return reasons
 
 
-def _breaks(
-    name: str, present: str, flights: Sequence[str], metrics: pa.Table, settings: DecisionSettings
-) -> list[str]:
-    """A break rate is held against a set where its interval lies wholly above that of the present set.
-
-    The level of the intervals allows for the number of flights, sources and axes that are looked at (Bonferroni).
-    """
+def _break_rates(sets: Sequence[str], metrics: pa.Table) -> BreakRates:
     rows = metrics.filter(
         pc.and_(
             pc.and_(
                 pc.equal(metrics["metric"], "break_rate_gate"),
                 pc.is_in(metrics["axis"], value_set=pa.array(AXES)),
             ),
-            pc.is_in(metrics["set"], value_set=pa.array([name, present])),
+            pc.is_in(metrics["set"], value_set=pa.array(sets)),
         )
     ).to_pylist()
-    rates: _Rates = {
+    return {
         (row["set"], row["source"], row["axis"], row["flight"]): (row["value"], row["n"])
         for row in rows
-        if row["flight"] in flights and math.isfinite(row["value"]) and row["n"] > 0
+        if math.isfinite(row["value"]) and row["n"] > 0
     }
-    compared = [place for one, *place in sorted(rates) if one == name and (present, *place) in rates]
-    confidence = 1.0 - (1.0 - settings.confidence) / max(len(compared), 1)
+
+
+def break_reasons(name: str, present: str, flights: Sequence[str], rates: BreakRates, confidence: float) -> list[str]:
+    """A break rate is held against a set where its interval lies wholly above that of the present set.
+
+    The level of the intervals allows for the number of flights, sources and axes that are looked at (Bonferroni).
+    """
+    compared = [
+        place for one, *place in sorted(rates) if one == name and place[2] in flights and (present, *place) in rates
+    ]
+    confidence = 1.0 - (1.0 - confidence) / max(len(compared), 1)
     reasons = []
     for source, axis in dict.fromkeys((source, axis) for source, axis, _ in compared):
         there = [flight for *place, flight in compared if place == [source, axis]]
@@ -189,10 +202,6 @@ def _breaks(
                 f"the present set has {base:.1f} % there"
             )
     return reasons
-
-
-_Rates = dict[tuple[str, str, str, str], tuple[float, float]]
-"""Set, source, axis and flight → break rate and number of samples."""
 
 
 def _interval(rate: tuple[float, float], confidence: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from tests.analyze.made_flight import MadeSet, make_flight
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.activity import inactive_parameters, same_results
-from fusetune.analyze.scoring.parameter_sources import required_sources, switched_off
+from fusetune.px4.parameter_sources import required_sources, switched_off
 from fusetune.save.flight_folder import load_flight
 
 

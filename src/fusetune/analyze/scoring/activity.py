@@ -11,9 +11,9 @@ import numpy as np
 
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples
-from fusetune.analyze.scoring.parameter_sources import observation_noise_of, required_sources, switched_off
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
+from fusetune.px4.parameter_sources import observation_noise_of, required_sources, switched_off
 
 _NEGLIGIBLE_SHARE = 0.02
 
