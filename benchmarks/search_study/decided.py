@@ -35,8 +35,8 @@ def decided(
 
     Parameters
     ----------
-    aims : (F,) differences of the found set to the present one in each kind of prediction, on each flight those of the set
-        that was found without it
+    aims : (F,) differences of the found set to the present one in each kind of prediction, on each flight those of the
+        set that was found without it
     weights : (F,) of each kind in the score of the flight
     """
     number = len(next(iter(aims.values())))
@@ -51,7 +51,7 @@ def decided(
 
 
 def _flight(name: str, aims: Mapping[str, tuple[float, float]]) -> AnalyzedFlight:
-    """One whose scores are the differences: half the logarithm of the mean square of one error of size exp difference."""
+    """One whose scores are the differences: half the logarithm of the mean square of an error as large as their exp."""
     parts = tuple(
         AimEvidence(
             aim,

@@ -1,8 +1,9 @@
 """Flights that answer at once: between sets that were really tried on them, scores are interpolated.
 
-Hundreds of searches, each with its cross-fitting, are too dear to be replayed. Each flight's score is a smooth function
-of the factors, and is emulated in each kind of prediction by a Gaussian process through the sets that were tried; lengths
-and scale are those of the mean over the flights. Beyond the outermost of these sets the scores stay as they are there.
+Hundreds of searches, each with its cross-fitting, are too dear to be replayed. Each flight's score is a smooth
+function of the factors, and is emulated in each kind of prediction by a Gaussian process through the sets that were
+tried; lengths and scale are those of the mean over the flights. Beyond the outermost of these sets the scores stay as
+they are there.
 """
 
 from __future__ import annotations
@@ -128,8 +129,8 @@ class EmulatedGround:
 
     Attributes
     ----------
-    signs : (F,) None: the flights as they are; else each flight's surface less the mean over all, turned by its sign, so
-        that no set is better than another but on single flights
+    signs : (F,) None: the flights as they are; else each flight's surface less the mean over all, turned by its sign,
+        so that no set is better than another but on single flights
     objects : whether vetoes count
     """
 

@@ -53,7 +53,7 @@ class Wander:
 
 @dataclass(frozen=True)
 class Gnss:
-    """The receiver: rate, true delay, place of its antenna (m, FRD, from the IMU), errors of velocity (m/s) and position
+    """The receiver: rate, true delay, where its antenna is (m from the IMU, FRD), errors of velocity (m/s) and position
     (m), and the accuracies that it reports."""
 
     rate_hz: float = 5.0
