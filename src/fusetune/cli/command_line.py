@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import design, fidelity, replay, save, simulate
+from fusetune.cli import design, fidelity, replay, save, search, simulate
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -19,6 +19,7 @@ COMMANDS: Mapping[str, Command] = {
     "save": save,
     "replay": replay,
     "fidelity": fidelity,
+    "search": search,
 }
 """In the order of the pipeline."""
 

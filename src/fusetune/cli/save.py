@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fusetune.cli.command import DONE, REFUSED
-from fusetune.errors import UserError
 
 if TYPE_CHECKING:
     from fusetune.finding import Finding
@@ -25,25 +23,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Save all and tell the verdicts; `REFUSED` where one cannot be replayed."""
     from fusetune.save import save_log
+    from fusetune.save.log_folder import demand_own_folders
 
-    _check_names(options.logs)
+    demand_own_folders(options.logs)
     verdicts = []
     for log in options.logs:
         verdict = save_log(log, options.out / log.stem)
         print(f"{log.stem}: {verdict.status}", *map(_advice, verdict.failures), sep="\n  ")
         verdicts.append(verdict)
     return DONE if all(verdict.status == "replayable" for verdict in verdicts) else REFUSED
-
-
-def _check_names(logs: Sequence[Path]) -> None:
-    """Each log gets a folder by its name."""
-    first: dict[str, Path] = {}
-    for log in logs:
-        if log.stem in ("", ".", ".."):
-            raise UserError(log, "gives no name to a folder", "Rename it")
-        other = first.setdefault(log.stem.casefold(), log)
-        if other is not log:
-            raise UserError(log, f"would be saved into the same folder as {other}", "Rename one, or save it elsewhere")
 
 
 def _advice(finding: Finding) -> str:

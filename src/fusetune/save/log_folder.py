@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,23 @@ def save_log(
         reason = f"cannot be written: {os.strerror(error.errno) if error.errno else error}"
         raise UserError(target, reason, "Make room or mend its permissions") from error
     return verdict
+
+
+def demand_own_folders(logs: Sequence[Path]) -> None:
+    """Each log gets a folder by its name.
+
+    Raises
+    ------
+    UserError
+        A log has no name, or two have names that some file system takes for the same.
+    """
+    first: dict[str, Path] = {}
+    for log in logs:
+        if log.stem in ("", ".", ".."):
+            raise UserError(log, "gives no name to a folder", "Rename it")
+        other = first.setdefault(log.stem.casefold(), log)
+        if other is not log:
+            raise UserError(log, f"would be saved into the same folder as {other}", "Rename one, or save it elsewhere")
 
 
 @dataclass(frozen=True)

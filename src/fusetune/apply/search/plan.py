@@ -14,6 +14,10 @@ FIRST_SUFFIXES = (DELAY_SUFFIX, "_POS_X", "_POS_Y", "_POS_Z")
 """Delays and lever arms come first: where they are wrong, a sensor's errors look as if they wandered, and all else is
 tuned to hide it."""
 
+DELAYS, ALL, PUTTING_BACK = "delays", "all", "putting back"
+STAGES = (DELAYS, ALL, PUTTING_BACK)
+PUTTING_BACK_ROUNDS = 3
+
 _FIRST_SIZE, _FIRST_GENERATIONS = 6, 2
 _START_SHARE = 0.35
 _GENERATIONS = 6
@@ -37,6 +41,14 @@ class Plan:
     first_generations: tuple[int, ...]
     start: int
     generations: tuple[int, ...]
+    factors: int
+
+    @property
+    def rounds(self) -> tuple[tuple[str, int], ...]:
+        """Stage and number of sets of every generation; putting back asks for no more than this."""
+        first = [(DELAYS, start_size(len(self.first))), *((DELAYS, size) for size in self.first_generations)]
+        second = [(ALL, self.start), *((ALL, size) for size in self.generations)]
+        return (*(first if self.first else ()), *second, *[(PUTTING_BACK, self.factors + 1)] * PUTTING_BACK_ROUNDS)
 
 
 def plan_of(space: Space, settings: SearchSettings) -> Plan:
@@ -46,7 +58,13 @@ def plan_of(space: Space, settings: SearchSettings) -> Plan:
     left = max(settings.evaluations - spent, 16)
     start = max(round(_START_SHARE * left), 8)
     size = max((left - start) // _GENERATIONS, 1)
-    return Plan(first, (_FIRST_SIZE,) * _FIRST_GENERATIONS if first else (), start, (size,) * _GENERATIONS)
+    return Plan(
+        first,
+        (_FIRST_SIZE,) * _FIRST_GENERATIONS if first else (),
+        start,
+        (size,) * _GENERATIONS,
+        len(space.parameters),
+    )
 
 
 def start_size(factors: int) -> int:

@@ -8,8 +8,9 @@ from typing import Protocol
 
 from fusetune.analyze.trials.tried_set import TriedSet
 from fusetune.apply.search.comparison import Comparison, TriedBase, compare
+from fusetune.apply.search.plan import DELAYS
 from fusetune.apply.search.requests import Request, Values
-from fusetune.apply.search.stages import DELAYS, Ask
+from fusetune.apply.search.stages import Ask
 from fusetune.apply.settings import DecisionSettings
 
 Batch = tuple[str, Values, tuple[Values, ...]]

@@ -14,7 +14,7 @@ from fusetune.apply.search.folds import folds
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import PUTTING_BACK_ROUNDS, Ask, Asking, Found, search_stages
+from fusetune.apply.search.stages import Ask, Asking, Found, search_stages
 
 ON_ALL = "all flights"
 
@@ -43,18 +43,14 @@ class Searched:
     aside: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Round:
-    """A generation of all searches.
-
-    Attributes
-    ----------
-    number : from 1
-    stage : of the search on all flights
-    """
+@dataclass(frozen=True, eq=False)
+class AskedRound:
+    """What one search asked in a round, from 1, and how it compared."""
 
     number: int
-    stage: str
+    search: Searched
+    ask: Ask
+    compared: Comparison
 
 
 def searches(flights: Sequence[str], settings: SearchSettings) -> list[Searched]:
@@ -72,27 +68,36 @@ def run_searches(
     space: Space,
     settings: SearchSettings,
     ground: Ground,
-    told: Callable[[Round], None] = lambda one: None,
-) -> list[Found]:
-    """Run all searches to their ends; what each found."""
+    begin: Callable[[int], None] = lambda number: None,
+) -> tuple[list[Found], list[AskedRound]]:
+    """Run all searches to their ends.
+
+    Parameters
+    ----------
+    begin : is told the number of each round before it begins
+
+    Returns
+    -------
+    What each found, and all that they asked
+    """
     plan = plan_of(space, settings)
     running = [search_stages(space, plan, settings) for _ in studied]
-    found: list[Found | None] = [None] * len(running)
+    found: dict[int, Found] = {}
     asks = dict(enumerate(map(next, running)))
+    asked: list[AskedRound] = []
     number = 0
     while asks:
         number += 1
-        told(Round(number, next(iter(asks.values())).stage))
-        places = list(asks)
-        answers = ground.compare([(studied[place].flights, asks[place]) for place in places])
-        asks = {}
-        for place, answer in zip(places, answers, strict=True):
-            ask = _next(running[place], answer)
-            if isinstance(ask, Found):
-                found[place] = ask
-            else:
-                asks[place] = ask
-    return [one for one in found if one is not None]
+        begin(number)
+        answers = ground.compare([(studied[place].flights, ask) for place, ask in asks.items()])
+        asked += [
+            AskedRound(number, studied[place], ask, answer)
+            for (place, ask), answer in zip(asks.items(), answers, strict=True)
+        ]
+        following = {place: _next(running[place], answer) for place, answer in zip(asks, answers, strict=True)}
+        found |= {place: one for place, one in following.items() if isinstance(one, Found)}
+        asks = {place: one for place, one in following.items() if isinstance(one, Ask)}
+    return [found[place] for place in range(len(studied))], asked
 
 
 def _next(search: Asking, answer: Comparison) -> Ask | Found:
@@ -101,10 +106,3 @@ def _next(search: Asking, answer: Comparison) -> Ask | Found:
     except StopIteration as ended:
         result: Found = ended.value
         return result
-
-
-def rounds_of(space: Space, settings: SearchSettings) -> int:
-    """How many generations a search has: as many as are planned, those of putting back among them."""
-    plan = plan_of(space, settings)
-    first = 1 + len(plan.first_generations) if plan.first else 0
-    return first + 1 + len(plan.generations) + PUTTING_BACK_ROUNDS

@@ -15,17 +15,13 @@ import numpy.typing as npt
 
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.objective import objective
-from fusetune.apply.search.plan import FIRST_RADIUS, RADIUS, SHRINKS, Plan
+from fusetune.apply.search.plan import ALL, DELAYS, FIRST_RADIUS, PUTTING_BACK, RADIUS, SHRINKS, STAGES, Plan
 from fusetune.apply.search.proposals import propose
 from fusetune.apply.search.requests import Values, values_of
 from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.space import DELAY_SUFFIX, Space
 
 Array = npt.NDArray[np.float64]
-
-DELAYS, ALL, PUTTING_BACK = "delays", "all", "putting back"
-STAGES = (DELAYS, ALL, PUTTING_BACK)
-PUTTING_BACK_ROUNDS = 3
 
 _NEAR = 0.35
 """After the first stage delays move no farther from what it found, in half ranges."""

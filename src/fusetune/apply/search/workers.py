@@ -68,11 +68,12 @@ class WorkerTrier:
         named = {name: str(Path(folder)) for name, folder in folders.items()}
         # a process that is forked from one with threads may wait for ever
         context = multiprocessing.get_context("spawn")
-        self._pool = ProcessPoolExecutor(processes, context, _begin, (named, settings))
+        self.pool = ProcessPoolExecutor(processes, context, _begin, (named, settings))
+        """Its processes, for whatever else they may do."""
 
     def try_batches(self, batches: Sequence[Batch]) -> Iterator[tuple[Batch, Tried]]:
         """What the sets of each batch did, as it comes."""
-        running = {self._pool.submit(_try_batch, batch): batch for batch in batches}
+        running = {self.pool.submit(_try_batch, batch): batch for batch in batches}
         try:
             for one in as_completed(running):
                 yield running[one], one.result()
@@ -82,7 +83,7 @@ class WorkerTrier:
 
     def close(self) -> None:
         """End the processes."""
-        self._pool.shutdown(cancel_futures=True)
+        self.pool.shutdown(cancel_futures=True)
 
 
 _of_this_process: list[FlightTrier] = []
