@@ -68,7 +68,7 @@ def search_once(
     fresh = np.setdiff1d(np.arange(number), drawn)
     ground = EmulatedGround(emulator, chance.choice([-1.0, 1.0], number) if kind == NOISE_ONLY else None)
     studied = searches([str(place) for place in drawn], replace(settings, seed=seed))
-    found = run_searches(studied, space, replace(settings, seed=seed), ground)
+    found, _ = run_searches(studied, space, replace(settings, seed=seed), ground)
     return outcome(ground, space, decision, studied, found, drawn, fresh)
 
 

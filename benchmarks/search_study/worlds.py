@@ -23,7 +23,8 @@ class SearchWorld:
 
     Attributes
     ----------
-    right : parameters that the vehicle is told wrong, as they should be; of noises nobody can tell without the truth
+    right : what the vehicle should be told, where that follows from the world; of noises the truth has to say it
+    wrong : names of all parameters that it is told wrong
     """
 
     name: str
@@ -34,6 +35,10 @@ class SearchWorld:
     @property
     def right(self) -> dict[str, float]:
         return dict(self.described.get("right", {}))
+
+    @property
+    def wrong(self) -> tuple[str, ...]:
+        return (*self.right, *self.described.get("wrong_noises", ()))
 
     @property
     def settings(self) -> ReplaySettings:
