@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 
 _FAR = 2.0
 """Scores beyond so many nat say no more than that a set is bad."""
-_NUGGET = 1e-6
+_NUGGET = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ def tried_table(factors: Sequence[Factor], sets: Sequence[Mapping[str, float]], 
 
     The score of a flight is a weighted sum of its kinds of prediction; the weights follow from the differences.
     """
-    known = np.isfinite(compared.differences).all(axis=1)
+    known = np.asarray(np.isfinite(compared.differences).all(axis=1))
     rows = [[one.coordinate(values[one.parameter]) for one in factors] for values in sets]
     aims = {name: np.nan_to_num(compared.aims[name][known]) for name in AIMS}
     weights = np.array(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -36,6 +37,7 @@ class Outcome:
         found without each flight, on the flights that no search saw, and on all flights of the world
     lower, upper : interval of the expected difference; NaN where there is none
     changed : parameters of the found set
+    flights, fresh_flights : of the search, and those that it did not see
     """
 
     changes: bool
@@ -46,10 +48,20 @@ class Outcome:
     lower: float
     upper: float
     changed: tuple[str, ...]
+    flights: int
+    fresh_flights: int
 
-    def covers(self, gain: float) -> bool:
-        """Whether a difference lies in the interval."""
-        return self.lower <= gain <= self.upper
+    def covers(self, gain: float, of_flights: float = math.inf) -> bool:
+        """Whether a difference lies in the interval, widened for one that is the mean of so many flights alone.
+
+        The interval is that of the mean over all flights to come. The mean of m of them has a spread of its own: that
+        of the n of the search, by √(n/m).
+        """
+        wider = math.sqrt(1.0 + self.flights / of_flights)
+        return self._end(self.lower, wider) <= gain <= self._end(self.upper, wider)
+
+    def _end(self, bound: float, wider: float) -> float:
+        return self.expected + wider * (bound - self.expected)
 
 
 def search_once(
@@ -103,6 +115,8 @@ def outcome(
         lower,
         upper,
         found[0].changed,
+        drawn.size,
+        fresh.size,
     )
 
 
@@ -122,17 +136,3 @@ def search_often(
         return [once(seed) for seed in range(number)]
     with ProcessPoolExecutor(workers) as pool:
         return list(pool.map(once, range(number), chunksize=4))
-
-
-def summary(outcomes: Sequence[Outcome]) -> Mapping[str, float]:
-    """Shares, %: changes, intervals that cover the gain on fresh flights and that of the world; mean gains, nat."""
-    return {
-        "changes": 100.0 * float(np.mean([one.changes for one in outcomes])),
-        "fresh": 100.0 * float(np.mean([one.covers(one.fresh) for one in outcomes])),
-        "world": 100.0 * float(np.mean([one.covers(one.world) for one in outcomes])),
-        **{
-            f"mean {name}": float(np.mean([getattr(one, name) for one in outcomes]))
-            for name in ("searched", "expected", "fresh")
-        }
-        | {"mean of the world": float(np.mean([one.world for one in outcomes]))},
-    }

@@ -66,10 +66,10 @@ class WorldSearch:
     def __init__(self, world: SearchWorld, folder: Path, settings: SearchSettings, decision: DecisionSettings) -> None:
         self.world, self._folder, self._settings, self._decision = world, folder, settings, decision
         self._folders = {one.name: one for one in world.flights(range(max(FRESH) + 1))}
-        self._names = list(self._folders)
+        self.names = list(self._folders)
         flights = [JudgedFlight(one, world.settings) for one in self._folders.values()]
         self.truth = KeptFigures(folder / "truth", flights)
-        self.parameters = read_metadata(self._folders[self._names[0]])["ekf2_parameters"]
+        self.parameters = read_metadata(self._folders[self.names[0]])["ekf2_parameters"]
 
     @property
     def space(self) -> Space:
@@ -78,11 +78,11 @@ class WorldSearch:
 
     def judged(self) -> JudgedWorld:
         """Search both ways on the first flights, and judge on the others."""
-        flights = [self._names[number] for number in SEARCHED]
+        flights = [self.names[number] for number in SEARCHED]
         only = [Searched(ON_ALL, tuple(flights), ())]
         found, oracle = (
             run_searches(only, self.space, self._settings, ground)[0][0]
-            for ground in (self._replays(), TruthGround(self.truth, self._names))
+            for ground in (self.replays(), TruthGround(self.truth, self.names))
         )
         return JudgedWorld(
             self.world.name,
@@ -96,8 +96,8 @@ class WorldSearch:
 
     def with_folds(self) -> tuple[list[Searched], list[Found], Ground]:
         """The product's searches, those with flights kept aside, too."""
-        studied = searches([self._names[number] for number in SEARCHED], self._settings)
-        ground = self._replays()
+        studied = searches([self.names[number] for number in SEARCHED], self._settings)
+        ground = self.replays()
         return studied, run_searches(studied, self.space, self._settings, ground)[0], ground
 
     def change_percent(self, values: Mapping[str, float]) -> Array:
@@ -116,7 +116,8 @@ class WorldSearch:
         curve = np.polyfit(PROFILE_STEPS[at - 1 : at + 2], errors[at - 1 : at + 2], 2)
         return float(found[name] * 2.0 ** (-0.5 * curve[1] / curve[0]))
 
-    def _replays(self) -> ReplayGround:
+    def replays(self) -> ReplayGround:
+        """The ground of the search itself."""
         trials = TrialSettings(
             self.world.settings,
             ScoringSettings(),
