@@ -2,7 +2,8 @@
 # make test           … then runs the tests
 # make lint           … then looks for slips, form, and imports that the house forbids
 # make types          … then checks the types
-# make demonstration  … then runs the pipeline and looks whether it made all and would do nothing twice
+# make demonstration  … then runs the pipeline and looks whether it made all, found what is wrong with its vehicle, and would
+#                     do nothing twice
 # These are the checks of a change; .ci/run and .github/workflows/checks.yml call them.
 CORES ?= 2
 LOCKS ?= requirements.lock
@@ -45,6 +46,11 @@ types: $(READY)
 
 demonstration: all
 	@for file in $(MADE); do [ -s "$$file" ] || { echo "$$file is missing or empty" >&2; exit 1; }; done
+	@[ -n "$$(find -L flights -name '*.ulg')" ] || grep -q "It confirms the change" results/report.html || \
+		{ echo "no change that the truth confirms" >&2; exit 1; }
+	@[ -n "$$(find -L flights -name '*.ulg')" ] || for name in EKF2_GPS_DELAY EKF2_ACC_NOISE EKF2_GYR_NOISE; do \
+		grep -q "$$name" results/apply/best_params.params || { echo "$$name is left wrong" >&2; exit 1; }; \
+	done
 	@$(BIN)/snakemake --cores 1 --dry-run | grep -q "Nothing to be done" || { echo "a second run would not be idle" >&2; exit 1; }
 
 # The stamp goes first and comes last: a set-up that was interrupted is done again from nothing.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fusetune.configuration import Configuration, Demonstration
+from fusetune.configuration import Configuration
 from fusetune.errors import UserError
 from fusetune.inputs import check_demonstration, read_inputs
 
@@ -22,7 +22,11 @@ def settings(project_root: Path, tmp_path: Path) -> Configuration:
         study=str(project_root / default.study),
         mission=str(project_root / default.mission),
         flights_dir=str(tmp_path),
-        demonstration=Demonstration(vehicle=str(project_root / default.demonstration.vehicle)),
+        demonstration=replace(
+            default.demonstration,
+            study=str(project_root / default.demonstration.study),
+            vehicle=str(project_root / default.demonstration.vehicle),
+        ),
     )
 
 
@@ -30,7 +34,9 @@ def test_the_demonstration_flies_every_set_in_turn(settings: Configuration) -> N
     once = read_inputs(settings, "config.yaml")
     assert once.is_demonstration
     assert once.flights == [f"flight_{number}_{name}" for number, name in enumerate(PAPER_SETS, 1)]
-    twice = read_inputs(replace(settings, demonstration=Demonstration(flights_per_set=2)), "config.yaml")
+    twice = read_inputs(
+        replace(settings, demonstration=replace(settings.demonstration, flights_per_set=2)), "config.yaml"
+    )
     assert [twice.simulated[flight] for flight in twice.flights] == PAPER_SETS * 2
     assert twice.flights[0] == "flight_01_paper1"
     assert twice.flights == sorted(twice.flights)
@@ -63,3 +69,17 @@ def test_faults_of_the_demonstration_are_checked(settings: Configuration) -> Non
         UserError, match=r"demonstration\.faults\.flight_1_paper1: faults\[0\]\.duration_s is 0; expected"
     ):
         check_demonstration(bad, "config.yaml")
+
+
+def test_without_logs_the_papers_sets_are_flown_and_compared_with_logs_what_is_around_the_present(
+    settings: Configuration, tmp_path: Path
+) -> None:
+    demonstrated = read_inputs(settings, "config.yaml")
+    assert [one.name for one in demonstrated.study.sets] == PAPER_SETS
+    assert demonstrated.study_file == settings.demonstration.study
+    (tmp_path / "a.ulg").write_bytes(b"")
+    flown = read_inputs(settings, "config.yaml")
+    assert (flown.study.name, flown.study_file, flown.study.sets) == ("around_present", settings.study, ())
+    (tmp_path / "a.ulg").unlink()
+    with pytest.raises(UserError, match=r"demonstration\.study.*sets follow from flights"):
+        read_inputs(replace(settings, demonstration=replace(settings.demonstration, study=settings.study)), "c.yaml")

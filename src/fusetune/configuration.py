@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
@@ -30,7 +30,13 @@ from fusetune.storage.files import AnyPath
 class Demonstration:
     """What is simulated while there are no logs."""
 
-    vehicle: str = setting("config/vehicles/quadrotor.yaml", "file of the simulated vehicle", at_least=1)
+    study: str = setting(
+        "config/studies/paper_table11.yaml",
+        "file of the parameter sets that are flown and compared where `study` needs flights, as one around the present "
+        "values does",
+        at_least=1,
+    )
+    vehicle: str = setting("config/vehicles/mistuned_quadrotor.yaml", "file of the simulated vehicle", at_least=1)
     seed: int = setting(1, "seed of wind and sensor errors; the same seed gives the same logs", low=0)
     flights_per_set: int = setting(1, "flights that are simulated with each set of the study", low=1, high=100)
     faults: Mapping[str, tuple[Mapping[str, Any], ...]] = setting(
@@ -50,10 +56,12 @@ class Configuration:
         at_least=1,
     )
     study: str = setting(
-        "config/studies/paper_table11.yaml", "file of the parameter sets that are compared", at_least=1
+        "config/studies/around_present.yaml",
+        "file of the parameter sets that are compared, see [docs/studies.md](../docs/studies.md)",
+        at_least=1,
     )
     mission: str = setting(
-        "config/missions/survey.yaml",
+        "config/missions/short_survey.yaml",
         "file of the mission that is planned, and flown by the demonstration",
         at_least=1,
     )
@@ -72,6 +80,11 @@ class Configuration:
         "its own number",
         low=1,
         high=1000,
+    )
+    search_job: Literal["round", "flight"] = setting(
+        "round",
+        "what one job of a search takes: all flights of a `round`, on all cores, or one `flight` of it; the files are "
+        "the same; the profile for Slurm says `flight`",
     )
     demonstration: Demonstration = section(Demonstration)
     reading: ReadingLimits = section(ReadingLimits)

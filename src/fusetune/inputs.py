@@ -20,6 +20,8 @@ class Inputs:
     """What the configuration asks for, read from where it says."""
 
     study: Study
+    study_file: str
+    """The configuration's own, or that of the demonstration."""
     mission: Mission
     found: Discovery
     """Logs in the folder of flights and in folders below it, and what looks like one and cannot be flown."""
@@ -53,14 +55,21 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
     UserError
         A file or the folder of flights cannot be used, or the configuration names a flight that does not exist.
     """
-    study = load_study(settings.study)
+    found = _discovered(settings.flights_dir, file)
+    study, study_file = load_study(settings.study), settings.study
+    if study.needs_flights and not (found.logs or found.refused):
+        study, study_file = load_study(settings.demonstration.study), settings.demonstration.study
+        if study.needs_flights:
+            reason = f"demonstration.study is {study_file!r}, whose sets follow from flights"
+            raise UserError(file, reason, "Name a study with sets of its own")
     mission = load_mission(settings.mission)
     simulated = dict(_simulated_flights(study, settings.demonstration.flights_per_set))
     for flight in settings.demonstration.faults:
-        if flight not in simulated:
+        # with logs, a study whose sets follow from them names no flights of the demonstration
+        if flight not in simulated and not study.needs_flights:
             reason = f"demonstration.faults names the flight {flight!r}; expected one of {', '.join(simulated)}"
             raise UserError(file, reason, "Mend the name")
-    inputs = Inputs(study, mission, _discovered(settings.flights_dir, file), simulated)
+    inputs = Inputs(study, study_file, mission, found, simulated)
     if settings.present_flight not in (None, *inputs.flights):
         reason = f"present_flight is {settings.present_flight!r}, which is no flight in {settings.flights_dir!r}"
         raise UserError(file, reason, "Name one of its logs without .ulg, or leave it empty for the newest")

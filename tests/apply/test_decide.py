@@ -11,6 +11,7 @@ from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
+from fusetune.apply.recommended import Recommended
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.study import load_study
 from fusetune.errors import UserError
@@ -26,6 +27,7 @@ OUTPUTS = (
     "best_params.params",
     "rollback.params",
     "candidates.yaml",
+    "sensitivity.json",
 )
 QUIET = {"EKF2_ACC_NOISE": 0.2, "EKF2_GYR_NOISE": 0.015}
 PRESENT = {"EKF2_ACC_NOISE": 0.35, "EKF2_GYR_NOISE": 0.015}
@@ -54,6 +56,8 @@ def test_a_clearly_better_set_is_chosen_and_written(tmp_path: Path) -> None:
     assert entry.value == pytest.approx(0.2, abs=1e-7)
     assert "previous value 0.35 m/s^2, new value 0.2 m/s^2" in entry.comments[0]
     assert "better on 6 of 6 flights" in entry.comments[1]
+    assert [one["kind"] for one in decision["next_steps"]] == ["load", "confirm", "load"]
+    assert decision["paragraphs"][-1].startswith("Next: (1) Load best_params.params")
     (back,) = read_params(tmp_path / "apply" / "rollback.params")
     assert (back.name, back.value) == ("EKF2_ACC_NOISE", pytest.approx(0.35, abs=1e-7))
 
@@ -73,6 +77,10 @@ def test_a_difference_of_chance_keeps_the_present_set(tmp_path: Path) -> None:
     decision = run(tmp_path, sets)
     assert decision["status"] == "keep"
     assert "Keep the parameters that fly now." in decision["paragraph"]
+    # how the flights moved is told by the analysis: they stand still
+    assert next(one["kind"] for one in decision["missing_motion"]) == "delays"
+    assert decision["power"]["flights"] == 6
+    assert {one["gain_percent"] for one in decision["power"]["curves"]} == {5.0, 10.0, 20.0}
 
 
 def test_inflated_noise_is_not_chosen_though_its_mean_nis_is_least(tmp_path: Path) -> None:
@@ -329,3 +337,21 @@ def test_leaving_out_flights_is_reported(tmp_path: Path) -> None:
 def test_a_source_is_trusted_as_far_as_its_error_is_white() -> None:
     settings = DecisionSettings(distrust_white_share=0.6, trust_white_share=0.9)
     assert [settings.trust(share) for share in (0.2, 0.6, 0.75, 0.9, 1.0)] == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
+
+
+def test_a_set_that_stands_for_what_a_search_found_is_written_as_found_on_all(tmp_path: Path) -> None:
+    """On each flight it was replayed with other values; those that are written are given."""
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "found": MadeSet(error=0.1, overrides=QUIET)}
+    found = Recommended("found", {"EKF2_ACC_NOISE": 0.25}, {"EKF2_ACC_NOISE": "alone it brings 3 %"})
+    decision = run(tmp_path, sets, recommended=found)
+    assert (decision["status"], decision["chosen"]) == ("change", "found")
+    (entry,) = read_params(tmp_path / "apply" / "best_params.params")
+    assert entry.value == pytest.approx(0.25, abs=1e-7)
+    assert entry.comments[1] == "alone it brings 3 %"
+
+
+def test_what_speaks_against_the_very_values_rules_the_set_out(tmp_path: Path) -> None:
+    sets = {"present": MadeSet(error=0.13, overrides=PRESENT), "found": MadeSet(error=0.1, overrides=QUIET)}
+    decision = run(tmp_path, sets, recommended=Recommended("found", QUIET, objections=("it resets all the time",)))
+    assert decision["status"] == "keep"
+    assert ranked(decision, "found")["reasons"] == ["it resets all the time"]

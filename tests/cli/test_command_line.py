@@ -35,6 +35,27 @@ def test_design_writes_what_the_vehicle_loads(tmp_path: Path, project_root: Path
     assert (tmp_path / "paper4.params").exists()
 
 
+def test_study_writes_and_prints_the_sets_of_a_file(
+    tmp_path: Path, project_root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", str(project_root / "config/studies/paper_table11.yaml"), "--out", str(tmp_path)]) == 0
+    head, *rows = capsys.readouterr().out.splitlines()
+    assert head.split()[:2] == ["set", "EKF2_BARO_NOISE"]
+    assert [line.split()[0] for line in rows] == [f"paper{number}" for number in range(1, 7)]
+    assert {"paper4.params", "sets.parquet"} <= {file.name for file in tmp_path.iterdir()}
+
+
+def test_study_around_a_log_tells_what_is_varied_and_why_the_rest_is_not(
+    golden_logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", "--around", str(golden_logs / "mc_vision.ulg"), "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "evp_noise_up" in printed
+    assert "no EKF2_GPS_POS_X: EKF2_GPS_CTRL is 0" in printed
+    written = {file.stem for file in tmp_path.glob("*.params")}
+    assert written == {line.split()[0] for line in printed.splitlines()[1:] if not line.startswith("no ")}
+
+
 def test_a_mistake_of_the_user_is_one_line_and_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     missing = tmp_path / "no_study.yaml"
     assert main(["design", "--mission", "config/missions/survey.yaml", "--study", str(missing), "--out", "x"]) == 2
@@ -75,3 +96,11 @@ def test_a_command_that_is_not_run_loads_no_room(project_root: Path) -> None:
     loaded = done.stdout.split()
     assert "numpy" not in loaded
     assert {name.split(".")[1] for name in loaded if name.startswith("fusetune.")} == {"cli", "errors"}
+
+
+def test_cards_are_written_and_told(tmp_path: Path, project_root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study = project_root / "config" / "studies" / "paper_table11.yaml"
+    out = tmp_path / "cards.html"
+    assert main(["cards", str(study), "--flights", "10", "--out", str(out)]) == 0
+    assert capsys.readouterr().out == f"{out}: 12 flights in blocks of 6\n"
+    assert "paper6.params" in out.read_text(encoding="utf-8")

@@ -112,6 +112,21 @@ def test_an_output_that_is_a_file_is_named(
     assert str(tmp_path) in error
 
 
+def test_studies_and_logs_that_do_not_fit_are_told(tmp_path: Path, project_root: Path, capsys: Captured) -> None:
+    studies, broken = project_root / "config/studies", tmp_path / "broken.ulg"
+    broken.write_bytes(b"this is no ULog")
+    tries: dict[str, list[str | Path]] = {
+        "names neither a study nor a log": [],
+        "Name its log with --around": [studies / "around_present.yaml"],
+        "Leave --around out": [studies / "imu_noise_grid.yaml", "--around", broken],
+        "broken.ulg: the log is not a ULog file": ["--around", broken],
+    }
+    for said, arguments in tries.items():
+        status, error = status_and_error(capsys, "study", *arguments, "--out", tmp_path / "out")
+        assert (status, said in error, len(error.splitlines())) == (2, True, 1), error
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("name", SETS)
 def test_a_set_that_cannot_be_replayed_is_named_before_the_log_is_read(
     name: str, tmp_path: Path, capsys: Captured

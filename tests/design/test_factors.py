@@ -84,7 +84,7 @@ def test_whatever_flies_the_factor_is_sound(name: str, present: float, coordinat
     slack = 1e-6 * max(abs(factor.low), abs(factor.high)) + factor.grid
     assert factor.low - slack <= value <= factor.high + slack
     # 32 bits hold no multiple of 10 exactly beyond 2 ** 24
-    if factor.grid and factor.high - factor.low >= factor.grid and factor.high < 1e6:
+    if factor.grid and factor.high - factor.low >= factor.grid and max(abs(factor.low), abs(factor.high)) < 1e6:
         assert value % factor.grid == 0.0
         assert factor.low <= value <= factor.high
     if math.isfinite(present) and (present > 0.0 or KINDS[TUNABLE_PARAMETERS[name].kind].scale == "linear"):

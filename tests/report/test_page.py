@@ -31,6 +31,7 @@ def test_the_page_says_what_was_decided_and_why(made: tuple[Path, str]) -> None:
     assert "IMU at 20 Hz" in page
     assert "ab" * 32 in page
     for heading in (
+        "What to do next",
         "What the flights say",
         "What PX4 is told, and what the data say",
         "Without a sensor",

@@ -198,3 +198,10 @@ def test_sets_with_mended_delays_are_the_sets_but_for_the_delay() -> None:
     described = sets.described({"quiet": "less noise", "late": ""})
     assert described["quiet+delay_mended"] == "less noise, delays mended"
     assert described["delay_mended"] == "the configuration that flies now, delays mended"
+
+
+def test_of_sets_with_equal_values_the_first_alone_is_mended() -> None:
+    values = {"EKF2_ACC_NOISE": 0.2, "EKF2_GYR_NOISE": 0.01}
+    sets = FlightSets({"a": values, "b": values | {"EKF2_ACC_NOISE": 0.3}, "a_again": dict(reversed(values.items()))})
+    assert sets.mendable == [PRESENT, "a", "b"]
+    assert sets.scored == [PRESENT, "a", "b", "a_again"]

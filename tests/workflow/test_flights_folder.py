@@ -64,6 +64,7 @@ def test_only_entries_that_cannot_be_flown_are_no_empty_folder(workspace: Worksp
     (workspace.folder / "flights" / "dangling.ulg").symlink_to("/nowhere/b.ulg")
     printed = workspace.run_ok("--cores", "2")
     assert "1 flights, 1 refused" in printed
+    assert "(for each refused log, flights.csv says what it lacks)." in printed.partition("\nNext: ")[2]
     assert verdicts(workspace).keys() == {"dangling"}
     page = (workspace.folder / "results" / "report.html").read_text(encoding="utf-8")
     assert "dangling" in page

@@ -122,6 +122,7 @@ rule analyze_flight:
         delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
         present_replay=replay_files([PRESENT]) if MENDS_DELAYS else [],
         mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
+        found="results/search/found.json" if SEARCH else [],
     output:
         update(replay_files(REPLAY_CHUNKS[-1])),
         expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
@@ -133,10 +134,11 @@ rule analyze_flight:
     priority: 1
     conda:
         "../envs/fusetune.yaml"
+    # around the present values each parameter makes two sets at the most
     resources:
-        **replay_resources(len(REPLAY_CHUNKS[-1]), len(SETS.scored)),
+        **replay_resources(len(REPLAY_CHUNKS[-1]) + 2 * len(SETS.around), len(SETS.scored) + 2 * len(SETS.around)),
     params:
-        sets=overrides_of(REPLAY_CHUNKS[-1]),
+        sets=sets_of_analysis(REPLAY_CHUNKS[-1]),
         replay=asdict(SETTINGS.replay),
         code=DIGEST["replay"],
         scored=scored_sets,

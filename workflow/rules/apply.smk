@@ -9,6 +9,7 @@ rule decide:
         replays=of_replayable_flights(ANALYZED_FILES),
         mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
+        found="results/search/found.json" if SEARCH else [],
         configuration=CONFIGURATION_FILES,
     output:
         "results/apply/ranking.parquet",
@@ -33,6 +34,8 @@ rule decide:
         ),
         "results/apply/rollback.params",
         "results/apply/candidates.yaml",
+        "results/apply/sensitivity.json",
+        search="results/search/search.json" if SEARCH else [],
     log:
         "results/logs/decide.log",
     conda:
@@ -43,7 +46,7 @@ rule decide:
     params:
         sets=scored_sets,
         present=PRESENT,
-        descriptions=SETS.described({pset.name: pset.description for pset in INPUTS.study.sets}),
+        descriptions=set_descriptions,
         decision=asdict(SETTINGS.decision) | {"seed": SETTINGS.seed},
         contents=contents(*CONFIGURATION_FILES),
         code=DIGEST["apply"],

@@ -46,13 +46,33 @@ def of_replayable_flights(patterns):
     return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
-def present_values():
-    return told_in_one_line(read_present, checkpoints.list_flights.get().output.present).parameters
+def present_found():
+    """What flies now and, of a study around it, the sets."""
+    return told_in_one_line(read_present, checkpoints.list_flights.get().output.present)
+
+
+def sets_found():
+    """All sets: of a study around the present values they are known when the flights are listed."""
+    return SETS.found(present_found()) if SETS.around else SETS
 
 
 def overrides_of(names):
     """Params function: the values of some sets, so that only sets whose values change are replayed again."""
-    return lambda wildcards: SETS.overrides(names, present_values() if PRESENT in names else {})
+    return lambda wildcards: SETS.overrides(names, present_found().parameters if PRESENT in names else {})
+
+
+def sets_of_analysis(names):
+    """Params function: the values of the sets that the job which scores a flight replays.
+
+    Beside its share of the sets with known names these are all around the present values: how many there are is known
+    too late for rules of their own.
+    """
+
+    def values(wildcards):
+        around = {pset.name: pset.overrides for pset in present_found().sets} if SETS.around else {}
+        return {**overrides_of(names)(wildcards), **around}
+
+    return values
 
 
 MENDS_DELAYS = SETTINGS.delays.mend
@@ -66,13 +86,23 @@ def mended_delays():
 
 
 def mended_sets():
-    """Names of the sets with mended delays; none where no delay is proved wrong."""
+    """Names of the sets with mended delays; none where no delay is proved wrong.
+
+    Of a study around the present values the present set alone is mended: a delay comes before all else, and twice as
+    many sets would be harder to tell from chance, and to read.
+    """
     return [mended_name(name) for name in SETS.mendable] if mended_delays() else []
 
 
 def scored_sets(wildcards):
     """Params function: names of all sets that are scored."""
-    return [*SETS.scored, *mended_sets()]
+    return [*sets_found().scored, *mended_sets()]
+
+
+def set_descriptions(wildcards):
+    """Params function: a line about each set."""
+    around = present_found().sets if SETS.around else ()
+    return sets_found().described({pset.name: pset.description for pset in (*INPUTS.study.sets, *around)})
 
 
 def of_mended_sets(pattern):
@@ -85,7 +115,7 @@ def of_mended_sets(pattern):
 
 def mended_overrides_of(names):
     """Params function: the values of some sets with the delays mended, by the names that they have then."""
-    return lambda wildcards: SETS.mended(names, present_values(), mended_delays())
+    return lambda wildcards: SETS.mended(names, present_found().parameters, mended_delays())
 
 
 def closing_words():
@@ -100,4 +130,9 @@ def closing_words():
         flights = f"Changed while the run was at work: {', '.join(changed)}. Run the pipeline again.\n{flights}"
     if not os.path.exists("results/report.html"):
         return flights
-    return f"{flights} The decision and its evidence: results/report.html"
+    words = f"{flights} The decision and its evidence: results/report.html"
+    # a run for other targets leaves an older decision as it is, or none
+    if os.path.exists("results/apply/decision.json"):
+        for step in read_document("results/apply/decision.json").get("next_steps", ())[:1]:
+            words += f"\nNext: {step['text']}"
+    return words

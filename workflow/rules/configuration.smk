@@ -10,14 +10,17 @@ CONFIG_FILE = configuration_files()[-1]
 
 INPUTS = told_in_one_line(read_inputs, SETTINGS, CONFIG_FILE)
 DEMONSTRATED = INPUTS.is_demonstration
-SETS = FlightSets({pset.name: pset.overrides for pset in INPUTS.study.sets})
+SEARCH = INPUTS.study.search
+SETS = FlightSets(
+    {pset.name: pset.overrides for pset in INPUTS.study.sets}, INPUTS.study.around, SEARCH.varied if SEARCH else ()
+)
 FLOWN_LOGS = {log.flight: log for log in INPUTS.found.logs}
 LOGS = {flight: log.path for flight, log in FLOWN_LOGS.items()}
 if DEMONSTRATED:
     LOGS = {flight: f"results/execute/{flight}.ulg" for flight in INPUTS.flights}
 CONFIGURATION_FILES = [
     *map(str, workflow.configfiles),
-    SETTINGS.study,
+    INPUTS.study_file,
     SETTINGS.mission,
 ]
 if DEMONSTRATED and workflow.is_main_process:

@@ -1,7 +1,10 @@
 rule design:
     input:
-        study=SETTINGS.study,
+        study=INPUTS.study_file,
         mission=SETTINGS.mission,
+        # what it says comes in as a parameter, so that only other sets make anything again; asked for by a function, as
+        # Snakemake plans a job anew behind a checkpoint only where its input waits for that
+        present=ancient(lambda wildcards: checkpoints.list_flights.get().output.present if SETS.around else []),
     output:
         plan=f"results/design/{INPUTS.mission.name}.plan",
         sets=report(
@@ -11,6 +14,7 @@ rule design:
             labels={"table": "parameter sets"},
         ),
         params=expand("results/design/{pset}.params", pset=list(SETS.study)),
+        around=[directory("results/design/around_present")] if SETS.around else [],
     log:
         "results/logs/design.log",
     conda:
@@ -19,7 +23,8 @@ rule design:
         mem_mb=of_its_logs(LIBRARIES_MB),
         runtime=of_its_logs(5),
     params:
-        contents=contents(SETTINGS.study, SETTINGS.mission),
+        contents=contents(INPUTS.study_file, SETTINGS.mission),
+        around=lambda wildcards: asdict(present_found())["sets"] if SETS.around else (),
         code=DIGEST["design"],
     message:
         "Design: write the mission plan and {INPUTS.study.name}'s parameter sets"

@@ -3,11 +3,13 @@ SUMMARY_FIGURES = {
     "flights_by_sets.svg": "flights and sets",
     "pareto.svg": "two aims",
     "drift.svg": "drift without GNSS",
+    "sensitivity.svg": "what matters",
     "rms.svg": "RMS of innovations",
     "innovations.svg": "innovations",
     "normalised_innovations.svg": "normalised innovations",
     "consistency.svg": "consistency",
     "breaks.svg": "fusion breaks",
+    "power.svg": "what more flights would find",
 }
 
 
@@ -30,6 +32,7 @@ rule plot_flight:
         mem_mb=of_its_logs(LIBRARIES_MB, 1.5),
         runtime=of_its_logs(5, 0.05),
     params:
+        # of a study around the present values that set alone: the others hardly differ to the eye
         sets=SETS.scored,
         present=PRESENT,
         code=DIGEST["report"],
@@ -43,6 +46,7 @@ rule plot_summary:
     input:
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
         decision="results/apply/decision.json",
+        sensitivity="results/apply/sensitivity.json",
     output:
         [
             report(
@@ -75,6 +79,7 @@ rule build_report:
         figures=of_replayable_flights("results/report/flights/{flight}.png"),
         summary=rules.plot_summary.output,
         decision="results/apply/decision.json",
+        sensitivity="results/apply/sensitivity.json",
     output:
         report(
             "results/report.html",

@@ -5,6 +5,8 @@ import os
 
 KERNELS_MB = 350  # Python, its libraries and the compiled estimator
 LIBRARIES_MB = 200
+SEARCHED_MB_PER_MB = 8.0  # of a flight on which sets are tried in memory, for each MB of its log
+MOST_PREPARED = 12  # flights that a process of a search holds
 SIMULATED_LOG_MB = 10.0  # of a flight that is not simulated yet
 
 
@@ -30,6 +32,13 @@ def of_its_logs(fixed, for_each_mb=0.0):
 def of_the_largest_log(fixed, for_each_mb):
     """Resource function of a job that works on one log after the other."""
     return lambda wildcards, attempt: round((fixed + for_each_mb * max(map(log_mb, LOGS), default=0.0)) * attempt)
+
+
+def of_several_logs(threads):
+    """Memory, MB, of a job that holds several flights in each of its processes."""
+    return lambda wildcards, attempt: round(
+        threads * (KERNELS_MB + SEARCHED_MB_PER_MB * sum(sorted(map(log_mb, LOGS))[-MOST_PREPARED:])) * attempt
+    )
 
 
 def replay_resources(replayed, scored=0):

@@ -50,6 +50,7 @@ checkpoint list_flights:
         refused=[list(astuple(entry)) for entry in INPUTS.found.refused],
         code=DIGEST["save"],
         varied=SETS.varied,
+        around=list(SETS.around),
         present_flight=SETTINGS.present_flight,
         vehicle=SETTINGS.vehicle,
         replay=asdict(SETTINGS.replay),

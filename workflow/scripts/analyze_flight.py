@@ -8,7 +8,9 @@ from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.replaying.store.ledger import ReplayLedger
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.settings import TrustSettings
+from fusetune.set_names import FOUND
 from fusetune.settings.declaration import built
+from fusetune.storage.documents import read_document
 
 from job import keep_out, logged_job
 
@@ -20,12 +22,15 @@ with logged_job(snakemake.log[0]):
     params = snakemake.params
     flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
     ledger = ReplayLedger(flight, folder, [params.code, dict(params.replay)])
-    outdated = ledger.outdated(params.sets)
+    found = read_document(snakemake.input.found)["on_flights"].get(flight.name) if snakemake.input.found else None
+    searched = {FOUND: found} if found is not None else {}
+    sets, scored = {**params.sets, **searched}, [*params.scored, *searched]
+    outdated = ledger.outdated(sets)
     settings = AnalysisSettings(
         built(ReplaySettings, params.replay),
         ScoringSettings(**params.scoring),
         TrustSettings(**params.trust),
     )
-    analyze_flight(flight, folder, outdated, params.scored, present=params.present, settings=settings)
+    analyze_flight(flight, folder, outdated, scored, present=params.present, settings=settings)
     ledger.record(outdated)
-    print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(params.sets) - len(outdated)}")
+    print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(sets) - len(outdated)}")

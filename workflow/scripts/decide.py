@@ -4,8 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.decide import decide
+from fusetune.apply.search.found_sets import DESCRIPTION, read_found_sets, search_decision, write_search_document
 from fusetune.apply.settings import DecisionSettings
 from fusetune.save import read_present
+from fusetune.set_names import FOUND
+from fusetune.storage.documents import read_document
 
 from job import keep_out, logged_job
 
@@ -15,16 +18,25 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
     now = read_present(snakemake.input.present)
+    found = read_found_sets(snakemake.input.found) if snakemake.input.found else None
+    sets, descriptions = snakemake.params.sets, snakemake.params.descriptions
+    settings, folder = DecisionSettings(**snakemake.params.decision), Path(snakemake.output[0]).parent
+    if found is not None:
+        sets, descriptions = [*dict.fromkeys([*sets, *found.decided])], {**descriptions, FOUND: DESCRIPTION}
+        settings = search_decision(settings)
     decide(
         [Path(scores).parent for scores in snakemake.input.scores],
         Path(snakemake.input.flights),
-        Path(snakemake.output[0]).parent,
-        sets=snakemake.params.sets,
+        folder,
+        sets=sets,
         present=snakemake.params.present,
         newest_flight=now.flight,
         same_present=now.same,
-        descriptions=snakemake.params.descriptions,
+        descriptions=descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
         delays=Path(snakemake.input.delays) if snakemake.input.delays else None,
-        settings=DecisionSettings(**snakemake.params.decision),
+        recommended=found.recommended if found is not None and FOUND in sets else None,
+        settings=settings,
     )
+    if found is not None:
+        write_search_document(snakemake.output.search, found, read_document(folder / "decision.json"))

@@ -1,8 +1,10 @@
 """Write the mission plan, one parameter file per set, and the table of sets."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.design import write_design
+from fusetune.design.parameter_sets import ParameterSet
 
 from job import keep_out, logged_job
 
@@ -11,4 +13,8 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    write_design(snakemake.input.mission, snakemake.input.study, "results/design")
+    if snakemake.output.around:
+        # also where the flights lead to no set
+        Path(snakemake.output.around[0]).mkdir(parents=True, exist_ok=True)
+    around = [ParameterSet(**one) for one in snakemake.params.around]
+    write_design(snakemake.input.mission, snakemake.input.study, "results/design", around)

@@ -29,14 +29,23 @@ from fusetune.apply.consistency import (
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.delays import confirmed, delay_findings, delay_sentences
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out, white_shares
+from fusetune.apply.missing_motion import missing_motion
+from fusetune.apply.next_steps import Situation, next_steps, refused_remedies, steps_sentence
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
+from fusetune.apply.power.power import Power, power_of
+from fusetune.apply.power.spread import spread_of
 from fusetune.apply.provenance import file_hash, flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
 from fusetune.apply.recommended import Recommended
+from fusetune.apply.rounded import rounded
+from fusetune.apply.sensitivity.files import SENSITIVITY_FILE, write_sensitivity
+from fusetune.apply.sensitivity.result import Sensitivity
+from fusetune.apply.sensitivity.sensitivity import sensitivity
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.study_trials import trials_of_study
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
@@ -45,9 +54,7 @@ from fusetune.set_names import DELAY_MENDED, PRESENT, is_mended
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
-from fusetune.storage.parquet import write_table
-
-_SIGNIFICANT_DIGITS = 9
+from fusetune.storage.parquet import read_table, write_table
 
 
 def decide(
@@ -66,7 +73,8 @@ def decide(
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
-    `decision.json`, `best_params.params`, `rollback.params` and `candidates.yaml` to `output_folder`.
+    `decision.json`, `best_params.params`, `rollback.params`, `candidates.yaml` and `sensitivity.json` to
+    `output_folder`.
 
     Parameters
     ----------
@@ -94,7 +102,8 @@ def decide(
     folders = [Path(folder) for folder in analyze_folders]
     newest_flight = newest_flight or max((folder.name for folder in folders), default=None)
     vehicle = decided_vehicle(flights_table, [folder.name for folder in folders], newest_flight)
-    flights = read_flights([one for one in folders if one.name not in vehicle.others], settings, present)
+    seen_by = DELAY_MENDED if recommended is None else recommended.name
+    flights = read_flights([one for one in folders if one.name not in vehicle.others], settings, present, seen_by)
     others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
     newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
@@ -112,6 +121,24 @@ def decide(
     late = confirmed(_delay_findings(delays, newest, present), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
+    power = _power(ranked, present, flights, settings)
+    missing = missing_motion(flights, present, read_joined(delays) if delays is not None else ())
+    steps = next_steps(
+        Situation(
+            choice,
+            ranked,
+            flights,
+            changes,
+            proposed,
+            late,
+            missing,
+            power,
+            _changed_parameters(newest, present),
+            refused_remedies(read_table(flights_table).to_pylist()),
+            is_simulated=vehicle.identity is not None and not vehicle.identity.is_real,
+        ),
+        settings,
+    )
     sentences = (
         delay_sentences(late),
         paragraph(choice, ranked, flights, settings),
@@ -120,10 +147,14 @@ def decide(
         candidates_sentence(proposed, _gains(better)),
         *vehicle.sentences(),
         *unsure_of_present(flights, newest),
+        steps_sentence(steps),
     )
     text = " ".join(filter(None, sentences))
     decision = _decision(choice, ranked, flights, newest, changes, text, settings)
     decision["paragraphs"] = [one for one in sentences if one]
+    decision["next_steps"] = [asdict(one) for one in steps]
+    decision["missing_motion"] = [asdict(one) for one in missing]
+    decision["power"] = None if power is None else power.document()
     decision["cautions"] = list(minded)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
@@ -141,11 +172,12 @@ def decide(
     _write_ranking(output, ranked, values)
     _write_per_flight(output, flights)
     write_candidates(output / "candidates.yaml", proposed)
+    write_sensitivity(output / SENSITIVITY_FILE, _sensitivity(flights, newest, present, choice, ranked, settings))
     firmware = newest.summary["firmware"] if newest else "unknown"
     written = write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
     with atomic_path(output / "decision.json") as temporary:
-        write_document(temporary, _rounded(decision), allow_nan=False)
+        write_document(temporary, rounded(decision), allow_nan=False)
 
 
 def _ranked_and_chosen(
@@ -170,6 +202,27 @@ def _whiteness(metrics: pa.Table, flights: Sequence[AnalyzedFlight], present: st
     """How white the error of each source is, the mean over the flights that count."""
     counted = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
     return white_shares(metrics.filter(pc.is_in(metrics["flight"], value_set=counted)), present)
+
+
+def _power(
+    ranked: Sequence[RankedSet], present: str, flights: Sequence[AnalyzedFlight], settings: DecisionSettings
+) -> Power | None:
+    """How many flights a gain takes, from the sets that nothing but their score speaks against."""
+    counted = [one for one in flights if one.evidence is not None]
+    evidence = [one.evidence for one in counted if one.evidence is not None]
+    sets = [one.name for one in ranked if one.flights == len(evidence) and not (one.is_present or one.is_vetoed)]
+    minutes = sum(one.summary["scored_s"] for one in counted) / 60.0 / max(len(counted), 1)
+    return power_of(spread_of(evidence, [present, *sorted(sets)]), minutes, settings)
+
+
+def _changed_parameters(newest: AnalyzedFlight | None, present: str) -> dict[str, list[str]]:
+    """Of each set the parameters that it gives another value than the vehicle has."""
+    sets = newest.summary["sets"] if newest is not None else {}
+    now = sets.get(present, {}).get("parameters", {})
+    return {
+        name: sorted(key for key, value in one["overrides"].items() if value != now.get(key))
+        for name, one in sets.items()
+    }
 
 
 def _delay_findings(delays: AnyPath | None, newest: AnalyzedFlight | None, present: str) -> tuple[Finding, ...]:
@@ -204,6 +257,22 @@ def _noises(
     deciding = pa.array([flight.name for flight in flights if flight.evidence is not None], pa.string())
     parameters = newest.summary["sets"].get(present, {}).get("parameters", {}) if newest is not None else {}
     return source_noises(metrics.filter(pc.is_in(metrics["flight"], deciding)), present, parameters, settings)
+
+
+def _sensitivity(
+    flights: Sequence[AnalyzedFlight],
+    newest: AnalyzedFlight | None,
+    present: str,
+    choice: Choice,
+    ranked: Sequence[RankedSet],
+    settings: DecisionSettings,
+) -> Sensitivity | None:
+    """What the sets tell of the parameters, around the set that is chosen."""
+    trials = trials_of_study(flights, newest, present, [one.name for one in ranked if one.is_vetoed])
+    if trials is None:
+        return None
+    incumbent = trials.values[trials.names.index(choice.chosen)] if choice.chosen in trials.names else None
+    return sensitivity(trials, incumbent, confidence=settings.confidence, seed=settings.seed)
 
 
 def _vetoed_but_better(ranked: Sequence[RankedSet]) -> list[RankedSet]:
@@ -326,7 +395,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
         del row["aims"], row["is_present"]
         row["reasons"] = "; ".join(one.reasons)
         row["worse_aims"] = " ".join(one.worse_aims)
-        rows.append(_rounded(row))
+        rows.append(rounded(row))
     table = pa.Table.from_pylist(rows)
     # A column in which nothing is known is one of figures all the same.
     schema = [pa.field(one.name, pa.float64()) if pa.types.is_null(one.type) else one for one in table.schema]
@@ -380,14 +449,3 @@ def _file_origin(choice: Choice, decision: dict[str, Any], newest: AnalyzedFligh
     if choice.exploratory:
         lines.append(f"exploratory: flights in the decision: {decision['flights_scored']}")
     return tuple(lines)
-
-
-def _rounded(value: Any) -> Any:
-    """Round every float to nine significant digits: the last bits may differ between machines. None where none is."""
-    if isinstance(value, float):
-        return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(item) for item in value]
-    return value

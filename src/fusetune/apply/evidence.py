@@ -142,15 +142,21 @@ class BlockSums:
     sum_log_variance: Array
 
 
-def read_flights(folders: Sequence[AnyPath], settings: DecisionSettings, present: str) -> list[AnalyzedFlight]:
+def read_flights(
+    folders: Sequence[AnyPath], settings: DecisionSettings, present: str, seen_by: str = DELAY_MENDED
+) -> list[AnalyzedFlight]:
     """Read `results/analyze/<flight>` of all flights of a vehicle, ordered by name so that the order of arguments does
     not matter.
 
     A flight that is too short to show how white a source is takes the mean of those that do, as all are of one vehicle.
+
+    Parameters
+    ----------
+    seen_by : the set that says how white the sources are, where a flight has it; the present one elsewhere. A source
+        with a wrong delay looks coloured, as its error holds the acceleration.
     """
     metrics = {folder: read_table(folder / "metrics.parquet") for folder in map(Path, folders)}
-    # a source with a wrong delay looks coloured, as its error holds the acceleration
-    shares = {one: white_shares(table, DELAY_MENDED) or white_shares(table, present) for one, table in metrics.items()}
+    shares = {one: white_shares(table, seen_by) or white_shares(table, present) for one, table in metrics.items()}
     known: dict[str, list[float]] = {}
     for one in shares.values():
         for source, share in one.items():

@@ -1,7 +1,8 @@
 """What a set of the decision stands for where its replays are not of one set: what a search found on all flights.
 
 On each flight the set was replayed with what the search found without that flight, so that the decision sees what the
-search is worth on flights that it did not see. What is written is what it found on all of them.
+search is worth on flights that it did not see. What is written is what it found on all of them. How white the sources
+are is told by what was found, for the delays of the present set may be wrong.
 """
 
 from __future__ import annotations

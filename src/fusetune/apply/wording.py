@@ -29,8 +29,8 @@ def paragraph(
     minutes = sum(flight.summary["scored_s"] for flight in scored) / 60.0
     sentences = [
         f"Fly the set “{choice.chosen}”." if choice.status == "change" else "Keep the parameters that fly now.",
-        f"{_count(len(ranked), 'parameter set')} {'was' if len(ranked) == 1 else 'were'} replayed on "
-        f"{_count(len(scored), 'flight')} ({minutes:.1f} minutes scored) and judged by {_basis(scored)}.",
+        f"{counted(len(ranked), 'parameter set')} {'was' if len(ranked) == 1 else 'were'} replayed on "
+        f"{counted(len(scored), 'flight')} ({minutes:.1f} minutes scored) and judged by {_basis(scored)}.",
         _comparison(choice, ranked, settings),
         _left_out(choice),
         *_not_eligible(ranked),
@@ -38,7 +38,7 @@ def paragraph(
     ]
     if choice.exploratory:
         sentences.append(
-            f"This is exploratory: {_count(len(scored), 'flight')} cannot speak for the next one; "
+            f"This is exploratory: {counted(len(scored), 'flight')} cannot speak for the next one; "
             f"fly and add at least {settings.minimum_flights} before relying on it."
         )
     return " ".join(filter(None, sentences))
@@ -71,7 +71,7 @@ def _not_counted(flights: Sequence[AnalyzedFlight], settings: DecisionSettings) 
     ):
         count = sum(flight.without is not None and flight.without.kind == kind for flight in flights)
         if count:
-            yield f"{_count(count, 'replayed flight')} {one if count == 1 else more}."
+            yield f"{counted(count, 'replayed flight')} {one if count == 1 else more}."
 
 
 def named(names: Sequence[str], most: int = _MOST_NAMES) -> str:
@@ -109,7 +109,7 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
             return f"No other set did better; the nearest, “{best.name}”, has the same prediction errors."
         span = _larger(best.lower, best.upper, settings.confidence)
         return f"No other set did better; the nearest, “{best.name}”, has prediction errors {size} ({span})."
-    wins = f"better on {best.flights_better} of {_count(best.flights, 'flight')}"
+    wins = f"better on {best.flights_better} of {counted(best.flights, 'flight')}"
     found = f"The best candidate, “{best.name}”, had errors {best.improvement_percent:.1f} % smaller "
     if best.upper is None:
         return f"{found}({wins}), but {UNKNOWN_INTERVAL}: nothing in these flights shows how it varies."
@@ -135,7 +135,7 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
 
 def _for_the_mended(choice: Choice, pick: RankedSet, settings: DecisionSettings) -> str:
     """Why a set with mended delays is chosen: what is measured is proof enough if the predictions do not contradict."""
-    wins = f"better on {pick.flights_better} of {_count(pick.flights, 'flight')}"
+    wins = f"better on {pick.flights_better} of {counted(pick.flights, 'flight')}"
     span = _smaller(pick.lower, pick.upper, settings.confidence)
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
     beyond = choice.beyond_mending
@@ -144,13 +144,13 @@ def _for_the_mended(choice: Choice, pick: RankedSet, settings: DecisionSettings)
     span = _smaller(beyond.lower, beyond.upper, settings.confidence)
     return (
         f"{text} They are {beyond.improvement_percent:.1f} % smaller than with nothing but the delay mended ({span}; "
-        f"better on {beyond.flights_better} of {_count(beyond.flights, 'flight')})."
+        f"better on {beyond.flights_better} of {counted(beyond.flights, 'flight')})."
     )
 
 
 def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) -> str:
     span = _smaller(pick.lower, pick.upper, settings.confidence)
-    wins = f"better on {pick.flights_better} of {_count(pick.flights, 'flight')}"
+    wins = f"better on {pick.flights_better} of {counted(pick.flights, 'flight')}"
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
     if not gains_enough(pick, settings):
         nearer = pick.aims[SMOOTHED]
@@ -214,5 +214,6 @@ def _no_evidence(flights: Sequence[AnalyzedFlight]) -> str:
     return f"Keep the parameters that fly now: none of the {len(flights)} replayed flights has a say ({reasons}{more})."
 
 
-def _count(number: int, noun: str) -> str:
+def counted(number: int, noun: str) -> str:
+    """A number of things, with the plural's s."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

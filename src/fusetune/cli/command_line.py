@@ -9,12 +9,14 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import design, fidelity, replay, save, search, simulate
+from fusetune.cli import cards, design, fidelity, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
 COMMANDS: Mapping[str, Command] = {
     "design": design,
+    "study": study,
+    "cards": cards,
     "simulate": simulate,
     "save": save,
     "replay": replay,

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--parameters", type=Path, metavar="FILE", help="YAML file of what to search, and how (docs/search.md)"
     )
-    parser.add_argument("--evaluations", type=int, metavar="N", help="parameter sets that are tried (120)")
+    parser.add_argument("--evaluations", type=int, metavar="N", help="parameter sets that are tried (400)")
     parser.add_argument("--seed", type=int, metavar="N", help="what chance follows from (1)")
     parser.add_argument("--cores", type=int, metavar="N", help="processes that replay (all cores)")
 
@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     import os
 
     from fusetune.apply.search.log_search import search_logs
-    from fusetune.apply.search.settings import SearchSettings
+    from fusetune.design.search_settings import SearchSettings
     from fusetune.settings.checking import checked
     from fusetune.settings.yaml_reader import read_yaml
 

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from fusetune.design.tunable_parameters import TUNABLE_PARAMETERS, Scale, TunableParameter
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, as_float32, metadata_of
 
+_LARGEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -115,8 +117,7 @@ def _factor_around(
     facts = parameter.facts
     sane_low, sane_high = parameter.sane_range(present)
     origin = float(present.get(parameter.name, math.nan))
-    if not math.isfinite(origin):
-        origin = PARAMETERS[parameter.name].default
+    origin = as_float32(origin) if abs(origin) <= _LARGEST_FLOAT32 else PARAMETERS[parameter.name].default
     if facts.scale == "log":
         origin = origin if origin > 0.0 else sane_low
         low, high = origin / ratio, origin * ratio

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fusetune.design.mission import Mission, Waypoint, load_mission
-from fusetune.design.study import ParameterSet, Study, load_study
+from fusetune.design.parameter_sets import ParameterSet
+from fusetune.design.study import Study, load_study
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.px4.parameters.params_file import ParamEntry, ParamsHeader, write_params
 from fusetune.px4.plan_file import (
@@ -22,14 +25,26 @@ from fusetune.px4.plan_file import (
 )
 from fusetune.storage.files import atomic_path
 
+AROUND_FOLDER = "around_present"
+
 FLY_OVER_ACCEPTANCE_M = 0.5
 """PX4 turns once it is this near, so a small radius makes it cross the waypoint; 0 leaves the vehicle's own."""
 
 
 def write_design(
-    mission_file: str | os.PathLike[str], study_file: str | os.PathLike[str], folder: str | os.PathLike[str]
+    mission_file: str | os.PathLike[str],
+    study_file: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    around: Sequence[ParameterSet] = (),
 ) -> None:
     """Write all that a mission and a study lead to: ``<mission>.plan``, ``<set>.params`` and ``sets.parquet``.
+
+    Of a study around the present values the parameter files lie in a folder ``around_present``, which then holds just
+    those.
+
+    Parameters
+    ----------
+    around : the sets of such a study, which flights have led to
 
     Raises
     ------
@@ -39,9 +54,14 @@ def write_design(
     mission, study = load_mission(mission_file), load_study(study_file)
     target = Path(folder)
     write_mission_plan(mission, target / f"{mission.name}.plan")
+    write_study(replace(study, sets=(*study.sets, *around)), target, target / AROUND_FOLDER if study.around else target)
+
+
+def write_study(study: Study, folder: Path, params_folder: Path) -> None:
+    """Write the sets: ``sets.parquet`` and, elsewhere or not, ``<set>.params``."""
     for parameter_set in study.sets:
-        write_set_params(study, parameter_set, target / f"{parameter_set.name}.params")
-    write_sets_table(study, target / "sets.parquet")
+        write_set_params(study, parameter_set, params_folder / f"{parameter_set.name}.params")
+    write_sets_table(study, folder / "sets.parquet")
 
 
 def write_mission_plan(mission: Mission, path: str | os.PathLike[str]) -> None:

@@ -1,8 +1,8 @@
 """Parameter studies: the named parameter sets that are compared.
 
-Three kinds: an explicit list of sets; one parameter at a time, each of its values a set; a grid of all
-combinations. The sets depend on the study file alone, and values appended to a list, a parameter or the axes of a
-grid leave the sets before them as they are, with the same names: only what is new has to be computed.
+The sets depend on the study file alone, but for those around the present values, which follow from the flights. Sets,
+values or numbers of sets that are appended leave the sets before them as they are, with the same names: only what is
+new has to be computed. docs/studies.md describes the kinds.
 """
 
 from __future__ import annotations
@@ -15,11 +15,19 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from fusetune.design.constraints import CONSTRAINT_PATTERN, Constraint
+from fusetune.design.factors import Factor
 from fusetune.design.names import NAME_PATTERN, name_problem, one_line
 from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
+from fusetune.design.parameter_sets import ParameterSet, short_name
+from fusetune.design.sampling import points
+from fusetune.design.search_settings import SEARCHED, SearchSettings
+from fusetune.design.tunable_parameters import TUNABLE_PARAMETERS, USUALLY_VARIED, Scale
+from fusetune.errors import UserError
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.set_names import RESERVED_SET_NAMES
 from fusetune.settings.checking import raise_problems, validate
-from fusetune.settings.declaration import required, setting
+from fusetune.settings.declaration import built, required, section, setting
 from fusetune.settings.schema import schema_of
 from fusetune.settings.yaml_reader import read_yaml
 
@@ -27,13 +35,15 @@ MOST_SETS = 2000
 """More sets than this are a slip of the pen: each is replayed on every flight."""
 
 LONGEST_SET_NAME = 120
+_CONSTRAINTS = "which of two parameters has to be smaller, `A < B` or `A <= B`; other sets are left out"
 REMEDY = "Mend the named keys; the examples in config/studies/ show studies of every kind"
 
 
 @dataclass(frozen=True)
 class _StudyKind:
-    kind: Literal["list", "one_at_a_time", "grid"] = required(
-        "explicit sets, one parameter changed at a time, or all combinations"
+    kind: Literal["list", "one_at_a_time", "grid", "latin_hypercube", "sobol", "around_present", "search"] = required(
+        "explicit sets, one parameter changed at a time, all combinations, two ways to fill the space between bounds, "
+        "one step up and down from what the vehicle flies, or a search"
     )
 
 
@@ -67,17 +77,57 @@ class _VariedFile(_StudyFile):
     )
 
 
-_FILE_OF_KIND = {"list": _ListFile, "one_at_a_time": _VariedFile, "grid": _VariedFile}
+@dataclass(frozen=True, kw_only=True)
+class _GridFile(_VariedFile):
+    constraints: tuple[str, ...] = setting((), _CONSTRAINTS, pattern=CONSTRAINT_PATTERN)
 
 
 @dataclass(frozen=True)
-class ParameterSet:
-    """A named set of EKF2 parameters that differ from those of the log."""
+class _FactorEntry:
+    """What a study that fills a space says of one parameter."""
 
-    name: str
-    overrides: dict[str, float]
-    """Parameter name → value; `int` for INT32 parameters."""
-    description: str = ""
+    low: float | None = setting(None, "lowest value; without it the lower end of the sane range")
+    high: float | None = setting(None, "highest value; without it the upper end of the sane range")
+    scale: Scale | None = setting(None, "whether ratios or differences count; without it as the catalogue says")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SampledFile(_StudyFile):
+    factors: Mapping[str, _FactorEntry] = required(
+        "parameters and the bounds of each", pattern=PARAMETER_PATTERN, at_least=1
+    )
+    number: int = required("number of sets", low=1, high=MOST_SETS)
+    seed: int = setting(1, "seed of the sequence; the same seed gives the same sets", low=0)
+    constraints: tuple[str, ...] = setting((), _CONSTRAINTS, pattern=CONSTRAINT_PATTERN)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _AroundFile(_StudyKind):
+    name: str = required("name of the study", pattern=NAME_PATTERN)
+    description: str = setting("", "what the study asks, in a sentence")
+    parameters: tuple[str, ...] = setting(
+        (),
+        "parameters to vary where the flights exercise them; empty: those that usually matter",
+        pattern=PARAMETER_PATTERN,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SearchFile(_StudyKind):
+    name: str = required("name of the study", pattern=NAME_PATTERN)
+    description: str = setting("", "what the study asks, in a sentence")
+    search: SearchSettings = section(SearchSettings)
+
+
+_FILE_OF_KIND: Mapping[str, type] = {
+    "list": _ListFile,
+    "one_at_a_time": _VariedFile,
+    "grid": _GridFile,
+    "latin_hypercube": _SampledFile,
+    "sobol": _SampledFile,
+    "around_present": _AroundFile,
+    "search": _SearchFile,
+}
 
 
 @dataclass(frozen=True)
@@ -88,6 +138,15 @@ class Study:
     kind: str
     sets: tuple[ParameterSet, ...]
     description: str = ""
+    around: tuple[str, ...] = ()
+    """Parameters that are varied around the present values, which the flights tell; such a study has no sets yet."""
+    search: SearchSettings | None = None
+    """How a study searches; its sets are found on the flights."""
+
+    @property
+    def needs_flights(self) -> bool:
+        """Whether what it compares follows from flights."""
+        return bool(self.around or self.search)
 
     def set_named(self, name: str) -> ParameterSet:
         """The set of that name; raises `KeyError` where the study has none."""
@@ -106,7 +165,15 @@ def load_study(path: str | os.PathLike[str]) -> Study:
     raise_problems(path, _parameter_problems(document), REMEDY)
     sets = tuple(_SETS_OF_KIND[document["kind"]](document))
     raise_problems(path, _name_problems(sets), REMEDY)
-    return Study(document["name"], document["kind"], sets, one_line(document.get("description", "")))
+    if len(sets) < document.get("number", 0):
+        reason = f"only {len(sets)} sets of {document['number']} keep the constraints"
+        raise UserError(path, reason, "Loosen the constraints or widen the bounds")
+    if not sets and document["kind"] not in ("around_present", "search"):
+        raise UserError(path, "no set keeps the constraints", "Loosen them")
+    around = (*document.get("parameters", ()),) or USUALLY_VARIED if document["kind"] == "around_present" else ()
+    description = one_line(document.get("description", ""))
+    search = built(SearchSettings, document.get("search", {})) if document["kind"] == "search" else None
+    return Study(document["name"], document["kind"], sets, description, around, search)
 
 
 def _listed_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
@@ -130,21 +197,76 @@ def _grid_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
     vary = document["vary"]
     combinations = itertools.product(*(range(len(values)) for values in vary.values()))
     for indices in sorted(combinations, key=lambda combination: (max(combination), combination)):
-        yield _varied_set(document, {name: vary[name][index] for name, index in zip(vary, indices, strict=True)})
+        values = {name: vary[name][index] for name, index in zip(vary, indices, strict=True)}
+        if _keeps_constraints(document, values):
+            yield _varied_set(document, values)
 
 
-_SETS_OF_KIND = {"list": _listed_sets, "one_at_a_time": _one_at_a_time_sets, "grid": _grid_sets}
+def _sampled_sets(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
+    """The first so many points that keep the constraints; a name is the number of a set among these."""
+    factors = [_factor(name, entry) for name, entry in document["factors"].items()]
+    drawn = points(document["kind"], [one.parameter for one in factors], document.get("seed", _SampledFile.seed))
+    sets = (
+        values
+        for point in drawn
+        if _keeps_constraints(document, values := {f.parameter: _at(f, u) for f, u in zip(factors, point, strict=True)})
+    )
+    for number, values in enumerate(itertools.islice(sets, document["number"]), 1):
+        described = ", ".join(f"{name} {value:g}" for name, value in values.items())
+        overrides = {**typed_values(document.get("fixed", {})), **values}
+        yield ParameterSet(f"{document['kind']}_{number:0{len(str(MOST_SETS))}}", overrides, described)
+
+
+def _factor(name: str, entry: Mapping[str, Any]) -> Factor:
+    known = TUNABLE_PARAMETERS.get(name)
+    low, high, scale = _bounds(name, entry)
+    middle = math.sqrt(low * high) if scale == "log" else (low + high) / 2.0
+    return Factor(name, scale, low, high, middle, 2.0 if scale == "log" else 1.0, known.facts.grid if known else 0.0)
+
+
+def _bounds(name: str, entry: Mapping[str, Any]) -> tuple[Any, Any, Scale]:
+    """Bounds, None where neither study nor catalogue tells, and scale."""
+    known = TUNABLE_PARAMETERS.get(name)
+    low, high = known.sane_range({}) if known else (None, None)
+    scale: Scale = known.facts.scale if known else "linear"
+    given = {key: value for key, value in entry.items() if value is not None}
+    return given.get("low", low), given.get("high", high), given.get("scale", scale)
+
+
+def _at(factor: Factor, share: float) -> float:
+    """Value at a share of the way from bound to bound, to four digits as long as that stays inside them."""
+    first, last = factor.bounds
+    value = factor.value(first + share * (last - first))
+    rounded = float(f"{value:.4g}")
+    return rounded if factor.low <= rounded <= factor.high else min(max(value, factor.low), factor.high)
+
+
+def _keeps_constraints(document: Mapping[str, Any], values: Mapping[str, float]) -> bool:
+    known = {**document.get("fixed", {}), **values}
+    return all(Constraint.of(text).holds(known) for text in document.get("constraints", ()))
+
+
+def _sets_of_flights(document: Mapping[str, Any]) -> Iterable[ParameterSet]:
+    """None yet: they follow from the flights (`around_present.study_around`)."""
+    return ()
+
+
+_SETS_OF_KIND = {
+    "list": _listed_sets,
+    "one_at_a_time": _one_at_a_time_sets,
+    "grid": _grid_sets,
+    "latin_hypercube": _sampled_sets,
+    "sobol": _sampled_sets,
+    "around_present": _sets_of_flights,
+    "search": _sets_of_flights,
+}
 
 
 def _varied_set(document: Mapping[str, Any], varied: Mapping[str, float]) -> ParameterSet:
     varied = typed_values(varied)
-    name = "-".join(f"{_short(parameter)}_{_value_text(value)}" for parameter, value in varied.items())
+    name = "-".join(f"{short_name(parameter)}_{_value_text(value)}" for parameter, value in varied.items())
     description = ", ".join(f"{parameter} {value:g}" for parameter, value in varied.items())
     return ParameterSet(name, {**typed_values(document.get("fixed", {})), **varied}, description)
-
-
-def _short(parameter: str) -> str:
-    return parameter.removeprefix("EKF2_").lower()
 
 
 def _value_text(value: float) -> str:
@@ -164,11 +286,63 @@ def _parameter_problems(document: Mapping[str, Any]) -> Iterable[str]:
         problem = parameter_problem(name, value)
         if problem:
             yield f"{place}: {problem}"
-    for name in set(document.get("fixed", {})) & set(document.get("vary", {})):
-        yield f"vary.{name}: the parameter is fixed too; expected it in only one of fixed and vary"
+    for key in ("vary", "factors"):
+        for name in set(document.get("fixed", {})) & set(document.get(key, {})):
+            yield f"{key}.{name}: the parameter is fixed too; expected it in only one of fixed and {key}"
     for name, values in document.get("vary", {}).items():
         for value in (value for value, count in Counter(values).items() if count > 1):
             yield f"vary.{name}: the value {value:g} stands more than once"
+    for name, entry in document.get("factors", {}).items():
+        yield from _factor_problems(name, entry)
+    for name in document.get("parameters", ()):
+        yield from _untunable(name, "parameters")
+    yield from _search_problems(document.get("search", {}))
+    known = {*document.get("fixed", {}), *document.get("vary", {}), *document.get("factors", {})}
+    for text in document.get("constraints", ()):
+        for name in {Constraint.of(text).smaller, Constraint.of(text).larger} - known:
+            yield f"constraints ({text}): {name} is neither varied nor fixed, so its value is not known"
+
+
+def _untunable(name: str, place: str) -> Iterable[str]:
+    if name not in TUNABLE_PARAMETERS:
+        problem = parameter_problem(name, 0.0) if name not in PARAMETERS else None
+        yield f"{place}: {problem or f'{name} is none of those that are tuned, see docs/studies.md'}"
+
+
+def _search_problems(search: Mapping[str, Any]) -> Iterable[str]:
+    for name in search.get("parameters", ()):
+        yield from _untunable(name, "search.parameters")
+    searched = search.get("parameters") or SEARCHED
+    for name, values in search.get("bounds", {}).items():
+        place = f"search.bounds.{name}"
+        if name not in searched:
+            yield f"{place}: the parameter is not searched; expected one of {', '.join(searched)}"
+        elif len(values) != 2 or not values[0] < values[1]:
+            yield f"{place}: {', '.join(f'{one:g}' for one in values)}; expected the lowest value and the highest"
+        else:
+            yield from (f"{place}: {problem}" for one in values if (problem := parameter_problem(name, one)))
+
+
+def _factor_problems(name: str, entry: Mapping[str, Any]) -> Iterable[str]:
+    place = f"factors.{name}"
+    low, high, scale = _bounds(name, entry)
+    if name in PARAMETERS and PARAMETERS[name].type == "INT32":
+        yield f"{place}: it is a whole number or a switch; expected it in a list or a grid"
+        return
+    if low is None or high is None:
+        unknown = parameter_problem(name, 0.0) if name not in PARAMETERS else None
+        yield f"{place}: {unknown or 'no sane range is known of it; expected low and high'}"
+        return
+    for value in (low, high):
+        problem = parameter_problem(name, value)
+        if problem:
+            yield f"{place}: {problem}"
+    if low >= high:
+        yield f"{place}: low is {low:g} and high {high:g}; expected low below high"
+    elif scale == "log" and low <= 0.0:
+        yield f"{place}: low is {low:g}; expected it above 0 on a logarithmic scale"
+    elif TUNABLE_PARAMETERS.get(name) and high - low < TUNABLE_PARAMETERS[name].facts.grid:
+        yield f"{place}: no step of {TUNABLE_PARAMETERS[name].facts.grid:g} lies between {low:g} and {high:g}"
 
 
 def _parameters_with_places(document: Mapping[str, Any]) -> Iterable[tuple[str, str, float]]:

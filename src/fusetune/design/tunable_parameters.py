@@ -18,7 +18,7 @@ from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 Kind = Literal["process noise", "bias noise", "measurement noise", "gate", "delay", "lever arm"]
 Scale = Literal["log", "linear"]
 
-DELAY_LIMIT = "EKF2_DELAY_MAX"
+DELAY_LIMIT, DELAY_SUFFIX = "EKF2_DELAY_MAX", "_DELAY"
 
 
 @dataclass(frozen=True)
@@ -147,3 +147,21 @@ _ROWS = (
 TUNABLE_PARAMETERS: Mapping[str, TunableParameter] = {row.name: row for row in _ROWS}
 """By name, in the order in which studies vary them. EKF2_IMU_POS_* is not among them: to move the IMU is to move all
 other sensors, which are. Switches, checks and limits are decisions of the pilot, not figures to tune."""
+
+_SELDOM_SEEN = frozenset({
+    "EKF2_MAG_E_NOISE", "EKF2_MAG_B_NOISE", "EKF2_TERR_NOISE", "EKF2_WIND_NSD", "EKF2_HEAD_NOISE", "EKF2_OF_N_MAX",
+    "EKF2_BETA_NOISE", "EKF2_DRAG_NOISE", "EKF2_GRAV_NOISE",
+})  # fmt: skip
+
+
+def _is_usual(one: TunableParameter) -> bool:
+    if one.kind == "gate":
+        return one.name == "EKF2_GPS_V_GATE"
+    if one.kind == "lever arm":
+        return one.name.startswith("EKF2_GPS_")
+    return one.name not in _SELDOM_SEEN
+
+
+USUALLY_VARIED = tuple(one.name for one in TUNABLE_PARAMETERS.values() if _is_usual(one))
+"""Those that a study around the present values varies where it names none: the others are seldom seen in the evidence,
+and each set more makes it harder for the others to stand out from chance."""

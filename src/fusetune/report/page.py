@@ -20,9 +20,11 @@ from fusetune.report.sections.flight_sections import (
     innovations_section,
     provenance_section,
     single_flights_section,
-    truth_section,
 )
+from fusetune.report.sections.next_steps_section import next_steps_section
+from fusetune.report.sections.sensitivity_section import sensitivity_section
 from fusetune.report.sections.trust_section import trust_section
+from fusetune.report.sections.truth_section import truth_section
 from fusetune.storage.files import AnyPath, atomic_path
 
 STYLE_SHEET = Path(__file__).with_name("page.css")
@@ -54,10 +56,12 @@ def build_report(
     pictures = flight_figure_paths([Path(folder).name for folder in analyze_folders], flight_figures)
     sections = (
         decision_section(results),
+        next_steps_section(results, figures),
         findings_section(results),
         evidence_section(results, figures),
         withheld_section(results, figures),
         holds_section(results),
+        sensitivity_section(results, figures),
         weights_section(results),
         paper_section(results),
         sets_section(results),

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
+from fusetune.apply.sensitivity.files import NOTHING_TOLD, SENSITIVITY_FILE, ToldSensitivity, read_sensitivity
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
 from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
@@ -34,6 +35,7 @@ class Results:
     ranking, per_flight : tables of the apply room
     shown : sets that plots show, in order of the ranking, the present one first
     scoring : summary of each analysed flight, by name
+    sensitivity : what the sets tell of the parameters
     """
 
     decision: dict[str, Any]
@@ -44,6 +46,7 @@ class Results:
     folders: dict[str, Path]
     shown: tuple[str, ...]
     present: str
+    sensitivity: ToldSensitivity = NOTHING_TOLD
 
     @property
     def scored(self) -> tuple[str, ...]:
@@ -98,6 +101,7 @@ def read_results(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath) -> R
         metrics=_categorical(pd.concat(metrics, ignore_index=True) if metrics else _empty_metrics()),
         scoring=scoring,
         folders=folders,
+        sensitivity=read_sensitivity(apply_folder / SENSITIVITY_FILE),
         shown=_shown(ranking, present),
         present=present,
     )

@@ -23,9 +23,10 @@ BASE = (
 JOB_SOURCES = {
     "design": (*BASE, "design"),
     "execute": (*BASE, "ekf2", "design", "execute"),
-    "save": (*BASE, "ekf2/feed", "save"),
+    "save": (*BASE, "design", "ekf2/feed", "save"),
     "replay": (
         *BASE,
+        "design",
         "ekf2",
         "save",
         "analyze/flight",
@@ -44,6 +45,7 @@ JOB_SOURCES = {
     ),
     "score": (*BASE, "ekf2", "save", "analyze"),
     "apply": (*BASE, "design", "apply"),
+    "search": (*BASE, "design", "ekf2", "save", "analyze", "apply"),
     "report": (*BASE, "design", "apply", "report"),
 }
 """Kind of job → files and folders of the package."""

@@ -14,17 +14,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+from fusetune.design.around_present import AroundPresent, study_around
+from fusetune.design.parameter_sets import ParameterSet
+from fusetune.design.tunable_parameters import DELAY_SUFFIX
 from fusetune.errors import UserError
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.set_names import AS_FLOWN, PRESENT, mended_name
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import atomic_path
-
-_DELAY = "_DELAY"
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,17 @@ class FlightSets:
     Attributes
     ----------
     study : sets of the study, name → values of the parameters that it varies
+    around : parameters that are varied around the present values; the sets are known when the flights are listed
+    searched : parameters that a set of a search may change; the sets are known when it has ended
     """
 
     study: Mapping[str, Mapping[str, float]]
+    around: Collection[str] = ()
+    searched: Collection[str] = ()
+
+    def found(self, present: Present) -> FlightSets:
+        """The same with the sets around the present values that the flights led to."""
+        return replace(self, study={**self.study, **{one.name: one.overrides for one in present.sets}})
 
     @property
     def scored(self) -> list[str]:
@@ -51,7 +60,9 @@ class FlightSets:
     @property
     def varied(self) -> list[str]:
         """Names of the parameters that the study varies, sorted."""
-        return sorted({name for overrides in self.study.values() for name in overrides})
+        return sorted(
+            {name for overrides in self.study.values() for name in overrides}.union(self.around, self.searched)
+        )
 
     def overrides(self, names: Collection[str], present: Mapping[str, float]) -> dict[str, dict[str, float]]:
         """The values that some of the sets give to parameters, by set.
@@ -65,9 +76,18 @@ class FlightSets:
 
     @property
     def mendable(self) -> list[str]:
-        """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves."""
-        study = [name for name, values in self.study.items() if not any(one.endswith(_DELAY) for one in values)]
-        return [PRESENT, *study]
+        """Names of the scored sets that can be compared with mended delays, too: those that vary none themselves.
+
+        Of sets with equal values the first alone: the others would be it once more. None beside a search that finds
+        delays as well: what is mended is found with all else.
+        """
+        if any(name.endswith(DELAY_SUFFIX) for name in self.searched):
+            return []
+        first: dict[tuple[tuple[str, float], ...], str] = {}
+        for name, values in self.study.items():
+            if not any(one.endswith(DELAY_SUFFIX) for one in values):
+                first.setdefault(tuple(sorted(values.items())), name)
+        return [PRESENT, *first.values()]
 
     def mended(
         self, names: Collection[str], present: Mapping[str, float], delays: Mapping[str, float]
@@ -100,12 +120,16 @@ class Present:
     checksum : of the flight's log
     parameters : name → value, sorted by name; those of the study's parameters that the log knows
     same : all flights of the vehicle that have these values, the newest first
+    sets : of a study around these values, one step from them each
+    left_out : parameter, or set, that such a study could have had → why it does not
     """
 
     flight: str | None
     checksum: str | None
     parameters: dict[str, float]
     same: Sequence[str] = ()
+    sets: Sequence[ParameterSet] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -128,8 +152,13 @@ class _Candidate:
     @property
     def values(self) -> dict[str, float]:
         """Those that the study varies, at the end of the flight."""
-        values = self.metadata["ekf2_parameters"]
-        return {name: values[name] for name in sorted(set(self.varied) & values.keys())}
+        return {name: self.parameters[name] for name in sorted(set(self.varied) & self.parameters.keys())}
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """All of the estimator, at the end of the flight."""
+        values: Mapping[str, float] = self.metadata["ekf2_parameters"]
+        return values
 
     def is_like(self, other: _Candidate) -> bool:
         """Whether it does not matter which of the two is taken."""
@@ -143,6 +172,7 @@ def find_present(
     wanted: str | None,
     vehicle: str | None = None,
     counts: Callable[[str], bool] = lambda flight: True,
+    around: Collection[str] = (),
 ) -> Present:
     """Find the flight whose parameters count as the present ones; its vehicle is the one that is decided for.
 
@@ -158,6 +188,7 @@ def find_present(
     wanted : name of the flight; None for the one recorded last, of several the last by name
     vehicle : name or id of the vehicle, or how it begins; None for any
     counts : whether the replay of a flight is trusted enough to decide; costs a replay, so it is asked of few
+    around : parameters that are varied around what is found
 
     Raises
     ------
@@ -183,7 +214,24 @@ def find_present(
     if chosen is None:
         return Present(None, None, {})
     same = tuple(one.flight for one in found if one.is_like(chosen))
-    return Present(chosen.flight, chosen.metadata["checksum"], chosen.values, same)
+    present = Present(chosen.flight, chosen.metadata["checksum"], chosen.values, same)
+    if not around:
+        return present
+    study = _around(chosen, [one for one in found if one.vehicle.is_same(chosen.vehicle)], around)
+    return replace(present, sets=study.sets, left_out=study.left_out)
+
+
+def _around(chosen: _Candidate, flights: Sequence[_Candidate], around: Collection[str]) -> AroundPresent:
+    """Sets around what flies now. Where the logs of the vehicle differ in one of the parameters, every set gives it the
+    present value, so that no two differ in more than what they vary; else a log keeps what it says."""
+    from fusetune.save.exercise import exercise_of
+
+    differing = {
+        name: value
+        for name, value in chosen.values.items()
+        if any(one.parameters.get(name) != value for one in flights)
+    }
+    return study_around(chosen.parameters, list(around), [exercise_of(one.folder) for one in flights], differing)
 
 
 def _of_vehicle(found: Sequence[_Candidate], vehicle: str) -> list[_Candidate]:
@@ -246,7 +294,8 @@ def read_present(file: str | os.PathLike[str]) -> Present:
     """
     document = read_document(file)
     try:
-        return Present(**document | {"same": tuple(document["same"])})
+        sets = tuple(ParameterSet(**one) for one in document.get("sets", ()))
+        return Present(**document | {"same": tuple(document["same"]), "sets": sets})
     except (TypeError, KeyError) as error:
         reason = f"does not say what the vehicle flies now ({error})"
         raise UserError(file, reason, "Delete it and run the pipeline again") from error

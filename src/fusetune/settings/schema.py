@@ -43,6 +43,8 @@ def _of_type(kind: Any, declaration: Declaration) -> dict[str, Any]:
     arguments, origin = get_args(kind), get_origin(kind)
     if NoneType in arguments:
         schema = _of_type(without_none(kind), declaration)
+        if "enum" in schema:
+            return {"enum": [*schema["enum"], None]}
         return schema | {"type": [schema["type"], "null"]}
     if is_dataclass(kind):
         return schema_of(kind)  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from fusetune.analyze.flight.excitation import Excitation, excitation
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import IMU_TOPICS, airborne_intervals, imu_gaps
 from fusetune.analyze.flight.reference_truth import TRUTH_TOPICS, Truth, read_references
@@ -167,8 +168,9 @@ def score_sets(
     add_ground_metrics(table, records, present, ground, settings)
     for record in records:
         add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
-    samples, gaps, whiteness = no_sample_scores(), [], {}
-    smoothed, reference = SMOOTHED_SCHEMA.empty_table(), None
+    samples, gaps = no_sample_scores(), []
+    whiteness: dict[SourceAxis, Whiteness] = {}
+    smoothed, reference, moved = SMOOTHED_SCHEMA.empty_table(), None, None
     if window.intervals:
         kept = [record for record in records if record.name not in window.excluded]
         samples = score_samples(table, kept, present, window, settings, take_samples, spool_folder)
@@ -181,7 +183,7 @@ def score_sets(
         references = read_references(flight, fused, records[0].parameters)
         reference = smoothed_velocity(kept[0], flight, window.intervals, STEP_US)
         differences = SmoothedScores(reference)
-        whiteness = _add_state_figures(table, kept, flight, references, window, settings, differences)
+        whiteness, moved = _add_state_figures(table, kept, flight, references, window, settings, differences)
         smoothed = differences.rows(flight.name, window.block_edges(settings.block_s))
         for truth in references:
             if truth.kind == "truth" and has_gaps:
@@ -190,6 +192,7 @@ def score_sets(
     withheld = withheld_rows(flight.name, gaps, edges)
     evidence = set_evidence([record.name for record in records], window, samples.costs, gaps, settings)
     summary = scoring_summary(flight, records, present, window, events, evidence, whiteness, settings)
+    summary["excitation"] = None if moved is None else moved.document()
     summary["smoothed_reference"] = None if reference is None else reference.document
     return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, smoothed, summary)
 
@@ -215,26 +218,28 @@ def _add_state_figures(
     window: ScoringWindow,
     settings: ScoringSettings,
     differences: SmoothedScores,
-) -> dict[SourceAxis, Whiteness]:
+) -> tuple[dict[SourceAxis, Whiteness], Excitation | None]:
     """Append what takes the states of each replay: whiteness of the sources, errors against the references.
 
     The differences to the smoothed velocity are taken, too.
 
     Returns
     -------
-    The whiteness as the first of the records, the present set, sees it
+    The whiteness and the motion as the first of the records, the present set, sees them
     """
     present: dict[SourceAxis, Whiteness] = {}
+    moved: Excitation | None = None
     for number, record in enumerate(records):
         states = record.states()
         found = source_whiteness(record, states, flight, window.intervals)
         add_whiteness(table, record.name, found)
         if not number:
             present = found
+            moved = excitation(states.time, states.velocity, states.quaternion, window.intervals)
             add_told_noise(table, record.name, told_noises(record, window.intervals))
         for truth in references:
             figures = true_errors(record, states, truth, window, settings.confidence)
             add_true_errors(table, record.name, figures, truth.kind)
         differences.add(record.name, states)
         give_back_freed_memory()
-    return present
+    return present, moved

@@ -37,13 +37,7 @@ class KeptPairs:
         """Write what a batch did."""
         flight, base, sets = batch
         named = hashlib.sha256(json.dumps([base, sets]).encode()).hexdigest()[:16]
-        document = {
-            "made_of": self._made_of[flight],
-            "flight": flight,
-            "base": dict(base),
-            "about": _base_document(tried[0]),
-            "sets": [{"values": dict(one), **_document(did)} for one, did in zip(sets, tried[1], strict=True)],
-        }
+        document = {"made_of": self._made_of[flight], **batch_document(batch, tried)}
         with atomic_path(self._folder / flight / f"{named}{_SUFFIX}") as temporary:
             write_document(temporary, document, lines=True)
 
@@ -56,14 +50,26 @@ class KeptPairs:
                 except UserError:
                     continue
                 if document["made_of"] == made_of:
-                    yield _batch_of(flight, document)
+                    yield batch_of(document)
 
 
-def _batch_of(flight: str, document: Mapping[str, Any]) -> tuple[Batch, Tried]:
+def batch_document(batch: Batch, tried: Tried) -> dict[str, Any]:
+    """What a batch did, as JSON has it."""
+    flight, base, sets = batch
+    return {
+        "flight": flight,
+        "base": dict(base),
+        "about": _base_document(tried[0]),
+        "sets": [{"values": dict(one), **_document(did)} for one, did in zip(sets, tried[1], strict=True)],
+    }
+
+
+def batch_of(document: Mapping[str, Any]) -> tuple[Batch, Tried]:
+    """The batch that `batch_document` made it of, and what it did."""
     sets = tuple(_values(one["values"]) for one in document["sets"])
     about = document["about"]
     base = TriedBase(about["reason"], about["whiteness"], _tried(about["tried"]))
-    return (flight, _values(document["base"]), sets), (base, tuple(map(_tried, document["sets"])))
+    return (document["flight"], _values(document["base"]), sets), (base, tuple(map(_tried, document["sets"])))
 
 
 def _values(document: Mapping[str, float]) -> Values:

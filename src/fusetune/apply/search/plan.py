@@ -5,24 +5,33 @@ So the whole search is planned before the first set is tried.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from fusetune.apply.search.settings import SearchSettings
-from fusetune.apply.search.space import DELAY_SUFFIX, Space
+from fusetune.design.search_settings import SearchSettings
+from fusetune.design.tunable_parameters import DELAY_SUFFIX
+
+if TYPE_CHECKING:
+    from fusetune.apply.search.space import Space
 
 FIRST_SUFFIXES = (DELAY_SUFFIX, "_POS_X", "_POS_Y", "_POS_Z")
 """Delays and lever arms come first: where they are wrong, a sensor's errors look as if they wandered, and all else is
 tuned to hide it."""
 
-DELAYS, ALL, PUTTING_BACK = "delays", "all", "putting back"
-STAGES = (DELAYS, ALL, PUTTING_BACK)
-PUTTING_BACK_ROUNDS = 3
+DELAYS, ALL, DELAYS_AGAIN, PUTTING_BACK = "delays", "all", "delays again", "putting back"
+STAGES = (DELAYS, ALL, DELAYS_AGAIN, PUTTING_BACK)
+OF_DELAYS = (DELAYS, DELAYS_AGAIN)
+"""Stages that move, or put back, delays and lever arms alone."""
 
-_FIRST_SIZE, _FIRST_GENERATIONS = 6, 2
-_START_SHARE = 0.35
+_PUTTING_DELAYS_BACK_ROUNDS = 2
+_PUTTING_BACK_ROUNDS = 3
+
+_FIRST_GENERATIONS, _AGAIN_GENERATIONS = 3, 1
+_START_SHARE = 0.2
 _GENERATIONS = 6
-FIRST_RADIUS, RADIUS, SHRINKS = 0.5, 0.6, 0.75
-"""How far from the best set the first generation of a stage looks, in half ranges, and what share of that the next."""
+RADIUS, SHRINKS = 0.6, 0.75
+"""How far from the best set the first generation looks, in half ranges, and what share of that the next."""
 
 
 @dataclass(frozen=True)
@@ -31,42 +40,74 @@ class Plan:
 
     Attributes
     ----------
-    first : parameters of the first stage
-    first_generations : sizes after the start of the first stage
+    parameters : all that are searched
+    first : those of the first stage
     start : number of sets that the second stage starts with
     generations : sizes of its generations
     """
 
+    parameters: tuple[str, ...]
     first: tuple[str, ...]
-    first_generations: tuple[int, ...]
     start: int
     generations: tuple[int, ...]
-    factors: int
+
+    @property
+    def first_generations(self) -> tuple[int, ...]:
+        """Sizes after the start of the first stage: the lowest point of a parabola, and one beside it by factor."""
+        return (1 + len(self.first),) * _FIRST_GENERATIONS
+
+    @property
+    def again_generations(self) -> tuple[int, ...]:
+        """The same when delays and lever arms are looked at again."""
+        return (1 + len(self.first),) * _AGAIN_GENERATIONS
 
     @property
     def rounds(self) -> tuple[tuple[str, int], ...]:
-        """Stage and number of sets of every generation; putting back asks for no more than this."""
-        first = [(DELAYS, start_size(len(self.first))), *((DELAYS, size) for size in self.first_generations)]
-        second = [(ALL, self.start), *((ALL, size) for size in self.generations)]
-        return (*(first if self.first else ()), *second, *[(PUTTING_BACK, self.factors + 1)] * PUTTING_BACK_ROUNDS)
+        """Stage and number of sets of every generation; none asks for more than this."""
+        count = len(self.first)
+        first = [start_size(count), *self.first_generations]
+        again = [again_size(count), *self.again_generations, *(1 + count,) * _PUTTING_DELAYS_BACK_ROUNDS]
+        rest = 1 + len(self.parameters) - count
+        back = (rest, rest, 1 + len(self.parameters))
+        assert len(back) == _PUTTING_BACK_ROUNDS
+        return (
+            *(((DELAYS, size) for size in first) if count else ()),
+            (ALL, self.start),
+            *((ALL, size) for size in self.generations),
+            *(((DELAYS_AGAIN, size) for size in again) if count else ()),
+            *((PUTTING_BACK, size) for size in back),
+        )
 
 
 def plan_of(space: Space, settings: SearchSettings) -> Plan:
-    """Share the evaluations out; putting back takes those that are left."""
-    first = tuple(name for name in space.parameters if name.endswith(FIRST_SUFFIXES))
-    spent = 3 * len(space.parameters) + (start_size(len(first)) + _FIRST_SIZE * _FIRST_GENERATIONS if first else 0)
-    left = max(settings.evaluations - spent, 16)
-    start = max(round(_START_SHARE * left), 8)
-    size = max((left - start) // _GENERATIONS, 1)
-    return Plan(
-        first,
-        (_FIRST_SIZE,) * _FIRST_GENERATIONS if first else (),
-        start,
-        (size,) * _GENERATIONS,
-        len(space.parameters),
-    )
+    """Share the evaluations out among the searches: what they start with is the same, and counts once."""
+    return _plan(space.parameters, settings)
+
+
+def planned_rounds(settings: SearchSettings) -> int:
+    """Number of rounds that the searches of a study take at the most, whatever its flights turn out to tell.
+
+    The last one tries what was found on the flights that were kept aside.
+    """
+    return len(_plan(settings.searched, settings).rounds) + 1
+
+
+def _plan(parameters: Sequence[str], settings: SearchSettings) -> Plan:
+    first = tuple(name for name in parameters if name.endswith(FIRST_SUFFIXES))
+    searches = settings.folds + 1
+    fixed = Plan(tuple(parameters), first, 0, ()).rounds
+    shared = start_size(len(first)) if first else 0
+    left = settings.evaluations - shared - searches * (sum(size for _, size in fixed) - shared)
+    start = max(round(_START_SHARE * left), 2 * len(parameters))
+    size = max((left - start) // (searches * _GENERATIONS), 1)
+    return Plan(tuple(parameters), first, start, (size,) * _GENERATIONS)
 
 
 def start_size(factors: int) -> int:
-    """Of a star with four points along each factor."""
-    return 4 * factors
+    """Of a star with four points along each factor, and its middle."""
+    return 4 * factors + 1
+
+
+def again_size(factors: int) -> int:
+    """Of a star with two points along each factor, and its middle."""
+    return 2 * factors + 1

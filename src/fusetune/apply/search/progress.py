@@ -35,7 +35,8 @@ class Progress:
 
     def begin(self, number: int) -> None:
         """A round begins."""
-        self._number, self._begun = number, self._clock()
+        # the last round, on flights kept aside, is not among those planned for a search
+        self._number, self._begun = min(number, len(self._rounds)), self._clock()
         self._before = self._replayed
 
     def better(self, objective: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +18,18 @@ Array = npt.NDArray[np.float64]
 _DARING = 1.0
 """A set is tried for the score that it may have: the expected one less so many standard deviations."""
 
-_POPULATION, _GENERATIONS, _STARTS = 20, 25, 2
-"""Of CMA-ES on the surrogate; starts with different seeds, the best of which counts."""
+_DRAWN, _POPULATION, _GENERATIONS = 512, 16, 15
+"""CMA-ES on the surrogate starts at the best of so many points that are drawn; its population and generations."""
+
+
+class Proposing(Protocol):
+    """`propose`, or what gives the same."""
+
+    def __call__(
+        self, space: Space, points: Array, scores: Array, number: int, radius: float, seed: Sequence[int]
+    ) -> list[dict[str, float]]:
+        """Sets to try after those at some points."""
+        ...
 
 
 def propose(
@@ -86,25 +97,32 @@ def _lowest(surrogate: Surrogate, start: Array, box: Array, daring: float, seed:
         return start
     if np.count_nonzero(moving) == 1:
         return _lowest_along(surrogate, start, box, daring, int(np.argmax(moving)))
-    span = box[moving, 1] - box[moving, 0]
+    low, span = box[moving, 0], box[moving, 1] - box[moving, 0]
+
+    def bound(inside: Array) -> Array:
+        points = np.tile(start, (len(inside), 1))
+        points[:, moving] = low + inside * span
+        mean, spread = surrogate.predict(points)
+        return mean - daring * spread
+
+    first, second = np.random.SeedSequence(list(seed)).generate_state(2)
+    drawn = np.vstack([(start[moving] - low) / span, np.random.default_rng(first).random((_DRAWN, span.size))])
+    values = bound(drawn)
+    best, lowest = drawn[np.argmin(values)], float(values.min())
     # inside, for CMA-ES takes no start at a bound
-    inside = np.clip(start[moving], box[moving, 0] + 0.01 * span, box[moving, 1] - 0.01 * span)
-    seeds = np.random.SeedSequence(list(seed)).generate_state(_STARTS)
-    results = []
-    for number in seeds:
-        search = CMA(
-            (inside - box[moving, 0]) / span, 0.25, np.tile([0.0, 1.0], (span.size, 1)),
-            seed=int(number), population_size=_POPULATION,
-        )  # fmt: skip
-        for _ in range(_GENERATIONS):
-            asked = np.array([search.ask() for _ in range(_POPULATION)])
-            points = np.tile(start, (_POPULATION, 1))
-            points[:, moving] = box[moving, 0] + asked * span
-            mean, spread = surrogate.predict(points)
-            bound = mean - daring * spread
-            search.tell(list(zip(asked, bound.tolist(), strict=True)))
-            results.append((float(bound.min()), points[np.argmin(bound)]))
-    return min(results, key=lambda one: one[0])[1]
+    search = CMA(
+        np.clip(best, 0.01, 0.99), 0.15, np.tile([0.0, 1.0], (span.size, 1)),
+        seed=int(second), population_size=_POPULATION,
+    )  # fmt: skip
+    for _ in range(_GENERATIONS):
+        asked = np.array([search.ask() for _ in range(_POPULATION)])
+        values = bound(asked)
+        search.tell(list(zip(asked, values.tolist(), strict=True)))
+        if values.min() < lowest:
+            best, lowest = asked[np.argmin(values)], float(values.min())
+    found = start.copy()
+    found[moving] = low + best * span
+    return found
 
 
 def _lowest_along(surrogate: Surrogate, start: Array, box: Array, daring: float, axis: int) -> Array:

@@ -8,9 +8,8 @@ from typing import Protocol
 
 from fusetune.analyze.trials.tried_set import TriedSet
 from fusetune.apply.search.comparison import Comparison, TriedBase, compare
-from fusetune.apply.search.plan import DELAYS
-from fusetune.apply.search.requests import Request, Values
-from fusetune.apply.search.stages import Ask
+from fusetune.apply.search.plan import OF_DELAYS
+from fusetune.apply.search.requests import Ask, Request, Values
 from fusetune.apply.settings import DecisionSettings
 
 Batch = tuple[str, Values, tuple[Values, ...]]
@@ -62,14 +61,25 @@ class ReplayGround:
         self._try_all(asks)
         return [self._compared(flights, ask) for flights, ask in asks]
 
+    def pairs(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[tuple[Batch, Tried]]:
+        """All that some asks need to be compared, in batches; what is not known is replayed first."""
+        self._try_all(asks)
+        return [
+            (batch, (self._bases[batch[:2]], tuple(self._tried[Request(batch[0], batch[1], one)] for one in batch[2])))
+            for batch in _batches(asks, {}, {})
+        ]
+
     def _compared(self, flights: Sequence[str], ask: Ask) -> Comparison:
         bases = [self._bases[flight, ask.base] for flight in flights]
+        if ask.seen_by is not None:
+            seen = [self._bases[flight, ask.seen_by].whiteness for flight in flights]
+            bases = [replace(base, whiteness=one or base.whiteness) for base, one in zip(bases, seen, strict=True)]
         tried = [[self._tried[Request(flight, ask.base, one)] for flight in flights] for one in ask.sets]
-        return compare(bases, tried, self._weighed_by(ask.stage))
+        return compare(bases, tried, self.weighed_by(ask.stage))
 
-    def _weighed_by(self, stage: str) -> DecisionSettings:
+    def weighed_by(self, stage: str) -> DecisionSettings:
         """Before the delays are right, the sources' errors look as if they wandered, and are trusted all the same."""
-        if stage == DELAYS:
+        if stage in OF_DELAYS:
             return replace(self._decision, distrust_white_share=0.0, trust_white_share=0.0)
         return self._decision
 
@@ -100,6 +110,8 @@ def _batches(
             new = {one: None for one in ask.sets if Request(flight, ask.base, one) not in tried}
             if new or (flight, ask.base) not in bases:
                 wanted.setdefault((flight, ask.base), {}).update(new)
+            if ask.seen_by is not None and (flight, ask.seen_by) not in bases:
+                wanted.setdefault((flight, ask.seen_by), {})
     batches: list[Batch] = []
     for (flight, base), sets in wanted.items():
         ordered = tuple(sets)

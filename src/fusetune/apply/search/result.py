@@ -89,8 +89,9 @@ def candidate_documents(asked: Sequence[AskedRound]) -> list[dict[str, Any]]:
     ordered = sorted(asked, key=lambda one: (one.search.name != ON_ALL, one.search.name, one.number))
     rows = []
     for one in ordered:
+        scores = objective(one.compared, one.ask.stage)
         for values, score, mean, objections in zip(
-            one.ask.sets, objective(one.compared), one.compared.means, one.compared.objections, strict=True
+            one.ask.sets, scores, one.compared.means, one.compared.objections, strict=True
         ):
             rows.append(
                 {

@@ -5,18 +5,28 @@ They go on in rounds, a generation of each at a time, so that what they ask for 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.folds import folds
 from fusetune.apply.search.plan import plan_of
-from fusetune.apply.search.settings import SearchSettings
+from fusetune.apply.search.proposals import Proposing, propose
+from fusetune.apply.search.requests import Ask
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask, Asking, Found, search_stages
+from fusetune.apply.search.stages import Asking, Found, search_stages
+from fusetune.design.search_settings import SearchSettings
 
 ON_ALL = "all flights"
+
+T = TypeVar("T")
+
+AskedOfFlights = tuple[tuple[str, ...], Ask]
+"""Flights, and what is to be compared on them."""
+
+Rounds = Generator[list[AskedOfFlights], list[Comparison], T]
+"""Rounds, a list of what is asked in each; it is sent how that compares."""
 
 
 class Ground(Protocol):
@@ -80,16 +90,22 @@ def run_searches(
     -------
     What each found, and all that they asked
     """
+    return answered(search_rounds(studied, space, settings), ground, begin)
+
+
+def search_rounds(
+    studied: Sequence[Searched], space: Space, settings: SearchSettings, proposing: Proposing = propose
+) -> Rounds[tuple[list[Found], list[AskedRound]]]:
+    """All searches, a round at a time; what each found, and all that they asked."""
     plan = plan_of(space, settings)
-    running = [search_stages(space, plan, settings) for _ in studied]
+    running = [search_stages(space, plan, settings, proposing) for _ in studied]
     found: dict[int, Found] = {}
     asks = dict(enumerate(map(next, running)))
     asked: list[AskedRound] = []
     number = 0
     while asks:
         number += 1
-        begin(number)
-        answers = ground.compare([(studied[place].flights, ask) for place, ask in asks.items()])
+        answers = yield [(studied[place].flights, ask) for place, ask in asks.items()]
         asked += [
             AskedRound(number, studied[place], ask, answer)
             for (place, ask), answer in zip(asks.items(), answers, strict=True)
@@ -98,6 +114,20 @@ def run_searches(
         found |= {place: one for place, one in following.items() if isinstance(one, Found)}
         asks = {place: one for place, one in following.items() if isinstance(one, Ask)}
     return [found[place] for place in range(len(studied))], asked
+
+
+def answered(rounds: Rounds[T], ground: Ground, begin: Callable[[int], None] = lambda number: None) -> T:
+    """What rounds lead to when a ground answers them all."""
+    number, answers = 0, None
+    while True:
+        try:
+            asks = next(rounds) if answers is None else rounds.send(answers)
+        except StopIteration as ended:
+            result: T = ended.value
+            return result
+        number += 1
+        begin(number)
+        answers = ground.compare(asks)
 
 
 def _next(search: Asking, answer: Comparison) -> Ask | Found:

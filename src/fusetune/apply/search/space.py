@@ -15,14 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.design.factors import Factor
-from fusetune.design.tunable_parameters import DELAY_LIMIT
+from fusetune.design.tunable_parameters import DELAY_LIMIT, DELAY_SUFFIX
 from fusetune.px4.parameters.ekf2_parameters import as_float32
 
 Array = npt.NDArray[np.float64]
 
 _DIGITS = 2
-
-DELAY_SUFFIX = "_DELAY"
 
 _STEP_MS, _SHORTEST_UPDATES = 10.0, 1.25
 """A delay needs one update more than itself, and updates are at the least 10 ms / 1.25 long."""

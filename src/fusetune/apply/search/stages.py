@@ -1,4 +1,4 @@
-"""One search on some flights: delays and lever arms first, then all with the weights anew, then putting back.
+"""One search on some flights: delays and lever arms, all with the weights anew, delays again, then putting back.
 
 A search is a generator that yields what it wants tried, a generation at a time, and is sent how that compares. Their
 number is planned; a generation may be empty. What is asked follows from the answers alone, so that a search which is
@@ -15,11 +15,14 @@ import numpy.typing as npt
 
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.objective import objective
-from fusetune.apply.search.plan import ALL, DELAYS, FIRST_RADIUS, PUTTING_BACK, RADIUS, SHRINKS, STAGES, Plan
-from fusetune.apply.search.proposals import propose
-from fusetune.apply.search.requests import Values, values_of
-from fusetune.apply.search.settings import SearchSettings
-from fusetune.apply.search.space import DELAY_SUFFIX, Space
+from fusetune.apply.search.parabola import propose_on_parabola
+from fusetune.apply.search.plan import ALL, DELAYS, DELAYS_AGAIN, PUTTING_BACK, RADIUS, SHRINKS, STAGES, Plan
+from fusetune.apply.search.proposals import Proposing, propose
+from fusetune.apply.search.putting_back import put_back
+from fusetune.apply.search.requests import Ask, ask_for
+from fusetune.apply.search.space import Space
+from fusetune.design.search_settings import SearchSettings
+from fusetune.design.tunable_parameters import DELAY_SUFFIX
 
 Array = npt.NDArray[np.float64]
 
@@ -29,17 +32,8 @@ _NEAR = 0.35
 _MATTERS = 0.01
 """What the first stage finds is taken where it makes errors smaller by 1 %."""
 
-_SHARE_OF_GAIN = 0.1
-"""Putting back costs no more than this share of the gain, however large the standard error is."""
-
-
-@dataclass(frozen=True)
-class Ask:
-    """Sets to be compared with a base on the flights of a search."""
-
-    stage: str
-    base: Values
-    sets: tuple[Values, ...]
+_AGAIN = 0.2
+"""How far around what was found delays and lever arms are looked at again, in half ranges: 20 ms, 0.1 m."""
 
 
 Asking = Generator[Ask, Comparison, "Found"]
@@ -82,53 +76,70 @@ class _Tried:
         return self.points[int(np.argmin(self.scores))]
 
 
-def search_stages(space: Space, plan: Plan, settings: SearchSettings) -> Asking:
+def search_stages(space: Space, plan: Plan, settings: SearchSettings, proposing: Proposing = propose) -> Asking:
     """Search; the origin of the space is the present set."""
     present = space.values(np.zeros(len(space.factors)))
-    base = yield from _first_stage(space, plan, settings, present)
+    first = space.only(plan.first)
+    base = present
+    if plan.first:
+        base = yield from _first_stage(first, present, _star(first, (1.0 / 3.0, 1.0)), len(plan.first_generations))
     around = _second_space(space, base, plan.first)
-    best = yield from _stage(
-        around, ALL, base, _start(around, plan.start, settings.seed), plan.generations, RADIUS, settings.seed
-    )
-    return (yield from _putting_back(space, best, base, present, settings))
+    best = yield from _second_stage(around, base, plan, settings, proposing)
+    before = best
+    if plan.first:
+        again = first.around(best)
+        star = _star(again, (_AGAIN,))
+        before = yield from _first_stage(again, best, star, len(plan.again_generations), base, DELAYS_AGAIN)
+        changed = [name for name in plan.first if before[name] != present[name]]
+        best = yield from put_back(space, before, base, present, changed, settings, DELAYS_AGAIN)
+    rest = [name for name in space.parameters if name not in plan.first and best[name] != present[name]]
+    values = yield from put_back(space, best, base, present, rest, settings, PUTTING_BACK)
+    kept = tuple(name for name in space.parameters if values[name] != present[name])
+    last = yield ask_for(PUTTING_BACK, space, base, [values, *(values | {name: present[name]} for name in kept)])
+    steps = objective(last, PUTTING_BACK)
+    costs = dict(zip(kept, (steps[1:] - steps[0]).tolist(), strict=True))
+    return Found(space.whole(values), kept, space.whole(before), costs, space.whole(base))
 
 
 def _first_stage(
-    space: Space, plan: Plan, settings: SearchSettings, present: dict[str, float]
-) -> Generator[Ask, Comparison, dict[str, float]]:
-    if not plan.first:
-        return present
-    first = space.only(plan.first)
-    star = [values for values in _star(first) if values != {name: present[name] for name in plan.first}]
-    best = yield from _stage(
-        first, DELAYS, present, [present | one for one in star], plan.first_generations, FIRST_RADIUS, settings.seed
-    )
-    return best
-
-
-def _stage(
     space: Space,
-    stage: str,
-    base: dict[str, float],
-    start: Sequence[dict[str, float]],
-    generations: Sequence[int],
-    radius: float,
-    seed: int,
+    start: dict[str, float],
+    star: Sequence[dict[str, float]],
+    generations: int,
+    base: dict[str, float] | None = None,
+    stage: str = DELAYS,
+) -> Generator[Ask, Comparison, dict[str, float]]:
+    """Delays and lever arms around a set, the origin of the space; compared with the base, by default that set."""
+    known = {name: start[name] for name in space.parameters}
+    asked = [start, *(start | one for one in star if one != known)]
+    tried = _Tried(space)
+    for generation in range(generations + 1):
+        compared = yield ask_for(stage, space, base or start, asked)
+        tried.add(asked, objective(compared, stage))
+        if generation < generations:
+            new = propose_on_parabola(space, np.array(tried.points), np.array(tried.scores), generation)
+            asked = [start | one for one in new]
+    gain = tried.scores[0] - min(tried.scores)
+    return start | space.values(tried.best) if gain > (_MATTERS if stage == DELAYS else 0.0) else start
+
+
+def _second_stage(
+    space: Space, base: dict[str, float], plan: Plan, settings: SearchSettings, proposing: Proposing
 ) -> Generator[Ask, Comparison, dict[str, float]]:
     """The best set of the factors of a space; all others as in the base, the origin of the space."""
     tried = _Tried(space)
     tried.add([base], np.zeros(1))
-    asked: Sequence[dict[str, float]] = start
-    for generation, size in enumerate((*generations, 0)):
-        compared = yield _ask(stage, space, base, asked)
-        tried.add(asked, objective(compared))
+    asked: Sequence[dict[str, float]] = [base | one for one in _start(space, plan.start, settings.seed)]
+    radius = RADIUS
+    for generation, size in enumerate((*plan.generations, 0)):
+        compared = yield ask_for(ALL, space, base, asked)
+        tried.add(asked, objective(compared, ALL))
         if size:
-            chance = (seed, STAGES.index(stage), generation)
-            new = propose(space, np.array(tried.points), np.array(tried.scores), size, radius, chance)
+            chance = (settings.seed, STAGES.index(ALL), generation)
+            new = proposing(space, np.array(tried.points), np.array(tried.scores), size, radius, chance)
             asked = [base | one for one in new]
             radius *= SHRINKS
-    best = base | space.values(tried.best)
-    return best if min(tried.scores) < (-_MATTERS if stage == DELAYS else 0.0) else base
+    return base | space.values(tried.best)
 
 
 def _second_space(space: Space, base: dict[str, float], first: Sequence[str]) -> Space:
@@ -144,14 +155,15 @@ def _second_space(space: Space, base: dict[str, float], first: Sequence[str]) ->
     return replace(space, factors=tuple(found))
 
 
-def _star(space: Space) -> list[dict[str, float]]:
-    """Points along each factor alone, a third and all of the way to its bounds."""
+def _star(space: Space, shares: Sequence[float]) -> list[dict[str, float]]:
+    """Points along each factor alone, on both sides, so far of the way to its bounds."""
     points = []
-    for place, (low, high) in enumerate(space.bounds):
-        for one in (low, low / 3.0, high / 3.0, high):
-            point = np.zeros(len(space.factors))
-            point[place] = one
-            points.append(point)
+    for place, bounds in enumerate(space.bounds):
+        for bound in bounds:
+            for share in shares:
+                point = np.zeros(len(space.factors))
+                point[place] = share * bound
+                points.append(point)
     return [space.values(point) for point in points]
 
 
@@ -159,48 +171,7 @@ def _start(space: Space, number: int, seed: int) -> list[dict[str, float]]:
     """A scrambled Sobol sequence over the space."""
     from scipy.stats import qmc
 
-    drawn = qmc.Sobol(len(space.factors), rng=np.random.default_rng([seed, len(space.factors)])).random(number)
+    sequence = qmc.Sobol(len(space.factors), rng=np.random.default_rng([seed, len(space.factors)]))
+    drawn = sequence.random_base2(max(number - 1, 1).bit_length())[:number]
     low, high = space.bounds[:, 0], space.bounds[:, 1]
     return [space.values(low + row * (high - low)) for row in drawn]
-
-
-def _putting_back(
-    space: Space, best: dict[str, float], base: dict[str, float], present: dict[str, float], settings: SearchSettings
-) -> Asking:
-    """Put parameters back to the present value, the one that costs least first, as long as that costs little."""
-    changed = [name for name in best if best[name] != present[name]]
-    ask = [best, *(best | {name: present[name]} for name in changed)]
-    alone = yield _ask(PUTTING_BACK, space, base, ask)
-    scores = objective(alone)
-    alone_costs = dict(zip(changed, (scores[1:] - scores[0]).tolist(), strict=True))
-    order = sorted(changed, key=lambda name: alone_costs[name])
-    nested = [best | {name: present[name] for name in order[: count + 1]} for count in range(len(order))]
-    together = yield _ask(PUTTING_BACK, space, base, [best, *nested])
-    values = _fewest_changes(together, [best, *nested], settings)
-    kept = tuple(name for name in best if values[name] != present[name])
-    without = [values | {name: present[name]} for name in kept]
-    last = yield _ask(PUTTING_BACK, space, base, [values, *without])
-    steps = objective(last)
-    costs = dict(zip(kept, (steps[1:] - steps[0]).tolist(), strict=True))
-    return Found(space.whole(values), kept, space.whole(best), costs, space.whole(base))
-
-
-def _ask(stage: str, space: Space, base: dict[str, float], sets: Sequence[dict[str, float]]) -> Ask:
-    return Ask(stage, values_of(space.whole(base)), tuple(values_of(space.whole(one)) for one in sets))
-
-
-def _fewest_changes(
-    compared: Comparison, sets: Sequence[dict[str, float]], settings: SearchSettings
-) -> dict[str, float]:
-    """The last of sets, each with one more parameter put back, that is hardly worse than the first."""
-    scores = objective(compared)
-    rows = compared.differences[:, compared.usable]
-    gain = max(-float(scores[0]), 0.0)
-    chosen = sets[0]
-    for place in range(1, len(sets)):
-        steps = rows[place] - rows[0]
-        error = float(np.std(steps, ddof=1) / np.sqrt(steps.size)) if steps.size > 1 else 0.0
-        little = max(np.log1p(0.01 * settings.putting_back_percent), min(error, _SHARE_OF_GAIN * gain))
-        if scores[place] - scores[0] <= little:
-            chosen = sets[place]
-    return chosen

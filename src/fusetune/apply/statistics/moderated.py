@@ -74,15 +74,25 @@ def moderated(differences: Array) -> list[Moderated]:
     flights = len(differences)
     mean, variance = differences.mean(axis=0), differences.var(axis=0, ddof=1)
     size = np.square(differences).mean(axis=0)
-    share = np.minimum(np.divide(variance, size, out=np.ones_like(size), where=size > 0.0), 1.0)
-    usual, others = _medians_of_others(share, size > 0.0, np.asarray(_first_twins(differences)))
+    share = shares(variance, size)
+    usual, others = _medians_of_others(share, size > 0.0, np.asarray(first_twins(differences)))
     weight = np.minimum(PRIOR_FLIGHTS, others)
-    steadied = (weight * usual * size + (flights - 1) * variance) / (weight + flights - 1)
-    error = np.sqrt(np.where(variance > EQUAL_WITHIN**2, steadied, variance) / flights)
+    steady = steadied(variance, size, usual, weight, flights)
+    error = np.sqrt(np.where(variance > EQUAL_WITHIN**2, steady, variance) / flights)
     return [
         Moderated(value, one if one > EQUAL_WITHIN else None, flights - 1 + freedom)
         for value, one, freedom in zip(mean.tolist(), error.tolist(), weight.astype(float).tolist(), strict=True)
     ]
+
+
+def shares(variance: Array, size: Array) -> Array:
+    """Shares that variances have in the mean squares, 1 where there is neither."""
+    return np.minimum(np.divide(variance, size, out=np.ones_like(size), where=size > 0.0), 1.0)
+
+
+def steadied(variance: Array, size: Array, usual: Array, weight: float | Array, flights: int) -> Array:
+    """Variances between flights, drawn towards the usual share of the mean square as if by so many flights more."""
+    return np.asarray((weight * usual * size + (flights - 1) * variance) / (weight + flights - 1))
 
 
 def _medians_of_others(
@@ -103,7 +113,7 @@ def _medians_of_others(
     return np.where(number > 0, median, 0.0), number
 
 
-def _first_twins(differences: Array) -> Sequence[int]:
+def first_twins(differences: Array) -> Sequence[int]:
     """(C,) index of the first candidate that has the same differences on every flight."""
     _, first, group = np.unique(np.round(differences / EQUAL_WITHIN), axis=1, return_index=True, return_inverse=True)
     return np.asarray(first[np.ravel(group)]).tolist()

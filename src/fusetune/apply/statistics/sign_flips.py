@@ -13,6 +13,7 @@ two places counts, for the flips as for the candidates.
 
 import itertools
 import math
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -21,10 +22,8 @@ from fusetune.apply.statistics.rounding import without_rounding
 
 Array = npt.NDArray[np.float64]
 
-MOST_ENUMERATED = 12
-"""Up to this number of flights all flips are tried; beyond, `RANDOM_FLIPS` of them."""
-
 RANDOM_FLIPS = 4096
+"""Flips that are tried where there are more; up to twelve flights all are."""
 
 POWERS_OF_SIZE = (0.25, 0.75)
 """Powers of the size that mean differences are divided by."""
@@ -32,13 +31,14 @@ POWERS_OF_SIZE = (0.25, 0.75)
 _EQUAL = 1e-9
 
 
-def family_p_values(differences: Array, seed: int) -> Array:
+def family_p_values(differences: Array, seed: int, most_flips: int = RANDOM_FLIPS) -> Array:
     """Probability that by luck the best of the candidates is as much better as each of them is.
 
     Parameters
     ----------
     differences : (F, C) score of each candidate less that of the present set on each flight; below 0 is better
     seed : of the flips, where there are too many to try all
+    most_flips : how many are tried at most
 
     Returns
     -------
@@ -63,7 +63,7 @@ def family_p_values(differences: Array, seed: int) -> Array:
     rivals = ~worse & (size > 0.0)
     if not rivals.any():
         return p_values
-    signs = _signs(flights, seed)
+    signs = _signs(flights, seed, most_flips)
     places, flipped_places = [], []
     for power in POWERS_OF_SIZE:
         scale = size[rivals] ** power
@@ -89,11 +89,14 @@ def _students_t(mean: Array, size: Array, flights: int) -> Array:
         return np.where(mean == 0.0, 0.0, mean / np.sqrt(variance))
 
 
-def _signs(flights: int, seed: int) -> Array:
-    """(K, F) signs, the first row all +1."""
-    if flights <= MOST_ENUMERATED:
-        return np.array(list(itertools.product((1.0, -1.0), repeat=flights)))
-    generator = np.random.Generator(np.random.PCG64(seed))
-    signs = generator.choice((1.0, -1.0), size=(RANDOM_FLIPS, flights))
-    signs[0] = 1.0
+@lru_cache(maxsize=32)
+def _signs(flights: int, seed: int, most: int) -> Array:
+    """(K, F) signs, the first row all +1; read-only, as they are kept for the next call."""
+    if 2**flights <= most:
+        signs = np.array(list(itertools.product((1.0, -1.0), repeat=flights)))
+    else:
+        generator = np.random.Generator(np.random.PCG64(seed))
+        signs = generator.choice((1.0, -1.0), size=(most, flights))
+        signs[0] = 1.0
+    signs.setflags(write=False)
     return signs

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fusetune.apply.evidence import AIDED, UNAIDED
+from fusetune.apply.pareto import pareto_front
 from fusetune.report.comparison import (
     AIM_LABELS,
     SCORE,
@@ -173,13 +174,8 @@ def _pareto_limits(both: pd.DataFrame) -> tuple[Limits, Limits]:
 def _front(axes: Axes, both: pd.DataFrame, results: Results, right: float, top: float) -> None:
     """Stairs through the sets that no eligible set beats in both; the present set is one of them if none beats it."""
     able = both[[not results.is_ruled_out(str(name)) for name in both.index]]
-    points = [(0.0, 0.0), *zip(able["change_aided"], able["change_unaided"], strict=True)]
-    best = math.inf
-    front = []
-    for x, y in sorted(points):
-        if y < best:
-            best = y
-            front.append((x, y))
+    points = np.array([(0.0, 0.0), *zip(able["change_aided"], able["change_unaided"], strict=True)], dtype=np.float64)
+    front = sorted({(float(x), float(y)) for x, y in points[pareto_front(points)]})
     x, y = zip((front[0][0], max(top, front[0][1])), *front, (max(right, front[-1][0]), front[-1][1]), strict=True)
     axes.plot(x, y, drawstyle="steps-post", color="#00694C", linewidth=0.9, linestyle=":", label="Pareto front")
 

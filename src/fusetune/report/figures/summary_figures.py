@@ -8,6 +8,8 @@ from matplotlib.figure import Figure
 from fusetune.report.figures.difference_figures import differences, flights_by_sets, pareto
 from fusetune.report.figures.drawing import empty_figure, figure_style, save_svg
 from fusetune.report.figures.innovation_figures import boxes, breaks, consistency, rms_by_variable
+from fusetune.report.figures.power_figure import power_figure
+from fusetune.report.figures.sensitivity_figure import sensitivity_figure
 from fusetune.report.figures.unaided_figures import drift_figure
 from fusetune.report.results import pooled_samples, read_results
 from fusetune.storage.files import AnyPath
@@ -17,11 +19,13 @@ SUMMARY_FIGURES = (
     "flights_by_sets.svg",
     "pareto.svg",
     "drift.svg",
+    "sensitivity.svg",
     "rms.svg",
     "innovations.svg",
     "normalised_innovations.svg",
     "consistency.svg",
     "breaks.svg",
+    "power.svg",
 )
 """Files that `plot_summary` writes."""
 
@@ -41,11 +45,13 @@ def plot_summary(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath, figu
         "flights_by_sets.svg": lambda: flights_by_sets(results),
         "pareto.svg": lambda: pareto(results),
         "drift.svg": lambda: drift_figure(results),
+        "sensitivity.svg": lambda: sensitivity_figure(results.sensitivity.found),
         "rms.svg": lambda: rms_by_variable(results),
         "innovations.svg": lambda: boxes(results, pooled, normalised=False),
         "normalised_innovations.svg": lambda: boxes(results, pooled, normalised=True),
         "consistency.svg": lambda: consistency(results),
         "breaks.svg": lambda: breaks(results),
+        "power.svg": lambda: power_figure(results),
     }
     with figure_style():
         for name in SUMMARY_FIGURES:

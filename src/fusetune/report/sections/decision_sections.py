@@ -7,6 +7,7 @@ from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.report.markup import Cell, number, paragraph, section, table
 from fusetune.report.results import Results
 from fusetune.report.sections.ranking_tables import set_name
+from fusetune.report.sections.truth_section import truth_sentence
 
 _HEADINGS = {"change": "Change to “{chosen}”", "keep": "Keep what flies now", "no_evidence": "Keep what flies now"}
 
@@ -18,7 +19,10 @@ def decision_section(results: Results) -> str:
     heading = escape(_HEADINGS[status].format(chosen=decision["chosen"]))
     tag = '<span class="tag">exploratory</span>' if decision["exploratory"] else ""
     parts = [f'<section class="decision {escape(status)}"><h2>{heading}{tag}</h2>']
-    parts += [paragraph(matter) for matter in decision["paragraphs"]]
+    # the last one is the next steps, which have a section of their own
+    parts += [paragraph(matter) for matter in decision["paragraphs"][:-1]]
+    truth = truth_sentence(results)
+    parts.append(paragraph(truth) if truth else "")
     parts.append(_vehicle(decision["vehicle"]))
     if decision["changes"]:
         rows = [_change_row(change) for change in decision["changes"]]

@@ -1,10 +1,8 @@
-"""The parts of the page about the flights: verdicts, figures of the innovations, truth, single flights, origin."""
+"""The parts of the page about the flights: verdicts, figures of the innovations, single flights, origin."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import pandas as pd
 
 from fusetune.finding import from_documents
 from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
@@ -15,16 +13,6 @@ from fusetune.report.sections.advice import advice_table
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
 
-_TRUE_ERRORS = (
-    ("truth_velocity", "all", "rmse", "velocity m/s"),
-    ("truth_position", "all", "rmse", "position m"),
-    ("truth_position_mean_removed", "all", "rmse", "position, mean removed m"),
-    ("truth_attitude_deg", "tilt", "rmse", "tilt °"),
-    ("truth_attitude_deg", "heading", "rmse", "heading °"),
-    ("truth_withheld_position", "horizontal", "rmse", "drift of position in its gaps without GNSS m"),
-    ("truth_withheld_velocity", "horizontal", "rmse", "drift of velocity in its gaps without GNSS m/s"),
-    ("truth_velocity", "all", "nees", "velocity NEES / 3"),
-)
 _AS_FLOWN_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
 
 
@@ -96,46 +84,6 @@ def innovations_section(results: Results, figures: AnyPath) -> str:
     }
     parts += [figure(figures / name, caption) for name, caption in captions.items()]
     return section("The innovations", *parts)
-
-
-def truth_section(results: Results) -> str:
-    """Errors against the ground truth, where logs have one: by set, and of the present set by flight."""
-    by_set, by_flight = _true_errors(results, "set"), _true_errors(results, "flight")
-    if by_set.empty:
-        return ""
-    flights = len(by_flight)
-    text = (
-        f"{flights} flight{'s have' if flights != 1 else ' has'} a known truth. The decision never looks at it; "
-        "it shows here whether the decision deserves trust."
-    )
-    order = [name for name in results.shown if name in by_set.index]
-    return section(
-        "True errors (RMSE)",
-        paragraph(text),
-        _error_table("set", by_set.loc[order], "Mean over the flights"),
-        _error_table("flight", by_flight, f"Of the set “{results.present}” on each flight"),
-    )
-
-
-def _true_errors(results: Results, by: str) -> pd.DataFrame:
-    """True errors, a row per set (mean over flights) or per flight (of the present set)."""
-    columns = {}
-    for source, axis, metric, label in _TRUE_ERRORS:
-        rows = figure_values(results, source, axis, metric)
-        if by == "flight":
-            rows = rows[rows["set"] == results.present]
-        if len(rows):
-            values = rows.groupby(by, observed=True)["value"].mean()
-            columns[label] = values / 3.0 if metric == "nees" else values
-    return pd.DataFrame(columns)
-
-
-def _error_table(first: str, frame: pd.DataFrame, caption: str) -> str:
-    rows: list[list[Cell | str]] = [
-        [str(name), *(number(float(value)) for value in values)]
-        for name, values in zip(frame.index, frame.to_numpy(), strict=True)
-    ]
-    return table((first, *map(str, frame.columns)), rows, caption)
 
 
 def as_flown_section(results: Results) -> str:

@@ -1,13 +1,34 @@
-"""How a search goes on: which parameters, how far, how many sets."""
+"""A search: which parameters, how far, how many sets."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fusetune.design.tunable_parameters import DELAY_LIMIT
 from fusetune.settings.declaration import setting
 
 FEWEST_EVALUATIONS = 24
+
+SEARCHED = (
+    "EKF2_GPS_DELAY",
+    "EKF2_GPS_POS_X",
+    "EKF2_GPS_POS_Y",
+    "EKF2_GPS_POS_Z",
+    "EKF2_GPS_V_NOISE",
+    "EKF2_ACC_NOISE",
+    "EKF2_GYR_NOISE",
+    "EKF2_BARO_NOISE",
+    "EKF2_MAG_NOISE",
+    "EKF2_EV_DELAY",
+    "EKF2_EVP_NOISE",
+    "EKF2_EVV_NOISE",
+    "EKF2_OF_DELAY",
+    "EKF2_OF_N_MIN",
+    "EKF2_RNG_NOISE",
+)
+"""What is searched by default, as far as the flights exercise it: what flights of simulated vehicles could tell
+(docs/search.md), and the like of other sensors."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +46,8 @@ class SearchSettings:
     )
     ratio: float = setting(8.0, "by how much a value may be larger or smaller than the present one", above=1, high=1000)
     evaluations: int = setting(
-        120,
-        "parameter sets that the search on all flights tries, and each with a part of them kept aside",
+        400,
+        "parameter sets that are tried in all: by the search on all flights, and by those with a part kept aside",
         low=FEWEST_EVALUATIONS,
         high=5000,
     )
@@ -40,3 +61,13 @@ class SearchSettings:
         high=50,
     )
     seed: int = setting(1, "what chance follows from", low=0, high=2**31 - 1)
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the parameters that are searched."""
+        return self.parameters or SEARCHED
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Names of all that a set of the search may change: what goes along with a delay, too."""
+        return (*self.searched, DELAY_LIMIT)

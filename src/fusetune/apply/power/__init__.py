@@ -1,0 +1,1 @@
+"""How many flights a gain takes to be found by the decision's own rule."""

@@ -1,0 +1,50 @@
+"""A study around what flies now: its sets are known only when the flights are listed."""
+
+from __future__ import annotations
+
+import json
+
+from tests.workflow.conftest import CONFIG, Workspace
+
+NEAR = {"name": "near", "kind": "around_present", "parameters": ["EKF2_ACC_NOISE", "EKF2_GPS_DELAY", "EKF2_EV_DELAY"]}
+
+
+def replays(workspace: Workspace) -> dict[str, tuple[int, bytes]]:
+    """When the innovations of each set were made, and what they are."""
+    folder = workspace.folder / "results/analyze/first"
+    return {
+        file.name.partition(".")[0]: (file.stat().st_mtime_ns, file.read_bytes())
+        for file in folder.glob("*.innovations.parquet")
+    }
+
+
+def compared(workspace: Workspace) -> list[str]:
+    decision = json.loads((workspace.folder / "results/apply/decision.json").read_text(encoding="utf-8"))
+    return [one["set"] for one in decision["sets"]]
+
+
+def params(workspace: Workspace) -> set[str]:
+    return {file.stem for file in (workspace.folder / "results/design/around_present").glob("*.params")}
+
+
+def test_sets_follow_from_the_flights_and_a_factor_more_makes_its_own(flown: Workspace) -> None:
+    flown.write("near.yaml", NEAR)
+    flown.write("config.yaml", CONFIG | {"study": "config/near.yaml"})
+    flown.run_ok("--cores", "2")
+    first = {"acc_noise_down", "acc_noise_up", "gps_delay_down", "gps_delay_up"}  # no vision on board
+    assert set(compared(flown)) == {"present", *first}
+    assert params(flown) == first
+    assert "EKF2_ACC_NOISE" in (flown.folder / "results/design/around_present/acc_noise_up.params").read_text("utf-8")
+    assert flown.planned_jobs() == {}
+    before = replays(flown)
+    assert first <= before.keys()
+
+    flown.write("near.yaml", NEAR | {"parameters": [*NEAR["parameters"], "EKF2_BARO_NOISE"]})
+    targets = ("results/apply/decision.json", "results/design/sets.parquet")
+    flown.run_ok("--cores", "2", *targets)
+    more = {"baro_noise_down", "baro_noise_up"}
+    assert set(compared(flown)) == {"present", *first, *more}
+    assert params(flown) == first | more
+    after = replays(flown)
+    assert {name: after[name] for name in first} == {name: before[name] for name in first}
+    assert flown.planned_jobs(*targets) == {}

@@ -1,0 +1,50 @@
+"""Find the flights that can be searched on: those of the vehicle whose replay is trusted."""
+
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusetune.analyze.analyze_flight import AnalysisSettings
+from fusetune.analyze.replaying.settings import ReplaySettings
+from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.analyze.trust.settings import TrustSettings
+from fusetune.apply.search.searched_flights import searched_flights, write_searched_flights
+from fusetune.apply.settings import DecisionSettings
+from fusetune.design.search_settings import SearchSettings
+from fusetune.save import read_present
+from fusetune.settings.declaration import built
+
+from job import keep_out, logged_job
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+keep_out("pandas")
+
+if __name__ == "__main__":
+    with logged_job(snakemake.log[0]), ExitStack() as stack:
+        params = snakemake.params
+        analysis = AnalysisSettings(
+            built(ReplaySettings, params.settings["replay"]),
+            ScoringSettings(**params.settings["scoring"]),
+            TrustSettings(**params.settings["trust"]),
+        )
+        folders = {Path(folder).name: Path(folder) for folder in snakemake.input.folders}
+        processes = min(snakemake.threads, len(folders))
+        mapping = map
+        if processes > 1:
+            mapping = stack.enter_context(ProcessPoolExecutor(processes, get_context("spawn"))).map
+        found = searched_flights(
+            folders,
+            snakemake.input.flights,
+            read_present(snakemake.input.present).flight,
+            SearchSettings(parameters=tuple(params.parameters)),
+            DecisionSettings(**params.settings["decision"]),
+            analysis,
+            mapping,
+        )
+        write_searched_flights(snakemake.output[0], found)
+        print(f"searched on: {', '.join(found.flights) or 'no flight'}")
+        print(*(f"{name}: left out, {why}" for name, why in found.left_out.items()), sep="\n")
