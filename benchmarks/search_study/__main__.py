@@ -14,8 +14,8 @@ from pathlib import Path
 
 from benchmarks.decision_study.tables import between_marks
 
-from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.settings import DecisionSettings
+from fusetune.design.search_settings import SearchSettings
 
 from .emulated import Emulator
 from .emulated_studies import AS_IT_IS, NOISE_ONLY, Outcome, search_often
@@ -90,7 +90,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--worlds", nargs="*", help="names of worlds; by default all")
     parser.add_argument("--evaluations", type=int, default=SearchSettings().evaluations, help="of each search")
     parser.add_argument("--emulated", type=int, default=200, help="searches of each kind on emulated flights; 0: none")
-    parser.add_argument("--emulated-evaluations", type=int, default=40, help="of each of these")
+    parser.add_argument("--emulated-evaluations", type=int, default=200, help="of each of these")
     parser.add_argument("--table-sets", type=int, default=64, help="a third of the sets that these are emulated from")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument(

@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from fusetune.apply.search.requests import values_of
 from fusetune.apply.search.rounds import Searched, run_searches, searches
-from fusetune.apply.search.settings import SearchSettings
 from fusetune.apply.search.space import Space
 from fusetune.apply.search.stages import Found
 from fusetune.apply.settings import DecisionSettings
+from fusetune.design.search_settings import SearchSettings
 
 from .decided import decided
 from .emulated import EmulatedGround, Emulator

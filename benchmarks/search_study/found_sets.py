@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.trials.tried_flight import TrialSettings
+from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.apply.search.kept_pairs import KeptPairs
-from fusetune.apply.search.log_search import search_space
 from fusetune.apply.search.replays import ReplayGround
 from fusetune.apply.search.rounds import ON_ALL, Ground, Searched, run_searches, searches
-from fusetune.apply.search.settings import SearchSettings
+from fusetune.apply.search.search_space import search_space
 from fusetune.apply.search.space import Space
 from fusetune.apply.search.stages import Found
+from fusetune.apply.search.trial_keys import made_of, trial_settings
 from fusetune.apply.search.workers import FlightTrier
 from fusetune.apply.settings import DecisionSettings
+from fusetune.design.around_present import not_exercised
+from fusetune.design.search_settings import SearchSettings
+from fusetune.save.exercise import exercise_of
 from fusetune.save.flight_folder import read_metadata
-from fusetune.storage.digest import source_digest
-from fusetune.storage.ledger import key_of
 
 from .true_figures import FIGURES, JudgedFlight, KeptFigures
 from .truth_ground import TruthGround
@@ -73,8 +73,10 @@ class WorldSearch:
 
     @property
     def space(self) -> Space:
-        """The product's own, around what the vehicle flies."""
-        return search_space(self.parameters, self._settings)
+        """The product's own: around what the vehicle flies, of what its flights exercise."""
+        exercises = [exercise_of(self._folders[self.names[number]]) for number in SEARCHED]
+        names = [name for name in self._settings.searched if not not_exercised(name, exercises)]
+        return search_space(self.parameters, names, self._settings)
 
     def judged(self) -> JudgedWorld:
         """Search both ways on the first flights, and judge on the others."""
@@ -118,15 +120,8 @@ class WorldSearch:
 
     def replays(self) -> ReplayGround:
         """The ground of the search itself."""
-        trials = TrialSettings(
-            self.world.settings,
-            ScoringSettings(),
-            tuple(sorted(self._decision.sources)),
-            tuple(sorted({key.partition(".")[0] for key in self._decision.withheld_sources})),
-        )
-        program = source_digest("px4", "ekf2", "save", "analyze")
-        made_of = {one.folder.name: key_of([one.name, program]) for one in self.truth.flights}
-        pairs = KeptPairs(self._folder / "tried" / self.world.name, made_of)
+        trials = trial_settings(self._decision, AnalysisSettings(replay=self.world.settings))
+        pairs = KeptPairs(self._folder / "tried" / self.world.name, made_of(self._folders, trials))
         folders = {name: str(folder) for name, folder in self._folders.items()}
         ground = ReplayGround(FlightTrier(folders, trials), self._decision, pairs.keep)
         for batch, tried in pairs.kept():
