@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from benchmarks.decision_study.tables import between_marks
+from benchmarks.decision_study.tables import renew_tables
 
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
@@ -46,10 +46,7 @@ def main() -> None:
         parts["emulated"] = emulated_table(outcomes)
     print("\n\n".join(parts.values()))
     if options.write:
-        text = DOCUMENT.read_text(encoding="utf-8")
-        for name, table in parts.items():
-            text = between_marks(text, name, table)
-        DOCUMENT.write_text(text, encoding="utf-8")
+        renew_tables(DOCUMENT, parts)
 
 
 def _search(folder: Path, saved: Path | None, settings: SearchSettings, name: str) -> WorldSearch:
