@@ -12,11 +12,11 @@ from .collect import Folders, StudyFiles, collect
 from .figure import draw_power
 from .study import Sizes, StudiedWorld, study_worlds
 from .tables import (
-    between_marks,
     calibration_table,
     choices_table,
     false_changes_table,
     power_table,
+    renew_tables,
     resampled_table,
     rules_table,
     truth_tables,
@@ -36,10 +36,7 @@ def main() -> None:
     parts = _parts(worlds, options.pool, sizes)
     print("\n\n".join(parts.values()))
     if options.write:
-        text = DOCUMENT.read_text(encoding="utf-8")
-        for name, table in parts.items():
-            text = between_marks(text, name, table)
-        DOCUMENT.write_text(text, encoding="utf-8")
+        renew_tables(DOCUMENT, parts)
         draw_power([one for world in worlds for one in world.drawn], FIGURE)
 
 

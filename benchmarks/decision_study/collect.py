@@ -118,16 +118,13 @@ def _fly_and_score(files: StudyFiles, folders: Folders, world: str, number: int)
     raw = folders.raw and folders.raw / world / f"{target.name}.npz"
     if _is_made_from(target, key) and (raw is None or raw.is_file()):
         return f"{target}: there"
-    saved = folders.saved / world / target.name
-    if not _is_made_from(saved, flown_from):
-        _fly(files, world, number, saved)
-        _stamp(saved).write_text(flown_from, encoding="utf-8")
-    _stamp(target).unlink(missing_ok=True)
+    saved = saved_flight(files, folders.saved, world, number)
+    stamp(target).unlink(missing_ok=True)
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
     with tempfile.TemporaryDirectory() as scratch:
         analyzed = Path(scratch, "analyzed")
-        settings = _replay_settings(files.worlds_by_name()[world])
+        settings = replay_settings(files.worlds_by_name()[world])
         replay_saved_flight(saved, sets, analyzed, settings)
         score_saved_flight(saved, analyzed, list(sets), present=PRESENT)
         write_delays(saved, analyzed, {}, settings)
@@ -135,13 +132,22 @@ def _fly_and_score(files: StudyFiles, folders: Folders, world: str, number: int)
             shutil.copy(analyzed / name, target / name)
         if raw is not None:
             write_raw(raw, saved, analyzed, list(sets))
-    _stamp(target).write_text(key, encoding="utf-8")
+    stamp(target).write_text(key, encoding="utf-8")
     return f"{target}: scored"
+
+
+def saved_flight(files: StudyFiles, folder: Path, world: str, number: int) -> Path:
+    """A flight of a world, saved below `folder`; it is flown if it is not there from the same sources."""
+    saved, flown_from = folder / world / _flight_name(number), _flown_from(files, world)
+    if not _is_made_from(saved, flown_from):
+        _fly(files, world, number, saved)
+        stamp(saved).write_text(flown_from, encoding="utf-8")
+    return saved
 
 
 def _fly(files: StudyFiles, world: str, number: int, saved: Path) -> None:
     """Fly one flight of a world and save its log into `saved`."""
-    _stamp(saved).unlink(missing_ok=True)
+    stamp(saved).unlink(missing_ok=True)
     shutil.rmtree(saved, ignore_errors=True)
     saved.parent.mkdir(parents=True, exist_ok=True)
     described, seed = files.worlds_by_name()[world], FIRST_SEED + number
@@ -154,8 +160,8 @@ def _fly(files: StudyFiles, world: str, number: int, saved: Path) -> None:
         save_log(log, saved)
 
 
-def _replay_settings(described: Mapping[str, Any]) -> ReplaySettings:
-    """A whole log needs no repair, and starts cold."""
+def replay_settings(described: Mapping[str, Any]) -> ReplaySettings:
+    """How flights of a world are replayed: a whole log needs no repair, and starts cold."""
     if described.get("second", {}).get("default_profile", False):
         return replace(IN_USE, withholding=GNSS_GAPS)
     return ReplaySettings(withholding=GNSS_GAPS)
@@ -176,11 +182,11 @@ def _key(*parts: object) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def _stamp(folder: Path) -> Path:
+def stamp(folder: Path) -> Path:
     """The file that says what a folder was made from; beside it, for the folder is another's."""
     return folder.with_name(f"{folder.name}.made_from")
 
 
 def _is_made_from(folder: Path, key: str) -> bool:
-    stamp = _stamp(folder)
-    return folder.is_dir() and stamp.is_file() and stamp.read_text(encoding="utf-8") == key
+    file = stamp(folder)
+    return folder.is_dir() and file.is_file() and file.read_text(encoding="utf-8") == key

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -186,6 +187,14 @@ def _signed(values: Mapping[str, float]) -> str:
 def truth_tables(tables: Mapping[str, str]) -> str:
     """The tables of all worlds."""
     return "\n\n".join(f"{world}:\n\n{table}" for world, table in tables.items())
+
+
+def renew_tables(document: Path, tables: Mapping[str, str]) -> None:
+    """Replace the tables of a document, each between the marks of its name."""
+    text = document.read_text(encoding="utf-8")
+    for name, table in tables.items():
+        text = between_marks(text, name, table)
+    document.write_text(text, encoding="utf-8")
 
 
 def between_marks(text: str, name: str, content: str) -> str:

@@ -42,8 +42,9 @@ def vehicle_gps_position(truth: Truth, gnss: Gnss, rng: np.random.Generator) -> 
     """The topic of the receiver; `timestamp` is that of receipt, later than the measurement by the true delay."""
     time = _sampled(truth, gnss.rate_hz, rng)
     samples, step_s = time.size, 1.0 / gnss.rate_hz
-    position = truth.at(time, truth.position) + _error(gnss.position, samples, step_s, rng)
-    velocity = (truth.at(time, truth.velocity) + _error(gnss.velocity, samples, step_s, rng)).astype(np.float32)
+    at_antenna = truth.beside(np.array(gnss.antenna_m))
+    position = truth.at(time, at_antenna.position) + _error(gnss.position, samples, step_s, rng)
+    velocity = (truth.at(time, at_antenna.velocity) + _error(gnss.velocity, samples, step_s, rng)).astype(np.float32)
     lat, lon, alt = geodetic(position)
 
     def constant(value: float, kind: type = np.float32) -> np.ndarray:

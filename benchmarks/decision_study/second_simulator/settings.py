@@ -53,10 +53,12 @@ class Wander:
 
 @dataclass(frozen=True)
 class Gnss:
-    """The receiver: rate, true delay, errors of velocity (m/s) and position (m), and the accuracies that it reports."""
+    """The receiver: rate, true delay, where its antenna is (m from the IMU, FRD), errors of velocity (m/s) and position
+    (m), and the accuracies that it reports."""
 
     rate_hz: float = 5.0
     delay_ms: float = 110.0
+    antenna_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     velocity: Wander = Wander(0.1, 0.0, 1.0)
     position: Wander = Wander(0.06, 0.5, 45.0)
     reported_velocity_m_s: float = 0.08

@@ -27,6 +27,14 @@ GROUNDTRUTH_EVERY = 20
 
 
 @dataclass(frozen=True)
+class PlaceAboard:
+    """Where a place aboard is and how it moves, (N, 3) NED."""
+
+    position: Array
+    velocity: Array
+
+
+@dataclass(frozen=True)
 class Truth:
     """The motion at N instants, `STEP_S` apart; frames NED at home and FRD.
 
@@ -49,6 +57,13 @@ class Truth:
     @property
     def time_s(self) -> Array:
         return self.path.time_s
+
+    def beside(self, arm: Array) -> PlaceAboard:
+        """Motion of a place aboard, (3,) m from the IMU in the body frame: turning adds to its velocity."""
+        if not arm.any():
+            return PlaceAboard(self.position, self.velocity)
+        arm_ned = self.attitude.apply(arm)
+        return PlaceAboard(self.position + arm_ned, self.velocity + np.gradient(arm_ned, STEP_S, axis=0))
 
     def at(self, time_s: Array, values: Array) -> Array:
         """Values (N,) or (N, D) at other times; linear over a millisecond."""
