@@ -87,20 +87,21 @@ def test_a_killed_search_goes_on_and_leaves_what_one_in_a_single_process_does(
     assert searched.planned_jobs(TOLD, "--config", "search_job=flight")["search_try_2"] == 3
 
     monkeypatch.chdir(searched.folder)
+    command = tmp_path / "command"
     settings = read_configuration(["config/config.yaml"])
     search_logs(
         sorted(Path("flights").glob("*.ulg")),
-        tmp_path,
+        command,
         load_study(settings.study).search,
         decision=replace(settings.decision, seed=settings.seed),
         analysis=AnalysisSettings(settings.replay, settings.scoring, settings.trust),
         told=lambda line: None,
     )
-    assert (tmp_path / "search.json").read_bytes() == (results / "search" / "search.json").read_bytes()
-    assert (tmp_path / "sensitivity.json").read_bytes() == (results / "apply" / "sensitivity.json").read_bytes()
-    assert contents(tmp_path / "tried") == contents(results / "tried")
+    assert (command / "search.json").read_bytes() == (results / "search" / "search.json").read_bytes()
+    assert (command / "sensitivity.json").read_bytes() == (results / "apply" / "sensitivity.json").read_bytes()
+    assert contents(command / "tried") == contents(results / "tried")
 
-    one_by_one = go_through(results, settings, tmp_path / "tried", tmp_path / "rounds")
+    one_by_one = go_through(results, settings, command / "tried", tmp_path / "rounds")
     made = contents(results / "search")
     assert one_by_one.keys() == made.keys() - {"flights.json", "search.json"}
     assert [name for name in one_by_one if one_by_one[name] != made[name]] == []
