@@ -90,7 +90,7 @@ def test_a_killed_search_goes_on_and_leaves_what_one_in_a_single_process_does(
     command = tmp_path / "command"
     settings = read_configuration(["config/config.yaml"])
     search_logs(
-        sorted(Path("flights").glob("*.ulg")),
+        sorted((searched.folder / "flights").glob("*.ulg")),
         command,
         load_study(settings.study).search,
         decision=replace(settings.decision, seed=settings.seed),
