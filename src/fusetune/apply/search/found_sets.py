@@ -82,6 +82,7 @@ def found_sets(
         "gain_in_search_percent": gain_percent(outcome.on_all.differences[0].tolist()),
         "gain_kept_aside_percent": gain_percent(list(outcome.aside.values())),
         "kept_aside": {name: gain_percent([value]) for name, value in outcome.aside.items()},
+        "spread_of_searches": outcome.spread,
         "objections": list(objections),
         "parameters": parameter_documents(found, space),
         "searches": search_documents(outcome.studied, outcome.found, outcome.on_seen, outcome.aside),
@@ -103,6 +104,7 @@ def nothing_found(search: SearchSettings, left_out: Mapping[str, str]) -> FoundS
         "gain_in_search_percent": None,
         "gain_kept_aside_percent": None,
         "kept_aside": {},
+        "spread_of_searches": 0.0,
         "objections": [],
         "parameters": {},
         "searches": [],
@@ -127,7 +129,7 @@ def write_search_document(file: AnyPath, found: FoundSets, decision: Mapping[str
         "product": f"fusetune {__version__}",
         "status": decision["status"],
         "exploratory": decision["exploratory"],
-        "expected_gain": _expected(row),
+        "expected_gain": _expected(row, found.document["spread_of_searches"]),
         "paragraphs": [],
         **found.document,
     }
@@ -162,15 +164,19 @@ def _found_of(document: dict[str, Any]) -> FoundSets:
     return FoundSets(recommended, document["on_flights"], document["document"])
 
 
-def _expected(row: Mapping[str, Any] | None) -> dict[str, float | None] | None:
+def _expected(row: Mapping[str, Any] | None, spread: float) -> dict[str, float | None] | None:
     """Gain to be expected on as many flights again, percent, and its interval; None where nothing was kept aside.
 
-    The interval of the decision is one of the mean over all flights to come. That of the mean over as many flights as
-    were searched on is wider by √2, for these vary as much again.
+    The interval of the decision is one of the mean over all flights to come. The mean over as many flights as were
+    searched on varies as much again; and so does by `spread`, nat, what a search finds: the sets that were judged on
+    the flights kept aside are not quite the one that is written.
     """
     if row is None or row["difference"] is None:
         return None
-    middle = row["difference"]
-    ends = [None if row[one] is None else middle + math.sqrt(2.0) * (row[one] - middle) for one in ("upper", "lower")]
-    lower, upper = (None if one is None else improvement_percent(one) for one in ends)
-    return {"percent": improvement_percent(middle), "lower_percent": lower, "upper_percent": upper}
+    middle, lower, upper = row["difference"], row["lower"], row["upper"]
+    if lower is None or upper is None or not row["error"]:
+        return {"percent": improvement_percent(middle), "lower_percent": None, "upper_percent": None}
+    times = 0.5 * (upper - lower) / row["error"]
+    half = times * math.sqrt(2.0 * row["error"] ** 2 + spread**2)
+    ends = improvement_percent(middle + half), improvement_percent(middle - half)
+    return {"percent": improvement_percent(middle), "lower_percent": ends[0], "upper_percent": ends[1]}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +40,20 @@ class Outcome:
     on_seen: Sequence[Sequence[float]]
     of_base: Comparison
     aside: Mapping[str, float]
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of what the searches' sets are worth on all flights, nat: which one is written is luck.
+
+        0 with one search, and where the flights say nothing.
+        """
+        means = [np.nanmean([*seen, *(self.aside[name] for name in one.aside)]) for one, seen in self._each_on_seen()]
+        return float(np.std(means, ddof=1)) if len(means) > 1 and np.isfinite(means).all() else 0.0
+
+    def _each_on_seen(self) -> Iterator[tuple[Searched, Sequence[float]]]:
+        for one, seen in zip(self.studied, self.on_seen, strict=True):
+            if np.isfinite([*seen, *(self.aside[name] for name in one.aside)]).any():
+                yield one, seen
 
     @property
     def without(self) -> dict[str, dict[str, float]]:
