@@ -3,7 +3,7 @@
 from fusetune.apply.search.plan import planned_rounds
 
 FLIGHT_BY_FLIGHT = SETTINGS.search_job == "flight"
-SEARCH_THREADS = 1 if FLIGHT_BY_FLIGHT else workflow.cores or 1
+SEARCH_THREADS = workflow.cores or 1 if SEARCH and not FLIGHT_BY_FLIGHT else 1
 KEPT_PAIRS = "results/tried"
 
 

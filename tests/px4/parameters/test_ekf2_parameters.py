@@ -158,3 +158,13 @@ def compare_parameters(logs: Path, reference: Path) -> int:
             values["EKF2_MAG_DECL"] = expected["EKF2_MAG_DECL"]
         assert values == expected, (name, file.stem)
     return len(files)
+
+
+def test_a_limit_that_was_rounded_to_single_precision_is_that_limit() -> None:
+    # 0.1 rad/s, the largest EKF2_GYR_NOISE, is 0.10000000149 as a float32
+    assert as_float32(0.1) > 0.1
+    check_value("EKF2_GYR_NOISE", as_float32(0.1))
+    with pytest.raises(ParameterError, match="out of range"):
+        check_value("EKF2_GYR_NOISE", 0.1001)
+    with pytest.raises(ParameterError, match="out of range"):
+        check_value("EKF2_GYR_NOISE", 1e300)

@@ -94,4 +94,4 @@ def _written(factor: Factor, coordinate: float) -> float:
     if factor.grid:
         return value
     rounded = as_float32(float(f"{value:.{_DIGITS}g}"))
-    return rounded if factor.low <= rounded <= factor.high else value
+    return min(max(rounded, as_float32(factor.low)), as_float32(factor.high))

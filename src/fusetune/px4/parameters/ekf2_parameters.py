@@ -196,7 +196,8 @@ def _check_range(metadata: ParameterMetadata, value: float) -> None:
     high = math.inf if metadata.maximum is None else metadata.maximum
     if metadata.kind == "boolean":
         low, high = 0.0, 1.0
-    if not low <= value <= high:
+    # a limit that was rounded to a float32 is that limit
+    if not min(low, as_float32(low)) <= value <= max(high, as_float32(high)):
         raise ParameterError(metadata.name, f"{value:g} is out of range", f"Give {_range_text(metadata)}")
 
 
