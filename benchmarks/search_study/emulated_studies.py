@@ -35,7 +35,8 @@ class Outcome:
     changes : whether a change is recommended
     searched, expected, fresh, world : difference of the found set on the flights of the search, as expected from sets
         found without each flight, on the flights that no search saw, and on all flights of the world
-    lower, upper : interval of the expected difference; NaN where there is none
+    lower, upper, error : interval of the expected difference and its standard error; NaN where there is none
+    spread : of what the searches found, on all flights of the world
     changed : parameters of the found set
     flights, fresh_flights : of the search, and those that it did not see
     """
@@ -47,6 +48,8 @@ class Outcome:
     world: float
     lower: float
     upper: float
+    error: float
+    spread: float
     changed: tuple[str, ...]
     flights: int
     fresh_flights: int
@@ -54,14 +57,14 @@ class Outcome:
     def covers(self, gain: float, of_flights: float = math.inf) -> bool:
         """Whether a difference lies in the interval, widened for one that is the mean of so many flights alone.
 
-        The interval is that of the mean over all flights to come. The mean of m of them has a spread of its own: that
-        of the n of the search, by √(n/m).
+        The interval is that of the mean over all flights to come. The mean of m of them has a spread of its own, that
+        of the n of the search by √(n/m); and what is written is not quite any of the sets that were judged.
         """
-        wider = math.sqrt(1.0 + self.flights / of_flights)
-        return self._end(self.lower, wider) <= gain <= self._end(self.upper, wider)
-
-    def _end(self, bound: float, wider: float) -> float:
-        return self.expected + wider * (bound - self.expected)
+        if not self.error > 0.0:
+            return False
+        times = 0.5 * (self.upper - self.lower) / self.error
+        half = times * math.sqrt((1.0 + self.flights / of_flights) * self.error**2 + self.spread**2)
+        return abs(gain - self.expected) <= half
 
 
 def search_once(
@@ -114,6 +117,8 @@ def outcome(
         float(score[0].mean()),
         lower,
         upper,
+        np.nan if shown.found.error is None else shown.found.error,
+        float(np.std(score.mean(axis=1), ddof=1)) if len(found) > 1 else 0.0,
         found[0].changed,
         drawn.size,
         fresh.size,
