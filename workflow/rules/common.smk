@@ -118,6 +118,27 @@ def mended_overrides_of(names):
     return lambda wildcards: SETS.mended(names, present_found().parameters, mended_delays())
 
 
+FLIGHT_BY_FLIGHT = SETTINGS.search_job == "flight"
+"""Whether each flight's part of a round of a search is a job of its own."""
+
+
+def searched_flights_found():
+    return told_in_one_line(read_document, checkpoints.search_flights.get().output[0])["flights"]
+
+
+def asked_before(number):
+    """What was asked in the rounds before one."""
+    return [f"results/search/ask_{each}.json" for each in range(1, number)]
+
+
+def tried_before(number):
+    """Input function: what flights answered in the rounds before one."""
+    folders = [f"results/search/tried/{each}" for each in range(1, number)]
+    if not FLIGHT_BY_FLIGHT:
+        return folders
+    return lambda wildcards: [f"{folder}/{flight}.json" for folder in folders for flight in searched_flights_found()]
+
+
 def closing_words():
     if not os.path.exists("results/save/flights.csv"):
         return "Done."

@@ -2,26 +2,8 @@
 # follows from the study alone; those that a search does not need ask for nothing.
 from fusetune.apply.search.plan import planned_rounds
 
-FLIGHT_BY_FLIGHT = SETTINGS.search_job == "flight"
 SEARCH_THREADS = workflow.cores or 1 if SEARCH and not FLIGHT_BY_FLIGHT else 1
 KEPT_PAIRS = "results/tried"
-
-
-def searched_flights_found():
-    return told_in_one_line(read_document, checkpoints.search_flights.get().output[0])["flights"]
-
-
-def asked_before(number):
-    """What was asked in the rounds before one."""
-    return [f"results/search/ask_{each}.json" for each in range(1, number)]
-
-
-def tried_before(number):
-    """Input function: what flights answered in the rounds before one."""
-    folders = [f"results/search/tried/{each}" for each in range(1, number)]
-    if not FLIGHT_BY_FLIGHT:
-        return folders
-    return lambda wildcards: [f"{folder}/{flight}.json" for folder in folders for flight in searched_flights_found()]
 
 
 if SEARCH:
