@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
 from fusetune.errors import UserError
 from fusetune.px4.ulog.reader import file_checksum
+from fusetune.running.worker_processes import worker_processes
 from fusetune.save.flight_folder import METADATA_FILE
 from fusetune.save.flights_table import write_flights_table
 from fusetune.save.log_folder import demand_own_folders, save_log
@@ -65,7 +65,7 @@ def search_logs(
     target = Path(folder)
     demand_searchable(settings, asked_in)
     demand_search_folder(target)
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+    with worker_processes(processes) as pool:
         folders = _saved(logs, target / "save", pool, told)
         table = target / "save" / "flights.parquet"
         rows = write_flights_table(list(folders.values()), table, table.with_suffix(".csv"))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
 
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
@@ -14,6 +13,7 @@ from fusetune.analyze.trials.tried_flight import TrialSettings, TriedFlight, pre
 from fusetune.apply.search.comparison import TriedBase
 from fusetune.apply.search.replays import Batch, Tried
 from fusetune.apply.search.requests import Values
+from fusetune.running.worker_processes import worker_processes
 
 _MOST_PREPARED = 12
 """Flights that a process holds; one of a minute takes about 30 MB."""
@@ -66,9 +66,7 @@ class WorkerTrier:
 
     def __init__(self, folders: Mapping[str, str | os.PathLike[str]], settings: TrialSettings, processes: int) -> None:
         named = {name: str(Path(folder)) for name, folder in folders.items()}
-        # a process that is forked from one with threads may wait for ever
-        context = multiprocessing.get_context("spawn")
-        self.pool = ProcessPoolExecutor(processes, context, _begin, (named, settings))
+        self.pool = worker_processes(processes, _begin, named, settings)
         """Its processes, for whatever else they may do."""
 
     def try_batches(self, batches: Sequence[Batch]) -> Iterator[tuple[Batch, Tried]]:
