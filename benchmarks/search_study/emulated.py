@@ -21,8 +21,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from fusetune.apply.evidence import AIMS
 from fusetune.apply.search.comparison import Comparison
-from fusetune.apply.search.requests import Values
-from fusetune.apply.search.stages import Ask
+from fusetune.apply.search.requests import Ask, Values
 from fusetune.design.factors import Factor
 
 Array = npt.NDArray[np.float64]

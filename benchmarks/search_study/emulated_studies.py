@@ -97,7 +97,7 @@ def outcome(
     fresh: npt.NDArray[np.int64],
 ) -> Outcome:
     """Judge what the searches found; the first of them is that on all flights."""
-    present = values_of(space.values(np.zeros(len(space.factors))))
+    present = values_of(space.present)
     score, aims = ground.differences(present, [values_of(one.values) for one in found])
     without = {int(name): place for place, one in enumerate(studied) for name in one.aside}
     rows = [without[int(place)] for place in drawn]

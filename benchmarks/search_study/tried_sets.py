@@ -8,10 +8,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from fusetune.apply.search.plan import ALL, FIRST_SUFFIXES
-from fusetune.apply.search.requests import values_of
+from fusetune.apply.search.requests import Ask, values_of
 from fusetune.apply.search.rounds import Ground
 from fusetune.apply.search.space import Space
-from fusetune.apply.search.stages import Ask
 
 from .emulated import TriedTable, tried_table
 
@@ -41,6 +40,6 @@ def sets_to_try(space: Space, best: Mapping[str, float], number: int, seed: int)
 
 def try_sets(ground: Ground, flights: Sequence[str], space: Space, sets: Sequence[Mapping[str, float]]) -> TriedTable:
     """Try sets on flights, all against the present set."""
-    present = values_of(space.values(np.zeros(len(space.factors))))
+    present = values_of(space.present)
     ask = Ask(ALL, present, tuple(values_of(one) for one in sets))
     return tried_table(space.factors, sets, ground.compare([(flights, ask)])[0])

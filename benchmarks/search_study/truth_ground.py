@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from fusetune.apply.evidence import AIDED, AIMS, UNAIDED
 from fusetune.apply.search.comparison import Comparison
-from fusetune.apply.search.stages import Ask
+from fusetune.apply.search.requests import Ask
 
 from .true_figures import FIGURES, KeptFigures
 

@@ -130,7 +130,7 @@ def test_what_was_tried_tells_what_matters(made: Made) -> None:
 def test_of_a_single_flight_nothing_is_kept_aside_and_it_says_so(made: Made, tmp_path: Path, capsys: Captured) -> None:
     folder = tmp_path / "one"
     shutil.copytree(made.whole / "save" / "hop_1", folder / "save" / "hop_1")
-    shutil.copy(made.whole / "save" / ".hop_1.made.json", folder / "save")
+    shutil.copy(made.whole / "save" / ".made.json", folder / "save")
     shutil.copytree(made.whole / "tried" / "hop_1", folder / "tried" / "hop_1")
     shutil.copy(made.whole / ".search.json", folder)
     options = ["search", str(made.logs[0]), "--parameters", str(made.settings), "--out", str(folder), "--cores", "1"]

@@ -1,19 +1,15 @@
 """Find the flights that can be searched on: those of the vehicle whose replay is trusted."""
 
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.analyze_flight import AnalysisSettings
-from fusetune.analyze.replaying.settings import ReplaySettings
-from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.apply.search.flights_to_search import flights_to_search
 from fusetune.apply.search.searched_flights import write_searched_flights
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
+from fusetune.running.worker_processes import worker_processes
 from fusetune.save import read_present
 from fusetune.settings.declaration import built
 
@@ -27,16 +23,12 @@ keep_out("pandas")
 if __name__ == "__main__":
     with logged_job(snakemake.log[0]), ExitStack() as stack:
         params = snakemake.params
-        analysis = AnalysisSettings(
-            built(ReplaySettings, params.settings["replay"]),
-            ScoringSettings(**params.settings["scoring"]),
-            TrustSettings(**params.settings["trust"]),
-        )
+        analysis = built(AnalysisSettings, {key: params.settings[key] for key in ("replay", "scoring", "trust")})
         folders = {Path(folder).name: Path(folder) for folder in snakemake.input.folders}
         processes = min(snakemake.threads, len(folders))
         mapping = map
         if processes > 1:
-            mapping = stack.enter_context(ProcessPoolExecutor(processes, get_context("spawn"))).map
+            mapping = stack.enter_context(worker_processes(processes)).map
         found = flights_to_search(
             folders,
             snakemake.input.flights,

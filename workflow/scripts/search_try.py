@@ -4,8 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.analyze_flight import AnalysisSettings
-from fusetune.analyze.replaying.settings import ReplaySettings
-from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.apply.search.round_files import read_round
 from fusetune.apply.search.searched_flights import read_searched_flights
 from fusetune.apply.search.tried_round import try_round
@@ -38,9 +36,7 @@ if __name__ == "__main__":
             tried,
             params.kept,
             DecisionSettings(**params.settings["decision"]),
-            AnalysisSettings(
-                built(ReplaySettings, params.settings["replay"]), ScoringSettings(**params.settings["scoring"])
-            ),
+            built(AnalysisSettings, {key: params.settings[key] for key in ("replay", "scoring")}),
             snakemake.threads,
         )
         print(*told, sep="\n")

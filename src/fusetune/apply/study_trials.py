@@ -10,6 +10,7 @@ import numpy as np
 from fusetune.apply.evidence import AIMS, AnalyzedFlight
 from fusetune.apply.trials import Trials
 from fusetune.design.factors import Factor
+from fusetune.design.tunable_parameters import DELAY_SUFFIX
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, as_float32
 
 _DOUBLING = 2.0
@@ -91,7 +92,7 @@ def _differs(value: float, now: float) -> bool:
 def _factor(parameter: str, now: float, values: Sequence[float]) -> Factor:
     """A factor whose bounds are what was tried: on a logarithmic scale where ratios have a meaning."""
     low, high = min(now, *values), max(now, *values)
-    if low > 0.0 and not parameter.endswith("_DELAY"):
+    if low > 0.0 and not parameter.endswith(DELAY_SUFFIX):
         return Factor(parameter, "log", low, high, now, _DOUBLING)
     return Factor(parameter, "linear", low, high, now, max(high - now, now - low))
 

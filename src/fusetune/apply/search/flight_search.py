@@ -20,7 +20,7 @@ from fusetune.apply.search.found_sets import (
     write_search_document,
 )
 from fusetune.apply.search.kept_pairs import KeptPairs
-from fusetune.apply.search.objective import objective
+from fusetune.apply.search.objective import lowest_on_all
 from fusetune.apply.search.outcome import Outcome, outcome_rounds
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.progress import Progress
@@ -117,9 +117,7 @@ class _Watched:
 
     def compare(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[Comparison]:
         answers = self._ground.compare(asks)
-        scores = objective(answers[0], asks[0][1].stage)
-        if scores.size:
-            self._progress.better(float(scores.min()))
+        self._progress.better(lowest_on_all(asks, answers))
         return answers
 
 

@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from fusetune import __version__
 from fusetune.apply.ranking import improvement_percent
 from fusetune.apply.recommended import Recommended
@@ -73,7 +71,7 @@ def found_sets(
     recommended = None
     if found.changed and outcome.aside:
         recommended = Recommended(FOUND, found.values, alone_sentences(found), objections)
-    present = space.values(np.zeros(len(space.factors)))
+    present = space.present
     document = {
         "parameters_found": {
             name: found.values[name] for name in found.values if found.values[name] != present.get(name)

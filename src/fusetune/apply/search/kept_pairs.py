@@ -14,7 +14,7 @@ from typing import Any
 from fusetune.analyze.trials.tried_set import Column, Rejections, Sums, TriedSet
 from fusetune.apply.search.comparison import TriedBase
 from fusetune.apply.search.replays import Batch, Tried
-from fusetune.apply.search.requests import Values
+from fusetune.apply.search.requests import values_of
 from fusetune.errors import UserError
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import AnyPath, atomic_path
@@ -66,14 +66,10 @@ def batch_document(batch: Batch, tried: Tried) -> dict[str, Any]:
 
 def batch_of(document: Mapping[str, Any]) -> tuple[Batch, Tried]:
     """The batch that `batch_document` made it of, and what it did."""
-    sets = tuple(_values(one["values"]) for one in document["sets"])
+    sets = tuple(values_of(one["values"]) for one in document["sets"])
     about = document["about"]
     base = TriedBase(about["reason"], about["whiteness"], _tried(about["tried"]))
-    return (document["flight"], _values(document["base"]), sets), (base, tuple(map(_tried, document["sets"])))
-
-
-def _values(document: Mapping[str, float]) -> Values:
-    return tuple(sorted((name, float(value)) for name, value in document.items()))
+    return (document["flight"], values_of(document["base"]), sets), (base, tuple(map(_tried, document["sets"])))
 
 
 def _base_document(base: TriedBase) -> dict[str, Any]:

@@ -23,8 +23,8 @@ from fusetune.save.flights_table import write_flights_table
 from fusetune.save.log_folder import demand_own_folders, save_log
 from fusetune.save.present import find_present
 from fusetune.storage.digest import source_digest
-from fusetune.storage.documents import read_document, write_document
-from fusetune.storage.files import AnyPath, atomic_path
+from fusetune.storage.files import AnyPath
+from fusetune.storage.ledger import Ledger, key_of
 
 
 def search_logs(
@@ -106,22 +106,19 @@ def _saved(logs: Sequence[AnyPath], folder: Path, pool: Executor, told: Callable
     told(f"saving {len(paths)} log{'s' if len(paths) > 1 else ''}")
     program = source_digest("px4", "ekf2/feed", "save")
     named = {path.stem: path for path in paths}
-    outdated = [name for name, path in named.items() if not _is_saved(path, folder / name, program)]
+    ledger = Ledger(folder / ".made.json")
+    # the log of a flight that cannot be read gets a folder that says why
+    keys = {name: key_of([_checksum(path), program]) for name, path in named.items()}
+    outdated = [name for name in named if not ledger.is_current(name, keys[name], [folder / name / METADATA_FILE])]
     running = {name: pool.submit(save_log, named[name], folder / name) for name in outdated}
     for name, one in running.items():
         one.result()
-        with atomic_path(_stamp(folder / name)) as temporary:
-            write_document(temporary, {"program": program})
+        ledger.record(name, keys[name], [folder / name / METADATA_FILE])
     return {name: folder / name for name in named}
 
 
-def _is_saved(log: Path, folder: Path, program: str) -> bool:
+def _checksum(log: Path) -> str:
     try:
-        stamped = read_document(_stamp(folder))["program"] == program
-        return bool(stamped and read_document(folder / METADATA_FILE)["checksum"] == file_checksum(log))
-    except (UserError, KeyError):
-        return False
-
-
-def _stamp(folder: Path) -> Path:
-    return folder.with_name(f".{folder.name}.made.json")
+        return file_checksum(log)
+    except UserError:
+        return ""

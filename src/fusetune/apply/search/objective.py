@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.plan import OF_DELAYS
+from fusetune.apply.search.requests import Ask
 
 Array = npt.NDArray[np.float64]
 
@@ -35,6 +38,11 @@ def objective(compared: Comparison, stage: str) -> Array:
     ruled_out = np.array([bool(one) for one in compared.objections], dtype=bool)
     found[ruled_out] = np.maximum(found[ruled_out], 0.0) + _OBJECTED
     return np.where(np.isfinite(found), found, _UNKNOWN)
+
+
+def lowest_on_all(asks: Sequence[tuple[Sequence[str], Ask]], answers: Sequence[Comparison]) -> float:
+    """The lowest of what the search on all flights, which asks first, makes small in a round; 0 is the base."""
+    return float(objective(answers[0], asks[0][1].stage).min(initial=0.0))
 
 
 def aim_means(compared: Comparison, aim: str) -> Array:

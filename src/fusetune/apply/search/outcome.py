@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,13 +48,12 @@ class Outcome:
 
         0 with one search, and where the flights say nothing.
         """
-        means = [np.nanmean([*seen, *(self.aside[name] for name in one.aside)]) for one, seen in self._each_on_seen()]
-        return float(np.std(means, ddof=1)) if len(means) > 1 and np.isfinite(means).all() else 0.0
-
-    def _each_on_seen(self) -> Iterator[tuple[Searched, Sequence[float]]]:
+        means = []
         for one, seen in zip(self.studied, self.on_seen, strict=True):
-            if np.isfinite([*seen, *(self.aside[name] for name in one.aside)]).any():
-                yield one, seen
+            known = [value for value in (*seen, *(self.aside[name] for name in one.aside)) if math.isfinite(value)]
+            if known:
+                means.append(np.mean(known))
+        return float(np.std(means, ddof=1)) if len(means) > 1 else 0.0
 
     @property
     def without(self) -> dict[str, dict[str, float]]:
@@ -71,7 +71,7 @@ def outcome_rounds(
     """Search on flights, in order of time; the origin of the space is the present set."""
     studied = searches(flights, settings)
     found, asked = yield from search_rounds(studied, space, settings, proposing)
-    present = values_of(space.values(np.zeros(len(space.factors))))
+    present = values_of(space.present)
     whats = [values_of(one.values) for one in found]
     asks = [Ask(ALL, present, (what,), seen_by=what) for what in whats]
     base = values_of(found[0].base)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,20 +16,6 @@ from fusetune.apply.search.stages import Found
 
 _AT_BOUND = 0.02
 """In half ranges: nearer to a bound a value is not told from it."""
-
-
-@dataclass(frozen=True)
-class KeptAside:
-    """What searches found, on flights that each of them did not see, beside the present set.
-
-    Attributes
-    ----------
-    flights : in the order of the differences
-    differences : score less the present set's, nat; NaN where a flight says nothing
-    """
-
-    flights: tuple[str, ...]
-    differences: tuple[float, ...]
 
 
 def parameter_documents(found: Found, space: Space) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def search_trials(space: Space, asked: Sequence[AskedRound], found: Found, of_ba
     is worth beside that, flight by flight. The sets of stages that move delays and lever arms alone are left out: they
     are weighed otherwise, and those of the first lie far from all others.
     """
-    present, base = values_of(space.whole(space.values(np.zeros(len(space.factors))))), values_of(found.base)
+    present, base = values_of(space.whole(space.present)), values_of(found.base)
     rounds = [one for one in asked if one.search.name == ON_ALL and one.ask.stage not in OF_DELAYS and one.ask.sets]
     if not rounds:
         return None

@@ -14,7 +14,7 @@ from typing import Any
 from fusetune.apply.ranking import improvement_percent
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.found_sets import FoundSets, found_sets, nothing_found
-from fusetune.apply.search.objective import objective
+from fusetune.apply.search.objective import lowest_on_all
 from fusetune.apply.search.outcome import Outcome, outcome_rounds
 from fusetune.apply.search.plan import plan_of
 from fusetune.apply.search.recorded_proposals import RecordedProposals
@@ -120,8 +120,7 @@ class SearchedSoFar:
 
     def _compared(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[Comparison]:
         answers = self._ground.compare(asks)
-        scores = objective(answers[0], asks[0][1].stage)
-        self.best = min(self.best, float(scores.min()) if scores.size else 0.0)
+        self.best = min(self.best, lowest_on_all(asks, answers))
         return answers
 
 

@@ -41,6 +41,11 @@ class Space:
     def parameters(self) -> tuple[str, ...]:
         return tuple(factor.parameter for factor in self.factors)
 
+    @property
+    def present(self) -> dict[str, float]:
+        """The present set: the one at the point 0."""
+        return self.values(np.zeros(len(self.factors)))
+
     @cached_property
     def _units(self) -> Array:
         return np.array([max(map(abs, factor.bounds)) or 1.0 for factor in self.factors])

@@ -75,7 +75,7 @@ class _Tried:
 
 def search_stages(space: Space, plan: Plan, settings: SearchSettings, proposing: Proposing = propose) -> Asking:
     """Search; the origin of the space is the present set."""
-    present = space.values(np.zeros(len(space.factors)))
+    present = space.present
     first = space.only(plan.first)
     base = present
     if plan.first:

@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 FEWEST = 8
 """With fewer sets nothing is said about others."""
 
-_SHARE_FAR = 0.5
+_FAR = 0.5
 """Scores beyond so many nat above the median say no more than that they are bad: one that is far off would bend the
 surface where it matters."""
 
@@ -46,20 +46,22 @@ class Surrogate:
 
 def fit_surrogate(points: Array, scores: Array) -> Surrogate:
     """Fit the scores (N,) of sets at points (N, P), N at least `FEWEST`: Matérn 5/2, a length for each factor."""
+    from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-    clipped = np.minimum(scores, np.median(scores) + _SHARE_FAR)
+    clipped = np.minimum(scores, np.median(scores) + _FAR)
     offset, scale = float(np.mean(clipped)), float(np.std(clipped)) or 1.0
     kernel = ConstantKernel(1.0, (0.05, 50.0)) * Matern(
         np.full(points.shape[1], 1.5), (0.3, 15.0), nu=2.5
     ) + WhiteKernel(1e-3, (1e-5, 0.3))
-    return Surrogate(_process(kernel, fit=True).fit(points, (clipped - offset) / scale), offset, scale)
+    with warnings.catch_warnings():
+        # a length at its bound is a factor that does not matter, or matters everywhere
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        process = _process(kernel, fit=True).fit(points, (clipped - offset) / scale)
+    return Surrogate(process, offset, scale)
 
 
 def _process(kernel: object, *, fit: bool):  # type: ignore[no-untyped-def]
-    from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
 
-    # a length at its bound is a factor that does not matter, or matters everywhere
-    warnings.filterwarnings("ignore", category=ConvergenceWarning)
     return GaussianProcessRegressor(kernel, alpha=1e-8, optimizer="fmin_l_bfgs_b" if fit else None)

@@ -7,7 +7,6 @@ budget, may ask for much of it once more.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 
 from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.analyze.trials.tried_flight import TrialSettings
@@ -48,12 +47,11 @@ def try_round(
     For each flight, how many sets there are, in words; when all are tried
     """
     trials = trial_settings(decision, analysis)
-    named = {name: str(Path(folder)) for name, folder in folders.items()}
-    keys = made_of(folders, trials)
-    ground = ReplayGround(_LateTrier(named, trials, processes), decision, KeptPairs(kept, keys).keep)
+    pairs_kept = KeptPairs(kept, made_of(folders, trials))
+    ground = ReplayGround(_LateTrier(folders, trials, processes), decision, pairs_kept.keep)
     asks = [(own, ask) for flights, ask in asked.asks if (own := tuple(name for name in flights if name in folders))]
     if asks:
-        for batch, did in KeptPairs(kept, keys).kept():
+        for batch, did in pairs_kept.kept():
             ground.know(batch, did)
     pairs = ground.pairs(asks)
     for name, file in tried.items():
@@ -66,7 +64,7 @@ def try_round(
 class _LateTrier:
     """Starts its processes when there is something to replay, and ends them after it; none where one is enough."""
 
-    def __init__(self, folders: Mapping[str, str], settings: TrialSettings, processes: int) -> None:
+    def __init__(self, folders: Mapping[str, AnyPath], settings: TrialSettings, processes: int) -> None:
         self._folders, self._settings, self._processes = folders, settings, processes
 
     def try_batches(self, batches: Sequence[Batch]) -> Iterator[tuple[Batch, Tried]]:

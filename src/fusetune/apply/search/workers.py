@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
-from pathlib import Path
 
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.trials.tried_flight import TrialSettings, TriedFlight, prepare_trials
@@ -14,6 +12,7 @@ from fusetune.apply.search.comparison import TriedBase
 from fusetune.apply.search.replays import Batch, Tried
 from fusetune.apply.search.requests import Values
 from fusetune.running.worker_processes import worker_processes
+from fusetune.storage.files import AnyPath
 
 _MOST_PREPARED = 12
 """Flights that a process holds; one of a minute takes about 30 MB."""
@@ -30,7 +29,7 @@ class FlightTrier:
     folders : of the saved flights, by name
     """
 
-    def __init__(self, folders: Mapping[str, str], settings: TrialSettings) -> None:
+    def __init__(self, folders: Mapping[str, AnyPath], settings: TrialSettings) -> None:
         self._folders, self._settings = dict(folders), settings
         self._flights: OrderedDict[str, tuple[PreparedFlight, OrderedDict[Values, TriedFlight]]] = OrderedDict()
 
@@ -64,9 +63,8 @@ class FlightTrier:
 class WorkerTrier:
     """Tries sets on saved flights in processes of its own; to be closed."""
 
-    def __init__(self, folders: Mapping[str, str | os.PathLike[str]], settings: TrialSettings, processes: int) -> None:
-        named = {name: str(Path(folder)) for name, folder in folders.items()}
-        self.pool = worker_processes(processes, _begin, named, settings)
+    def __init__(self, folders: Mapping[str, AnyPath], settings: TrialSettings, processes: int) -> None:
+        self.pool = worker_processes(processes, _begin, dict(folders), settings)
         """Its processes, for whatever else they may do."""
 
     def try_batches(self, batches: Sequence[Batch]) -> Iterator[tuple[Batch, Tried]]:
@@ -97,7 +95,7 @@ class WorkerTrier:
 _of_this_process: list[FlightTrier] = []
 
 
-def _begin(folders: Mapping[str, str], settings: TrialSettings) -> None:
+def _begin(folders: Mapping[str, AnyPath], settings: TrialSettings) -> None:
     _of_this_process[:] = [FlightTrier(folders, settings)]
 
 
