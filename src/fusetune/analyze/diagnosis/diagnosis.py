@@ -1,0 +1,71 @@
+"""A cause that a flight shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+
+@dataclass(frozen=True)
+class Sign:
+    """One thing seen that speaks for a cause.
+
+    Attributes
+    ----------
+    words : what was seen, with the figure, plainly
+    figure, usual, unit : what was measured, and up to where it is usual
+    origin : who computed what it is made of
+    """
+
+    words: str
+    figure: float
+    usual: float
+    unit: str = ""
+    origin: Literal["vehicle", "replay"] = "vehicle"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A cause, what shows it, and what to do.
+
+    Attributes
+    ----------
+    id : of the cause, one for each file of `fusetune.analyze.diagnosis.causes`; the same in every release of fusetune
+    cause : in plain words, the answer first: `The GNSS antenna is 0.3 m from where PX4 is told`
+    severity : note (worth knowing), warning (lessens what the filter can do), fail (do not fly like this)
+    confidence : 0 … 1, how sure: of as many diagnoses with this confidence this share should be right
+    explains : how much of what is wrong it explains, in the units of a test ratio's excess; the largest stands first
+    start_us, stop_us : when, µs since boot, half-open
+    signs : what shows it
+    remedy : what to do, in the order in which to do it; parameters by name
+    source : where the signs are known from
+    values : values to set or measured, by name; names of measured ones end in their unit
+    """
+
+    id: str
+    cause: str
+    severity: Literal["note", "warning", "fail"]
+    confidence: float
+    explains: float
+    start_us: int
+    stop_us: int
+    signs: tuple[Sign, ...]
+    remedy: str
+    source: str
+    values: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    def document(self, start_of_log_us: int) -> dict[str, Any]:
+        """As JSON holds it: times in seconds from the start of the log."""
+        return {
+            "id": self.id,
+            "cause": self.cause,
+            "severity": self.severity,
+            "confidence": self.confidence,
+            "since_s": round((self.start_us - start_of_log_us) * 1e-6, 3),
+            "until_s": round((self.stop_us - start_of_log_us) * 1e-6, 3),
+            "evidence": [vars(one) for one in self.signs],
+            "remedy": self.remedy,
+            "values": dict(self.values),
+            "source": self.source,
+        }

@@ -1,0 +1,68 @@
+"""A flight as the vehicle logged it and as it is replayed; what is expensive is made when it is first asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.flight.phases import airborne_intervals
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare_flight
+from fusetune.analyze.replaying.replay_flight import replay_set
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
+from fusetune.px4.flight import Flight
+from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.set_names import AS_FLOWN
+
+GROUND_EFFECT_US = 5_000_000
+"""After take-off and before landing the ground still shows in the sensors (PX4's ecl_ekf scripts cut as much)."""
+
+
+@dataclass(frozen=True)
+class ObservedFlight:
+    """One flight of any release.
+
+    Attributes
+    ----------
+    logged : as it was logged: all topics and instances, in the layout of its release
+    settings : how it is replayed
+    """
+
+    logged: Flight
+    settings: ReplaySettings = field(default=IN_USE)
+
+    @cached_property
+    def flight(self) -> Flight:
+        """In the layout of v1.16, with the sensors of the estimator instance that was primary at the time."""
+        return canonical(self.logged)
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """Parameters of the estimator that the log begins with, those that it lacks at their defaults."""
+        return self.prepared.parameters({})
+
+    @cached_property
+    def airborne(self) -> tuple[Interval, ...]:
+        """When the vehicle was in the air, µs."""
+        return airborne_intervals(self.flight, {})
+
+    @cached_property
+    def clear_of_ground(self) -> tuple[Interval, ...]:
+        """In the air, without take-off and landing."""
+        cut = ((start + GROUND_EFFECT_US, stop - GROUND_EFFECT_US) for start, stop in self.airborne)
+        return tuple(one for one in cut if one[0] < one[1])
+
+    @cached_property
+    def prepared(self) -> PreparedFlight:
+        """Ready for replays, with all that is asked for in `settings`."""
+        return prepare_flight(self.flight, self.settings)
+
+    @cached_property
+    def replayed(self) -> ReplayedSet:
+        """The replay with the parameters that flew."""
+        return replay_set(self.prepared, AS_FLOWN, {})
+
+    def since_start_s(self, timestamp: int) -> float:
+        """Seconds from the start of the log, for a time in µs since boot."""
+        return (timestamp - self.logged.start_timestamp) * 1e-6
