@@ -10,7 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.analyze_flight import AnalysisSettings
+from fusetune.analyze.delays.lag import Lag
+from fusetune.analyze.delays.sensor_delays import ARM_PARAMETERS
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.apply.search.kept_pairs import KeptPairs
+from fusetune.apply.search.measured_place import DELAY
 from fusetune.apply.search.replays import ReplayGround
 from fusetune.apply.search.rounds import ON_ALL, Ground, Searched, run_searches, searches
 from fusetune.apply.search.search_space import search_space
@@ -29,6 +33,9 @@ from .truth_ground import TruthGround
 from .worlds import FRESH, SEARCHED, SearchWorld
 
 Array = npt.NDArray[np.float64]
+
+_EXACT = 1e-3
+"""Error of what the truth knows, s and m."""
 
 PROFILE_STEPS = np.arange(-6, 7) / 3.0
 """Powers of two by which a noise is varied about the found one, for what the truth says of it alone."""
@@ -84,7 +91,7 @@ class WorldSearch:
         only = [Searched(ON_ALL, tuple(flights), ())]
         found, oracle = (
             run_searches(only, self.space, self._settings, ground)[0][0]
-            for ground in (self.replays(), TruthGround(self.truth, self.names))
+            for ground in (self.replays(), TruthGround(self.truth, self.names, self._true_place()))
         )
         return JudgedWorld(
             self.world.name,
@@ -95,6 +102,15 @@ class WorldSearch:
             self.change_percent(oracle.values),
             {name: self._right(name, found.values) for name in self.world.wrong},
         )
+
+    def _true_place(self) -> VelocityPlace | None:
+        """What the truth knows of the receiver where the vehicle is told it wrong."""
+        told, right = self.space.present, self.world.right
+        if not right:
+            return None
+        arm = [right.get(name, told.get(name, 0.0)) for name in ARM_PARAMETERS["gnss"]]
+        lag = Lag(1e-3 * right.get(DELAY, told.get(DELAY, 0.0)), _EXACT, 1000, 1000)
+        return VelocityPlace(lag, np.array(arm), _EXACT**2 * np.eye(3))
 
     def with_folds(self) -> tuple[list[Searched], list[Found], Ground]:
         """The product's searches, those with flights kept aside, too."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.apply.evidence import AIDED, AIMS, UNAIDED
 from fusetune.apply.search.comparison import Comparison
 from fusetune.apply.search.requests import Ask
@@ -25,10 +27,12 @@ class TruthGround:
     Parameters
     ----------
     names : of the flights, in the order of `kept`
+    place : delay and place of the antenna as they are; None where the vehicle is told both right
     """
 
-    def __init__(self, kept: KeptFigures, names: Sequence[str]) -> None:
+    def __init__(self, kept: KeptFigures, names: Sequence[str], place: VelocityPlace | None = None) -> None:
         self._kept, self._places = kept, {name: place for place, name in enumerate(names)}
+        self._place = place
 
     def compare(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[Comparison]:
         """Compare the sets of each ask with its base on some flights."""
@@ -38,7 +42,8 @@ class TruthGround:
         places = [self._places[name] for name in flights]
         base = self._kept.figures(dict(ask.base), places)
         rows = [self._kept.figures(dict(one), places) for one in ask.sets]
-        return compared_by_truth(np.array(rows).reshape(len(rows), *base.shape), base)
+        compared = compared_by_truth(np.array(rows).reshape(len(rows), *base.shape), base)
+        return replace(compared, places=(self._place,) * len(places))
 
 
 def compared_by_truth(figures: Array, base: Array) -> Comparison:

@@ -9,8 +9,8 @@ from typing import Any
 from fusetune.analyze.delays.delayed_series import airspeed_series, flow_series, range_series, vision_series
 from fusetune.analyze.delays.inertial_motion import InertialMotion, inertial_motion
 from fusetune.analyze.delays.lag import Lag, LaggedSeries, lag_of
-from fusetune.analyze.delays.velocity_delay import CERTAIN_S, velocity_delay
-from fusetune.analyze.flight.intervals import inside
+from fusetune.analyze.delays.velocity_place import CERTAIN_S, VelocityPlace, velocity_place
+from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
@@ -28,8 +28,10 @@ Series = Callable[[Flight, InertialMotion, Mapping[str, float]], LaggedSeries | 
 LAGGED: Mapping[str, Series] = {
     "range": range_series, "flow": flow_series, "ev": vision_series, "airspeed": airspeed_series,
 }  # fmt: skip
-"""Sensor → its measurements beside the motion; velocities are estimated by `velocity_delay`."""
+"""Sensor → its measurements beside the motion; velocities are estimated by `velocity_place`."""
 VELOCITIES = {"gnss": "gnss_vel"}
+ARM_PARAMETERS = {"gnss": ("EKF2_GPS_POS_X", "EKF2_GPS_POS_Y", "EKF2_GPS_POS_Z")}
+"""Sensor of velocities → parameters that tell PX4 where it is."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ def sensor_delays(prepared: PreparedFlight, record: ReplayedSet) -> tuple[Sensor
         if not any(AID_SOURCES[source].sensor == sensor for source in record.fused_sources):
             continue
         if sensor in VELOCITIES:
-            lag = velocity_delay(record, VELOCITIES[sensor], intervals, told_s)
+            place = velocity_place_of(record, sensor, intervals)
+            lag = None if place is None else place.lag
         else:
             imu = prepared.reconstructed.flight.topics["sensor_combined", 0]
             motion = motion or inertial_motion(imu, record.states())
@@ -89,6 +92,16 @@ def sensor_delays(prepared: PreparedFlight, record: ReplayedSet) -> tuple[Sensor
         if lag is not None:
             found.append(_delay(sensor, parameter, told_s, lag))
     return tuple(found)
+
+
+def velocity_place_of(record: ReplayedSet, sensor: str, intervals: Sequence[Interval]) -> VelocityPlace | None:
+    """Delay and place of a sensor of `VELOCITIES`, from a replay of any set; None where the flight does not tell."""
+
+    def told(parameter: str) -> float:
+        return record.parameters.get(parameter, PARAMETERS[parameter].default)
+
+    told_s = 1e-3 * told(SENSORS[sensor].delay_parameter)
+    return velocity_place(record, VELOCITIES[sensor], intervals, told_s, [told(one) for one in ARM_PARAMETERS[sensor]])
 
 
 def _lag(series: LaggedSeries | None, intervals: Sequence[Any], told_s: float) -> Lag | None:

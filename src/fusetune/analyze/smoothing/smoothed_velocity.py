@@ -19,7 +19,7 @@ from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.replaying.replayed_set import ReplayedSet, ReplayedSteps
 from fusetune.analyze.sensors.measurement_errors import VELOCITY_SOURCES
 from fusetune.analyze.smoothing.error_model import USUAL_WALK, ErrorModel, PositionErrors, likeliest_errors
-from fusetune.analyze.smoothing.inertial_steps import inertial_steps, transitions
+from fusetune.analyze.smoothing.inertial_steps import cross_matrix, inertial_steps, transitions
 from fusetune.analyze.smoothing.linear_smoother import Smoothed, measurement_residuals, smooth
 from fusetune.analyze.smoothing.measured_positions import MeasuredPositions, position_series
 from fusetune.analyze.smoothing.velocity_models import (
@@ -34,6 +34,7 @@ from fusetune.analyze.smoothing.velocity_models import (
 )
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
+from fusetune.quaternions import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 
@@ -146,9 +147,16 @@ def stretches_of(
 
 
 def stretch_of(
-    steps: ReplayedSteps, time: npt.NDArray[np.int64], values: Array, positions: Sequence[MeasuredPositions]
+    steps: ReplayedSteps,
+    time: npt.NDArray[np.int64],
+    values: Array,
+    positions: Sequence[MeasuredPositions],
+    swings: bool = False,
 ) -> Stretch | None:
-    """A stretch of the measurements (N, 3) at times (N,), µs; None with too few of them, or in another frame."""
+    """A stretch of the measurements (N, 3) at times (N,), µs; None with too few of them, or in another frame.
+
+    `swings`: with what a lever arm would add to them.
+    """
     rows = (time > steps.time[0]) & (time <= steps.time[-1])
     epoch, first = np.unique(np.searchsorted(steps.time, time[rows]), return_index=True)
     if epoch.size < FEWEST_MEASUREMENTS:
@@ -163,7 +171,14 @@ def stretch_of(
     # an observation in another frame than the state's, such as the body's
     if np.median(np.abs(measured)) > max(_IN_OTHER_FRAME, float(np.median(np.abs(values)))):
         return None
-    return Stretch(sums, epoch, measured, tuple(one.at(sums.time[epoch]) for one in positions))
+    swing = swing_of(steps, epoch) if swings else None
+    return Stretch(sums, epoch, measured, tuple(one.at(sums.time[epoch]) for one in positions), swing)
+
+
+def swing_of(steps: ReplayedSteps, rows: npt.NDArray[np.int64]) -> Array:
+    """R [ω]× (N, 3, 3) at some updates, 1/s: what a lever arm along each axis of the body adds to a velocity, NED."""
+    rate = steps.delta_angle[rows] / steps.delta_angle_dt[rows, None] - steps.gyro_bias[rows]
+    return np.asarray(rotation_matrix(steps.quaternion[rows]) @ cross_matrix(rate))
 
 
 def _smoothed(

@@ -1,9 +1,10 @@
 """Linear models of how the velocity error of a replay moves, as `linear_smoother` takes them.
 
-Horizontal: states δv north and east, and δθ; constants are the errors of the gyro and accelerometer biases and of the
-measurement's delay. Vertical: δv down; the attitude is known then, and one constant is left, the accelerometer's. With
-each series of positions or heights goes a state per axis, the integral of δv and a walk, as the errors of both wander
-for minutes. Where the error of the velocity measurement is correlated, it is a state, too.
+Horizontal: states δv north and east, and δθ; constants are the errors of the gyro and accelerometer biases, of the
+measurement's delay and, where it is asked for, of the place of its sensor. Vertical: δv down; the attitude is known
+then, and the accelerometer's constant is left, with the place. With each series of positions or heights goes a state
+per axis, the integral of δv and a walk, as the errors of both wander for minutes. Where the error of the velocity
+measurement is correlated, it is a state, too.
 """
 
 from __future__ import annotations
@@ -26,14 +27,16 @@ PLANE, DOWN = (0, 1), (2,)
 
 FIRST_VELOCITY, FIRST_ROTATION, FIRST_POSITION = 1.0, (0.1, 0.1, 0.3), 10.0
 """Standard deviations of the errors that a stretch begins with, m/s, rad and m."""
-GYRO_BIAS, ACCEL_BIAS, DELAY_S = 0.01, 0.3, 0.05
-"""Standard deviations of the constants, rad/s, m/s² and s."""
+GYRO_BIAS, ACCEL_BIAS, DELAY_S, ARM_M = 0.01, 0.3, 0.05, 0.3
+"""Standard deviations of the constants, rad/s, m/s², s and m."""
 ROTATION_TO_VELOCITY = 0.015 / 0.35
 """Walk of the attitude, rad/√s, for one of the velocity of 1 m/s/√s: as PX4's defaults of the noise of gyro and
 accelerometer stand to each other."""
 
-GYRO, ACCEL, DELAY = slice(0, 3), slice(3, 6), 6
+GYRO, ACCEL, DELAY, ARM = slice(0, 3), slice(3, 6), 6, slice(7, 10)
 CONSTANTS = 7
+"""Of the horizontal model; the place of the sensor, if it is one of them, comes behind them."""
+VERTICAL_ARM = slice(1, 4)
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,15 @@ class Stretch:
     epoch : (N,) the updates at which the velocity is measured
     measured : (N, 3) measured less estimated velocity, NED, m/s
     positions : what else is measured
+    swing : (N, 3, 3) R [ω]×, what a metre of lever arm along each axis of the body adds to the measured velocity,
+        NED, 1/s; None where the place of the sensor is taken as known
     """
 
     sums: InertialSteps
     epoch: npt.NDArray[np.int64]
     measured: Array
     positions: tuple[PositionSeries, ...] = ()
+    swing: Array | None = None
 
     @property
     def between(self) -> Transitions:
@@ -208,16 +214,19 @@ class VelocityModel:
 def horizontal_model(stretch: Stretch) -> VelocityModel:
     """North and east, with the attitude and all constants."""
     between, steps = stretch.between, stretch.epoch.size - 1
+    arm_m = _arm_m(stretch)
     passed_s = between.passed_s[:, None, None]
     transition = np.tile(np.eye(5), (steps, 1, 1))
     transition[:, :2, 2:] = between.velocity_by_rotation[:, :2]
-    of_constants = np.zeros((steps, 5, CONSTANTS))
+    of_constants = np.zeros((steps, 5, CONSTANTS + len(arm_m)))
     of_constants[:, :2, GYRO] = between.velocity_by_gyro[:, :2]
     of_constants[:, :2, ACCEL] = -between.turned[:, :2]
     of_constants[:, 2:, GYRO] = -between.turned
-    delay = np.zeros((steps + 1, 2, 2, CONSTANTS))
+    delay = np.zeros((steps + 1, 2, 2, CONSTANTS + len(arm_m)))
     delay[:, 0, :, DELAY] = stretch.acceleration[:, :2]
     delay[:, 1, :, DELAY] = stretch.sums.velocity[stretch.epoch, :2]
+    if stretch.swing is not None:
+        delay[:, 0, :, ARM] = stretch.swing[:, :2]
     motion = _Motion(
         step_s=between.passed_s,
         transition=transition,
@@ -229,7 +238,7 @@ def horizontal_model(stretch: Stretch) -> VelocityModel:
         known_position=between.known_position[:, :2],
         delay=delay,
         first=np.array([FIRST_VELOCITY, FIRST_VELOCITY, *FIRST_ROTATION]),
-        constants=np.array([*[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 3, DELAY_S]),
+        constants=np.array([*[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 3, DELAY_S, *arm_m]),
     )
     return VelocityModel(motion, stretch.measured[:, :2], [one for one in stretch.positions if one.axes == PLANE])
 
@@ -242,20 +251,31 @@ def vertical_model(stretch: Stretch, horizontal: Smoothed) -> VelocityModel:
     known = np.einsum("kj,kj->k", between.velocity_by_rotation[:, 2], rotation)
     known_position = np.einsum("kj,kj->k", between.position_by_rotation[:, 2], rotation)
     measured = stretch.measured[:, 2:] - stretch.acceleration[:, 2:] * constants[DELAY]
+    arm_m = _arm_m(stretch)
+    delay = np.zeros((stretch.epoch.size, 2, 1, 1 + len(arm_m)))
+    if stretch.swing is not None:
+        delay[:, 0, :, VERTICAL_ARM] = stretch.swing[:, 2:]
+    of_constants = np.zeros((passed_s.size, 1, 1 + len(arm_m)))
+    of_constants[:, 0, 0] = -passed_s
     motion = _Motion(
         step_s=passed_s,
         transition=np.ones((passed_s.size, 1, 1)),
-        of_constants=-passed_s[:, None, None],
+        of_constants=of_constants,
         known=(known + by_constants + between.known_velocity[:, 2])[:, None],
         walk=np.ones(1),
         position_by_state=passed_s[:, None, None],
-        position_by_constants=-0.5 * np.square(passed_s)[:, None, None],
+        position_by_constants=0.5 * passed_s[:, None, None] * of_constants,
         known_position=(known_position + 0.5 * passed_s * by_constants + between.known_position[:, 2])[:, None],
-        delay=np.zeros((stretch.epoch.size, 2, 1, 1)),
+        delay=delay,
         first=np.array([FIRST_VELOCITY]),
-        constants=np.array([ACCEL_BIAS]),
+        constants=np.array([ACCEL_BIAS, *arm_m]),
     )
     return VelocityModel(motion, measured, [one for one in stretch.positions if one.axes == DOWN])
+
+
+def _arm_m(stretch: Stretch) -> list[float]:
+    """Standard deviations of the place of the sensor, where it is asked for."""
+    return [] if stretch.swing is None else [ARM_M] * 3
 
 
 def _with_correlated_errors(model: LinearModel, errors: ErrorModel, step_s: Array, axes: int) -> LinearModel:

@@ -16,6 +16,8 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.delays.sensor_delays import velocity_place_of
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import airborne_intervals, imu_gaps
 from fusetune.analyze.metrics.attitude import interpolate
@@ -112,6 +114,11 @@ class TriedFlight:
             if np.isfinite(one.white_share):
                 shares.setdefault(source, []).append(one.white_share)
         return {source: float(np.mean(values)) for source, values in shares.items()}
+
+    @cached_property
+    def place(self) -> VelocityPlace | None:
+        """Delay and place of the GNSS antenna; None where the flight does not tell them."""
+        return velocity_place_of(self._base, "gnss", self._airborne)
 
     def try_set(self, overrides: Mapping[str, float]) -> TriedSet:
         """Replay a set and compare it; parameters in which it differs from the log's own."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.trials.tried_set import ONE_STEP, SMOOTHED, WITHHELD, Column, TriedSet
 from fusetune.apply.evidence import AIMS, BlockSums, FlightEvidence, flight_evidence
 from fusetune.apply.settings import DecisionSettings
@@ -26,11 +27,13 @@ class TriedBase:
     reason : why nothing can be compared there; empty where it can
     whiteness : how white the error of each source is as it sees it, 0 … 1
     tried : itself
+    place : how late the GNSS receiver is and where its antenna sits; None where the flight does not tell
     """
 
     reason: str
     whiteness: Mapping[str, float]
     tried: TriedSet
+    place: VelocityPlace | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +45,13 @@ class Comparison:
     differences : (N, F) score less that of the base, nat; NaN where a set has none, or the flight says nothing
     aims : the same in each kind of prediction that the flight has; NaN elsewhere
     objections : (N,) what speaks against each set beside its score
+    places : (F,) what each flight tells of the GNSS receiver, whatever the set; empty where nothing does
     """
 
     differences: Array
     aims: Mapping[str, Array]
     objections: tuple[tuple[str, ...], ...]
+    places: tuple[VelocityPlace | None, ...] = ()
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
@@ -83,7 +88,7 @@ def compare(bases: Sequence[TriedBase], tried: Sequence[Sequence[TriedSet]], set
         for aim in evidence.aims:
             aims[aim.name][rows, column] = evidence.differences(names, aim.name)[1:]
     objections = tuple(_objections(bases, row, settings) for row in tried)
-    return Comparison(differences, aims, objections)
+    return Comparison(differences, aims, objections, tuple(one.place for one in bases))
 
 
 def _usual(bases: Sequence[TriedBase]) -> dict[str, float]:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.trials.tried_set import Column, Rejections, Sums, TriedSet
 from fusetune.apply.search.comparison import TriedBase
 from fusetune.apply.search.replays import Batch, Tried
@@ -68,12 +69,18 @@ def batch_of(document: Mapping[str, Any]) -> tuple[Batch, Tried]:
     """The batch that `batch_document` made it of, and what it did."""
     sets = tuple(values_of(one["values"]) for one in document["sets"])
     about = document["about"]
-    base = TriedBase(about["reason"], about["whiteness"], _tried(about["tried"]))
+    place = None if about["place"] is None else VelocityPlace.from_document(about["place"])
+    base = TriedBase(about["reason"], about["whiteness"], _tried(about["tried"]), place)
     return (document["flight"], values_of(document["base"]), sets), (base, tuple(map(_tried, document["sets"])))
 
 
 def _base_document(base: TriedBase) -> dict[str, Any]:
-    return {"reason": base.reason, "whiteness": dict(base.whiteness), "tried": _document(base.tried)}
+    return {
+        "reason": base.reason,
+        "whiteness": dict(base.whiteness),
+        "tried": _document(base.tried),
+        "place": None if base.place is None else base.place.document(),
+    }
 
 
 def _document(tried: TriedSet) -> dict[str, Any]:

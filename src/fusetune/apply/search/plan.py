@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from fusetune.analyze.delays.sensor_delays import ARM_PARAMETERS
 from fusetune.design.search_settings import SearchSettings
 from fusetune.design.tunable_parameters import DELAY_SUFFIX
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 FIRST_SUFFIXES = (DELAY_SUFFIX, "_POS_X", "_POS_Y", "_POS_Z")
 """Delays and lever arms come first: where they are wrong, a sensor's errors look as if they wandered, and all else is
 tuned to hide it."""
+
+MEASURED = ARM_PARAMETERS["gnss"]
+"""Not searched by the score, for the flights themselves tell them, with an error (`fusetune.analyze.delays`)."""
 
 DELAYS, ALL, DELAYS_AGAIN, PUTTING_BACK = "delays", "all", "delays again", "putting back"
 STAGES = (DELAYS, ALL, DELAYS_AGAIN, PUTTING_BACK)
@@ -41,20 +45,25 @@ class Plan:
     Attributes
     ----------
     parameters : all that are searched
-    first : those of the first stage
+    first : those of the first stage that the score moves
+    measured : those that are measured, in the first stage, too
     start : number of sets that the second stage starts with
     generations : sizes of its generations
     """
 
     parameters: tuple[str, ...]
     first: tuple[str, ...]
+    measured: tuple[str, ...]
     start: int
     generations: tuple[int, ...]
 
     @property
     def first_generations(self) -> tuple[int, ...]:
-        """Sizes after the start of the first stage: the lowest point of a parabola, and one beside it by factor."""
-        return (1 + len(self.first),) * _FIRST_GENERATIONS
+        """Sizes after the start of the first stage: the lowest point of a parabola, and one beside it by factor.
+
+        The first of them tries what is measured as well: with the delay as it is, and as it is measured.
+        """
+        return tuple(1 + len(self.first) + (2 if number == 0 else 0) for number in range(_FIRST_GENERATIONS))
 
     @property
     def again_generations(self) -> tuple[int, ...]:
@@ -64,14 +73,14 @@ class Plan:
     @property
     def rounds(self) -> tuple[tuple[str, int], ...]:
         """Stage and number of sets of every generation; none asks for more than this."""
-        count = len(self.first)
+        count, measured = len(self.first), len(self.measured)
         first = [start_size(count), *self.first_generations, *(1 + count,) * _PUTTING_DELAYS_BACK_ROUNDS]
         again = [again_size(count), *self.again_generations, *(1 + count,) * _PUTTING_DELAYS_BACK_ROUNDS]
-        rest = 1 + len(self.parameters) - count
+        rest = 1 + len(self.parameters) - count - measured
         back = (rest, rest, 1 + len(self.parameters))
         assert len(back) == _PUTTING_BACK_ROUNDS
         return (
-            *(((DELAYS, size) for size in first) if count else ()),
+            *(((DELAYS, size) for size in first) if count + measured else ()),
             (ALL, self.start),
             *((ALL, size) for size in self.generations),
             *(((DELAYS_AGAIN, size) for size in again) if count else ()),
@@ -103,23 +112,23 @@ def _plan(parameters: Sequence[str], settings: SearchSettings) -> Plan:
     left = settings.evaluations - _shared_sets(parameters) - searches * _fixed_sets(parameters)
     start = max(round(_START_SHARE * left), 2 * len(parameters))
     size = max((left - start) // (searches * _GENERATIONS), 1)
-    return Plan(tuple(parameters), _first(parameters), start, (size,) * _GENERATIONS)
+    measured = tuple(name for name in parameters if name in MEASURED)
+    return Plan(tuple(parameters), _first(parameters), measured, start, (size,) * _GENERATIONS)
 
 
 def _first(parameters: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for name in parameters if name.endswith(FIRST_SUFFIXES))
+    return tuple(name for name in parameters if name.endswith(FIRST_SUFFIXES) and name not in MEASURED)
 
 
 def _shared_sets(parameters: Sequence[str]) -> int:
     """What all searches begin with."""
-    count = len(_first(parameters))
-    return start_size(count) if count else 0
+    return start_size(len(_first(parameters)))
 
 
 def _fixed_sets(parameters: Sequence[str]) -> int:
     """Sets of a search beside those of its second stage: as a rule, for what is put back is not known before."""
     count, rest = len(_first(parameters)), len(parameters) - len(_first(parameters))
-    of_delays = (_FIRST_GENERATIONS + _AGAIN_GENERATIONS) * (1 + count) + again_size(count) + 2 * 2 * count
+    of_delays = (_FIRST_GENERATIONS + _AGAIN_GENERATIONS) * (1 + count) + 2 + again_size(count) + 2 * 2 * count
     return (of_delays if count else 0) + 2 * rest + len(parameters) // 2
 
 

@@ -42,7 +42,7 @@ class FlightTrier:
         """What the sets of a batch did."""
         name, base, sets = batch
         flight = self._flight(name, base)
-        about = TriedBase(flight.reason, flight.whiteness, flight.base_set)
+        about = TriedBase(flight.reason, flight.whiteness, flight.base_set, flight.place)
         return about, tuple(flight.base_set if one == base else flight.try_set(dict(one)) for one in sets)
 
     def _flight(self, name: str, base: Values) -> TriedFlight:

@@ -5,7 +5,7 @@ import pytest
 from tests.analyze.smoothing.made_steps import motion, replayed
 
 from fusetune.analyze.delays.lag import Lag
-from fusetune.analyze.delays.velocity_delay import velocity_delay
+from fusetune.analyze.delays.velocity_place import velocity_place
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples
 
@@ -35,7 +35,8 @@ def record(late_s: float, moving: bool = True) -> ReplayedSet:
 
 def found(late_s: float, seconds: float = 60.0) -> Lag | None:
     begin = int(MADE.time[0])
-    return velocity_delay(record(late_s), "gnss_vel", [(begin, begin + int(seconds * 1e6) + 1)], TOLD_S)
+    place = velocity_place(record(late_s), "gnss_vel", [(begin, begin + int(seconds * 1e6) + 1)], TOLD_S)
+    return None if place is None else place.lag
 
 
 @pytest.mark.parametrize("late_s", [-0.08, 0.0, 0.1])
