@@ -21,20 +21,20 @@ from fusetune.storage.parquet import read_table, write_table
 
 
 def joined(value: float, mended: float | None, flights: tuple[str, ...] = ("a", "b", "c")) -> JoinedDelay:
-    return JoinedDelay("gnss", "EKF2_GPS_DELAY", 110.0, value, value - 7.0, value + 7.0, flights, mended)
+    return JoinedDelay("gnss", "EKF2_GPS_DELAY", 110.0, value, value - 7.0, value + 7.0, flights, mended, 200.0)
 
 
 def test_a_wrong_delay_is_told_with_the_value_to_set() -> None:
-    (found,) = delay_findings([joined(195.0, 200.0)], {"EKF2_DELAY_MAX": 200.0})
-    assert (found.id, found.severity, found.figure, found.threshold) == (WRONG, "warning", 195.0, 110.0)
+    (found,) = delay_findings([joined(145.0, 140.0)])
+    assert (found.id, found.severity, found.figure, found.threshold) == (WRONG, "warning", 145.0, 110.0)
     assert delay_sentences([found]) == (
-        "GNSS arrives 195 ms after its measurement (95 % interval 188 to 202 ms), and PX4 is told EKF2_GPS_DELAY = "
-        "110: set EKF2_GPS_DELAY to 200."
+        "GNSS arrives 145 ms after its measurement (95 % interval 138 to 152 ms), and PX4 is told EKF2_GPS_DELAY = "
+        "110: set EKF2_GPS_DELAY to 140."
     )
 
 
 def test_a_delay_that_the_predictions_speak_against_is_told_but_not_set() -> None:
-    findings = delay_findings([joined(195.0, 200.0)], {})
+    findings = delay_findings([joined(145.0, 140.0)])
     mended = one("delay_mended", 0.02, 0.1, worse_aims=("smoothed",))
     keep = Choice("keep", "present", mended, None, False, None)
     (found,) = confirmed(findings, keep, [mended])
@@ -45,22 +45,23 @@ def test_a_delay_that_the_predictions_speak_against_is_told_but_not_set() -> Non
 
 
 def test_a_delay_beyond_the_buffers_asks_for_longer_ones() -> None:
-    (found,) = delay_findings([joined(231.0, 230.0)], {"EKF2_DELAY_MAX": 200.0})
+    """(230 + 10) ms in updates of 8 ms, which count as 10: 300."""
+    (found,) = delay_findings([joined(231.0, 230.0)])
     assert (
         found.remedy
-        == "Set EKF2_GPS_DELAY to 230, and EKF2_DELAY_MAX, now 200, to as much, as EKF2 reaches no further back"
+        == "Set EKF2_GPS_DELAY to 230, and EKF2_DELAY_MAX, now 200, to 300, as EKF2 reaches no further back"
     )
 
 
 def test_one_flight_alone_is_worth_a_note() -> None:
-    (found,) = delay_findings([joined(205.0, None, ("a",))], {})
+    (found,) = delay_findings([joined(205.0, None, ("a",))])
     assert (found.id, found.severity) == (SINGLE, "note")
     assert delay_sentences([found]) == ""
 
 
 def test_a_way_of_estimating_that_was_not_tried_mends_nothing_but_is_told() -> None:
-    flow = JoinedDelay("flow", "EKF2_OF_DELAY", 20.0, 60.0, 50.0, 70.0, ("a", "b"), None)
-    (found,) = delay_findings([flow], {})
+    flow = JoinedDelay("flow", "EKF2_OF_DELAY", 20.0, 60.0, 50.0, 70.0, ("a", "b"), None, 200.0)
+    (found,) = delay_findings([flow])
     assert (found.id, found.severity) == (UNTRIED, "note")
     assert "Compare sets with other values of EKF2_OF_DELAY" in found.remedy
     assert delay_sentences([found]) == ""
@@ -68,7 +69,7 @@ def test_a_way_of_estimating_that_was_not_tried_mends_nothing_but_is_told() -> N
 
 @pytest.mark.parametrize("one", [joined(112.0, None), joined(112.0, None, ("a",))])
 def test_of_a_right_delay_nothing_is_said(one: JoinedDelay) -> None:
-    assert delay_findings([one], {}) == ()
+    assert delay_findings([one]) == ()
 
 
 PRESENT, MENDED = {"EKF2_GPS_DELAY": 110.0}, {"EKF2_GPS_DELAY": 200.0}

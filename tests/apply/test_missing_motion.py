@@ -36,7 +36,9 @@ def kinds(*flights: AnalyzedFlight, delays: tuple[JoinedDelay, ...] = ()) -> lis
 
 
 def delay(half_ms: float) -> JoinedDelay:
-    return JoinedDelay("gnss", "EKF2_GPS_DELAY", 110.0, 110.0, 110.0 - half_ms, 110.0 + half_ms, ("a", "b"), None)
+    return JoinedDelay(
+        "gnss", "EKF2_GPS_DELAY", 110.0, 110.0, 110.0 - half_ms, 110.0 + half_ms, ("a", "b"), None, 200.0
+    )
 
 
 def test_aggressive_flights_miss_nothing() -> None:

@@ -49,7 +49,7 @@ from fusetune.apply.study_trials import trials_of_study
 from fusetune.apply.vetoes import vetoes
 from fusetune.apply.wording import paragraph
 from fusetune.errors import UserError
-from fusetune.finding import Finding, documents
+from fusetune.finding import documents
 from fusetune.set_names import DELAY_MENDED, PRESENT, is_mended
 from fusetune.storage.csv_file import write_csv
 from fusetune.storage.documents import write_document
@@ -118,7 +118,7 @@ def decide(
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
-    late = confirmed(_delay_findings(delays, newest, present), choice, ranked)
+    late = confirmed(delay_findings(read_joined(delays) if delays is not None else ()), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
     power = _power(ranked, present, flights, settings)
@@ -223,12 +223,6 @@ def _changed_parameters(newest: AnalyzedFlight | None, present: str) -> dict[str
         name: sorted(key for key, value in one["overrides"].items() if value != now.get(key))
         for name, one in sets.items()
     }
-
-
-def _delay_findings(delays: AnyPath | None, newest: AnalyzedFlight | None, present: str) -> tuple[Finding, ...]:
-    sets = newest.summary["sets"] if newest is not None else {}
-    joined = read_joined(delays) if delays is not None else ()
-    return delay_findings(joined, sets.get(present, {}).get("parameters", {}))
 
 
 def _newest(flights: Sequence[AnalyzedFlight], name: str | None, flights_table: AnyPath) -> AnalyzedFlight | None:

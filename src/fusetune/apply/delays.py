@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from fusetune.analyze.delays.wrong_delays import STEP_MS, TRIED_SENSORS, JoinedDelay
 from fusetune.apply.choice import Choice
 from fusetune.apply.ranking import RankedSet
+from fusetune.design.tunable_parameters import DELAY_LIMIT
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.set_names import DELAY_MENDED
 
 WRONG, UNCONFIRMED = "sensor_delay_wrong", "sensor_delay_not_confirmed"
 SINGLE, UNTRIED = "sensor_delay_of_one_flight", "sensor_delay_to_be_checked"
-BUFFERS = "EKF2_DELAY_MAX"
 
 
-def delay_findings(delays: Iterable[JoinedDelay], parameters: Mapping[str, float]) -> tuple[Finding, ...]:
+def delay_findings(delays: Iterable[JoinedDelay]) -> tuple[Finding, ...]:
     """Findings about delays: warnings where one is proved wrong, notes where a single flight says so, or estimates that
     have not been held against the truth.
-
-    Parameters
-    ----------
-    parameters : of the present set
     """
     found = []
     for one in delays:
         if one.mended_ms is not None:
-            found.append(_wrong(one, parameters))
+            found.append(_wrong(one))
         elif len(one.flights) == 1 and _off_ms(one) > STEP_MS:
             found.append(_of_one_flight(one))
         elif one.sensor not in TRIED_SENSORS and _off_ms(one) > STEP_MS:
@@ -69,12 +65,11 @@ def _unconfirmed(one: Finding, mended: RankedSet) -> Finding:
     )
 
 
-def _wrong(one: JoinedDelay, parameters: Mapping[str, float]) -> Finding:
+def _wrong(one: JoinedDelay) -> Finding:
     assert one.mended_ms is not None
     remedy = f"Set {one.parameter} to {one.mended_ms:g}"
-    longest = parameters.get(BUFFERS)
-    if longest is not None and one.mended_ms > longest:
-        remedy += f", and {BUFFERS}, now {longest:g}, to as much, as EKF2 reaches no further back"
+    if one.needed_ms is not None:
+        remedy += f", and {DELAY_LIMIT}, now {one.reach_ms:g}, to {one.needed_ms:g}, as EKF2 reaches no further back"
     return Finding(
         id=WRONG,
         severity="warning",

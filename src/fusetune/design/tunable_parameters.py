@@ -98,6 +98,16 @@ class TunableParameter:
         return self.low, min(self.high, max([horizon, *delays]) if math.isfinite(horizon) else self.high)
 
 
+def reach_ms(delay_ms: float) -> float:
+    """EKF2_DELAY_MAX that a delay needs, in steps of 10 ms.
+
+    PX4 keeps samples for EKF2_DELAY_MAX, counted in updates of 10 ms (`Ekf::initialise_interface`); where the IMU's
+    rate makes updates shorter, 8 ms at 250 Hz, it acts as that shorter time. A delay needs one update more than itself.
+    """
+    return _UPDATE_MS * math.ceil((delay_ms + _UPDATE_MS) * _SHORTEST_UPDATES / _UPDATE_MS)
+
+
+_UPDATE_MS, _SHORTEST_UPDATES = 10.0, 1.25
 _DELAYS = tuple(sensor.delay_parameter for sensor in SENSORS.values() if sensor.buffered)
 
 # fmt: off

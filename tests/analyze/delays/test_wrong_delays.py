@@ -21,7 +21,7 @@ SETTINGS = DelaySettings()
 
 def delay(value: float, error: float = 3.0, told: float = 110.0, sensor: str = "gnss") -> SensorDelay:
     parameter = {"gnss": "EKF2_GPS_DELAY", "range": "EKF2_RNG_DELAY"}[sensor]
-    return SensorDelay(sensor, parameter, told, value, value - 2.0 * error, value + 2.0 * error, error, 300)
+    return SensorDelay(sensor, parameter, told, value, value - 2.0 * error, value + 2.0 * error, error, 300, 200.0)
 
 
 def of_flights(*values: float, **changes: float) -> JoinedDelay:
@@ -48,7 +48,8 @@ def test_a_delay_that_all_flights_contradict_is_wrong_and_mended_in_steps_of_an_
     one = of_flights(203.0, 205.0, 207.0, 204.0)
     assert one.is_wrong
     assert one.mended_ms == 200.0
-    assert mended_values([one]) == {"EKF2_GPS_DELAY": 200.0}
+    # (200 + 10) ms in updates of 8 ms, which count as 10, are 270
+    assert mended_values([one]) == {"EKF2_GPS_DELAY": 200.0, "EKF2_DELAY_MAX": 270.0}
 
 
 @pytest.mark.parametrize(

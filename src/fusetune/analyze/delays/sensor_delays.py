@@ -14,6 +14,7 @@ from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.design.tunable_parameters import DELAY_LIMIT
 from fusetune.px4.aid_sources import AID_SOURCES, SENSORS
 from fusetune.px4.flight import Flight
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
@@ -46,6 +47,7 @@ class SensorDelay:
     value_ms, lower_ms, upper_ms : the delay and its interval (`CONFIDENCE`)
     standard_error_ms : of the delay
     n : measurements behind it
+    reach_ms : EKF2_DELAY_MAX that the vehicle flew with
     """
 
     sensor: str
@@ -56,6 +58,7 @@ class SensorDelay:
     upper_ms: float
     standard_error_ms: float
     n: int
+    reach_ms: float
 
     def document(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -78,7 +81,7 @@ def sensor_delays(prepared: PreparedFlight, record: ReplayedSet) -> tuple[Sensor
     found, motion = [], None
     for sensor in (*VELOCITIES, *LAGGED):
         parameter = SENSORS[sensor].delay_parameter
-        told_s = record.parameters.get(parameter, PARAMETERS[parameter].default) * 1e-3
+        told_s = _told(record, parameter) * 1e-3
         if not any(AID_SOURCES[source].sensor == sensor for source in record.fused_sources):
             continue
         if sensor in VELOCITIES:
@@ -90,18 +93,19 @@ def sensor_delays(prepared: PreparedFlight, record: ReplayedSet) -> tuple[Sensor
             series = LAGGED[sensor](prepared.flight, motion, record.parameters) if motion is not None else None
             lag = _lag(series, intervals, told_s)
         if lag is not None:
-            found.append(_delay(sensor, parameter, told_s, lag))
+            found.append(_delay(sensor, parameter, told_s, lag, _told(record, DELAY_LIMIT)))
     return tuple(found)
 
 
 def velocity_place_of(record: ReplayedSet, sensor: str, intervals: Sequence[Interval]) -> VelocityPlace | None:
     """Delay and place of a sensor of `VELOCITIES`, from a replay of any set; None where the flight does not tell."""
+    told_s = 1e-3 * _told(record, SENSORS[sensor].delay_parameter)
+    arm = [_told(record, one) for one in ARM_PARAMETERS[sensor]]
+    return velocity_place(record, VELOCITIES[sensor], intervals, told_s, arm)
 
-    def told(parameter: str) -> float:
-        return record.parameters.get(parameter, PARAMETERS[parameter].default)
 
-    told_s = 1e-3 * told(SENSORS[sensor].delay_parameter)
-    return velocity_place(record, VELOCITIES[sensor], intervals, told_s, [told(one) for one in ARM_PARAMETERS[sensor]])
+def _told(record: ReplayedSet, parameter: str) -> float:
+    return record.parameters.get(parameter, PARAMETERS[parameter].default)
 
 
 def _lag(series: LaggedSeries | None, intervals: Sequence[Any], told_s: float) -> Lag | None:
@@ -115,14 +119,15 @@ def _lag(series: LaggedSeries | None, intervals: Sequence[Any], told_s: float) -
     return Lag(lag.delay_s, error_s, lag.freedom, lag.samples) if error_s <= CERTAIN_S else None
 
 
-def _delay(sensor: str, parameter: str, told_s: float, lag: Lag) -> SensorDelay:
+def _delay(sensor: str, parameter: str, told_s: float, lag: Lag, reach_ms: float) -> SensorDelay:
     value, half, error = (
         round(1e3 * one, 1) for one in (lag.delay_s, lag.half_width_s(CONFIDENCE), lag.standard_error_s)
     )
     told = round(1e3 * told_s, 3)
     return SensorDelay(
-        sensor, parameter, told, value, round(value - half, 1), round(value + half, 1), error, lag.samples
-    )
+        sensor, parameter, told, value, round(value - half, 1), round(value + half, 1), error, lag.samples,
+        reach_ms,
+    )  # fmt: skip
 
 
 def read_delays(documents: Iterable[Mapping[str, Any]]) -> tuple[SensorDelay, ...]:

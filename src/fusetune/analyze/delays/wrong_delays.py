@@ -17,6 +17,7 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.delays.sensor_delays import CONFIDENCE, SensorDelay, read_delays
 from fusetune.analyze.delays.settings import DelaySettings
+from fusetune.design.tunable_parameters import DELAY_LIMIT, reach_ms
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.storage.documents import read_as, read_document, write_document
@@ -45,6 +46,7 @@ class JoinedDelay:
         flight
     flights : names of the flights behind it
     mended_ms : value to set, where the told one is proved wrong
+    reach_ms : EKF2_DELAY_MAX now
     """
 
     sensor: str
@@ -55,6 +57,13 @@ class JoinedDelay:
     upper_ms: float
     flights: tuple[str, ...]
     mended_ms: float | None
+    reach_ms: float
+
+    @property
+    def needed_ms(self) -> float | None:
+        """EKF2_DELAY_MAX to set along with the mended value; None where the present one is long enough."""
+        needed = 0.0 if self.mended_ms is None else reach_ms(self.mended_ms)
+        return needed if needed > self.reach_ms else None
 
     @property
     def is_wrong(self) -> bool:
@@ -85,7 +94,8 @@ def join_delays(
         if len(of_sensor) >= FEWEST_FLIGHTS and sensor in TRIED_SENSORS:
             mended = _mended(now, value, max(lower - now.told_ms, now.told_ms - upper), settings)
         value, lower, upper = (round(one, 1) for one in (value, lower, upper))
-        found.append(JoinedDelay(sensor, now.parameter, now.told_ms, value, lower, upper, tuple(of_sensor), mended))
+        now_told = (sensor, now.parameter, now.told_ms)
+        found.append(JoinedDelay(*now_told, value, lower, upper, tuple(of_sensor), mended, now.reach_ms))
     return tuple(found)
 
 
@@ -118,8 +128,11 @@ def joined(values: Sequence[float], errors: Sequence[float]) -> tuple[float, flo
 
 
 def mended_values(delays: Iterable[JoinedDelay]) -> dict[str, float]:
-    """Parameters of the delays that are proved wrong → values to set."""
-    return {one.parameter: one.mended_ms for one in delays if one.mended_ms is not None}
+    """Parameters of the delays that are proved wrong → values to set, and EKF2_DELAY_MAX where they need it longer."""
+    known = list(delays)
+    needed = [one.needed_ms for one in known if one.needed_ms is not None]
+    mended = {one.parameter: one.mended_ms for one in known if one.mended_ms is not None}
+    return mended | ({DELAY_LIMIT: max(needed)} if needed else {})
 
 
 def write_joined(

@@ -15,15 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.design.factors import Factor
-from fusetune.design.tunable_parameters import DELAY_LIMIT, DELAY_SUFFIX
+from fusetune.design.tunable_parameters import DELAY_LIMIT, DELAY_SUFFIX, reach_ms
 from fusetune.px4.parameters.ekf2_parameters import as_float32
 
 Array = npt.NDArray[np.float64]
 
 _DIGITS = 2
-
-_STEP_MS, _SHORTEST_UPDATES = 10.0, 1.25
-"""A delay needs one update more than itself, and updates are at the least 10 ms / 1.25 long."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,7 @@ class Space:
     @cached_property
     def bounds(self) -> Array:
         """(P, 2) of the points."""
-        return np.array([factor.bounds for factor in self.factors]) / self._units[:, None]
+        return np.array([factor.bounds for factor in self.factors]).reshape(-1, 2) / self._units[:, None]
 
     def values(self, point: Array) -> dict[str, float]:
         """The set at a point, with values as they are written."""
@@ -82,13 +79,8 @@ class Space:
         return replace(self, factors=tuple(found))
 
     def whole(self, values: Mapping[str, float]) -> dict[str, float]:
-        """A set with what goes along with it: a longer EKF2_DELAY_MAX where one of its delays asks for it.
-
-        PX4 keeps samples for EKF2_DELAY_MAX, counted in updates of 10 ms (`Ekf::initialise_interface`); where the IMU's
-        rate makes updates shorter (8 ms at 250 Hz), a delay acts as that shorter time.
-        """
-        delays = [value for name, value in values.items() if name.endswith(DELAY_SUFFIX)]
-        needed = 10.0 * math.ceil((max(delays, default=0.0) + _STEP_MS) * _SHORTEST_UPDATES / 10.0)
+        """A set with what goes along with it: a longer EKF2_DELAY_MAX where one of its delays asks for it."""
+        needed = reach_ms(max((value for name, value in values.items() if name.endswith(DELAY_SUFFIX)), default=0.0))
         return {**values, DELAY_LIMIT: needed} if needed > self.delay_max else dict(values)
 
 

@@ -182,11 +182,13 @@ def _second_stage(
     for generation, size in enumerate((*plan.generations, 0)):
         compared = yield ask_for(ALL, space, base, asked)
         tried.add(asked, objective(compared, ALL))
-        if size:
+        if size and space.factors:
             chance = (settings.seed, STAGES.index(ALL), generation)
             new = proposing(space, np.array(tried.points), np.array(tried.scores), size, radius, chance)
             asked = [base | one for one in new]
             radius *= SHRINKS
+        else:
+            asked = []
     return base | space.values(tried.best)
 
 
@@ -219,6 +221,8 @@ def _start(space: Space, number: int, seed: int) -> list[dict[str, float]]:
     """A scrambled Sobol sequence over the space."""
     from scipy.stats import qmc
 
+    if not space.factors:
+        return []
     sequence = qmc.Sobol(len(space.factors), rng=np.random.default_rng([seed, len(space.factors)]))
     drawn = sequence.random_base2(max(number - 1, 1).bit_length())[:number]
     low, high = space.bounds[:, 0], space.bounds[:, 1]
