@@ -11,7 +11,7 @@ import pytest
 
 import fusetune
 from fusetune.ekf2.compiled.kernel_cache import KERNEL_SOURCES
-from fusetune.running.job_sources import JOB_SOURCES
+from fusetune.running.job_sources import JOB_SOURCES, TRIED
 
 PACKAGE = Path(fusetune.__file__).parent
 SCRIPTS = PACKAGE.parents[1] / "workflow" / "scripts"
@@ -84,6 +84,12 @@ def closure(files: Iterable[Path]) -> set[str]:
 
 def covered(name: str, parts: Iterable[str]) -> bool:
     return any(name == part or name.startswith(f"{part}/") for part in parts)
+
+
+def test_what_trying_a_set_imports_makes_it_be_tried_again() -> None:
+    names = closure([PACKAGE / "analyze" / "trials" / "tried_flight.py"])
+    assert "analyze/trials/tried_set.py" in names
+    assert [name for name in sorted(names) if not covered(name, {*TRIED, *WITHOUT_OUTCOME})] == []
 
 
 @pytest.mark.parametrize("script", MADE_BY)

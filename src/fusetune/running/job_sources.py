@@ -20,6 +20,22 @@ BASE = (
     "time_limit.py",
 )
 
+_SCORED = (
+    "analyze/analyze_flight.py",
+    "analyze/flight",
+    "analyze/flight_files.py",
+    "analyze/metrics",
+    "analyze/reconstruction",
+    "analyze/replaying",
+    "analyze/scoring",
+    "analyze/sensors",
+    "analyze/smoothing",
+    "analyze/trust",
+)
+
+TRIED = (*BASE, "design", "ekf2", "save", *_SCORED, "analyze/delays", "analyze/trials")
+"""What the figures of a set that is tried in a search follow from."""
+
 JOB_SOURCES = {
     "design": (*BASE, "design"),
     "execute": (*BASE, "ekf2", "design", "execute"),
@@ -43,9 +59,9 @@ JOB_SOURCES = {
         "analyze/sensors",
         "analyze/smoothing",
     ),
-    "score": (*BASE, "ekf2", "save", "analyze"),
-    "apply": (*BASE, "design", "apply"),
-    "search": (*BASE, "design", "ekf2", "save", "analyze", "apply"),
+    "score": (*BASE, "ekf2", "save", *_SCORED),
+    "apply": (*BASE, "analyze/delays", "analyze/trials", "design", "apply"),
+    "search": (*TRIED, "apply"),
     "report": (*BASE, "design", "apply", "report"),
 }
 """Kind of job → files and folders of the package."""

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.analyze.trials.tried_flight import TrialSettings
 from fusetune.apply.settings import DecisionSettings
+from fusetune.running.job_sources import TRIED
 from fusetune.save.flight_folder import read_metadata
 from fusetune.storage.digest import source_digest
 from fusetune.storage.files import AnyPath
@@ -22,7 +23,7 @@ def trial_settings(decision: DecisionSettings, analysis: AnalysisSettings) -> Tr
 
 def made_of(folders: Mapping[str, AnyPath], trials: TrialSettings) -> dict[str, str]:
     """By saved flight: its log, the settings, the program."""
-    program = source_digest("px4", "ekf2", "save", "analyze")
+    program = source_digest(*TRIED)
     return {
         name: key_of([read_metadata(folder)["checksum"], program, asdict(trials)]) for name, folder in folders.items()
     }
