@@ -1,8 +1,8 @@
-"""What the flights themselves tell of the GNSS receiver: where its antenna is, and how late it is.
+"""What the flights themselves tell of the GNSS receiver: how late it is, and where its antenna sits.
 
-A lever arm shows in the score only on flights that turn hard, and on others luck does; the smoother tells it with an
-error of its own (`fusetune.analyze.delays.velocity_place`). So it is set where it is measured to be wrong, and else
-left alone.
+A delay or a lever arm shows in the score only on flights that move hard, and on others luck does; the smoother tells
+both with errors of their own (`fusetune.analyze.delays.velocity_place`). So each is set where it is measured to be
+wrong, and else left alone.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from fusetune.apply.search.space import Space
 from fusetune.px4.aid_sources import SENSORS
 
 _ERRORS = 3.0
-"""An axis is wrong where it is measured so many standard errors from what is told: by chance on one of 120 vehicles."""
+"""It is wrong where it is measured so many standard errors from what is told: by chance, of the four, on one vehicle in
+90."""
 
-_LEAST_M = 0.05
-"""Nearer to what is told it makes no difference."""
+_LEAST_M, _LEAST_MS = 0.05, 10.0
+"""Nearer to what is told it makes no difference: EKF2 acts on delays in steps of 10 ms."""
 
-_CERTAIN_S = 0.03
-"""A delay whose standard error is larger is not tried for being measured."""
-
-DELAY = SENSORS["gnss"].delay_parameter
+DELAY, ARM = SENSORS["gnss"].delay_parameter, ARM_PARAMETERS["gnss"]
 
 
-def measured_arm(space: Space, told: Mapping[str, float], places: Sequence[VelocityPlace | None]) -> dict[str, float]:
-    """Axes of the antenna's place that are measured to be wrong, with the values that they are set to, in centimetres.
+def measured_values(
+    space: Space, told: Mapping[str, float], places: Sequence[VelocityPlace | None]
+) -> list[dict[str, float]]:
+    """What is measured to be wrong, with the values to set: delay and axes together, then each of the two alone.
 
     Parameters
     ----------
@@ -38,18 +38,18 @@ def measured_arm(space: Space, told: Mapping[str, float], places: Sequence[Veloc
     """
     pooled = pooled_place(places)
     if pooled is None:
-        return {}
-    found = {}
-    axes = zip(ARM_PARAMETERS["gnss"], pooled.arm.tolist(), pooled.arm_error.tolist(), strict=True)
-    for name, value, error in axes:
-        if name in space.parameters and abs(value - told[name]) > max(_LEAST_M, _ERRORS * error):
-            found[name] = space.values(space.point({**told, name: round(value, 2)}))[name]
-    return found
+        return []
+    delay = {DELAY: (1e3 * pooled.delay_s, 1e3 * pooled.delay_error_s)}
+    arm = dict(zip(ARM, zip(pooled.arm.tolist(), pooled.arm_error.tolist(), strict=True), strict=True))
+    late, off = _wrong(space, told, delay, _LEAST_MS, 0), _wrong(space, told, arm, _LEAST_M, 2)
+    return [one for one in ([late | off, late, off] if late and off else [late | off]) if one]
 
 
-def measured_delay(space: Space, told: Mapping[str, float], places: Sequence[VelocityPlace | None]) -> dict[str, float]:
-    """The delay on its grid, if it may be moved and the flights tell it."""
-    pooled = pooled_place(places)
-    if pooled is None or DELAY not in space.parameters or pooled.delay_error_s > _CERTAIN_S:
-        return {}
-    return {DELAY: space.values(space.point({**told, DELAY: 1e3 * pooled.delay_s}))[DELAY]}
+def _wrong(
+    space: Space, told: Mapping[str, float], measured: Mapping[str, tuple[float, float]], least: float, digits: int
+) -> dict[str, float]:
+    return {
+        name: space.values(space.point({**told, name: round(value, digits)}))[name]
+        for name, (value, error) in measured.items()
+        if name in space.parameters and abs(value - told[name]) > max(least, _ERRORS * error)
+    }

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from fusetune.analyze.delays.sensor_delays import ARM_PARAMETERS
 from fusetune.design.search_settings import SearchSettings
 from fusetune.design.tunable_parameters import DELAY_SUFFIX
+from fusetune.px4.aid_sources import SENSORS
 
 if TYPE_CHECKING:
     from fusetune.apply.search.space import Space
@@ -20,8 +21,10 @@ FIRST_SUFFIXES = (DELAY_SUFFIX, "_POS_X", "_POS_Y", "_POS_Z")
 """Delays and lever arms come first: where they are wrong, a sensor's errors look as if they wandered, and all else is
 tuned to hide it."""
 
-MEASURED = ARM_PARAMETERS["gnss"]
+MEASURED = (SENSORS["gnss"].delay_parameter, *ARM_PARAMETERS["gnss"])
 """Not searched by the score, for the flights themselves tell them, with an error (`fusetune.analyze.delays`)."""
+MEASURED_SIZES = (1, 4)
+"""The present set, whose replays measure; then with delay and lever arm as measured, with either, and with none."""
 
 DELAYS, ALL, DELAYS_AGAIN, PUTTING_BACK = "delays", "all", "delays again", "putting back"
 STAGES = (DELAYS, ALL, DELAYS_AGAIN, PUTTING_BACK)
@@ -59,11 +62,8 @@ class Plan:
 
     @property
     def first_generations(self) -> tuple[int, ...]:
-        """Sizes after the start of the first stage: the lowest point of a parabola, and one beside it by factor.
-
-        The first of them tries what is measured as well: with the delay as it is, and as it is measured.
-        """
-        return tuple(1 + len(self.first) + (2 if number == 0 else 0) for number in range(_FIRST_GENERATIONS))
+        """Sizes after the start of the first stage: the lowest point of a parabola, and one beside it by factor."""
+        return (1 + len(self.first),) * _FIRST_GENERATIONS
 
     @property
     def again_generations(self) -> tuple[int, ...]:
@@ -80,7 +80,8 @@ class Plan:
         back = (rest, rest, 1 + len(self.parameters))
         assert len(back) == _PUTTING_BACK_ROUNDS
         return (
-            *(((DELAYS, size) for size in first) if count + measured else ()),
+            *(((DELAYS, size) for size in MEASURED_SIZES) if measured else ()),
+            *(((DELAYS, size) for size in first) if count else ()),
             (ALL, self.start),
             *((ALL, size) for size in self.generations),
             *(((DELAYS_AGAIN, size) for size in again) if count else ()),
@@ -122,14 +123,16 @@ def _first(parameters: Sequence[str]) -> tuple[str, ...]:
 
 def _shared_sets(parameters: Sequence[str]) -> int:
     """What all searches begin with."""
-    return start_size(len(_first(parameters)))
+    count = len(_first(parameters))
+    return start_size(count) if count else 1
 
 
 def _fixed_sets(parameters: Sequence[str]) -> int:
     """Sets of a search beside those of its second stage: as a rule, for what is put back is not known before."""
-    count, rest = len(_first(parameters)), len(parameters) - len(_first(parameters))
-    of_delays = (_FIRST_GENERATIONS + _AGAIN_GENERATIONS) * (1 + count) + 2 + again_size(count) + 2 * 2 * count
-    return (of_delays if count else 0) + 2 * rest + len(parameters) // 2
+    count = len(_first(parameters))
+    rest = len(parameters) - count - len([name for name in parameters if name in MEASURED])
+    of_delays = (_FIRST_GENERATIONS + _AGAIN_GENERATIONS) * (1 + count) + again_size(count) + 2 * 2 * count
+    return (of_delays if count else 0) + MEASURED_SIZES[1] + 2 * rest + len(parameters) // 2
 
 
 def start_size(factors: int) -> int:

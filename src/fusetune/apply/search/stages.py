@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.apply.search.comparison import Comparison
-from fusetune.apply.search.measured_place import measured_arm, measured_delay
+from fusetune.apply.search.measured_place import measured_values
 from fusetune.apply.search.objective import objective
 from fusetune.apply.search.parabola import propose_on_parabola
 from fusetune.apply.search.plan import ALL, DELAYS, DELAYS_AGAIN, PUTTING_BACK, RADIUS, SHRINKS, STAGES, Plan
@@ -31,7 +31,10 @@ _NEAR = 0.35
 """After the first stage delays move no farther from what it found, in half ranges."""
 
 _HARDLY = 0.01
-"""The score speaks against a measured antenna if it is worse by so much, nat."""
+"""The score speaks against what is measured if it is worse by so much, nat."""
+
+_STAR = (1.0 / 3.0, 1.0)
+"""How far along each of them the first stage looks, in shares of the way to its bounds."""
 
 _AGAIN = 0.2
 """How far around what was found delays and lever arms are looked at again, in half ranges: 20 ms, 0.1 m."""
@@ -76,37 +79,25 @@ class _Tried:
     def best(self) -> Array:
         return self.points[int(np.argmin(self.scores))]
 
-    def best_of(self, start: dict[str, float]) -> dict[str, float]:
-        """A start, the first that was tried, with the best of what was tried; itself where nothing is better."""
-        return start | self.space.values(self.best) if min(self.scores) < self.scores[0] else start
-
-    def proposals(self, generation: int) -> list[dict[str, float]]:
-        """What to try next of delays and lever arms; of none there is nothing."""
-        if not self.space.factors:
-            return []
-        return propose_on_parabola(self.space, np.array(self.points), np.array(self.scores), generation)
-
-    def since(self, first: int) -> _Tried:
-        """Those from a place on."""
-        return _Tried(self.space, self.points[first:], self.scores[first:])
-
 
 def search_stages(space: Space, plan: Plan, settings: SearchSettings, proposing: Proposing = propose) -> Asking:
     """Search; the origin of the space is the present set."""
     present = space.present
     first = space.only(plan.first)
     base = present
-    if plan.first or plan.measured:
-        moved = yield from _first_stage(first, present, len(plan.first_generations), space.only(plan.measured))
+    if plan.measured:
+        base = yield from _measured(space, present, space.only(plan.measured))
+    if plan.first:
+        generations = len(plan.first_generations)
+        moved = yield from _around(first, base, _STAR, generations, present, DELAYS)
         changed = [name for name in plan.first if moved[name] != present[name]]
         base = yield from put_back(space, moved, present, present, changed, settings, DELAYS)
-    around = _second_space(space, base, (*plan.first, *plan.measured))
+    around = _second_space(space, base, plan)
     best = yield from _second_stage(around, base, plan, settings, proposing)
     before = best
     if plan.first:
-        again = first.around(best)
-        star = _star(again, (_AGAIN,))
-        before = yield from _again(again, best, star, len(plan.again_generations), base)
+        generations = len(plan.again_generations)
+        before = yield from _around(first.around(best), best, (_AGAIN,), generations, base, DELAYS_AGAIN)
         changed = [name for name in plan.first if before[name] != present[name]]
         best = yield from put_back(space, before, base, present, changed, settings, DELAYS_AGAIN)
     rest = [
@@ -120,50 +111,27 @@ def search_stages(space: Space, plan: Plan, settings: SearchSettings, proposing:
     return Found(space.whole(values), kept, space.whole(before), costs, space.whole(base))
 
 
-def _first_stage(
-    space: Space, present: dict[str, float], generations: int, of_place: Space
+def _measured(space: Space, present: dict[str, float], of_place: Space) -> Generator[Ask, Comparison, dict[str, float]]:
+    """The present set with what the flights measure to be wrong, as far as the score does not speak against it."""
+    compared = yield ask_for(DELAYS, space, present, [present])
+    starts = [present | one for one in measured_values(of_place, present, compared.places)] + [present]
+    scores = objective((yield ask_for(DELAYS, space, present, starts)), DELAYS)
+    return next(one for one, score in zip(starts, scores, strict=True) if score <= scores.min() + _HARDLY)
+
+
+def _around(
+    space: Space, start: dict[str, float], reach: Sequence[float], generations: int, base: dict[str, float], stage: str
 ) -> Generator[Ask, Comparison, dict[str, float]]:
-    """Delays and lever arms around the present set, the origin of the space.
-
-    The answer to the star says what is measured, too. What that changes of the antenna's place is tried next, and stays
-    but where the score speaks against it; of the sets before, the scores are then taken to be as much lower as the
-    present one's.
-    """
-    guide = _Tried(space)
-    asked = _with_star(space, present, _star(space, (1.0 / 3.0, 1.0)))
-    compared = yield ask_for(DELAYS, space, present, asked)
-    guide.add(asked, objective(compared, DELAYS))
-    start = present | measured_arm(of_place, present, compared.places)
-    late = measured_delay(space, present, compared.places)
-    asked = [start, *(start | one for one in [*guide.proposals(0), *([late] if late else [])])]
-    scores = objective((yield ask_for(DELAYS, space, present, asked)), DELAYS)
-    gain = float(scores[0]) - guide.scores[0]
-    if gain <= _HARDLY:
-        guide.scores = [one + gain for one in guide.scores]
-        guide.add(asked, scores)
-    else:
-        start = present
-    own = guide.since(0 if start == present else -len(asked))
-    for generation in range(1, generations):
-        asked = [start | one for one in guide.proposals(generation)]
-        scores = objective((yield ask_for(DELAYS, space, present, asked)), DELAYS)
-        guide.add(asked, scores)
-        own.add(asked, scores)
-    return own.best_of(start)
-
-
-def _again(
-    space: Space, start: dict[str, float], star: Sequence[dict[str, float]], generations: int, base: dict[str, float]
-) -> Generator[Ask, Comparison, dict[str, float]]:
-    """Delays and lever arms once more around a set, the origin of the space; compared with the base."""
-    asked = _with_star(space, start, star)
+    """Delays and lever arms around a set, the origin of the space; compared with the base."""
+    asked = _with_star(space, start, _star(space, reach))
     tried = _Tried(space)
     for generation in range(generations + 1):
-        compared = yield ask_for(DELAYS_AGAIN, space, base, asked)
-        tried.add(asked, objective(compared, DELAYS_AGAIN))
+        compared = yield ask_for(stage, space, base, asked)
+        tried.add(asked, objective(compared, stage))
         if generation < generations:
-            asked = [start | one for one in tried.proposals(generation)]
-    return tried.best_of(start)
+            new = propose_on_parabola(space, np.array(tried.points), np.array(tried.scores), generation)
+            asked = [start | one for one in new]
+    return start | space.values(tried.best) if min(tried.scores) < tried.scores[0] else start
 
 
 def _with_star(space: Space, start: dict[str, float], star: Sequence[dict[str, float]]) -> list[dict[str, float]]:
@@ -192,11 +160,13 @@ def _second_stage(
     return base | space.values(tried.best)
 
 
-def _second_space(space: Space, base: dict[str, float], first: Sequence[str]) -> Space:
-    """What the second stage moves: all but lever arms, and delays near what the first found."""
+def _second_space(space: Space, base: dict[str, float], plan: Plan) -> Space:
+    """What the second stage moves: all but lever arms and what is measured, and delays near what the first found."""
     found = []
     for factor, whole in zip(space.around(base).factors, space.factors, strict=True):
-        if factor.parameter not in first:
+        if factor.parameter in plan.measured:
+            continue
+        if factor.parameter not in plan.first:
             found.append(factor)
         elif factor.parameter.endswith(DELAY_SUFFIX):
             reach = _NEAR * max(map(abs, whole.bounds)) * whole.unit_step
