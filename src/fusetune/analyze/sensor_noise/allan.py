@@ -1,17 +1,17 @@
 """Overlapping Allan deviation of evenly sampled stretches, with the degrees of freedom of each value.
 
-The Allan variance at τ = m Δt is half the mean square of the difference between two successive means over τ; overlapping,
-it takes every start. Of several stretches (axes, times, flights) it is the mean over all terms: the mean of each stretch
-drops out of it, so they need not agree. Formulas: IEEE Std 952-1997, annex C; NIST SP 1065 (Riley, *Handbook of
-frequency stability analysis*), section 5.2.4 and table 5.
+The Allan variance at τ = m Δt is half the mean square of the difference between two successive means over τ;
+overlapping, it takes every start. Of several stretches (axes, times, flights) it is the mean over all terms: the mean
+of each stretch drops out of it, so they need not agree. Formulas: IEEE Std 952-1997, annex C; NIST SP 1065 (Riley,
+*Handbook of frequency stability analysis*), section 5.2.4 and table 5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +73,23 @@ class AllanCurve:
             for kind in total:
                 total[kind][used] += degrees_of_freedom(kind, length, self.factors[used])
         return total
+
+    def document(self) -> dict[str, Any]:
+        """As a JSON object."""
+        arrays = {name: getattr(self, name).tolist() for name in ("factors", "variance", "terms")}
+        return {"step_s": self.step_s, **arrays, "lengths": list(self.lengths)}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> AllanCurve:
+        """Read what `document` made."""
+        factors, variance, terms = (np.asarray(document[name]) for name in ("factors", "variance", "terms"))
+        return cls(
+            float(document["step_s"]),
+            factors.astype(np.int64),
+            variance.astype(np.float64),
+            terms.astype(np.float64),
+            tuple(document["lengths"]),
+        )
 
 
 def allan_curve(stretches: Sequence[npt.ArrayLike], step_s: float) -> AllanCurve:

@@ -115,7 +115,8 @@ class AllanFigures:
 def allan_figures(curve: AllanCurve) -> AllanFigures:
     """Fit the three parts to a curve.
 
-    Where the curve bends at its short end, as a sensor's own low-pass filter makes it, up to three octaves are left out.
+    Where the curve bends at its short end, as a sensor's own low-pass filter makes it, up to three octaves are left
+    out.
     """
     usable = np.flatnonzero(curve.variance > 0.0)
     if len(usable) < FEWEST_VALUES:
@@ -226,7 +227,7 @@ def _correlation(factors: tuple[int, ...], step_s: float, parts: Array) -> Array
 def _allan_filters(factors: tuple[int, ...]) -> tuple[Array, Array, Array]:
     """Frequencies (F,), cycles per sample, their widths, and |H|² of each m, (T, F): 2 sin⁴(π f m) / (m sin π f)².
 
-    Evenly spaced by logarithm: where sin⁴ turns over many times between two frequencies, they sample it as chance would.
+    Evenly spaced by logarithm: where sin⁴ turns over many times between two of them, they sample it as chance would.
     """
     edges = np.geomspace(0.02 / factors[-1], 0.5, _FREQUENCIES + 1)
     frequency = np.sqrt(edges[1:] * edges[:-1])

@@ -20,8 +20,9 @@ from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
 Array = npt.NDArray[np.float64]
 
 _VARIANCE_WITH_NEIGHBOURS = 1.0 + 0.29824
-"""Of a sample less the median of four others, all normal with variance 1: that median is the mean of the second and third
-of four, whose variances and covariance are 0.3605, 0.3605 and 0.2359 (Godwin, *Ann. Math. Stat.* 20, 1949)."""
+"""Of a sample less the median of four others, all normal with variance 1: that median is the mean of the second and
+the third of four, whose variances and covariance are 0.3605, 0.3605 and 0.2359 (Godwin, *Ann. Math. Stat.* 20, 1949).
+"""
 _SIGMA_PER_MAD = 1.482602
 OUTLIER = 5.0
 """Robust z beyond which a sample is an outlier: of normal samples one in 1.7 million is."""

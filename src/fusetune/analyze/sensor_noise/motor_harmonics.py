@@ -22,6 +22,8 @@ from fusetune.analyze.sensor_noise.spectrum import Tone, segment_length
 Array = npt.NDArray[np.float64]
 
 MOST_HARMONIC = 4
+LOWEST_FUNDAMENTAL_HZ = 25.0
+"""Of a large propeller at hover."""
 SAME_SHARE, SAME_HZ = 0.03, 1.5
 """A tone is a multiple when it lies that near to it: rotors of one vehicle turn some per cent apart."""
 FOLLOWS = 0.5
@@ -44,7 +46,8 @@ class MotorTone:
     tone : as the spectrum shows it
     multiple : of the fundamental; 0 where it is none
     folded : whether the multiple lies above half the log's rate and shows where it is folded to
-    slope_hz : how far it moves while the throttle goes from 0 to 1, Hz; None where it does not follow, or that is unknown
+    slope_hz : how far it moves while the throttle goes from 0 to 1, Hz; None where it does not follow, or that is not
+        known
     """
 
     tone: Tone
@@ -156,12 +159,16 @@ def _slope(tracks: _Tracks, tone: Tone, throttle: Array) -> float | None:
 
 
 def _fundamental(found: Sequence[Tone], slopes: Sequence[float | None], rate_hz: float) -> float | None:
-    """Frequency whose multiples explain most tones; one that follows the throttle needs no multiple."""
+    """Frequency whose multiples explain most tones; one that follows the throttle needs no multiple.
+
+    Folded multiples lie anywhere, so that by chance some tone is near to one: they do not count here.
+    """
     best, most = None, 1.0
     for tone, slope in zip(found, slopes, strict=True):
-        if slope is not None and slope < 0.0:
+        if tone.frequency_hz < LOWEST_FUNDAMENTAL_HZ or (slope is not None and slope < 0.0):
             continue
-        multiples = {_multiple_of(one.frequency_hz, tone.frequency_hz, rate_hz)[0] for one in found} - {0}
+        shown = [_multiple_of(one.frequency_hz, tone.frequency_hz, rate_hz) for one in found]
+        multiples = {multiple for multiple, folded in shown if multiple and not folded}
         score = len(multiples) + (1.0 if slope is not None else 0.0)
         if score > most:
             best, most = tone.frequency_hz, score

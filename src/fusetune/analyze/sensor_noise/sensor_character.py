@@ -37,8 +37,8 @@ class SensorCharacter:
     figures : what it says of the sensor, its axes together
     axis_figures : of each axis
     at_rest, in_flight : distribution of each axis; empty where there are too few samples
-    wander : root of the mean square deviation from the mean of each stretch, axes together (of GNSS the horizontal ones, of its
-        velocity from zero); None without a stretch
+    wander : root of the mean square deviation from the mean of each stretch, axes together (of GNSS the horizontal
+        ones, of its velocity from zero); None without a stretch
     rest_spectrum, flight_spectrum : of inertial sensors and magnetometers; None where there are too few samples
     vibration : None of other sensors
     stuck : the longest time that one value was held
@@ -71,17 +71,9 @@ class SensorCharacter:
             "rate_hz": self.series.rate_hz,
             "device_id": self.series.device_id,
             "still_s": self.still_s,
-            "allan": {
-                "step_s": self.curve.step_s,
-                "factors": self.curve.factors.tolist(),
-                "variance": self.curve.variance.tolist(),
-                "terms": self.curve.terms.tolist(),
-                "lengths": list(self.curve.lengths),
-            },
+            "allan": self.curve.document(),
             "figures": self.figures.document(),
-            "axis_figures": dict(
-                zip(self.sensor.axes, (one.document() for one in self.axis_figures), strict=True)
-            ),
+            "axis_figures": dict(zip(self.sensor.axes, (one.document() for one in self.axis_figures), strict=True)),
             "at_rest": [one.document() for one in self.at_rest],
             "in_flight": [one.document() for one in self.in_flight],
             "wander": self.wander,
@@ -148,7 +140,7 @@ def _wander(series: SensorSeries, pieces: list[np.ndarray]) -> float | None:
 
 
 def _stuck(series: SensorSeries, airborne: Sequence[Interval]) -> Standstill:
-    """All axes at one value; in the air where the vehicle flew, for a simulated sensor may be without noise on the ground."""
+    """All axes at one value; in the air where the vehicle flew: on the ground a simulated sensor may have no noise."""
     table = {"timestamp": series.time} | {str(i): series.values[:, i] for i in range(series.values.shape[1])}
     middle = series.inside(airborne)
     counted = middle[1:] & middle[:-1] if middle.any() else np.ones(len(series.time) - 1, np.bool_)

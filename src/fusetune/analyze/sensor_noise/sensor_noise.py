@@ -81,8 +81,8 @@ def sensor_noise(flight: Flight, airborne: Sequence[Interval]) -> SensorNoise:
     Parameters
     ----------
     flight : canonical
-    airborne : when it was in the air, µs; empty where that is not known: then nothing is said of the flight, and the log
-        is searched for times of standing still by the IMU alone
+    airborne : when it was in the air, µs; empty where that is not known: then nothing is said of the flight, and the
+        log is searched for times of standing still by the IMU alone
     """
     series = sensor_series(flight)
     still: tuple[Interval, ...] = ()
@@ -90,7 +90,7 @@ def sensor_noise(flight: Flight, airborne: Sequence[Interval]) -> SensorNoise:
         still = standing_still(flight, series["gyro"], series["accel"], airborne)
     command = motor_command(flight)
     found = {name: sensor_character(one, still, airborne, command) for name, one in series.items()}
-    starting = starting_noises(flight, found, still)
+    starting = starting_noises(flight, found)
     return SensorNoise(flight.name, flight.start_timestamp, still, tuple(airborne), found, starting)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -25,7 +26,7 @@ FULLER = 1.2
 GAP_STEPS = 1.5
 """From so many sampling intervals on there is a gap: the stretch ends there."""
 MOST_IMU_HZ = 1000.0
-"""Faster samples are averaged down to about this: what EKF2 integrates over milliseconds is not told by microseconds."""
+"""Faster samples are averaged to about this: what EKF2 integrates over milliseconds is not told by microseconds."""
 _FIX_3D = 3
 
 
@@ -93,9 +94,7 @@ class SensorSeries:
             breaks = np.flatnonzero(np.diff(self.time[first:last]) > GAP_STEPS * self.step_s * 1e6) + 1 + first
             edges = [int(first), *breaks.tolist(), int(last)]
             found += [
-                self.values[begin:end]
-                for begin, end in zip(edges[:-1], edges[1:], strict=True)
-                if (end - begin) * self.step_s >= shortest_s
+                self.values[begin:end] for begin, end in pairwise(edges) if (end - begin) * self.step_s >= shortest_s
             ]
         return found
 
@@ -120,12 +119,15 @@ def sensor_series(flight: Flight) -> dict[SensorName, SensorSeries]:
 def _series(
     name: SensorName, topic: str, time: np.ndarray, values: Array, averaged_s: float = 0.0, device_id: int = 0
 ) -> SensorSeries | None:
+    if len(time) < FEWEST_SAMPLES:
+        return None
     values = values.reshape(len(values), -1)
     kept = np.isfinite(values).all(axis=1)
     time, values = np.asarray(time, np.int64)[kept], values[kept]
-    kept = np.diff(time, prepend=time[0] - 1) > 0 if len(time) else np.zeros(0, np.bool_)
+    # a clock that goes back is for the verdict to tell; here what comes after a later time is passed over
+    kept = time > np.maximum.accumulate(np.concatenate([[-1], time]))[:-1]
     time, values = time[kept], values[kept]
-    if len(time) < FEWEST_SAMPLES or np.any(np.diff(time) <= 0):
+    if len(time) < FEWEST_SAMPLES:
         return None
     step_s = _usual_step_s(time)
     together = int(1.0 / (step_s * MOST_IMU_HZ) + 0.1)
@@ -153,7 +155,9 @@ def _inertial(flight: Flight, name: SensorName, combined: str, driver: str, incr
     best = None
     if table is not None and row_count(table) >= FEWEST_SAMPLES:
         prefix = "gyro" if name == "gyro" else "accelerometer"
-        integrated = float(np.median(table[f"{prefix}_integral_dt"])) * 1e-6 if f"{prefix}_integral_dt" in table else 0.0
+        integrated = (
+            float(np.median(table[f"{prefix}_integral_dt"])) * 1e-6 if f"{prefix}_integral_dt" in table else 0.0
+        )
         time = np.asarray(table["timestamp"], np.int64)
         best = _series(name, "sensor_combined", time, stacked(table, combined), integrated, device_id)
     for other in (
@@ -187,7 +191,7 @@ def _of_driver(flight: Flight, name: SensorName, topic: str, device_id: int) -> 
 
 
 def _of_fifo(flight: Flight, name: SensorName, topic: str, device_id: int) -> SensorSeries | None:
-    """Readings of the sensor's own FIFO: `samples` of each message are valid, `dt` µs apart, the last at its sample time."""
+    """Readings of the sensor's FIFO: `samples` of each message are valid, `dt` µs apart, the last at its sample time."""
     table = _of_device(flight, topic, "device_id", device_id)
     if table is None or not row_count(table) or not field_names(table, "x") or "samples" not in table:
         return None

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import median_filter
-from scipy.signal import find_peaks, welch
+from scipy.ndimage import binary_closing, median_filter
+from scipy.signal import welch
 
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
@@ -24,6 +24,8 @@ LOWEST_TONE_HZ = 15.0
 UPPER_SHARE = 0.9
 """Of the Nyquist frequency; up to there the broad-band level is read."""
 _BASELINE_HZ = 25.0
+_ONE_TONE_HZ = 3.0
+"""Peaks nearer to each other are one tone."""
 _TONE = 3.0
 """A tone stands so many times above the level around it, or six standard deviations where the segments are few."""
 _SIGNIFICANT = 6.0
@@ -59,8 +61,8 @@ class Spectrum:
     def broadband(self, lowest_hz: float) -> float:
         """Level between the tones, mean of the axes, unit²/Hz: the median from `lowest_hz` to 0.9 of Nyquist.
 
-        A median of averaged densities, which are spread like χ² with 2 s degrees of freedom, s the independent segments,
-        lies (1 − 2/9f)³ below their mean (Wilson and Hilferty); that is put right.
+        A median of averaged densities, which are spread like χ² with f = 2 s degrees of freedom, s the independent
+        segments, is (1 − 2/9f)³ times their mean (Wilson and Hilferty); that is put right.
         """
         highest = UPPER_SHARE * float(self.frequency_hz[-1])
         band = (self.frequency_hz >= min(lowest_hz, 0.5 * highest)) & (self.frequency_hz <= highest)
@@ -75,7 +77,7 @@ class Tone:
 
     Attributes
     ----------
-    frequency_hz : where it shows
+    frequency_hz : centre of its power
     amplitude : of a sine with its power, all axes together, unit of the sensor
     above : how many times its density stands above the level around it
     """
@@ -117,12 +119,18 @@ def tones(found: Spectrum) -> tuple[Tone, ...]:
     base = median_filter(smooth, size=width, mode="nearest")
     ratio = smooth / np.maximum(base, np.finfo(float).tiny)
     least = max(_TONE, 1.0 + _SIGNIFICANT / math.sqrt(_CORRELATION_OF_SEGMENTS * found.segments))
-    places = find_peaks(np.append(ratio, 0.0), height=least, distance=max(int(2.0 / found.resolution_hz), 1))[0]
-    listed = []
-    for place in places[found.frequency_hz[places] >= LOWEST_TONE_HZ]:
-        around = np.flatnonzero(ratio > 1.0 + 0.5 * (least - 1.0))
-        near = around[np.abs(around - place) <= width // 4]
-        power = float(np.sum((level - base)[near])) * found.resolution_hz
-        frequency = float(found.frequency_hz[place])
-        listed.append(Tone(frequency, math.sqrt(2.0 * max(power, 0.0)), float(ratio[place])))
-    return tuple(sorted(listed, key=lambda one: -one.above))
+    high = (ratio > 1.0 + 0.5 * (least - 1.0)) & (found.frequency_hz >= LOWEST_TONE_HZ)
+    # rotors turn some per cent apart, and what they shake at is told as one
+    closed = binary_closing(np.pad(high, width), np.ones(max(int(_ONE_TONE_HZ / found.resolution_hz), 1)))[width:-width]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], closed, [False]])))
+    runs = zip(edges[::2], edges[1::2], strict=True)
+    listed = [
+        _tone(found, level - base, ratio, run) for run in (slice(*run) for run in runs) if ratio[run].max() >= least
+    ]
+    return tuple(sorted(listed, key=lambda one: -one.amplitude))
+
+
+def _tone(found: Spectrum, excess: Array, ratio: Array, run: slice) -> Tone:
+    power = np.maximum(excess[run], 0.0)
+    frequency = float(power @ found.frequency_hz[run] / power.sum())
+    return Tone(frequency, math.sqrt(2.0 * float(power.sum()) * found.resolution_hz), float(ratio[run].max()))

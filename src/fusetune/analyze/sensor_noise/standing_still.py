@@ -18,7 +18,7 @@ SHORTEST_S = 3.0
 CLEAR_OF_FLIGHT_US = 1_000_000
 """The land detector tells take-off late, and landing before the vehicle has come to rest."""
 QUIET = 1.5
-"""A window is still whose spread is at most so many times that of the quietest tenth; chance makes 1.2 of 25 samples."""
+"""A window is still whose spread is at most so many times that of the quietest tenth; chance makes 1.2 of 25 rows."""
 QUIETEST = 10.0
 MOST_GYRO = 0.05
 MOST_ACCEL = 0.6

@@ -2,12 +2,12 @@
 
 What PX4 means by each (v1.16, `EKF/covariance.cpp` and `EKF/ekf_helper.cpp`, as `ekf2.filter.prediction` mirrors them):
 
-* ``EKF2_GYR_NOISE``, ``EKF2_ACC_NOISE``: per update of Δt the attitude gets (p Δt)² and the velocity likewise. White noise of
-  density N adds N² Δt, so p = N / √Δt: the standard deviation of a mean over one update, not a density.
-* ``EKF2_GYR_B_NOISE``, ``EKF2_ACC_B_NOISE``: per update the bias gets (p Δt)². A random walk of density K adds K² Δt, so
-  p = K / √Δt.
+* ``EKF2_GYR_NOISE``, ``EKF2_ACC_NOISE``: per update of Δt the attitude gets (p Δt)², and the velocity likewise. White
+  noise of density N adds N² Δt, so p = N / √Δt: the standard deviation of a mean over one update, not a density.
+* ``EKF2_GYR_B_NOISE``, ``EKF2_ACC_B_NOISE``: per update the bias gets (p Δt)². A random walk of density K adds K² Δt,
+  so p = K / √Δt.
 * ``EKF2_MAG_NOISE``, ``EKF2_BARO_NOISE``: standard deviation of one sample.
-* ``EKF2_GPS_V_NOISE``, ``EKF2_GPS_P_NOISE``: standard deviation of one sample, but not less than the receiver reports for it.
+* ``EKF2_GPS_V_NOISE``, ``EKF2_GPS_P_NOISE``: standard deviation of one sample, but not less than the receiver reports.
 
 Δt is ``EKF2_PREDICT_US``, 10 ms by default.
 """
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.sensor_noise.allan_fit import NoiseFigure
 from fusetune.analyze.sensor_noise.sensor_character import SensorCharacter
 from fusetune.analyze.sensor_noise.sensor_series import SensorName
 from fusetune.px4.flight import Flight
@@ -41,10 +41,20 @@ REPORTED = {"gnss_vel": "s_variance_m_s", "gnss_pos": "eph"}
 HORIZONTAL = 2
 """Axes of GNSS that the parameters are about; the vertical ones are worse by a factor that PX4 has built in."""
 _DIGITS = 2
+MORE_IN_FLIGHT = 1.2
 MORE = (
-    "In flight vibration, scale errors and what the filter's model leaves out usually ask for more than the sensor at rest: "
-    "take the value at rest for the least that makes sense"
+    "Scale errors, wrong delays and what else the filter's model leaves out usually ask for more than the sensor's "
+    "noise: go lower only with sets that are compared on flights"
 )
+_OF_SAMPLES: Mapping[SensorName, str] = {
+    "mag": "At rest slow wandering counts, in flight what changes from sample to sample: currents of the motors and "
+    "errors of the calibration come on top.",
+    "baro": "At rest slow wandering counts, in flight what changes from sample to sample: the airflow about the vehicle "
+    "adds errors of a metre or so, which no spectrum of the sensor tells.",
+    "gnss_vel": "At rest the whole velocity counts, in flight what changes from sample to sample, the vehicle's motion "
+    "among it.",
+    "gnss_pos": "A receiver's error wanders for minutes, of which a short stand shows little.",
+}
 
 
 @dataclass(frozen=True)
@@ -58,8 +68,9 @@ class StartingNoise:
     at_rest : that the sensor standing still would ask for; None where that is not known
     low, high : 95 % interval of it where it has one; without a value `high` is what it is not above
     in_flight : that the noise in flight asks for; None where that is not known
+    least : the larger of the two; None where neither is known
     flown : what the vehicle flew with
-    start_with : within PX4's limits; None where nothing is better known than what flew
+    start_with : `least` where the vehicle flew with less, else what flew; within PX4's limits
     words : what to make of it
     """
 
@@ -69,8 +80,9 @@ class StartingNoise:
     low: float | None
     high: float | None
     in_flight: float | None
+    least: float | None
     flown: float
-    start_with: float | None
+    start_with: float
     words: str
 
     def document(self) -> dict[str, Any]:
@@ -78,16 +90,13 @@ class StartingNoise:
         return dict(vars(self))
 
 
-def starting_noises(
-    flight: Flight, characters: Mapping[SensorName, SensorCharacter], still: tuple[Interval, ...]
-) -> tuple[StartingNoise, ...]:
+def starting_noises(flight: Flight, characters: Mapping[SensorName, SensorCharacter]) -> tuple[StartingNoise, ...]:
     """The parameters of the sensors that the flight has.
 
     Parameters
     ----------
     flight : canonical
     characters : its sensors
-    still : when it stood still, µs
     """
     flown = complete(flight.parameters.initial, {}, flight.release)
     found = []
@@ -96,7 +105,7 @@ def starting_noises(
             found.append(_of_white(WHITE[name], character, flown))
             found.append(_of_walk(WALK[name], character, flown))
         elif name in SAMPLE:
-            found.append(_of_sample(SAMPLE[name], name, character, flown, flight, still))
+            found.append(_of_sample(SAMPLE[name], name, character, flown, flight))
     return tuple(found)
 
 
@@ -111,58 +120,40 @@ def _period_s(flown: Mapping[str, float]) -> float:
 
 def _of_white(parameter: str, character: SensorCharacter, flown: Mapping[str, float]) -> StartingNoise:
     period_s, figure = _period_s(flown), character.figures.noise_density
-    rest = None if figure.value is None else per_update(figure.value, period_s)
     seen = character.vibration.density_in_flight if character.vibration else None
+    rest = _Interval.of(figure, period_s)
     flight = None if seen is None else per_update(seen, period_s)
-    start = None if flight is None else max(flight, rest or 0.0)
     if flight is None:
-        words = f"the flight is too short, or was not logged, to tell what it asks for. {MORE}."
-    elif rest is None:
-        words = f"broad-band noise in flight asks for this; what of it is the sensor's own is not known: {figure.refusal}."
-    elif flight > rest * 1.2:
-        words = f"in flight the noise is {flight / rest:.1f} times that at rest: begin with the value in flight. {MORE}."
+        words = "The log has too little of the flight to tell what that asks for."
+    elif rest.value is None:
+        words = f"How much of the noise in flight is the sensor's own is not known: {figure.refusal}."
+    elif flight > MORE_IN_FLIGHT * rest.value:
+        words = f"In flight the noise is {flight / rest.value:.1f} times that at rest, by vibration."
     else:
-        words = f"in flight the noise is that at rest. {MORE}."
-    low, high = (per_update(figure.low, period_s), per_update(figure.high, period_s)) if figure.high else (None, None)
-    return _noise(parameter, rest, (low, high), flight, flown, start, words)
+        words = "In flight the noise is that at rest."
+    return _noise(parameter, rest, flight, flown, words)
 
 
 def _of_walk(parameter: str, character: SensorCharacter, flown: Mapping[str, float]) -> StartingNoise:
-    period_s, figure = _period_s(flown), character.figures.random_walk
-    rest = None if figure.value is None else per_update(figure.value, period_s)
-    low, high = (per_update(figure.low, period_s), per_update(figure.high, period_s)) if figure.high else (None, None)
-    words = "In flight temperature and vibration move the bias, too; how much shows only by the filter's own bias states."
-    if rest is None:
-        words = f"{figure.refusal}: keep what flew. {words}"
-    return _noise(parameter, rest, (low, high), None, flown, rest, words)
+    figure = character.figures.random_walk
+    words = "In flight temperature and vibration move the bias, too; how much, only the filter's own bias states show."
+    if figure.value is None:
+        words = f"Not known: {figure.refusal}. {words}"
+    return _noise(parameter, _Interval.of(figure, _period_s(flown)), None, flown, words)
 
 
 def _of_sample(
-    parameter: str,
-    name: SensorName,
-    character: SensorCharacter,
-    flown: Mapping[str, float],
-    flight: Flight,
-    still: tuple[Interval, ...],
+    parameter: str, name: SensorName, character: SensorCharacter, flown: Mapping[str, float], flight: Flight
 ) -> StartingNoise:
-    rest = character.wander
-    axes = character.in_flight[:HORIZONTAL] if name.startswith("gnss") else character.in_flight
+    axes = character.in_flight[:HORIZONTAL] if name in REPORTED else character.in_flight
     moving = float(np.sqrt(np.mean([one.spread**2 for one in axes]))) if axes else None
-    known = [one for one in (rest, moving) if one is not None]
-    start = max(known) if known and name in ("mag", "baro") else rest
-    words = "At rest the whole deviation from the mean counts, slow wandering too; in flight only what changes from sample to sample."
-    if name in REPORTED:
-        reported = _reported(flight, REPORTED[name])
-        words = "The receiver's error wanders for minutes, so that a short stand shows too little of it: take it for the least."
-        if reported is not None:
-            words += f" The receiver itself reports {reported:.2g}: below that the parameter changes nothing."
-    elif name == "baro":
-        words += " In flight the airflow about the vehicle adds errors of a metre or so that no spectrum of the sensor tells."
-    elif name == "mag":
-        words += " Currents of the motors and errors of the calibration add to it in flight."
-    if rest is None and not still:
-        words = f"the vehicle does not stand still in this log. {words}"
-    return _noise(parameter, rest, (None, None), moving, flown, start, words)
+    words = _OF_SAMPLES[name]
+    if character.wander is None:
+        words = f"The vehicle does not stand still in this log. {words}"
+    reported = _reported(flight, REPORTED[name]) if name in REPORTED else None
+    if reported is not None:
+        words += f" The receiver itself reports {reported:.2g}: below that the parameter changes nothing."
+    return _noise(parameter, _Interval(character.wander), moving, flown, words)
 
 
 def _reported(flight: Flight, field: str) -> float | None:
@@ -174,21 +165,34 @@ def _reported(flight: Flight, field: str) -> float | None:
     return float(np.median(values)) if len(values) else None
 
 
+@dataclass(frozen=True)
+class _Interval:
+    value: float | None
+    low: float | None = None
+    high: float | None = None
+
+    @classmethod
+    def of(cls, figure: NoiseFigure, period_s: float) -> _Interval:
+        """A density as EKF2's parameter."""
+        value, low, high = (
+            None if one is None else per_update(one, period_s) for one in (figure.value, figure.low, figure.high)
+        )
+        return cls(value, low if high is not None else None, high)
+
+
 def _noise(
-    parameter: str,
-    rest: float | None,
-    limits: tuple[float | None, float | None],
-    in_flight: float | None,
-    flown: Mapping[str, float],
-    start: float | None,
-    words: str,
+    parameter: str, rest: _Interval, in_flight: float | None, flown: Mapping[str, float], words: str
 ) -> StartingNoise:
-    metadata = ALL_PARAMETERS[parameter]
-    if start is not None:
-        within = min(max(start, metadata.minimum or 0.0), metadata.maximum or math.inf)
-        if within != start:
-            words += f" PX4 allows {metadata.minimum:g} to {metadata.maximum:g}."
-        start = float(f"{within:.{_DIGITS}g}")
-    return StartingNoise(parameter, metadata.unit, rest, *limits, in_flight, float(flown[parameter]), start, words)
-
-
+    metadata, present = ALL_PARAMETERS[parameter], float(flown[parameter])
+    least = max((one for one in (rest.value, in_flight) if one is not None), default=None)
+    start = present
+    if least is not None and least > present:
+        start = float(f"{min(least, metadata.maximum or math.inf):.{_DIGITS}g}")
+        words += f" PX4 is told {present:.2g}, less than the noise that is there: begin with {start:g}."
+        if metadata.maximum is not None and least > metadata.maximum:
+            words += f" PX4 allows no more than {metadata.maximum:g}."
+    elif least is not None:
+        words += f" PX4 is told {present:.2g}, {present / least:.1f} times the noise that is there. {MORE}."
+    return StartingNoise(
+        parameter, metadata.unit, rest.value, rest.low, rest.high, in_flight, least, present, start, words
+    )

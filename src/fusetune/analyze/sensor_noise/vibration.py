@@ -23,8 +23,8 @@ class Vibration:
 
     Attributes
     ----------
-    density_in_flight, density_at_rest : broad-band noise, mean of the axes, unit/√Hz by the two-sided density, as Allan's N;
-        None where there are too few samples
+    density_in_flight, density_at_rest : broad-band noise, mean of the axes, unit/√Hz by the two-sided density, as
+        Allan's N; None where there are too few samples
     limited : whether vibration limits it; None where one of the two is not known
     tones : that stand out in flight
     aliasing : what may be folded into the log, in words; empty where nothing speaks for it
@@ -90,13 +90,15 @@ def _aliasing(series: SensorSeries, found: MotorTones) -> str:
     if against:
         seen = against[0].tone.frequency_hz
         return (
-            f"the tone at {seen:.0f} Hz goes down as the throttle goes up: it is one of {rate - seen:.0f} Hz or more, folded "
-            f"by the rate of {rate:.0f} Hz"
+            f"the tone at {seen:.0f} Hz goes down as the throttle goes up: it is one of {rate - seen:.0f} Hz or more, "
+            f"folded by the rate of {rate:.0f} Hz"
         )
     if found.fundamental_hz is None:
         return ""
     above = [n for n in range(2, MOST_HARMONIC + 1) if n * found.fundamental_hz > 0.5 * rate]
     if not above:
         return ""
-    places = ", ".join(f"{n * found.fundamental_hz:.0f} Hz at {shown_at(n * found.fundamental_hz, rate):.0f}" for n in above)
+    places = ", ".join(
+        f"{n * found.fundamental_hz:.0f} Hz at {shown_at(n * found.fundamental_hz, rate):.0f}" for n in above
+    )
     return f"multiples of {found.fundamental_hz:.0f} Hz above half of the rate of {rate:.0f} Hz show elsewhere: {places} Hz"
