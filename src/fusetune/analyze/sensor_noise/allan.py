@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 NoiseKind = Literal["white", "flicker", "walk"]
+KINDS: tuple[NoiseKind, ...] = ("white", "flicker", "walk")
 
 FEWEST_MEANS = 4
 """So many means over τ that do not overlap; over fewer a deviation says next to nothing."""
@@ -67,10 +68,11 @@ class AllanCurve:
     @cached_property
     def freedom(self) -> dict[NoiseKind, Array]:
         """(T,) equivalent degrees of freedom for each kind of noise that may rule a value."""
-        total = {kind: np.zeros(len(self.factors)) for kind in _FREEDOM}
-        for length in self.lengths:
-            used = FEWEST_MEANS * self.factors <= length
-            for kind in total:
+        total: dict[NoiseKind, Array] = {}
+        for kind in KINDS:
+            total[kind] = np.zeros(len(self.factors))
+            for length in self.lengths:
+                used = FEWEST_MEANS * self.factors <= length
                 total[kind][used] += degrees_of_freedom(kind, length, self.factors[used])
         return total
 

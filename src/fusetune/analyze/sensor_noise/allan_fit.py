@@ -20,15 +20,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
-from fusetune.analyze.sensor_noise.allan import AllanCurve, NoiseKind, degrees_of_freedom
+from fusetune.analyze.sensor_noise.allan import KINDS, AllanCurve, NoiseKind, degrees_of_freedom
 
 Array = npt.NDArray[np.float64]
 
-KINDS: tuple[NoiseKind, ...] = ("white", "flicker", "walk")
 NAMES: Mapping[NoiseKind, str] = {
     "white": "noise density",
     "flicker": "bias instability",
@@ -48,7 +46,7 @@ _MOST_LEFT_OUT = 3
 """Octaves at the short end that may follow the sensor's own low-pass filter and not the noise."""
 _MISFIT = 4.0
 """χ² per degree of freedom from which the short end is suspected."""
-_FREQUENCIES = 1500
+_FREQUENCIES = 1000
 USUAL_TAU_S: Mapping[NoiseKind, float] = {"white": 0.5, "flicker": 60.0, "walk": 300.0}
 """Where MEMS sensors as on autopilots usually show each part (about a second; the bottom at a minute, the rise after
 five): Allan curves in the data sheets of ICM-42688-P, BMI088 and ADIS16470, rounded."""
@@ -150,6 +148,7 @@ def freedom_of_mixture(curve: AllanCurve, figures: AllanFigures) -> Array:
     return _mixed_freedom(curve, np.arange(len(curve.factors)), parts)
 
 
+@lru_cache(maxsize=16)
 def needed_s(kind: NoiseKind, tau_s: float) -> float:
     """How long a record must be for the part that shows at τ: until its value has 2 · 3² degrees of freedom, s."""
     wanted = 2.0 * DISTINCT**2
@@ -174,14 +173,14 @@ def _fit(curve: AllanCurve, rows: npt.NDArray[np.int64]) -> _Fit:
     weights = np.sqrt(curve.freedom["white"][rows] / 2.0)
     parts = nnls(shapes / measured[:, None] * weights[:, None], weights)[0]
     whitened, target = shapes, measured
-    factor = np.eye(len(rows))
     for _ in range(_ITERATIONS):
         expected = shapes @ parts
         deviation = expected * np.sqrt(2.0 / _mixed_freedom(curve, rows, parts))
         correlation = _correlation(tuple(curve.factors[rows].tolist()), curve.step_s, parts)
-        factor = np.linalg.cholesky(correlation + 1e-6 * np.eye(len(rows)))
-        whitened = solve_triangular(factor, shapes / deviation[:, None], lower=True)
-        target = solve_triangular(factor, measured / deviation, lower=True)
+        # numpy's own small inverse: the triangular solver of BLAS waits for its threads longer than it works
+        whitening = np.linalg.inv(np.linalg.cholesky(correlation + 1e-6 * np.eye(len(rows))))
+        whitened = whitening @ (shapes / deviation[:, None])
+        target = whitening @ (measured / deviation)
         before, parts = parts, _positive(whitened, target)
         if np.allclose(before, parts, rtol=1e-3, atol=0.0):
             break
@@ -218,7 +217,8 @@ def _correlation(factors: tuple[int, ...], step_s: float, parts: Array) -> Array
     white, flicker, walk = parts
     density = 2.0 * white + flicker / (math.pi * f) + walk / (2.0 * math.pi**2 * f**2)
     weighted = filters * (density / density.max() * np.sqrt(width))
-    product = weighted @ weighted.T
+    # not by BLAS, whose threads wait for each other longer than this takes
+    product = np.einsum("if,jf->ij", weighted, weighted)
     size = np.sqrt(np.diag(product))
     return np.asarray(product / np.outer(size, size))
 
@@ -265,5 +265,5 @@ def _refusal(curve: AllanCurve, kind: NoiseKind) -> str:
 
 
 def _refused(curve: AllanCurve) -> AllanFigures:
-    figures = [NoiseFigure(None, 0.0, None, 0.0, _refusal(curve, kind)) for kind in KINDS]
-    return AllanFigures(*figures, from_s=curve.step_s, misfit=math.nan)
+    white, flicker, walk = (NoiseFigure(None, 0.0, None, 0.0, _refusal(curve, kind)) for kind in KINDS)
+    return AllanFigures(white, flicker, walk, curve.step_s, 0.0)

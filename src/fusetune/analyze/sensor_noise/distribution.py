@@ -75,7 +75,10 @@ class Distribution:
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Distribution:
         """Read what `document` made."""
-        return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in document.items()})
+        arguments: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in document.items()
+        }
+        return cls(**arguments)
 
 
 def deviations(values: Array) -> Array:

@@ -89,7 +89,8 @@ def motor_tones(
     command : of the motors; None where the log has none
     """
     tracks = _spectra_in_time(series, intervals) if found and command is not None else None
-    throttle, slopes = "not logged", [None] * len(found)
+    throttle = "not logged"
+    slopes: list[float | None] = [None] * len(found)
     if tracks is not None and command is not None:
         at = np.interp(tracks.time, command.time, command.throttle)
         throttle = "varied" if float(np.std(at)) >= LEAST_THROTTLE_SPREAD else "constant"

@@ -14,9 +14,10 @@ from fusetune.analyze.sensor_noise.motor_commands import motor_command
 from fusetune.analyze.sensor_noise.sensor_character import SensorCharacter, sensor_character
 from fusetune.analyze.sensor_noise.sensor_series import SensorName, sensor_series
 from fusetune.analyze.sensor_noise.standing_still import standing_still
-from fusetune.analyze.sensor_noise.starting_noises import StartingNoise, starting_noises
+from fusetune.analyze.sensor_noise.starting_noises import StartingNoise, period_s, starting_noises
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS, canonical
+from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
@@ -46,6 +47,7 @@ class SensorNoise:
     still, airborne : when the vehicle stood still, and when it flew, µs
     sensors : those that it has
     starting : noise parameters that follow
+    period_s : time of EKF2's updates, s
     """
 
     flight: str
@@ -54,6 +56,7 @@ class SensorNoise:
     airborne: tuple[Interval, ...]
     sensors: dict[SensorName, SensorCharacter]
     starting: tuple[StartingNoise, ...]
+    period_s: float
 
     @property
     def vibration_limited(self) -> tuple[SensorName, ...]:
@@ -68,6 +71,7 @@ class SensorNoise:
             "airborne_s": [self._seconds(one) for one in self.airborne],
             "vibration_limited": list(self.vibration_limited),
             "sensors": {name: one.document() for name, one in self.sensors.items()},
+            "period_s": self.period_s,
             "starting": [one.document() for one in self.starting],
         }
 
@@ -90,8 +94,9 @@ def sensor_noise(flight: Flight, airborne: Sequence[Interval]) -> SensorNoise:
         still = standing_still(flight, series["gyro"], series["accel"], airborne)
     command = motor_command(flight)
     found = {name: sensor_character(one, still, airborne, command) for name, one in series.items()}
-    starting = starting_noises(flight, found)
-    return SensorNoise(flight.name, flight.start_timestamp, still, tuple(airborne), found, starting)
+    flown = complete(flight.parameters.initial, {}, flight.release)
+    starting = starting_noises(flight, found, flown)
+    return SensorNoise(flight.name, flight.start_timestamp, still, tuple(airborne), found, starting, period_s(flown))
 
 
 def sensor_noise_of(flight_folder: AnyPath) -> SensorNoise:

@@ -191,7 +191,7 @@ def _of_driver(flight: Flight, name: SensorName, topic: str, device_id: int) -> 
 
 
 def _of_fifo(flight: Flight, name: SensorName, topic: str, device_id: int) -> SensorSeries | None:
-    """Readings of the sensor's FIFO: `samples` of each message are valid, `dt` µs apart, the last at its sample time."""
+    """Readings of the sensor's FIFO: `samples` of a message are valid, `dt` µs apart, the last at its sample time."""
     table = _of_device(flight, topic, "device_id", device_id)
     if table is None or not row_count(table) or not field_names(table, "x") or "samples" not in table:
         return None

@@ -91,17 +91,17 @@ def spectrum(series: SensorSeries, intervals: Sequence[Interval]) -> Spectrum | 
     """Welch's estimate over all stretches without a gap inside the intervals, µs; None where they are too short."""
     length = segment_length(series)
     pieces = series.pieces(intervals, length * series.step_s)
-    density, segments, frequency = 0.0, 0, np.zeros(0)
+    density, segments, frequency = np.zeros((length // 2 + 1, series.values.shape[1])), 0, np.zeros(0)
     for piece in pieces:
         count = 1 + (len(piece) - length) // (length // 2)
         if count < 1:
             continue
         frequency, one = welch(piece, 1.0 / series.step_s, nperseg=length, axis=0)
-        density = density + one * count
+        density += one * count
         segments += count
     if segments < FEWEST_SEGMENTS:
         return None
-    return Spectrum(frequency[1:], np.asarray(density / segments)[1:], segments)
+    return Spectrum(frequency[1:], (density / segments)[1:], segments)
 
 
 def segment_length(series: SensorSeries) -> int:
@@ -121,7 +121,9 @@ def tones(found: Spectrum) -> tuple[Tone, ...]:
     least = max(_TONE, 1.0 + _SIGNIFICANT / math.sqrt(_CORRELATION_OF_SEGMENTS * found.segments))
     high = (ratio > 1.0 + 0.5 * (least - 1.0)) & (found.frequency_hz >= LOWEST_TONE_HZ)
     # rotors turn some per cent apart, and what they shake at is told as one
-    closed = binary_closing(np.pad(high, width), np.ones(max(int(_ONE_TONE_HZ / found.resolution_hz), 1)))[width:-width]
+    closed = binary_closing(np.pad(high, width), np.ones(max(int(_ONE_TONE_HZ / found.resolution_hz), 1), np.bool_))[
+        width:-width
+    ]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], closed, [False]])))
     runs = zip(edges[::2], edges[1::2], strict=True)
     listed = [

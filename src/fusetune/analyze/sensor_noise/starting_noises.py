@@ -15,22 +15,22 @@ What PX4 means by each (v1.16, `EKF/covariance.cpp` and `EKF/ekf_helper.cpp`, as
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fusetune.analyze.sensor_noise.allan_fit import NoiseFigure
+from fusetune.analyze.sensor_noise.allan_fit import AllanFigures, NoiseFigure
 from fusetune.analyze.sensor_noise.sensor_character import SensorCharacter
 from fusetune.analyze.sensor_noise.sensor_series import SensorName
 from fusetune.px4.flight import Flight
-from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, complete
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 
 PERIOD = "EKF2_PREDICT_US"
-WHITE = {"gyro": "EKF2_GYR_NOISE", "accel": "EKF2_ACC_NOISE"}
-WALK = {"gyro": "EKF2_GYR_B_NOISE", "accel": "EKF2_ACC_B_NOISE"}
-SAMPLE = {
+WHITE: Mapping[SensorName, str] = {"gyro": "EKF2_GYR_NOISE", "accel": "EKF2_ACC_NOISE"}
+WALK: Mapping[SensorName, str] = {"gyro": "EKF2_GYR_B_NOISE", "accel": "EKF2_ACC_B_NOISE"}
+SAMPLE: Mapping[SensorName, str] = {
     "mag": "EKF2_MAG_NOISE",
     "baro": "EKF2_BARO_NOISE",
     "gnss_vel": "EKF2_GPS_V_NOISE",
@@ -49,8 +49,8 @@ MORE = (
 _OF_SAMPLES: Mapping[SensorName, str] = {
     "mag": "At rest slow wandering counts, in flight what changes from sample to sample: currents of the motors and "
     "errors of the calibration come on top.",
-    "baro": "At rest slow wandering counts, in flight what changes from sample to sample: the airflow about the vehicle "
-    "adds errors of a metre or so, which no spectrum of the sensor tells.",
+    "baro": "At rest slow wandering counts, in flight what changes from sample to sample: the airflow about the "
+    "vehicle adds errors of a metre or so, which no spectrum of the sensor tells.",
     "gnss_vel": "At rest the whole velocity counts, in flight what changes from sample to sample, the vehicle's motion "
     "among it.",
     "gnss_pos": "A receiver's error wanders for minutes, of which a short stand shows little.",
@@ -90,39 +90,61 @@ class StartingNoise:
         return dict(vars(self))
 
 
-def starting_noises(flight: Flight, characters: Mapping[SensorName, SensorCharacter]) -> tuple[StartingNoise, ...]:
+def starting_noises(
+    flight: Flight, characters: Mapping[SensorName, SensorCharacter], flown: Mapping[str, float]
+) -> tuple[StartingNoise, ...]:
     """The parameters of the sensors that the flight has.
 
     Parameters
     ----------
     flight : canonical
     characters : its sensors
+    flown : EKF2's parameters
     """
-    flown = complete(flight.parameters.initial, {}, flight.release)
     found = []
     for name, character in characters.items():
         if name in WHITE:
-            found.append(_of_white(WHITE[name], character, flown))
-            found.append(_of_walk(WALK[name], character, flown))
+            seen = character.vibration.density_in_flight if character.vibration else None
+            found.append(_of_white(name, character.figures.noise_density, seen, flown, period_s(flown)))
+            found.append(_of_walk(name, character.figures.random_walk, flown, period_s(flown)))
         elif name in SAMPLE:
             found.append(_of_sample(SAMPLE[name], name, character, flown, flight))
     return tuple(found)
 
 
-def per_update(density: float, period_s: float) -> float:
+def per_update(density: float, update_s: float) -> float:
     """EKF2's parameter for a density of white noise or of a random walk: over the root of the update's time."""
-    return density / math.sqrt(period_s)
+    return density / math.sqrt(update_s)
 
 
-def _period_s(flown: Mapping[str, float]) -> float:
+def pooled_inertial_noises(
+    name: SensorName, figures: AllanFigures, seen: Sequence[float], flown: Mapping[str, float], update_s: float
+) -> tuple[StartingNoise, ...]:
+    """The two parameters of a gyro or accelerometer over several flights.
+
+    Parameters
+    ----------
+    name : gyro or accel
+    figures : of the Allan curves of all flights together
+    seen : broad-band noise in each flight that tells it, unit/√Hz; the median counts
+    flown : what the newest flight flew with
+    update_s : time of EKF2's updates, s
+    """
+    usual = float(np.median(seen)) if len(seen) else None
+    white = _of_white(name, figures.noise_density, usual, flown, update_s)
+    return white, _of_walk(name, figures.random_walk, flown, update_s)
+
+
+def period_s(flown: Mapping[str, float]) -> float:
+    """Time of EKF2's updates, s."""
     return float(flown[PERIOD]) * 1e-6
 
 
-def _of_white(parameter: str, character: SensorCharacter, flown: Mapping[str, float]) -> StartingNoise:
-    period_s, figure = _period_s(flown), character.figures.noise_density
-    seen = character.vibration.density_in_flight if character.vibration else None
-    rest = _Interval.of(figure, period_s)
-    flight = None if seen is None else per_update(seen, period_s)
+def _of_white(
+    name: SensorName, figure: NoiseFigure, seen: float | None, flown: Mapping[str, float], update_s: float
+) -> StartingNoise:
+    rest = _Interval.of(figure, update_s)
+    flight = None if seen is None else per_update(seen, update_s)
     if flight is None:
         words = "The log has too little of the flight to tell what that asks for."
     elif rest.value is None:
@@ -131,15 +153,14 @@ def _of_white(parameter: str, character: SensorCharacter, flown: Mapping[str, fl
         words = f"In flight the noise is {flight / rest.value:.1f} times that at rest, by vibration."
     else:
         words = "In flight the noise is that at rest."
-    return _noise(parameter, rest, flight, flown, words)
+    return _noise(WHITE[name], rest, flight, flown, words)
 
 
-def _of_walk(parameter: str, character: SensorCharacter, flown: Mapping[str, float]) -> StartingNoise:
-    figure = character.figures.random_walk
+def _of_walk(name: SensorName, figure: NoiseFigure, flown: Mapping[str, float], update_s: float) -> StartingNoise:
     words = "In flight temperature and vibration move the bias, too; how much, only the filter's own bias states show."
     if figure.value is None:
         words = f"Not known: {figure.refusal}. {words}"
-    return _noise(parameter, _Interval.of(figure, _period_s(flown)), None, flown, words)
+    return _noise(WALK[name], _Interval.of(figure, update_s), None, flown, words)
 
 
 def _of_sample(
@@ -172,10 +193,10 @@ class _Interval:
     high: float | None = None
 
     @classmethod
-    def of(cls, figure: NoiseFigure, period_s: float) -> _Interval:
+    def of(cls, figure: NoiseFigure, update_s: float) -> _Interval:
         """A density as EKF2's parameter."""
         value, low, high = (
-            None if one is None else per_update(one, period_s) for one in (figure.value, figure.low, figure.high)
+            None if one is None else per_update(one, update_s) for one in (figure.value, figure.low, figure.high)
         )
         return cls(value, low if high is not None else None, high)
 

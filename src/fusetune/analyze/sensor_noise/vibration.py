@@ -101,4 +101,5 @@ def _aliasing(series: SensorSeries, found: MotorTones) -> str:
     places = ", ".join(
         f"{n * found.fundamental_hz:.0f} Hz at {shown_at(n * found.fundamental_hz, rate):.0f}" for n in above
     )
-    return f"multiples of {found.fundamental_hz:.0f} Hz above half of the rate of {rate:.0f} Hz show elsewhere: {places} Hz"
+    half = 0.5 * rate
+    return f"multiples of {found.fundamental_hz:.0f} Hz above {half:.0f} Hz, half of the rate, show elsewhere: {places} Hz"
