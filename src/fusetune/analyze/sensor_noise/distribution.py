@@ -103,8 +103,14 @@ def outlying(deviation: Array) -> npt.NDArray[np.bool_]:
     found = np.zeros(deviation.shape, np.bool_)
     if known.any():
         inner = deviation[known]
-        found[known] = np.abs(inner - np.median(inner, axis=0)) > OUTLIER * _spread(inner)
+        found[known] = np.abs(standardised(inner)) > OUTLIER
     return found
+
+
+def standardised(deviation: Array) -> Array:
+    """Robust z of each deviation (N, axes), none NaN: from the median of its axis, in robust standard deviations."""
+    spread = _spread(deviation)
+    return np.asarray((deviation - np.median(deviation, axis=0)) / np.where(spread > 0.0, spread, np.inf))
 
 
 def distributions(series: SensorSeries, intervals: Sequence[Interval]) -> tuple[Distribution, ...]:
@@ -120,7 +126,7 @@ def distributions(series: SensorSeries, intervals: Sequence[Interval]) -> tuple[
 
 def _distribution(deviation: Array, values: Array, same: npt.NDArray[np.bool_]) -> Distribution:
     spread = float(_spread(deviation))
-    z = (deviation - np.median(deviation)) / spread if spread > 0.0 else np.zeros_like(deviation)
+    z = standardised(deviation)
     inner = z[np.abs(z) <= OUTLIER]
     variance = float(np.mean(inner**2))
     counts = np.histogram(np.clip(z, HISTOGRAM_EDGES[0], HISTOGRAM_EDGES[-1]), HISTOGRAM_EDGES)[0]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_closing, median_filter
+from scipy.ndimage import binary_closing, percentile_filter
 from scipy.signal import welch
 
 from fusetune.analyze.flight.intervals import Interval
@@ -23,7 +23,9 @@ LOWEST_TONE_HZ = 15.0
 """Below it a vehicle flies: its own motion, and its controller's."""
 UPPER_SHARE = 0.9
 """Of the Nyquist frequency; up to there the broad-band level is read."""
-_BASELINE_HZ = 25.0
+_BASELINE_HZ = 40.0
+_BASELINE_PERCENTILE = 30.0
+"""The level around a tone is that of the lower third: the shaking of four rotors may fill half of the band."""
 _ONE_TONE_HZ = 3.0
 """Peaks nearer to each other are one tone."""
 _TONE = 3.0
@@ -116,7 +118,7 @@ def tones(found: Spectrum) -> tuple[Tone, ...]:
     if len(level) <= width:
         return ()
     smooth = np.convolve(np.pad(level, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
-    base = median_filter(smooth, size=width, mode="nearest")
+    base = percentile_filter(smooth, _BASELINE_PERCENTILE, size=width, mode="nearest")
     ratio = smooth / np.maximum(base, np.finfo(float).tiny)
     least = max(_TONE, 1.0 + _SIGNIFICANT / math.sqrt(_CORRELATION_OF_SEGMENTS * found.segments))
     high = (ratio > 1.0 + 0.5 * (least - 1.0)) & (found.frequency_hz >= LOWEST_TONE_HZ)

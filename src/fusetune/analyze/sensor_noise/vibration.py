@@ -102,4 +102,6 @@ def _aliasing(series: SensorSeries, found: MotorTones) -> str:
         f"{n * found.fundamental_hz:.0f} Hz at {shown_at(n * found.fundamental_hz, rate):.0f}" for n in above
     )
     half = 0.5 * rate
-    return f"multiples of {found.fundamental_hz:.0f} Hz above {half:.0f} Hz, half of the rate, show elsewhere: {places} Hz"
+    return (
+        f"multiples of {found.fundamental_hz:.0f} Hz above {half:.0f} Hz, half of the rate, show elsewhere: {places} Hz"
+    )
