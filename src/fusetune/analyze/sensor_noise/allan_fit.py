@@ -42,9 +42,9 @@ DISTINCT = 3.0
 FEWEST_VALUES = 5
 """Octaves that a fit of three parts needs."""
 _ITERATIONS = 6
-_MOST_LEFT_OUT = 3
+_MOST_LEFT_OUT = 5
 """Octaves at the short end that may follow the sensor's own low-pass filter and not the noise."""
-_MISFIT = 4.0
+_MISFIT = 2.5
 """χ² per degree of freedom from which the short end is suspected."""
 _FREQUENCIES = 1000
 USUAL_TAU_S: Mapping[NoiseKind, float] = {"white": 0.5, "flicker": 60.0, "walk": 300.0}
@@ -113,7 +113,7 @@ class AllanFigures:
 def allan_figures(curve: AllanCurve) -> AllanFigures:
     """Fit the three parts to a curve.
 
-    Where the curve bends at its short end, as a sensor's own low-pass filter makes it, up to three octaves are left
+    Where the curve bends at its short end, as a sensor's own low-pass filter makes it, up to five octaves are left
     out.
     """
     usable = np.flatnonzero(curve.variance > 0.0)
