@@ -55,6 +55,7 @@ CASES = (
     Case("an hour, walk", 3600.0, 20.0, 1.0, 0.0, 0.05),
     Case("an hour, all", 3600.0, 20.0, 0.2, 0.1, 0.01),
     Case("an hour, Gauss-Markov", 3600.0, 20.0, 0.3, 0.1, gauss_markov=True),
+    Case("an hour, Gauss-Markov, walk", 3600.0, 20.0, 0.2, 0.1, 0.01, gauss_markov=True),
 )
 
 
@@ -76,8 +77,8 @@ def made_noise(rng: np.random.Generator, case: Case) -> np.ndarray:
     samples, step_s = round(case.length_s * case.rate_hz), 1.0 / case.rate_hz
     values = white_noise(rng, samples, 3, step_s, case.white)
     if case.gauss_markov:
-        # its Allan deviation is at most 0.617 σ, near τ = 1.89 T (IEEE Std 952-1997, annex C): there as of flicker noise
-        deviation = case.flicker * 0.664 / 0.617
+        # its Allan deviation is at most 0.618 σ (IEEE Std 952-1997, annex C): there it is to be as of flicker noise
+        deviation = case.flicker * 0.664 / 0.618
         values += gauss_markov(rng, samples, 3, step_s, deviation, 30.0)
     elif case.flicker:
         values += flicker_noise(rng, samples, 3, step_s, case.flicker)

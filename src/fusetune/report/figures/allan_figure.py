@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from fusetune.analyze.sensor_noise.allan import KINDS, AllanCurve
-from fusetune.analyze.sensor_noise.allan_fit import FLAT, NAMES, AllanFigures, freedom_of_mixture, interval
+from fusetune.analyze.sensor_noise.allan_fit import NAMES, AllanFigures, freedom_of_mixture, interval
+from fusetune.analyze.sensor_noise.allan_model import FLAT
 from fusetune.analyze.sensor_noise.pooled import PooledSensor
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise
 from fusetune.analyze.sensor_noise.sensor_series import Sensor
