@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
-from fusetune.analyze.sensor_noise.allan import KINDS, AllanCurve, NoiseKind, degrees_of_freedom
+from fusetune.analyze.sensor_noise.allan import FEWEST_MEANS, KINDS, AllanCurve, NoiseKind, degrees_of_freedom
 from fusetune.analyze.sensor_noise.allan_model import FLICKER, NoiseModel
 
 Array = npt.NDArray[np.float64]
@@ -283,12 +283,19 @@ def _figure(curve: AllanCurve, kind: NoiseKind, part: float, variance: float) ->
 
 def _refusal(curve: AllanCurve, kind: NoiseKind) -> str:
     needs = needed_s(kind, USUAL_TAU_S[kind])
-    words = f"the log stands still for only {curve.longest_s:.0f} s: the {NAMES[kind]}"
     if curve.longest_s < needs:
-        return f"{words} needs about {needs:.0f} s"
+        return _too_short(curve, kind, needs)
     return f"in {curve.longest_s:.0f} s of standing still the {NAMES[kind]} does not rise above the rest of the noise"
 
 
+def _too_short(curve: AllanCurve, kind: NoiseKind, needs_s: float) -> str:
+    return f"the log stands still for only {curve.longest_s:.0f} s: the {NAMES[kind]} needs about {needs_s:.0f} s"
+
+
 def _refused(curve: AllanCurve) -> AllanFigures:
-    white, flicker, walk = (NoiseFigure(None, 0.0, None, 0.0, _refusal(curve, kind)) for kind in KINDS)
+    fewest_s = FEWEST_MEANS * 2 ** (FEWEST_VALUES - 1) * curve.step_s
+    white, flicker, walk = (
+        NoiseFigure(None, 0.0, None, 0.0, _too_short(curve, kind, max(fewest_s, needed_s(kind, USUAL_TAU_S[kind]))))
+        for kind in KINDS
+    )
     return AllanFigures(white, flicker, walk, curve.step_s, 0.0)
