@@ -83,8 +83,22 @@ def test_sample_noises_are_those_of_the_samples(noise: SensorNoise) -> None:
 def test_thinned_samples_keep_the_density_of_the_sensor() -> None:
     topics = made_topics(np.random.default_rng(3))
     topics["sensor_combined", 0] = {name: one[::4] for name, one in topics["sensor_combined", 0].items()}
-    figure = sensor_noise(made_flight(topics), AIRBORNE).sensors["gyro"].figures.noise_density
-    assert figure.value == pytest.approx(GYRO / math.sqrt(200.0), rel=0.06)
+    gyro = sensor_noise(made_flight(topics), AIRBORNE).sensors["gyro"]
+    assert gyro.figures.noise_density.value == pytest.approx(GYRO / math.sqrt(200.0), rel=0.06)
+    assert gyro.vibration is not None
+    assert gyro.vibration.density_in_flight == pytest.approx(5.0 * GYRO / math.sqrt(200.0), rel=0.06)
+
+
+def test_single_lost_samples_are_bridged() -> None:
+    topics = made_topics(np.random.default_rng(8))
+    kept = np.ones(len(topics["sensor_combined", 0]["timestamp"]), np.bool_)
+    kept[np.arange(10, len(kept), 15)] = False
+    topics["sensor_combined", 0] = {name: one[kept] for name, one in topics["sensor_combined", 0].items()}
+    gyro = sensor_noise(made_flight(topics), AIRBORNE).sensors["gyro"]
+    assert len(gyro.series.time) == len(kept)
+    assert gyro.vibration is not None
+    assert gyro.vibration.density_in_flight == pytest.approx(5.0 * GYRO / math.sqrt(200.0), rel=0.05)
+    assert gyro.figures.noise_density.value == pytest.approx(GYRO / math.sqrt(200.0), rel=0.06)
 
 
 def test_a_log_that_begins_in_the_air_is_told_to_begin_earlier() -> None:
