@@ -45,7 +45,7 @@ def test_level_and_amplitude_are_those_that_were_made() -> None:
     whole = spectrum(series(0.5 * np.sin(2.0 * np.pi * 60.0 * TIME)), WHOLE)
     assert whole is not None
     # white noise of σ at rate f has the one-sided density 2 σ² / f
-    assert whole.broadband(15.0) == pytest.approx(2.0 * NOISE**2 / RATE_HZ, rel=0.05)
+    assert whole.broadband() == pytest.approx(2.0 * NOISE**2 / RATE_HZ, rel=0.05)
     (tone,) = tones(whole)
     assert tone.frequency_hz == pytest.approx(60.0, abs=0.3)
     assert tone.amplitude == pytest.approx(0.5, rel=0.05)
@@ -112,3 +112,15 @@ def test_commands_of_each_release() -> None:
         assert command is not None
         assert command.throttle == pytest.approx(expected)
     assert motor_command(Flight("made")) is None
+
+
+def test_floor_is_read_beside_the_shaking_of_motors() -> None:
+    """Four rotors between 50 and 90 Hz, each wandering by some Hz, fill most of the band; the white noise is below."""
+    rng = np.random.default_rng(4)
+    shaking = np.zeros(len(TIME))
+    for hover in (52.0, 63.0, 75.0, 86.0):
+        wandering = hover + 4.0 * np.sin(2.0 * np.pi * TIME / 7.0 + rng.uniform(0.0, 6.0))
+        shaking += 0.3 * np.sin(2.0 * np.pi * np.cumsum(wandering) / RATE_HZ)
+    whole = spectrum(series(shaking), WHOLE)
+    assert whole is not None
+    assert whole.broadband() == pytest.approx(2.0 * NOISE**2 / RATE_HZ, rel=0.15)

@@ -89,16 +89,14 @@ def test_thinned_samples_keep_the_density_of_the_sensor() -> None:
     assert gyro.vibration.density_in_flight == pytest.approx(5.0 * GYRO / math.sqrt(200.0), rel=0.06)
 
 
-def test_single_lost_samples_are_bridged() -> None:
+def test_a_log_that_loses_a_sample_of_fifteen_says_nothing_of_the_flight() -> None:
     topics = made_topics(np.random.default_rng(8))
-    kept = np.ones(len(topics["sensor_combined", 0]["timestamp"]), np.bool_)
-    kept[np.arange(10, len(kept), 15)] = False
+    kept = np.arange(len(topics["sensor_combined", 0]["timestamp"])) % 15 != 10
     topics["sensor_combined", 0] = {name: one[kept] for name, one in topics["sensor_combined", 0].items()}
-    gyro = sensor_noise(made_flight(topics), AIRBORNE).sensors["gyro"]
-    assert len(gyro.series.time) == len(kept)
-    assert gyro.vibration is not None
-    assert gyro.vibration.density_in_flight == pytest.approx(5.0 * GYRO / math.sqrt(200.0), rel=0.05)
-    assert gyro.figures.noise_density.value == pytest.approx(GYRO / math.sqrt(200.0), rel=0.06)
+    gyro = starting(sensor_noise(made_flight(topics), AIRBORNE))["EKF2_GYR_NOISE"]
+    assert gyro.in_flight is None
+    assert "loses samples" in gyro.words
+    assert gyro.start_with == pytest.approx(gyro.flown)
 
 
 def test_a_log_that_begins_in_the_air_is_told_to_begin_earlier() -> None:

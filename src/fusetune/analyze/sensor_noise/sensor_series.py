@@ -24,9 +24,8 @@ FEWEST_SAMPLES = 50
 FULLER = 1.2
 """Another topic is taken when it holds so many times the samples."""
 GAP_STEPS = 1.5
-"""From so many sampling intervals on there is a gap: the stretch ends there."""
-MOST_BRIDGED = 0.1
-"""Share of single missing samples that may be bridged: each tenth makes the noise seem 2.5 % smaller."""
+"""From so many sampling intervals on there is a gap: the stretch ends there. Lost samples are not made up for: a mean of
+the neighbours of a tone near half the rate is wrong by its whole amplitude, and that is noise over the whole band."""
 MOST_IMU_HZ = 1000.0
 """Faster samples are averaged to about this: what EKF2 integrates over milliseconds is not told by microseconds."""
 WHOLE = 0.9
@@ -92,7 +91,7 @@ class SensorSeries:
 
     @property
     def shorter_mean(self) -> float:
-        """Root of the share of the sampling interval over which a sample is a mean; 1 where it is all of it, or unknown.
+        """Root of the share of the sampling interval that a sample is a mean over; 1 where that is all or unknown.
 
         Of a log that holds one sample of several the noise of a sample is that of a shorter mean, larger by the root of
         how much shorter it is: times this, white noise has the density of the sensor.
@@ -144,7 +143,6 @@ def _series(
     if len(time) < FEWEST_SAMPLES:
         return None
     step_s = _usual_step_s(time)
-    time, values = _bridged(time, values, step_s)
     together = int(1.0 / (step_s * MOST_IMU_HZ) + 0.1)
     if together > 1:
         rows = len(time) // together * together
@@ -152,19 +150,6 @@ def _series(
         time, step_s = time[together - 1 : rows : together], step_s * together
         averaged_s = step_s
     return SensorSeries(SENSORS[name], topic, time, values, step_s, averaged_s, device_id)
-
-
-def _bridged(time: npt.NDArray[np.int64], values: Array, step_s: float) -> tuple[npt.NDArray[np.int64], Array]:
-    """With the mean of its neighbours for each single sample that is missing, up to a tenth of all.
-
-    Loggers that are slow now and then lose one sample at a time; without this no stretch would be long enough.
-    """
-    before = np.flatnonzero(np.round(np.diff(time) / (step_s * 1e6)) == 2.0)
-    if not len(before) or len(before) > MOST_BRIDGED * len(time):
-        return time, values
-    middle = (time[before] + time[before + 1]) // 2
-    mean = 0.5 * (values[before] + values[before + 1])
-    return np.insert(time, before + 1, middle), np.insert(values, before + 1, mean, axis=0)
 
 
 def _usual_step_s(time: npt.NDArray[np.int64]) -> float:

@@ -146,7 +146,7 @@ def _of_white(
     rest = _Interval.of(figure, update_s)
     flight = None if seen is None else per_update(seen, update_s)
     if flight is None:
-        words = "The log has too little of the flight to tell what that asks for."
+        words = "What the flight asks for is not known: the log has too little of it in one piece, or loses samples."
     elif rest.value is None:
         words = f"How much of the noise in flight is the sensor's own is not known: {figure.refusal}."
     elif flight > MORE_IN_FLIGHT * rest.value:

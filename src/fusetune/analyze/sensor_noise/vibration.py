@@ -11,7 +11,7 @@ from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.sensor_noise.motor_commands import MotorCommand
 from fusetune.analyze.sensor_noise.motor_harmonics import MOST_HARMONIC, MotorTones, motor_tones, shown_at
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
-from fusetune.analyze.sensor_noise.spectrum import LOWEST_TONE_HZ, Spectrum, tones
+from fusetune.analyze.sensor_noise.spectrum import Spectrum, tones
 
 LIMITED = 2.0
 """In flight so many times the broad-band noise at rest: vibration, not the sensor, then makes three quarters of it."""
@@ -80,7 +80,7 @@ def vibration(
 
 
 def _density(series: SensorSeries, found: Spectrum | None) -> float | None:
-    return None if found is None else math.sqrt(0.5 * found.broadband(LOWEST_TONE_HZ)) * series.shorter_mean
+    return None if found is None else math.sqrt(0.5 * found.broadband()) * series.shorter_mean
 
 
 def _aliasing(series: SensorSeries, found: MotorTones) -> str:
