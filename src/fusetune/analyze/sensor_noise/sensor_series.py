@@ -24,8 +24,8 @@ FEWEST_SAMPLES = 50
 FULLER = 1.2
 """Another topic is taken when it holds so many times the samples."""
 GAP_STEPS = 1.5
-"""From so many sampling intervals on there is a gap: the stretch ends there. Lost samples are not made up for: a mean of
-the neighbours of a tone near half the rate is wrong by its whole amplitude, and that is noise over the whole band."""
+"""From so many sampling intervals on there is a gap: the stretch ends there. Lost samples are not made up for: a mean
+of the neighbours of a tone near half the rate is wrong by its whole amplitude, and that is noise in the whole band."""
 MOST_IMU_HZ = 1000.0
 """Faster samples are averaged to about this: what EKF2 integrates over milliseconds is not told by microseconds."""
 WHOLE = 0.9
