@@ -7,21 +7,21 @@ import pytest
 from benchmarks.sensor_noise import Case, figures_of, flicker_noise, made_noise, outcome
 
 from fusetune.analyze.sensor_noise.allan import KINDS, allan_curve
-from fusetune.analyze.sensor_noise.allan_fit import allan_figures, needed_s
+from fusetune.analyze.sensor_noise.allan_fit import NoiseFigure, allan_figures, needed_s
 
 DRAWS = range(60)
-
-
-@pytest.fixture(scope="module")
-def hour() -> dict[str, list]:
-    return figures_of(HOUR, DRAWS)
 
 
 HOUR = Case("an hour", 3600.0, 5.0, 0.2, 0.1, 0.01)
 
 
+@pytest.fixture(scope="module")
+def hour() -> dict[str, list[NoiseFigure]]:
+    return figures_of(HOUR, DRAWS)
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_figures_of_a_long_record_are_the_truth_within_a_tenth(hour: dict[str, list], kind: str) -> None:
+def test_figures_of_a_long_record_are_the_truth_within_a_tenth(hour: dict[str, list[NoiseFigure]], kind: str) -> None:
     found = outcome(hour[kind], HOUR.truth[kind])
     # the walk rises above the flicker for the last octaves only: half of the draws tell it, and none is told wrong
     assert found.told > (0.3 if kind == "walk" else 0.95)

@@ -171,7 +171,7 @@ def _fundamental(found: Sequence[Tone], slopes: Sequence[float | None], rate_hz:
         if tone.frequency_hz < LOWEST_FUNDAMENTAL_HZ or (slope is not None and slope < 0.0):
             continue
         shown = [_multiple_of(one.frequency_hz, tone.frequency_hz, rate_hz) for one in found]
-        score = len({multiple for multiple, folded in shown if multiple and not folded})
+        score = float(len({multiple for multiple, folded in shown if multiple and not folded}))
         score += 0.5 if (_OF_TWO_BLADES, True) in shown else 0.0
         score += 1.0 if slope is not None else 0.0
         if score > most:

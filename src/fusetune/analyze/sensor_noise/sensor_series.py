@@ -12,14 +12,13 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.px4.flight import Flight, TopicTable, field_names, row_count, stacked
+from fusetune.px4.layouts.logged_state import METRES_PER_DEGREE
 from fusetune.px4.sample_times import measurement_time
 
 Array = npt.NDArray[np.float64]
 SensorName = Literal["gyro", "accel", "mag", "baro", "gnss_vel", "gnss_pos"]
 BODY, EARTH = ("x", "y", "z"), ("north", "east", "down")
 
-METRES_PER_DEGREE = 111_194.93
-"""Of latitude, on PX4's sphere of 6371 km."""
 FEWEST_SAMPLES = 50
 FULLER = 1.2
 """Another topic is taken when it holds so many times the samples."""

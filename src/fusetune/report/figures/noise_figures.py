@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from fusetune.analyze.sensor_noise.pooled import PooledSensor
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise
@@ -26,17 +30,11 @@ def plot_sensor_noise(noise: SensorNoise, output_folder: AnyPath) -> tuple[Path,
     -------
     The files.
     """
-    folder = Path(output_folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = []
-    with figure_style():
-        for name in noise.sensors:
-            files.append(folder / f"sensor_{name}.png")
-            save_png(draw_sensor(noise, name), files[-1])
-        for name, draw in (("allan", draw_allan), ("spectra", draw_spectra)):
-            files.append(folder / f"{name}.svg")
-            save_svg(draw(noise), files[-1])
-    return tuple(files)
+    drawings: list[tuple[str, Callable[[], Figure]]] = [
+        (f"sensor_{name}.png", partial(draw_sensor, noise, name)) for name in noise.sensors
+    ]
+    drawings += [("allan.svg", partial(draw_allan, noise)), ("spectra.svg", partial(draw_spectra, noise))]
+    return _written(output_folder, drawings)
 
 
 def plot_pooled_sensors(pooled: tuple[PooledSensor, ...], output_folder: AnyPath) -> tuple[Path, ...]:
@@ -51,13 +49,18 @@ def plot_pooled_sensors(pooled: tuple[PooledSensor, ...], output_folder: AnyPath
     -------
     The files.
     """
+    drawings: list[tuple[str, Callable[[], Figure]]] = [
+        (f"pooled_{one.sensor.name}_{one.device_id}.svg", partial(draw_pooled_sensor, one)) for one in pooled
+    ]
+    return _written(output_folder, [*drawings, ("pooled_allan.svg", partial(draw_pooled_allan, pooled))])
+
+
+def _written(output_folder: AnyPath, drawings: Sequence[tuple[str, Callable[[], Figure]]]) -> tuple[Path, ...]:
+    """Files of what is drawn, one after the other: figures take more memory than their files."""
     folder = Path(output_folder)
     folder.mkdir(parents=True, exist_ok=True)
-    files = []
     with figure_style():
-        for one in pooled:
-            files.append(folder / f"pooled_{one.sensor.name}_{one.device_id}.svg")
-            save_svg(draw_pooled_sensor(one), files[-1])
-        files.append(folder / "pooled_allan.svg")
-        save_svg(draw_pooled_allan(pooled), files[-1])
-    return tuple(files)
+        for name, draw in drawings:
+            save = save_svg if name.endswith(".svg") else save_png
+            save(draw(), folder / name)
+    return tuple(folder / name for name, _ in drawings)
