@@ -11,7 +11,6 @@ from tests.analyze.sensor_noise.made_sensors import ACCEL, AIRBORNE, BARO, GYRO,
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.sensor_noise.pooled import pooled_sensors
 from fusetune.analyze.sensor_noise.sensor_noise import (
-    SENSOR_NOISE_TOPICS,
     SensorNoise,
     sensor_noise,
     write_sensor_noise,
@@ -19,7 +18,6 @@ from fusetune.analyze.sensor_noise.sensor_noise import (
 from fusetune.analyze.sensor_noise.starting_noises import StartingNoise, per_update
 from fusetune.errors import UserError
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.px4.ulog.used_topics import is_used
 from fusetune.save.flight_folder import write_flight
 from fusetune.storage.documents import read_document
 
@@ -126,10 +124,6 @@ def test_a_stuck_sensor_is_told() -> None:
     stuck = sensor_noise(made_flight(topics), AIRBORNE).sensors["mag"].stuck
     assert stuck.longest_s == pytest.approx(10.0, abs=0.05)
     assert stuck.share == pytest.approx(10.0 / 60.0, abs=0.01)
-
-
-def test_what_is_read_is_kept_of_logs_that_ask_for_too_much() -> None:
-    assert all(is_used(topic) for topic in SENSOR_NOISE_TOPICS)
 
 
 def test_an_empty_flight_has_no_sensors() -> None:
