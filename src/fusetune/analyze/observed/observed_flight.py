@@ -12,6 +12,7 @@ from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.px4.flight import Flight
+from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.set_names import AS_FLOWN
 
@@ -44,8 +45,8 @@ class ObservedFlight:
 
     @cached_property
     def airborne(self) -> tuple[Interval, ...]:
-        """When the vehicle was in the air, µs."""
-        return airborne_intervals(self.flight, {})
+        """When the vehicle was in the air, µs; as its estimator saw it where the log has no land detector."""
+        return airborne_intervals(self.flight, rows_of_primary(self.flight, "estimator_status_flags") or {})
 
     @cached_property
     def clear_of_ground(self) -> tuple[Interval, ...]:
