@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.flight.intervals import Interval, inside, subtract
 from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.judged_health import JudgedHealth
-from fusetune.analyze.health.over_time import Stretch, longest_between
+from fusetune.analyze.health.over_time import Stretch, longest_between, silences
 from fusetune.analyze.health.ratio_figures import ratio_rows
 from fusetune.analyze.health.settings import REJECTED_RATIO, Levels
 from fusetune.analyze.health.subject import Subject
@@ -31,21 +31,33 @@ _OUT_OF_RANGE = frozenset({"rng_hgt", "optical_flow", "airspeed", "sideslip", "d
 _LOOSE = frozenset({"rng_hgt", "optical_flow"})
 _OTHER_WAYS = {"mag": "mag_heading"}
 """Before v1.15 the magnetometer is fused in three axes or as a heading, by turns."""
+_SILENT_S = (1.0, 3.0)
+"""When nothing of an estimator is logged for so long, by how often it is logged, the log does not tell what it fused."""
 _LOOK_AT = "See which sensor is off: its mounting, interference, the noise and the gate that EKF2 is told"
 
 
 def aid_source_rows(health: JudgedHealth, samples: Samples, instance: int, origin: Origin) -> Iterator[HealthRow]:
     """Rows of all sources that one estimator had; samples are those of `onboard_samples` or of a replay."""
+    told = told_windows(health, samples, origin)
     for source in MEASURED_SOURCES.values():
         axes = {axis: samples[source.name, axis] for axis in range(source.axes) if (source.name, axis) in samples}
         if axes:
             yield from _source_rows(health, source, axes, instance, origin)
             if source.name not in _OTHER_WAYS.values():
-                yield _unfused_row(health, source, samples, instance, origin)
+                yield _unfused_row(health, source, samples, told, instance, origin)
         elif instance == health.primary and _may_fuse(health, source):
             yield Subject(source.name, source.label, GROUP, instance, origin).lacking(
                 "raised_share", "no innovations in the log"
             )
+
+
+def told_windows(health: JudgedHealth, samples: Samples, origin: Origin) -> tuple[Interval, ...]:
+    """Time in flight, less what the log is silent about: an estimator's topics are thinned each by itself."""
+    if origin == "replay":
+        return health.airborne
+    times = [samples[key].timestamp_sample for key in samples if not key[1]]
+    edges = np.array(health.airborne, np.int64).reshape(-1)
+    return subtract(health.airborne, silences(np.unique(np.concatenate([edges, *times])), _SILENT_S)) if times else ()
 
 
 def _source_rows(
@@ -70,7 +82,15 @@ def _source_rows(
             yield subject.lacking("raised_share", "its test ratios are not logged")
             continue
         evidence = {"ratio": UNFILTERED, "samples": int(known.sum())}
-        yield from ratio_rows(health, subject, first.timestamp_sample[known], ratio[known], within, evidence)
+        yield from ratio_rows(
+            health,
+            subject,
+            first.timestamp_sample[known],
+            ratio[known],
+            within,
+            evidence,
+            judged=not source.every_update,
+        )
         yield _rejected_row(health, subject, source, first, known, ratio)
 
 
@@ -106,12 +126,14 @@ def _rejected_row(
         rejected = rejected & (ratio > REJECTED_RATIO)
     when = samples.timestamp_sample[rejected]
     limits = health.limits.loose_rejected_share if source.name in _LOOSE else health.limits.rejected_share
+    # gravity is rejected by design whenever the vehicle accelerates
+    judged = known.sum() >= health.limits.fewest_samples and not source.every_update
     return subject.judged(
         "rejected_share",
         "samples rejected:",
         float(rejected.sum() / known.sum()),
         "",
-        Levels(*limits),
+        Levels(*limits) if judged else Levels(np.inf),
         remedy=_LOOK_AT,
         start_us=int(when[0]) if when.size else None,
         stop_us=int(when[-1]) + 1 if when.size else None,
@@ -120,7 +142,12 @@ def _rejected_row(
 
 
 def _unfused_row(
-    health: JudgedHealth, source: AidSource, samples: Samples, instance: int, origin: Origin
+    health: JudgedHealth,
+    source: AidSource,
+    samples: Samples,
+    told: Sequence[Interval],
+    instance: int,
+    origin: Origin,
 ) -> HealthRow:
     """Longest time in flight, after the first fusion, without a sample fused in any way."""
     subject = Subject(source.name, health.name_of(source.label, instance), GROUP, instance, origin)
@@ -128,7 +155,7 @@ def _unfused_row(
     fused = np.unique(np.concatenate([_fused_times(samples[one, 0]) for one in ways]))
     if not fused.size:
         return subject.lacking("longest_unfused_s", "never fused")
-    within = tuple((max(start, int(fused[0])), stop) for start, stop in health.airborne if stop > fused[0])
+    within = tuple((max(start, int(fused[0])), stop) for start, stop in told if stop > fused[0])
     table = health.topic(source.topic, instance) if origin == "vehicle" else None
     longest = _since_last_fusion(table, within) or longest_between(fused, within)
     one_at_a_time = source.quantity == "height" and (health.flight.release or ALL_HEIGHT_SOURCES) < ALL_HEIGHT_SOURCES
@@ -164,5 +191,3 @@ def _since_last_fusion(table: TopicTable | None, within: tuple[Interval, ...]) -
     if since[row] <= 0:
         return Stretch(0.0, 0, 0)
     return Stretch(float(since[row]) * 1e-6, int(last[row]), int(sampled[row]))
-
-

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fusetune.analyze.flight.intervals import Interval
-from fusetune.analyze.health.aid_source_rows import Samples
+from fusetune.analyze.health.aid_source_rows import Samples, told_windows
 from fusetune.analyze.health.filter_rows import Flags
 from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.judged_health import JudgedHealth
@@ -16,7 +16,13 @@ from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 
-_SAYS_SO = ("cs_inertial_dead_reckoning", "cs_wind_dead_reckoning", "cs_fake_pos", "cs_constant_pos", "cs_valid_fake_pos")
+_SAYS_SO = (
+    "cs_inertial_dead_reckoning",
+    "cs_wind_dead_reckoning",
+    "cs_fake_pos",
+    "cs_constant_pos",
+    "cs_valid_fake_pos",
+)
 _SPARSE_S = 1.0
 """Innovations that are logged less often do not tell gaps of a second."""
 _REMEDY = "See why the sources of position and velocity were rejected, or did not come"
@@ -34,24 +40,26 @@ def aiding_rows(
         return
     time = np.unique(np.concatenate([one.timestamp_sample[one.fused] for one in fused]))
     every = np.unique(np.concatenate([one.timestamp_sample for one in fused]))
-    within = tuple((max(start, int(time[0])), stop) for start, stop in health.airborne if stop > time[0])
+    within = tuple(
+        (max(start, int(time[0])), stop) for start, stop in told_windows(health, samples, origin) if stop > time[0]
+    )
     usual = float(np.median(np.diff(every))) * 1e-6 if every.size > 1 else np.inf
     if usual > _SPARSE_S or not within:
         yield subject.lacking("longest_unaided_s", "innovations are logged too seldom to tell")
         return
-    # the last sample before an interval counts for it, and none is expected sooner than the log has them
-    gaps = _gaps(time, within, max(health.limits.unaided_s[0], 2.0 * usual))
+    # a thinned log tells the ends of a gap no better than its interval
+    gaps = _gaps(time, within, health.limits.unaided_s[0] + 2.0 * usual)
     longest = max(gaps, key=lambda one: one[1] - one[0], default=None)
     yield subject.judged(
         "longest_unaided_s",
         "longest time in flight without any",
         0.0 if longest is None else (longest[1] - longest[0]) * 1e-6,
         "s",
-        Levels(*health.limits.unaided_s),
+        Levels(*(one + 2.0 * usual for one in health.limits.unaided_s)),
         remedy=_REMEDY,
         start_us=None if longest is None else longest[0],
         stop_us=None if longest is None else longest[1],
-        evidence={"usual_interval_s": round(usual, 3)},
+        evidence={"logged_every_s": round(usual, 3)},
     )
     silent = [(_unsaid(health, flags, gap, usual), gap) for gap in gaps]
     worst = max(silent, key=lambda one: one[0], default=(0.0, None))

@@ -43,9 +43,7 @@ def bias_rows(
         span = np.ptp(values[flying], axis=0)
         more["evidence"] = evidence | dict(zip("xyz", map(float, span), strict=True))
         words = f"change of the {name} bias in flight"
-        yield subject.judged(
-            f"{name}_change", words, float(np.linalg.norm(span)), unit, Levels(change_level), **more
-        )
+        yield subject.judged(f"{name}_change", words, float(np.linalg.norm(span)), unit, Levels(change_level), **more)
         yield _at_limit(health, subject, name, values[flying], health.parameters[limit], remedy)
 
 

@@ -77,13 +77,13 @@ def alignment_rows(
             yield subject.lacking(f"{kind}_s", f"the log does not tell when the {label} was known")
             continue
         if not values.any():
-            flew = take_off is not None
+            end = health.observed.since_start_s(health.flight.last_timestamp)
             yield subject.judged(
-                f"{kind}_never",
-                f"the {label} never became known, in flight" if flew else f"the {label} never became known",
-                1.0,
-                "",
-                Levels(np.inf, 0.0) if flew else Levels(0.0),
+                f"{kind}_s",
+                f"{label} not known to the end of the log, after",
+                end,
+                "s",
+                Levels(np.inf, 0.0 if take_off is not None else np.inf),
                 remedy="Calibrate the sensors, keep the vehicle still after boot",
             )
             continue
@@ -109,7 +109,10 @@ def flight_rows(health: JudgedHealth) -> Iterator[HealthRow]:
     if not intervals:
         yield subject.lacking("airborne_s", "never in the air, as far as the log tells")
         return
-    for name, words, when in (("take_off_s", "take-off at", intervals[0][0]), ("landing_s", "end at", intervals[-1][1])):
+    for name, words, when in (
+        ("take_off_s", "take-off at", intervals[0][0]),
+        ("landing_s", "end at", intervals[-1][1]),
+    ):
         seconds = health.observed.since_start_s(when)
         yield subject.told(name, words, max(seconds, 0.0), "s", start_us=when, stop_us=when + 1)
     seconds = sum(stop - start for start, stop in intervals) * 1e-6

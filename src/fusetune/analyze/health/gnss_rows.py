@@ -100,7 +100,9 @@ def _minimum_row(
     values, time = values[known], time[known]
     share = health.limits.gnss_share
     # the value of a sample, so that half a satellite never decides
-    figure = float(np.quantile(values, share if minimum.least else 1.0 - share, method="lower" if minimum.least else "higher"))
+    figure = float(
+        np.quantile(values, share if minimum.least else 1.0 - share, method="lower" if minimum.least else "higher")
+    )
     median, beyond = float(np.median(values)), values < limit if minimum.least else values > limit
     fails = is_used and is_checked and (median < limit if minimum.least else median > limit)
     levels = Levels(limit if is_used else (-np.inf if minimum.least else np.inf), limit if fails else np.inf)
@@ -132,7 +134,9 @@ def _rest_rows(health: JudgedHealth, subject: Subject, table: TopicTable, is_use
     drift = drift_at_rest(table, _at_rest(health, table["timestamp"]), health.parameters)
     for name, label, attribute, parameter, bit, typical in _AT_REST:
         if drift is None or not drift.settled.any():
-            yield subject.lacking(name, f"{label}: the vehicle stands for less than {DRIFT_TIME_CONSTANT_S:g} s with GNSS")
+            yield subject.lacking(
+                name, f"{label}: the vehicle stands for less than {DRIFT_TIME_CONSTANT_S:g} s with GNSS"
+            )
             continue
         limit = health.parameters[parameter]
         yield _rest_row(health, subject, drift, (name, label, attribute, bit, typical), limit, is_used)

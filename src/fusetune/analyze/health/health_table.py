@@ -20,10 +20,30 @@ from fusetune.analyze.health.sensor_rows import aid_sensor_rows, imu_rows
 from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.health.status_rows import rejection_rows, status_ratio_rows
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.analyze.replaying.onboard import onboard_samples
+from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
+from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
+from fusetune.px4.aid_sources import SENSOR_TOPICS
 from fusetune.px4.layouts.bias_states import bias_states
+from fusetune.px4.layouts.logged_state import LOGGED_STATE_TOPICS
 
 DEFAULTS = HealthSettings()
+
+HEALTH_TOPICS = (
+    *dict.fromkeys(
+        (
+            *REPLAY_TOPICS,
+            *INNOVATION_TOPICS,
+            *LOGGED_STATE_TOPICS,
+            *(name for topic in SENSOR_TOPICS.values() for name in (topic.name, *topic.made_of)),
+            "estimator_event_flags",
+            "sensor_gps",
+            "vehicle_imu",
+            "vehicle_imu_status",
+            "vehicle_status",
+        )
+    ),
+)
+"""What the table reads of a saved flight."""
 
 
 def health_rows(observed: ObservedFlight, settings: HealthSettings = DEFAULTS) -> tuple[HealthRow, ...]:
@@ -56,7 +76,8 @@ def _rows_of_instance(health: JudgedHealth, instance: int) -> Iterator[HealthRow
     if samples:
         yield from aid_source_rows(health, samples, instance, "vehicle")
         yield from aiding_rows(health, samples, flags, instance, "vehicle")
-    yield from status_ratio_rows(health, instance, judged=not samples)
+    most = max((samples[key].timestamp_sample.size for key in samples), default=0)
+    yield from status_ratio_rows(health, instance, judged=most < health.limits.fewest_samples)
     yield from rejection_rows(health, instance)
     if flags is not None:
         yield fault_row(health, flags, instance)

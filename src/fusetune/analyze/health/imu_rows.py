@@ -45,7 +45,13 @@ def _rows_of(health: JudgedHealth, vibration: Vibration) -> Iterator[HealthRow]:
             continue
         here, time = values[rows].astype(np.float64), vibration.time[rows]
         yield subject.judged(
-            f"{name}_mean", f"mean {label}", float(np.mean(here)), unit, Levels(mean), remedy=_ISOLATE, evidence=evidence
+            f"{name}_mean",
+            f"mean {label}",
+            float(np.mean(here)),
+            unit,
+            Levels(mean),
+            remedy=_ISOLATE,
+            evidence=evidence,
         )
         row = int(np.argmax(here))
         at = {"start_us": int(time[row]), "stop_us": int(time[row]) + 1}

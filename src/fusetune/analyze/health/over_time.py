@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.flight.intervals import Interval, duration
+from fusetune.analyze.flight.intervals import Cut, Interval, duration
 
 Times = npt.NDArray[np.int64]
 
@@ -81,6 +81,20 @@ def worst_mean(time: Times, values: npt.NDArray[np.float64], length_s: float, wi
         if means[row] > worst.value:
             worst = Stretch(float(means[row]), int(starts[row]), min(int(starts[row]) + length, end))
     return worst
+
+
+def silences(time: Times, between_s: tuple[float, float]) -> tuple[Cut, ...]:
+    """Times without any of some events for longer than three times their usual interval.
+
+    Parameters
+    ----------
+    time : (N,) µs, ascending
+    between_s : shortest and longest such time, whatever is usual
+    """
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    wide = np.flatnonzero(steps > np.clip(3.0 * usual, between_s[0] * 1e6, between_s[1] * 1e6))
+    return tuple(Cut(int(time[row]), int(time[row + 1]), "nothing is logged") for row in wide)
 
 
 def longest_between(time: Times, within: Iterable[Interval]) -> Stretch:

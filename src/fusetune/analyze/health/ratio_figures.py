@@ -35,6 +35,9 @@ def ratio_rows(
     judged : whether the levels count; without it the figures are only told
     """
     limits = health.limits
+    order = np.argsort(time, kind="stable")
+    time, ratio = time[order], ratio[order]
+    judged = judged and ratio.size >= limits.fewest_samples
     raised, red = ratio > limits.raised_ratio, ratio > REJECTED_RATIO
     when = time[raised]
     at = {"start_us": int(when[0]), "stop_us": int(when[-1]) + 1} if when.size else {}

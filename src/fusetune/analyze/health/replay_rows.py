@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from fusetune.analyze.health.aid_source_rows import aid_source_rows
 from fusetune.analyze.health.aiding_rows import aiding_rows
 from fusetune.analyze.health.bias_rows import bias_rows
@@ -15,9 +17,10 @@ from fusetune.analyze.health.subject import Subject
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.px4.layouts.bias_states import BiasStates
+from fusetune.save.thresholds import VerdictThresholds
 
 _IMU = ("gyro_rad[2]", "accelerometer_m_s2[2]", "gyro_integral_dt", "accelerometer_integral_dt")
-_FEWEST_SAMPLES = 1000
+_LIMITS = VerdictThresholds()
 
 
 def replay_rows(health: JudgedHealth) -> Iterator[HealthRow]:
@@ -56,7 +59,9 @@ def _why_not(health: JudgedHealth) -> str:
     imu = health.topic("sensor_combined")
     if imu is None or any(name not in imu for name in _IMU):
         return "the log has no IMU samples, so there is no replay either"
-    if len(imu["timestamp"]) < _FEWEST_SAMPLES:
+    steps = np.diff(imu["timestamp"])
+    steps = steps[steps > 0]
+    if steps.sum() * 1e-6 < _LIMITS.min_imu_duration_s or 1e6 / np.median(steps) < _LIMITS.min_imu_rate_hz:
         return "the log has too few IMU samples, so there is no replay either"
     return ""
 

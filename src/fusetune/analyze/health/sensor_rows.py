@@ -15,7 +15,8 @@ from fusetune.analyze.health.over_time import longest_between
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.px4.estimator_samples import taken_times
-from fusetune.px4.flight import TopicTable, field_names, row_count
+from fusetune.px4.flight import TopicTable, field_names, row_count, select_rows
+from fusetune.px4.layouts.logged_state import MIN_FIX_TYPE
 from fusetune.px4.sample_times import measurement_time
 from fusetune.save.checks.standstill import standstill
 
@@ -209,6 +210,9 @@ def _gap_row(health: JudgedHealth, subject: Subject, aid: Aid, table: TopicTable
 
 def _stuck_row(health: JudgedHealth, subject: Subject, aid: Aid, table: TopicTable) -> HealthRow:
     """Longest standstill in flight, judged where the sensor's own habit of repeating values does not explain it."""
+    if "fix_type" in table:
+        # without a fix there is nothing to repeat
+        table = select_rows(table, table["fix_type"] >= MIN_FIX_TYPE)
     columns = [name for name in aid.columns if name in table and np.isfinite(table[name]).any()]
     flying = _flying_steps(health, table["timestamp"])
     if len(columns) < len(aid.columns) or flying.sum() < _FEWEST:
@@ -230,9 +234,7 @@ def _stuck_row(health: JudgedHealth, subject: Subject, aid: Aid, table: TopicTab
     )
 
 
-def _chance(
-    table: TopicTable, columns: list[str], flying: npt.NDArray[np.bool_], start_us: int, stop_us: int
-) -> float:
+def _chance(table: TopicTable, columns: list[str], flying: npt.NDArray[np.bool_], start_us: int, stop_us: int) -> float:
     """Upper bound of the chance of such a run, if each sample repeated the last as often as outside of it.
 
     Of n steps each repeating with probability p a run of k somewhere has a probability of at most n pᵏ; p is (r + 1) /

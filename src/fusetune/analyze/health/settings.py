@@ -38,6 +38,7 @@ class HealthSettings:
         (0.05, 0.5), "warning and failure: share of raised test ratios, those above 1 among them", low=0, high=1
     )
     """PX4's, who takes those above 1 away first."""
+    fewest_samples: float = setting(10.0, "of fewer samples the shares are told and not judged", low=1)
     rejected_share: tuple[float, float] = setting(
         (0.0, 0.01), "warning and failure: share of samples, or of the time, that was rejected", low=0, high=1
     )
@@ -86,7 +87,9 @@ class HealthSettings:
     bias_at_limit: float = setting(0.95, "a bias beyond this share of its limit is at it", above=0, high=1)
     bias_at_limit_share: float = setting(0.05, "warning: share of the time with a bias at its limit", low=0, high=1)
     output_errors: tuple[float, float, float] = setting(
-        (8e-3, 0.05, 0.15), "warnings: median output-predictor error of angle (rad), velocity (m/s), position (m)", low=0
+        (8e-3, 0.05, 0.15),
+        "warnings: median output-predictor error of angle (rad), velocity (m/s), position (m)",
+        low=0,
     )
     """PX4's."""
     gnss_share: float = setting(

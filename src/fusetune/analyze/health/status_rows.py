@@ -47,7 +47,7 @@ _FILTERED = "{field}: square root of the largest ratio in use, low-pass filtered
 
 
 def status_ratio_rows(health: JudgedHealth, instance: int, *, judged: bool) -> Iterator[HealthRow]:
-    """Test ratios of `estimator_status`; judged where the log has no innovations to make better ones of."""
+    """Test ratios of `estimator_status`; judged where the log has too few innovations to make better ones of."""
     table = health.topic("estimator_status", instance)
     for name, label, fields, clear in RATIOS:
         field = next((one for one in fields if table is not None and one in table), None)

@@ -45,9 +45,12 @@ class Subject:
         threshold = crossed if crossed is not None else next((one for one in levels if math.isfinite(one)), None)
         if severity == "pass":
             more.pop("remedy", None)
+        for edge in ("start_us", "stop_us"):
+            if more.get(edge) is not None:
+                more[edge] = int(more[edge])
         said = f"{self.label}: {words} {_written(figure, value, unit)}"
         found = Finding(
-            f"{self.name}.{figure}", severity, said, figure=value, threshold=threshold, unit=unit, **more
+            f"{self.name}.{figure}", severity, said, figure=float(value), threshold=threshold, unit=unit, **more
         )
         return HealthRow(found, self.group, self.instance, self.origin)
 
