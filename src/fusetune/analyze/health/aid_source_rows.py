@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import Interval, inside, subtract
 from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.judged_health import JudgedHealth
-from fusetune.analyze.health.over_time import Stretch, longest_between, silences
+from fusetune.analyze.health.over_time import Stretch, longest_between, silences, span
 from fusetune.analyze.health.ratio_figures import ratio_rows
 from fusetune.analyze.health.settings import REJECTED_RATIO, Levels
 from fusetune.analyze.health.subject import Subject
@@ -32,7 +32,7 @@ _LOOSE = frozenset({"rng_hgt", "optical_flow"})
 _OTHER_WAYS = {"mag": "mag_heading"}
 """Before v1.15 the magnetometer is fused in three axes or as a heading, by turns."""
 _SILENT_S = (1.0, 3.0)
-"""When nothing of an estimator is logged for so long, by how often it is logged, the log does not tell what it fused."""
+"""When nothing of an estimator is logged for so long, the log does not tell what it fused; by how often it is."""
 _LOOK_AT = "See which sensor is off: its mounting, interference, the noise and the gate that EKF2 is told"
 
 
@@ -81,7 +81,7 @@ def _source_rows(
         if not known.any():
             yield subject.lacking("raised_share", "its test ratios are not logged")
             continue
-        evidence = {"ratio": UNFILTERED, "samples": int(known.sum())}
+        evidence: dict[str, int | str] = {"ratio": UNFILTERED, "samples": int(known.sum())}
         yield from ratio_rows(
             health,
             subject,
@@ -135,8 +135,7 @@ def _rejected_row(
         "",
         Levels(*limits) if judged else Levels(np.inf),
         remedy=_LOOK_AT,
-        start_us=int(when[0]) if when.size else None,
-        stop_us=int(when[-1]) + 1 if when.size else None,
+        when=span(when),
         evidence={"rejected": int(rejected.sum()), "samples": int(known.sum())},
     )
 
@@ -167,8 +166,7 @@ def _unfused_row(
         "s",
         Levels(health.limits.unfused_s) if judged else Levels(np.inf),
         remedy="See whether its samples were rejected or did not come",
-        start_us=longest.start_us or None,
-        stop_us=longest.stop_us or None,
+        when=longest.when,
     )
 
 
@@ -189,5 +187,5 @@ def _since_last_fusion(table: TopicTable | None, within: tuple[Interval, ...]) -
     since = np.where(counted, sampled - last, 0)
     row = int(np.argmax(since))
     if since[row] <= 0:
-        return Stretch(0.0, 0, 0)
-    return Stretch(float(since[row]) * 1e-6, int(last[row]), int(sampled[row]))
+        return Stretch(0.0, None)
+    return Stretch(float(since[row]) * 1e-6, (int(last[row]), int(sampled[row])))

@@ -57,8 +57,7 @@ def aiding_rows(
         "s",
         Levels(*(one + 2.0 * usual for one in health.limits.unaided_s)),
         remedy=_REMEDY,
-        start_us=None if longest is None else longest[0],
-        stop_us=None if longest is None else longest[1],
+        when=longest,
         evidence={"logged_every_s": round(usual, 3)},
     )
     silent = [(_unsaid(health, flags, gap, usual), gap) for gap in gaps]
@@ -70,8 +69,7 @@ def aiding_rows(
         "s",
         Levels(*health.limits.unflagged_loss_s),
         remedy=_REMEDY,
-        start_us=worst[1][0] if worst[1] else None,
-        stop_us=worst[1][1] if worst[1] else None,
+        when=worst[1],
     )
 
 
@@ -96,11 +94,11 @@ def _unsaid(health: JudgedHealth, flags: Flags | None, gap: Interval, usual_s: f
     end = health.flight.last_timestamp
     known = [flags[name].astype(bool) for name in _SAYS_SO if name in flags] if flags is not None else []
     if known and flags is not None:
-        told = time_set(flags["timestamp"], np.logical_or.reduce(known), end, ((start, gap[1]),)).seconds
+        told = time_set(flags["timestamp"], np.logical_or.reduce(known), end, ((start, gap[1]),)).value
     local = health.topic("vehicle_local_position")
     if local is not None and "xy_valid" in local:
         invalid = ~local["xy_valid"].astype(bool)
         if "dead_reckoning" in local:
             invalid |= local["dead_reckoning"].astype(bool)
-        told = max(told, time_set(local["timestamp"], invalid, end, ((start, gap[1]),)).seconds)
+        told = max(told, time_set(local["timestamp"], invalid, end, ((start, gap[1]),)).value)
     return max((gap[1] - start) * 1e-6 - told, 0.0)

@@ -36,14 +36,20 @@ def bias_rows(
     )
     for name, values, unit, level, change_level, limit, remedy in sensors:
         medians = np.median(values[clear], axis=0)
-        more = {"remedy": remedy, "evidence": evidence | dict(zip("xyz", map(float, medians), strict=True))}
-        yield subject.judged(
-            name, f"norm of the median {name} bias", float(np.linalg.norm(medians)), unit, Levels(level), **more
-        )
-        span = np.ptp(values[flying], axis=0)
-        more["evidence"] = evidence | dict(zip("xyz", map(float, span), strict=True))
-        words = f"change of the {name} bias in flight"
-        yield subject.judged(f"{name}_change", words, float(np.linalg.norm(span)), unit, Levels(change_level), **more)
+        changes = np.ptp(values[flying], axis=0)
+        for figure, words, axes, beyond in (
+            (name, f"norm of the median {name} bias", medians, level),
+            (f"{name}_change", f"change of the {name} bias in flight", changes, change_level),
+        ):
+            yield subject.judged(
+                figure,
+                words,
+                float(np.linalg.norm(axes)),
+                unit,
+                Levels(beyond),
+                remedy=remedy,
+                evidence=evidence | dict(zip("xyz", map(float, axes), strict=True)),
+            )
         yield _at_limit(health, subject, name, values[flying], health.parameters[limit], remedy)
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.judged_health import JudgedHealth
-from fusetune.analyze.health.over_time import time_set
+from fusetune.analyze.health.over_time import at, time_set
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.px4.flight import TopicTable
@@ -43,8 +43,8 @@ def fault_row(health: JudgedHealth, flags: Flags | None, instance: int, origin: 
     for name, values in (flags or {}).items():
         if flags is not None and name.startswith("fs_") and values.any():
             found = time_set(flags["timestamp"], values.astype(bool), end, ((0, end + 1),))
-            named[name] = round(found.seconds, 3)
-            times += [one for one in (found.first, found.last) if one is not None]
+            named[name] = round(found.value, 3)
+            times += list(found.when or ())
     if bits is None and flags is None:
         return subject.lacking("faults", "the log does not tell its faults")
     if bits is not None and status is not None and bits.any():
@@ -59,8 +59,7 @@ def fault_row(health: JudgedHealth, flags: Flags | None, instance: int, origin: 
         "",
         _FAULTS,
         remedy="Numerical faults: raise noise parameters again; bad acceleration: mend the vibration",
-        start_us=min(times, default=None),
-        stop_us=max(times, default=None),
+        when=(min(times), max(times)) if times else None,
         evidence=named,
     )
 
@@ -97,8 +96,7 @@ def alignment_rows(
             "s",
             Levels(health.observed.since_start_s(take_off) if late and take_off is not None else np.inf),
             remedy="Wait with take-off until the filter is aligned",
-            start_us=when,
-            stop_us=when + 1,
+            when=at(when),
         )
 
 
@@ -114,11 +112,15 @@ def flight_rows(health: JudgedHealth) -> Iterator[HealthRow]:
         ("landing_s", "end at", intervals[-1][1]),
     ):
         seconds = health.observed.since_start_s(when)
-        yield subject.told(name, words, max(seconds, 0.0), "s", start_us=when, stop_us=when + 1)
+        yield subject.told(name, words, max(seconds, 0.0), "s", when=at(when))
     seconds = sum(stop - start for start, stop in intervals) * 1e-6
-    more = {"evidence": {"flights": len(intervals)}}
     yield subject.told(
-        "airborne_s", "in the air for", seconds, "s", start_us=intervals[0][0], stop_us=intervals[-1][1], **more
+        "airborne_s",
+        "in the air for",
+        seconds,
+        "s",
+        when=(intervals[0][0], intervals[-1][1]),
+        evidence={"flights": len(intervals)},
     )
 
 

@@ -12,7 +12,7 @@ from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.health.gnss_drift import DRIFT_TIME_CONSTANT_S, Drift, drift_at_rest
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.judged_health import JudgedHealth
-from fusetune.analyze.health.over_time import share_of, time_set
+from fusetune.analyze.health.over_time import at, share_of, span, time_set
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.px4.flight import TopicTable
@@ -91,7 +91,7 @@ def _minimum_row(
     time: npt.NDArray[np.int64],
     is_used: bool,
 ) -> HealthRow:
-    """The value that all but a small share of the samples keep to, against the limit; a failure where half are beyond."""
+    """The value that all but a few samples keep to, against the limit; a failure where half are beyond."""
     limit = health.parameters[minimum.parameter] if minimum.parameter else float(_LEAST_FIX)
     is_checked = minimum.bit is None or bool(int(health.parameters["EKF2_GPS_CHECK"]) >> minimum.bit & 1)
     known = np.isfinite(values)
@@ -116,8 +116,7 @@ def _minimum_row(
         levels,
         least=minimum.least,
         remedy=_MOVE_ANTENNA,
-        start_us=int(when[0]) if when.size else None,
-        stop_us=int(when[-1]) + 1 if when.size else None,
+        when=span(when),
         evidence={
             "median": median,
             "worst": float(values.min() if minimum.least else values.max()),
@@ -161,8 +160,7 @@ def _rest_row(
         "m/s",
         Levels(limit if is_used else np.inf),
         remedy=_MOVE_ANTENNA,
-        start_us=int(time[row]),
-        stop_us=int(time[row]) + 1,
+        when=at(time[row]),
         evidence={
             "median": float(np.median(values)),
             "typical": typical,
@@ -210,8 +208,7 @@ def _interference_rows(subject: Subject, table: TopicTable, rows: npt.NDArray[np
             "",
             Levels(1.0, 2.0),
             remedy="Find the source of interference, or fly elsewhere",
-            start_us=int(when[0]) if when.size else None,
-            stop_us=int(when[-1]) + 1 if when.size else None,
+            when=span(when),
         )
 
 
@@ -229,10 +226,9 @@ def check_row(health: JudgedHealth, instance: int) -> HealthRow:
     return subject.judged(
         "checks_failed_share",
         "EKF2's checks failed for",
-        share_of(found.seconds, health.airborne),
+        share_of(found.value, health.airborne),
         "",
         Levels(*health.limits.unchecked_share) if is_used else Levels(np.inf),
         remedy=_MOVE_ANTENNA,
-        start_us=found.first,
-        stop_us=found.last,
+        when=found.when,
     )

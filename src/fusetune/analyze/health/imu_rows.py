@@ -9,6 +9,7 @@ import numpy as np
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.judged_health import JudgedHealth
+from fusetune.analyze.health.over_time import at, span
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.px4.flight import TopicTable, field_names
@@ -54,15 +55,21 @@ def _rows_of(health: JudgedHealth, vibration: Vibration) -> Iterator[HealthRow]:
             evidence=evidence,
         )
         row = int(np.argmax(here))
-        at = {"start_us": int(time[row]), "stop_us": int(time[row]) + 1}
         words = f"largest {label}"
         yield subject.judged(
-            f"{name}_peak", words, float(here[row]), unit, Levels(peak), remedy=_ISOLATE, evidence=evidence, **at
+            f"{name}_peak",
+            words,
+            float(here[row]),
+            unit,
+            Levels(peak),
+            remedy=_ISOLATE,
+            evidence=evidence,
+            when=at(time[row]),
         )
 
 
 def clipping_rows(health: JudgedHealth) -> Iterator[HealthRow]:
-    """Clipped samples in flight, clear of the ground, by the counters of each IMU, else by the samples of the one used."""
+    """Clipped samples in flight, clear of the ground, by each IMU's counters, else of the samples that were used."""
     tables = [(one, health.topic("vehicle_imu_status", one)) for one in health.flight.instances("vehicle_imu_status")]
     counted = False
     for instance, table in tables:
@@ -81,7 +88,7 @@ def _counter_row(
     subject = Subject("clipping", f"IMU {instance}", "IMU", instance)
     time = table["timestamp"]
     grown = np.sum([_grown(table[name], time, health.clear) for name in names], axis=0)
-    at = np.flatnonzero(grown)
+    rows = np.flatnonzero(grown)
     within = np.sum([_grown(table[name], time, health.airborne) for name in names])
     return subject.judged(
         kind,
@@ -90,8 +97,7 @@ def _counter_row(
         "",
         Levels(*health.limits.clipped),
         remedy=_CLIPPING,
-        start_us=int(time[max(at[0] - 1, 0)]) if at.size else None,
-        stop_us=int(time[at[-1]]) + 1 if at.size else None,
+        when=(int(time[max(rows[0] - 1, 0)]), int(time[rows[-1]]) + 1) if rows.size else None,
         evidence={
             "in_flight": int(within),
             **{f"axis_{axis}": int(_grown(table[name], time, health.clear).sum()) for axis, name in enumerate(names)},
@@ -124,6 +130,5 @@ def _flagged_row(health: JudgedHealth) -> HealthRow:
         "",
         Levels(*health.limits.clipped),
         remedy=_CLIPPING,
-        start_us=int(when[0]) if when.size else None,
-        stop_us=int(when[-1]) + 1 if when.size else None,
+        when=span(when),
     )

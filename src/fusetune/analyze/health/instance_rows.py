@@ -9,6 +9,7 @@ import numpy as np
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.judged_health import JudgedHealth
+from fusetune.analyze.health.over_time import span
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.px4.layouts.estimator_instances import instance_shares, instance_switches
@@ -31,7 +32,6 @@ def instance_rows(health: JudgedHealth) -> Iterator[HealthRow]:
         return
     limits, times = health.limits, instance_switches(health.logged)
     times = times[inside(times, health.airborne)]
-    when = {"start_us": int(times[0]), "stop_us": int(times[-1]) + 1} if times.size else {}
     yield subject.judged(
         "switches",
         "changes of the primary one in flight:",
@@ -39,12 +39,11 @@ def instance_rows(health: JudgedHealth) -> Iterator[HealthRow]:
         "",
         Levels(limits.switches),
         remedy=_REMEDY,
-        **when,
+        when=span(times),
     )
     window = int(limits.whipsaw_window_s * 1e6)
     counts = np.searchsorted(times, times + window) - np.arange(times.size)
     row = int(np.argmax(counts)) if times.size else 0
-    when = {"start_us": int(times[row]), "stop_us": int(times[row + counts[row] - 1]) + 1} if times.size else {}
     yield subject.judged(
         "whipsaw",
         f"most changes within {limits.whipsaw_window_s:g} s:",
@@ -52,5 +51,5 @@ def instance_rows(health: JudgedHealth) -> Iterator[HealthRow]:
         "",
         Levels(*limits.whipsaw),
         remedy=_REMEDY,
-        **when,
+        when=span(times[row : row + counts[row]]) if times.size else None,
     )

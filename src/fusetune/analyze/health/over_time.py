@@ -14,23 +14,24 @@ Times = npt.NDArray[np.int64]
 
 
 class Stretch(NamedTuple):
-    """A figure of a part of the flight, µs."""
+    """A figure of a part of the flight, and the part, µs; None where there is none."""
 
     value: float
-    start_us: int
-    stop_us: int
+    when: Interval | None
 
 
-class FlagTime(NamedTuple):
-    """How long a flag was set, s, and from when to when, µs; `first` and `last` are None where it never was."""
-
-    seconds: float
-    first: int | None
-    last: int | None
+def at(time: int) -> Interval:
+    """A single time, µs, as an interval."""
+    return int(time), int(time) + 1
 
 
-def time_set(time: Times, values: npt.NDArray[np.bool_], last_time: int, within: Sequence[Interval]) -> FlagTime:
-    """How long a flag was set that holds until its next row.
+def span(times: Times) -> Interval | None:
+    """From the first to the last of some times (N,), µs; None without any."""
+    return (int(times[0]), int(times[-1]) + 1) if times.size else None
+
+
+def time_set(time: Times, values: npt.NDArray[np.bool_], last_time: int, within: Sequence[Interval]) -> Stretch:
+    """For how many seconds a flag was set that holds until its next row, and from when to when.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def time_set(time: Times, values: npt.NDArray[np.bool_], last_time: int, within:
             total += int(overlap[met].sum())
             first = max(int(starts[met][0]), begin) if first is None else first
             last = min(int(stops[met][-1]), end)
-    return FlagTime(total * 1e-6, first, last)
+    return Stretch(total * 1e-6, None if first is None or last is None else (first, last))
 
 
 def share_of(seconds: float, within: Sequence[Interval]) -> float:
@@ -67,7 +68,7 @@ def worst_mean(time: Times, values: npt.NDArray[np.float64], length_s: float, wi
     """
     length = int(length_s * 1e6)
     sums = np.r_[0.0, np.cumsum(values)]
-    worst = Stretch(-np.inf, int(time[0]), int(time[-1]))
+    worst = Stretch(-np.inf, None)
     for begin, end in within:
         first, behind = np.searchsorted(time, (begin, end))
         if behind <= first:
@@ -79,7 +80,7 @@ def worst_mean(time: Times, values: npt.NDArray[np.float64], length_s: float, wi
         means = (sums[ends] - sums[begins]) / (ends - begins)
         row = int(np.argmax(means))
         if means[row] > worst.value:
-            worst = Stretch(float(means[row]), int(starts[row]), min(int(starts[row]) + length, end))
+            worst = Stretch(float(means[row]), (int(starts[row]), min(int(starts[row]) + length, end)))
     return worst
 
 
@@ -99,11 +100,11 @@ def silences(time: Times, between_s: tuple[float, float]) -> tuple[Cut, ...]:
 
 def longest_between(time: Times, within: Iterable[Interval]) -> Stretch:
     """Longest time without an event in some intervals, from their begin and to their end as well, s."""
-    longest = Stretch(0.0, 0, 0)
+    longest = Stretch(0.0, None)
     for begin, end in within:
         edges = np.r_[begin, time[(time >= begin) & (time < end)], end]
         steps = np.diff(edges)
         row = int(np.argmax(steps))
         if steps[row] * 1e-6 > longest.value:
-            longest = Stretch(float(steps[row]) * 1e-6, int(edges[row]), int(edges[row + 1]))
+            longest = Stretch(float(steps[row]) * 1e-6, (int(edges[row]), int(edges[row + 1])))
     return longest

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.judged_health import JudgedHealth
-from fusetune.analyze.health.over_time import worst_mean
+from fusetune.analyze.health.over_time import at, span, worst_mean
 from fusetune.analyze.health.settings import REJECTED_RATIO, Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.finding import Evidence
@@ -40,7 +40,6 @@ def ratio_rows(
     judged = judged and ratio.size >= limits.fewest_samples
     raised, red = ratio > limits.raised_ratio, ratio > REJECTED_RATIO
     when = time[raised]
-    at = {"start_us": int(when[0]), "stop_us": int(when[-1]) + 1} if when.size else {}
     yield subject.judged(
         "raised_share",
         f"test ratios above {limits.raised_ratio:g}:",
@@ -49,7 +48,7 @@ def ratio_rows(
         Levels(*limits.raised_share) if judged else Levels(np.inf),
         remedy="Find out what disturbs the sensor, or whether EKF2 is told too small a noise",
         evidence=evidence,
-        **at,
+        when=span(when),
     )
     yield subject.told(
         "amber_share", f"test ratios in ({limits.raised_ratio:g}, 1]:", float(np.mean(raised & ~red)), evidence=evidence
@@ -57,9 +56,7 @@ def ratio_rows(
     yield subject.told("red_share", "test ratios above 1:", float(np.mean(red)), evidence=evidence)
     yield subject.told("mean_ratio", "mean test ratio", float(np.mean(ratio)), evidence=evidence)
     peak = int(np.argmax(ratio))
-    at = {"start_us": int(time[peak]), "stop_us": int(time[peak]) + 1}
-    yield subject.told("max_ratio", "largest test ratio", float(ratio[peak]), evidence=evidence, **at)
+    yield subject.told("max_ratio", "largest test ratio", float(ratio[peak]), evidence=evidence, when=at(time[peak]))
     worst = worst_mean(time, ratio, limits.worst_window_s, within)
-    at = {"start_us": worst.start_us, "stop_us": worst.stop_us}
     words = f"mean test ratio of the worst {limits.worst_window_s:g} s"
-    yield subject.told("worst_ratio", words, worst.value, evidence=evidence, **at)
+    yield subject.told("worst_ratio", words, worst.value, evidence=evidence, when=worst.when)

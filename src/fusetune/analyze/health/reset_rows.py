@@ -10,6 +10,7 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.judged_health import JudgedHealth
+from fusetune.analyze.health.over_time import span
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.analyze.replaying.replayed_set import RESET_COUNTERS, counter_steps
@@ -61,8 +62,7 @@ def rows_of_resets(
             "",
             Levels(limit),
             remedy="See which source was rejected or lost before",
-            start_us=int(settled[0]) if settled.size else None,
-            stop_us=int(settled[-1]) + 1 if settled.size else None,
+            when=span(settled),
             evidence={"in_flight": int(in_flight.size), "in_log": int(all_times.size), **(events or {})},
         )
 

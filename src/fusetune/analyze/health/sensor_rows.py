@@ -83,8 +83,7 @@ def imu_rows(health: JudgedHealth) -> Iterator[HealthRow]:
         "s",
         Levels(max(limits.imu_gap_s, limits.aid_gap_factor * usual)),
         remedy="Use a faster SD card; where the vehicle itself lost them, see time_slip_s",
-        start_us=gap.start_us or None,
-        stop_us=gap.stop_us or None,
+        when=gap.when,
     )
     covered = float(inside(time, health.airborne).sum()) * interval / (duration(health.airborne) * 1e-6)
     yield subject.told("logged_share", "share of the flight that the logged samples cover:", min(covered, 1.0))
@@ -107,8 +106,7 @@ def _imu_stuck_row(health: JudgedHealth, subject: Subject, table: TopicTable) ->
         "s",
         Levels(health.limits.stuck_imu_s),
         remedy=_CHECK,
-        start_us=one.start_us or None,
-        stop_us=one.stop_us or None,
+        when=(one.start_us, one.stop_us) if one.longest_s else None,
     )
 
 
@@ -161,11 +159,11 @@ def _rate_row(health: JudgedHealth, aid: Aid, table: TopicTable) -> HealthRow:
     least = health.limits.min_mag_rate_hz if aid.name == "mag" else None
     if least is not None and not told and rate < least:
         return subject.lacking("rate_hz", f"the log holds {rate:.3g} samples a second, maybe thinned: {_LOG_ALL}")
-    more = {"evidence": {"taken_by_estimator": told}}
+    evidence = {"taken_by_estimator": told}
     words = "samples a second:"
     if least is None:
-        return subject.told("rate_hz", words, rate, "Hz", **more)
-    return subject.judged("rate_hz", words, rate, "Hz", Levels(least), least=True, remedy=_CHECK, **more)
+        return subject.told("rate_hz", words, rate, "Hz", evidence=evidence)
+    return subject.judged("rate_hz", words, rate, "Hz", Levels(least), least=True, remedy=_CHECK, evidence=evidence)
 
 
 def _height_row(health: JudgedHealth, rates: dict[str, float]) -> HealthRow:
@@ -202,8 +200,7 @@ def _gap_row(health: JudgedHealth, subject: Subject, aid: Aid, table: TopicTable
         "s",
         Levels(max(health.limits.aid_gap_s, health.limits.aid_gap_factor * usual)),
         remedy=_CHECK,
-        start_us=gap.start_us or None,
-        stop_us=gap.stop_us or None,
+        when=gap.when,
         evidence={"usual_interval_s": round(usual, 4)},
     )
 
@@ -228,8 +225,7 @@ def _stuck_row(health: JudgedHealth, subject: Subject, aid: Aid, table: TopicTab
         "s",
         Levels(warning, fail) if is_stuck else Levels(np.inf),
         remedy=_CHECK,
-        start_us=found.start_us or None,
-        stop_us=found.stop_us or None,
+        when=(found.start_us, found.stop_us) if found.longest_s else None,
         evidence={"chance": float(chance)},
     )
 

@@ -1,4 +1,4 @@
-"""What `estimator_status` says itself: test ratios as PX4's scripts take them, rejections, checks of GNSS, lost time."""
+"""What `estimator_status` says itself: test ratios as PX4's scripts take them, and rejections."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def status_ratio_rows(health: JudgedHealth, instance: int, *, judged: bool) -> I
         if not ratio[rows].size or not ratio[rows].max() > 0.0:
             yield subject.lacking("raised_share", "nothing of the kind was fused")
             continue
-        evidence = {"ratio": _FILTERED.format(field=field), "samples": int(rows.sum())}
+        evidence: dict[str, int | str] = {"ratio": _FILTERED.format(field=field), "samples": int(rows.sum())}
         yield from ratio_rows(health, subject, table["timestamp"][rows], ratio[rows], within, evidence, judged=judged)
 
 
@@ -86,11 +86,10 @@ def _rejection(
     return subject.judged(
         f"{flag.removeprefix('reject_')}_share",
         f"{label}, share of the flight",
-        share_of(found.seconds, within),
+        share_of(found.value, within),
         "",
         Levels(*limits),
         remedy="See the aid sources that measure it",
-        start_us=found.first,
-        stop_us=found.last,
-        evidence={"seconds": round(found.seconds, 3)},
+        when=found.when,
+        evidence={"seconds": round(found.value, 3)},
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
+from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.settings import Levels
-from fusetune.finding import Finding, Severity
+from fusetune.finding import Evidence, Finding, Severity
 
 
 @dataclass(frozen=True)
@@ -28,29 +28,52 @@ class Subject:
     instance: int | None = None
     origin: Origin = "vehicle"
 
-    def told(self, figure: str, words: str, value: float, unit: str = "", **more: Any) -> HealthRow:
-        """A figure without a limit, or what is worth knowing."""
-        return self.judged(figure, words, value, unit, Levels(math.inf), **more)
+    def told(
+        self,
+        figure: str,
+        words: str,
+        value: float,
+        unit: str = "",
+        *,
+        when: Interval | None = None,
+        evidence: Evidence | None = None,
+    ) -> HealthRow:
+        """A figure without a limit."""
+        return self.judged(figure, words, value, unit, Levels(math.inf), when=when, evidence=evidence)
 
     def judged(
-        self, figure: str, words: str, value: float, unit: str, levels: Levels, *, least: bool = False, **more: Any
+        self,
+        figure: str,
+        words: str,
+        value: float,
+        unit: str,
+        levels: Levels,
+        *,
+        least: bool = False,
+        remedy: str = "",
+        when: Interval | None = None,
+        evidence: Evidence | None = None,
     ) -> HealthRow:
         """A figure against its levels: worse is what lies above them or, with `least`, below.
 
-        What is no number does not apply. `more` are fields of the finding: remedy, start_us, stop_us, evidence.
+        What is no number does not apply. The remedy is told of a warning or a failure, `when` is µs.
         """
         if not math.isfinite(value):
             return self.lacking(figure, f"{words}: not known")
         severity, crossed = _severity(value, levels, least)
         threshold = crossed if crossed is not None else next((one for one in levels if math.isfinite(one)), None)
-        if severity == "pass":
-            more.pop("remedy", None)
-        for edge in ("start_us", "stop_us"):
-            if more.get(edge) is not None:
-                more[edge] = int(more[edge])
-        said = f"{self.label}: {words} {_written(figure, value, unit)}"
+        start, stop = when or (None, None)
         found = Finding(
-            f"{self.name}.{figure}", severity, said, figure=float(value), threshold=threshold, unit=unit, **more
+            f"{self.name}.{figure}",
+            severity,
+            f"{self.label}: {words} {_written(figure, value, unit)}",
+            remedy if severity != "pass" else "",
+            float(value),
+            threshold,
+            unit,
+            start,
+            stop,
+            evidence or {},
         )
         return HealthRow(found, self.group, self.instance, self.origin)
 

@@ -67,4 +67,4 @@ def update_interval_s(flight: Flight, time: np.ndarray, states: np.ndarray, rate
     if combined is None or "gyro_integral_dt" not in combined or not row_count(combined):
         return UPDATE_INTERVAL_S
     imu = float(np.median(combined["gyro_integral_dt"])) * 1e-6
-    return max(round(UPDATE_INTERVAL_S / imu), 1) * imu if 0.0 < imu else UPDATE_INTERVAL_S
+    return max(round(UPDATE_INTERVAL_S / imu), 1) * imu if imu > 0.0 else UPDATE_INTERVAL_S
