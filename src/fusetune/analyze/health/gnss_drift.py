@@ -1,4 +1,4 @@
-"""How far GNSS wanders while the vehicle stands, as EKF2 filters it and does not log it.
+"""How far GNSS wanders while the vehicle stands, as EKF2 filters it; before v1.13 no log holds it.
 
 The figures of PX4 v1.16 `EKF/aid_sources/gnss/gps_checks.cpp`, of which the estimator's own copy works on its memory:
 `fusetune.ekf2.filter.aid_sources.gnss.gps_checks`.
@@ -27,15 +27,15 @@ class Drift:
     Attributes
     ----------
     time : µs
-    horizontal, vertical : drift of the position, m/s
-    speed : horizontal speed that the receiver reports, m/s
+    drift_horizontal, drift_vertical : of the position, m/s
+    speed_at_rest : horizontal, that the receiver reports, m/s
     settled : whether the vehicle has stood for the filter's time constant
     """
 
     time: npt.NDArray[np.int64]
-    horizontal: Array
-    vertical: Array
-    speed: Array
+    drift_horizontal: Array
+    drift_vertical: Array
+    speed_at_rest: Array
     settled: npt.NDArray[np.bool_]
 
 
@@ -74,9 +74,9 @@ def drift_at_rest(table: TopicTable, at_rest: npt.NDArray[np.bool_], parameters:
     filtered, since = _low_pass(np.clip(speeds, -limits, limits), step, time, rest)
     return Drift(
         time=time[rest],
-        horizontal=np.hypot(filtered[rest, 0], filtered[rest, 1]),
-        vertical=np.abs(filtered[rest, 2]),
-        speed=np.hypot(filtered[rest, 3], filtered[rest, 4]),
+        drift_horizontal=np.hypot(filtered[rest, 0], filtered[rest, 1]),
+        drift_vertical=np.abs(filtered[rest, 2]),
+        speed_at_rest=np.hypot(filtered[rest, 3], filtered[rest, 4]),
         settled=since[rest] >= DRIFT_TIME_CONSTANT_S,
     )
 

@@ -44,11 +44,27 @@ MINIMA = (
 """In the order of the bits; typical values are those of PX4's tuning guide. The fix is checked whatever the bits."""
 
 _LEAST_FIX = 3
-_AT_REST = (
-    ("drift_horizontal", "horizontal drift at rest", "horizontal", "EKF2_REQ_HDRIFT", 5, 0.01),
-    ("drift_vertical", "vertical drift at rest", "vertical", "EKF2_REQ_VDRIFT", 6, 0.02),
-    ("speed_at_rest", "horizontal speed at rest", "speed", "EKF2_REQ_HDRIFT", 7, 0.01),
+
+
+class Rest(NamedTuple):
+    """One of EKF2's checks of a vehicle that stands: its row, parameter, bit, what is typical, and where it is logged."""
+
+    name: str
+    label: str
+    parameter: str
+    bit: int
+    typical: float
+    field: str
+
+
+AT_REST = (
+    Rest(
+        "drift_horizontal", "horizontal drift at rest", "EKF2_REQ_HDRIFT", 5, 0.01, "position_drift_rate_horizontal_m_s"
+    ),
+    Rest("drift_vertical", "vertical drift at rest", "EKF2_REQ_VDRIFT", 6, 0.02, "position_drift_rate_vertical_m_s"),
+    Rest("speed_at_rest", "horizontal speed at rest", "EKF2_REQ_HDRIFT", 7, 0.01, "filtered_horizontal_speed_m_s"),
 )
+"""The fields are of `estimator_gps_status`, which v1.13 brought; before, nothing logs them."""
 _MOVE_ANTENNA = "Give the antenna a free view of the sky, away from cameras, video links and USB 3"
 
 
@@ -131,40 +147,47 @@ def _minimum_row(
 def _rest_rows(health: JudgedHealth, subject: Subject, table: TopicTable, is_used: bool) -> Iterator[HealthRow]:
     """EKF2's own drift figures while the vehicle stands, their largest once its filter had time to settle."""
     drift = drift_at_rest(table, _at_rest(health, table["timestamp"]), health.parameters)
-    for name, label, attribute, parameter, bit, typical in _AT_REST:
-        if drift is None or not drift.settled.any():
-            yield subject.lacking(
-                name, f"{label}: the vehicle stands for less than {DRIFT_TIME_CONSTANT_S:g} s with GNSS"
-            )
-            continue
-        limit = health.parameters[parameter]
-        yield _rest_row(health, subject, drift, (name, label, attribute, bit, typical), limit, is_used)
+    told = health.topic("estimator_gps_status", health.primary)
+    for rest in AT_REST:
+        time, values = np.zeros(0, np.int64), np.zeros(0)
+        is_told = drift is None or not drift.settled.any()
+        if drift is not None and not is_told:
+            time, values = drift.time[drift.settled], getattr(drift, rest.name)[drift.settled]
+        elif told is not None and rest.field in told:
+            # the filter goes on saying in the air what it found at rest
+            known = np.isfinite(told[rest.field])
+            time, values = told["timestamp"][known], told[rest.field][known].astype(np.float64)
+        if values.size:
+            yield _rest_row(health, subject, rest, time, values, is_used, is_told)
+        else:
+            short = f"the vehicle stands for less than {DRIFT_TIME_CONSTANT_S:g} s with GNSS"
+            yield subject.lacking(rest.name, f"{rest.label}: {short}")
 
 
 def _rest_row(
     health: JudgedHealth,
     subject: Subject,
-    drift: Drift,
-    what: tuple[str, str, str, int, float],
-    limit: float,
+    rest: Rest,
+    time: npt.NDArray[np.int64],
+    values: npt.NDArray[np.float64],
     is_used: bool,
+    is_told: bool,
 ) -> HealthRow:
-    name, label, attribute, bit, typical = what
-    values = getattr(drift, attribute)[drift.settled]
-    time = drift.time[drift.settled]
     row = int(np.argmax(values))
     return subject.judged(
-        name,
-        label,
+        rest.name,
+        rest.label,
         float(values[row]),
         "m/s",
-        Levels(limit if is_used else np.inf),
+        Levels(health.parameters[rest.parameter] if is_used else np.inf),
         remedy=_MOVE_ANTENNA,
         when=at(time[row]),
         evidence={
             "median": float(np.median(values)),
-            "typical": typical,
-            "checked": bool(int(health.parameters["EKF2_GPS_CHECK"]) >> bit & 1),
+            "limit": health.parameters[rest.parameter],
+            "typical": rest.typical,
+            "checked": bool(int(health.parameters["EKF2_GPS_CHECK"]) >> rest.bit & 1),
+            "told_by_filter": is_told,
         },
     )
 

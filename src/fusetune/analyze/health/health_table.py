@@ -36,6 +36,7 @@ HEALTH_TOPICS = (
             *LOGGED_STATE_TOPICS,
             *(name for topic in SENSOR_TOPICS.values() for name in (topic.name, *topic.made_of)),
             "estimator_event_flags",
+            "estimator_gps_status",
             "sensor_gps",
             "vehicle_imu",
             "vehicle_imu_status",
