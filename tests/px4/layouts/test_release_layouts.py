@@ -166,6 +166,24 @@ def test_status_flags_before_v1_12_from_bits() -> None:
     assert flags["fs_bad_acc_vertical"].tolist() == [False, True]
 
 
+@pytest.mark.parametrize("split", [True, False], ids=["v1.11", "v1.10"])
+def test_rejections_before_v1_12_from_bits(split: bool) -> None:
+    """Velocity has two bits from v1.11 on, horizontal and vertical; before, one, and all others are a bit lower."""
+    bits = [0b1, 0b100, 1 << 7] if split else [0b1, 0b10, 1 << 6]
+    status = {
+        "timestamp": TIME[:3],
+        "control_mode_flags": np.zeros(3, np.uint32),
+        "innovation_check_flags": np.array(bits, np.uint16),
+    }
+    if split:
+        status["pre_flt_fail_innov_heading"] = np.zeros(3, np.bool_)
+    flags = canonical_topic("estimator_status", status, "estimator_status_flags")
+    assert flags["reject_hor_vel"].tolist() == [True, False, False]
+    assert flags["reject_ver_vel"].tolist() == [not split, False, False]
+    assert flags["reject_hor_pos"].tolist() == [False, True, False]
+    assert flags["reject_yaw"].tolist() == [False, False, True]
+
+
 def innovation_flight(**innovations: np.ndarray) -> Flight:
     rows = len(next(iter(innovations.values())))
     time = np.arange(rows, dtype=np.int64) * 500_000 + 1_000_000

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import inside
-from fusetune.analyze.health.gnss_drift import DRIFT_TIME_CONSTANT_S, Drift, drift_at_rest
+from fusetune.analyze.health.gnss_drift import DRIFT_TIME_CONSTANT_S, drift_at_rest
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.over_time import at, share_of, span, time_set
@@ -47,7 +47,7 @@ _LEAST_FIX = 3
 
 
 class Rest(NamedTuple):
-    """One of EKF2's checks of a vehicle that stands: its row, parameter, bit, what is typical, and where it is logged."""
+    """One of EKF2's checks of a vehicle that stands: row, parameter, bit, what is typical, and where it is logged."""
 
     name: str
     label: str
