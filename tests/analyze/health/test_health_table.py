@@ -123,6 +123,19 @@ def test_a_topic_that_is_missing_is_no_mistake(shared_logs: Path, lacking):
         assert airborne == pytest.approx(21.9, abs=3.0)
 
 
+@pytest.mark.parametrize(
+    "topic",
+    ["estimator_status", "estimator_status_flags", "vehicle_gps_position", "vehicle_imu_status", "sensor_combined"],
+)
+def test_a_column_that_is_missing_is_no_mistake(shared_logs: Path, topic):
+    (path,) = shared_logs.glob("SkyRats__log_10_*.ulg")
+    logged = read_ulog(path)
+    table = logged.topics[topic, 0]
+    for lacking in table.keys() - {"timestamp"}:
+        rest = {name: values for name, values in table.items() if name != lacking}
+        assert health_rows(ObservedFlight(logged.with_topics(logged.topics | {(topic, 0): rest}))), lacking
+
+
 def test_topics_without_rows_are_no_mistake(shared_logs: Path):
     (path,) = shared_logs.glob("SkyRats__log_10_*.ulg")
     logged = read_ulog(path)

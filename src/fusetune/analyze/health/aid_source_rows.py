@@ -43,7 +43,7 @@ def aid_source_rows(health: JudgedHealth, samples: Samples, instance: int, origi
         axes = {axis: samples[source.name, axis] for axis in range(source.axes) if (source.name, axis) in samples}
         if axes:
             yield from _source_rows(health, source, axes, instance, origin)
-            if source.name not in _OTHER_WAYS.values():
+            if source.name not in _OTHER_WAYS.values() and (source.name, 0) in samples:
                 yield _unfused_row(health, source, samples, told, instance, origin)
         elif instance == health.primary and _may_fuse(health, source):
             yield Subject(source.name, source.label, GROUP, instance, origin).lacking(

@@ -14,7 +14,7 @@ from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.over_time import at, time_set
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
-from fusetune.px4.flight import TopicTable
+from fusetune.px4.flight import TopicTable, field_names
 
 GROUP = "filter"
 Flags = Mapping[str, npt.NDArray[Any]]
@@ -159,4 +159,5 @@ def output_rows(health: JudgedHealth, instance: int) -> Iterator[HealthRow]:
 def _with_output_errors(health: JudgedHealth, instance: int) -> Iterator[TopicTable | None]:
     for name in ("estimator_status", "ekf2_innovations"):
         table = health.topic(name, instance)
-        yield table if table is not None and "output_tracking_error[2]" in table else None
+        whole = table is not None and len(field_names(table, "output_tracking_error")) == len(_OUTPUT_ERRORS)
+        yield table if whole else None

@@ -195,7 +195,8 @@ def _rest_row(
 def _at_rest(health: JudgedHealth, time: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """Whether the filter takes the vehicle to stand on the ground, at some times (N,), µs."""
     flags, landed = health.topic("estimator_status_flags", health.primary), health.topic("vehicle_land_detected")
-    table = flags if flags is not None and flags.get("cs_vehicle_at_rest", np.zeros(1)).any() else landed
+    tells = flags is not None and {"cs_vehicle_at_rest", "cs_in_air"} <= set(flags)
+    table = flags if flags is not None and tells and flags["cs_vehicle_at_rest"].any() else landed
     if table is None:
         return np.zeros(time.shape, bool)
     if table is flags:
