@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fusetune.px4.flight import Flight, TopicTable
-from fusetune.px4.layouts.bias_states import bias_states
+from fusetune.px4.layouts.bias_states import bias_limits, bias_states
 
 TIME = np.arange(50) * 200_000 + 1_000_000
 BIASES = np.array([0.01, -0.02, 0.005, 0.1, 0.2, -0.05])
@@ -63,3 +63,13 @@ def test_what_is_no_state_of_any_release_tells_nothing() -> None:
     assert bias_states(Flight("made", {("estimator_states", 0): table}), 0) is None
     nothing = states(0.01) | {"states[11]": np.full(50, np.nan)}
     assert bias_states(Flight("made", {("estimator_states", 0): nothing}), 0) is None
+
+
+def test_limits_are_those_of_the_log_before_those_of_its_release() -> None:
+    """20 °/s for the gyro before EKF2_GYR_B_LIM came with v1.14, as logs of v1.11 to v1.13 tell."""
+    parameters = {"EKF2_GYR_B_LIM": 0.15, "EKF2_ABL_LIM": 0.4}
+    old, new = ({"ver_sw_release": 1 << 24 | minor << 16 | 255} for minor in (13, 14))
+    assert bias_limits(Flight("old", info=old), 0, parameters) == (pytest.approx(0.349, abs=1e-3), 0.4)
+    assert bias_limits(Flight("new", info=new), 0, parameters) == (0.15, 0.4)
+    told: TopicTable = {"timestamp": TIME, "gyro_bias_limit": np.full(50, 0.2), "accel_bias_limit": np.full(50, 0.3)}
+    assert bias_limits(Flight("new", {("estimator_sensor_bias", 0): told}, info=new), 0, parameters) == (0.2, 0.3)

@@ -40,9 +40,10 @@ def fault_row(health: JudgedHealth, flags: Flags | None, instance: int, origin: 
     named: dict[str, Any] = {}
     times = []
     end = health.flight.last_timestamp
-    for name, values in (flags or {}).items():
-        if flags is not None and name.startswith("fs_") and values.any():
-            found = time_set(flags["timestamp"], values.astype(bool), end, ((0, end + 1),))
+    known = flags or {}
+    for name, values in known.items():
+        if name.startswith("fs_") and values.any():
+            found = time_set(known["timestamp"], values.astype(bool), end, ((0, end + 1),))
             named[name] = round(found.value, 3)
             times += list(found.when or ())
     if bits is None and flags is None:

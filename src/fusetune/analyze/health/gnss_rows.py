@@ -109,7 +109,7 @@ def _minimum_row(
 ) -> HealthRow:
     """The value that all but a few samples keep to, against the limit; a failure where half are beyond."""
     limit = health.parameters[minimum.parameter] if minimum.parameter else float(_LEAST_FIX)
-    is_checked = minimum.bit is None or bool(int(health.parameters["EKF2_GPS_CHECK"]) >> minimum.bit & 1)
+    is_checked = _is_checked(health, minimum.bit)
     known = np.isfinite(values)
     if not known.any():
         return subject.lacking(minimum.name, f"{minimum.label} is not reported")
@@ -142,6 +142,11 @@ def _minimum_row(
             "checked": is_checked,
         },
     )
+
+
+def _is_checked(health: JudgedHealth, bit: int | None) -> bool:
+    """Whether EKF2 was told to look at it; what has no bit it always does."""
+    return bit is None or bool(int(health.parameters["EKF2_GPS_CHECK"]) >> bit & 1)
 
 
 def _rest_rows(health: JudgedHealth, subject: Subject, table: TopicTable, is_used: bool) -> Iterator[HealthRow]:
@@ -186,7 +191,7 @@ def _rest_row(
             "median": float(np.median(values)),
             "limit": health.parameters[rest.parameter],
             "typical": rest.typical,
-            "checked": bool(int(health.parameters["EKF2_GPS_CHECK"]) >> rest.bit & 1),
+            "checked": _is_checked(health, rest.bit),
             "told_by_filter": is_told,
         },
     )
