@@ -71,6 +71,33 @@ def test_ratios_of_an_aid_source_are_unfiltered_and_by_direction(told):
     assert "unfiltered" not in health.row("status_velocity.mean_ratio").finding.evidence["ratio"]
 
 
+@pytest.mark.parametrize("instance", [1, 2, 3])
+def test_instances_whose_innovations_were_thinned_apart_have_the_ratios_that_they_logged(told, instance):
+    """`estimator_innovation_test_ratios`, while GNSS is fused: each time that any of its values is a new one."""
+    health = told(SWITCHING)
+    table, flags = (health.raw.topic(f"estimator_{name}", instance) for name in ("innovation_test_ratios", "status"))
+    values = np.column_stack([table["gps_hvel[0]"], table["gps_hvel[1]"], table["gps_vvel"]])
+    before = np.maximum(np.searchsorted(flags["timestamp"], table["timestamp"], side="right") - 1, 0)
+    rows = (flags["control_mode_flags"][before] >> 2 & 1).astype(bool) & health.raw.flying(table["timestamp_sample"])
+    rows &= np.r_[True, np.any(np.diff(values, axis=0) != 0, axis=1)] & np.any(values > 0, axis=1)
+    vertical = values[rows, 2].astype(np.float64)
+    assert len(vertical) > 60
+    assert health.figure("gnss_vel_vertical.raised_share", instance) == pytest.approx(np.mean(vertical > 0.5))
+    assert health.figure("gnss_vel_vertical.mean_ratio", instance) == pytest.approx(vertical.mean())
+    horizontal = values[rows, :2].max(axis=1)
+    assert health.figure("gnss_vel_horizontal.red_share", instance) == pytest.approx(np.mean(horizontal > 1.0))
+    assert "estimator_innovation_test_ratios" in health.row("mag.mean_ratio", instance).finding.evidence["ratio"]
+
+
+def test_a_magnetometer_that_one_instance_gave_up_was_not_fused_from_then_on(told):
+    health = told(SWITCHING)
+    flags = health.raw.topic("estimator_status_flags", 2)
+    given_up = flags["timestamp"][np.argmax(flags["cs_mag_fault"] > 0)]
+    row = health.row("mag.longest_unfused_s", 2).finding
+    assert row.figure == pytest.approx((health.raw.flights[-1][1] - given_up) * 1e-6, abs=0.6)
+    assert row.severity == "warning"
+
+
 def test_time_without_fusion_is_what_the_filter_says_of_its_last_one(told):
     health = told(BETA)
     table = health.raw.topic("estimator_aid_src_gnss_pos")

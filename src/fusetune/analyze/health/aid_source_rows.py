@@ -24,6 +24,7 @@ Figures = npt.NDArray[np.float64]
 
 GROUP = "aid source"
 UNFILTERED = "innovation² / (gate² × innovation variance) of each sample, the largest of the axes"
+AS_LOGGED = "estimator_innovation_test_ratios, unfiltered; the innovations were thinned apart from their variances"
 _CLEAR_OF_GROUND = frozenset({"height", "heading", "field", "flow"})
 """Quantities that ground effect and the fields near the ground falsify."""
 _OUT_OF_RANGE = frozenset({"rng_hgt", "optical_flow", "airspeed", "sideslip", "drag", "aux_vel", "gravity"})
@@ -81,7 +82,8 @@ def _source_rows(
         if not known.any():
             yield subject.lacking("raised_share", "its test ratios are not logged")
             continue
-        evidence: dict[str, int | str] = {"ratio": UNFILTERED, "samples": int(known.sum())}
+        ratio_is = AS_LOGGED if np.isnan(first.innovation).all() else UNFILTERED
+        evidence: dict[str, int | str] = {"ratio": ratio_is, "samples": int(known.sum())}
         yield from ratio_rows(
             health,
             subject,
