@@ -15,13 +15,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.special import stdtrit
+
+from fusetune.analyze.smoothing.smoothed_velocity import NORMAL_QUARTILE
 
 Array = npt.NDArray[np.float64]
 
@@ -35,6 +37,7 @@ _FINER = (0.5, 0.25, 0.125)
 _FIRST_OF_WALK = 1e4
 """Variance with which a walk begins, against what it gains in all."""
 _CONFIDENCE = 0.95
+_ROUNDS = 2
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,8 @@ def fit_walking(rows: WalkingRows, ratio: float | None = None, memory_s: float |
         return None
     if ratio is None or memory_s is None:
         ratio, memory_s = _likeliest(equations, rows)
+    for _ in range(_ROUNDS):
+        equations = replace(equations, scale=equations.solved(ratio, memory_s).noise)
     return equations.solved(ratio, memory_s).fit()
 
 
@@ -177,9 +182,8 @@ class _Equations:
             for other in range(states):
                 product = share * (1.0 - share) * rows.walking[:, one] * rows.walking[:, other]
                 band[states + one - other, other::states] += np.bincount(left, product, pieces + 1)
-        free = rows.design[:, ~np.isfinite(rows.expected)]
-        plain = np.linalg.lstsq(free, rows.target, rcond=None)[0] if free.shape[1] else np.zeros(0)
-        scale = max(float(np.std(np.diff(rows.target - free @ plain))) / math.sqrt(2.0), 1e-9)
+        # of the difference of two; what the constants are expected to be is weighed by it until σ itself is known
+        scale = max(float(np.median(np.abs(np.diff(rows.target)))) / (math.sqrt(2.0) * NORMAL_QUARTILE), 1e-9)
         knots = begin + rows.knots_s * np.arange(pieces + 1)
         return cls(rows, scale, left, share, knots, block, band, border, sights.T @ sights)
 
@@ -223,6 +227,7 @@ class _Solved:
         self.constants: Array = -self.covariance @ corner[:-1, -1]
         self.cost = float(corner[-1, -1] + corner[-1, :-1] @ self.constants)
         self.freedom = max(rows.target.size - int(np.count_nonzero(~np.isfinite(rows.expected))), 1)
+        self.noise = math.sqrt(max(self.cost, 1e-300) / self.freedom)
         sign, determinant = np.linalg.slogdet(self.normal)
         self.score = self.freedom * math.log(max(self.cost, 1e-300)) + log_determinant
         self.score += float(determinant) if sign > 0 else 0.0
@@ -232,16 +237,15 @@ class _Solved:
         # x of the least squares for any constants: -(projected g), the last column that of the 1
         course = -(self.projected[:, :-1] @ self.constants + self.projected[:, -1]).reshape(-1, self.states)
         net, residual = self._net_rows(course)
-        noise = math.sqrt(max(self.cost, 1e-300) / self.freedom)
-        promised = noise * np.sqrt(np.diag(self.covariance))
+        promised = self.noise * np.sqrt(np.diag(self.covariance))
         spread, blocks = self._jackknife(net, residual)
         wider = spread > promised
         return WalkingFit(
             constants=self.constants,
             standard_error=np.where(wider, spread, promised),
             freedom=np.where(wider, float(blocks - 1), float(self.freedom)),
-            noise=noise,
-            walk=noise * math.sqrt(self.ratio) if self.states else 0.0,
+            noise=self.noise,
+            walk=self.noise * math.sqrt(self.ratio) if self.states else 0.0,
             memory_s=self.memory_s,
             knot_s=given.knot_s,
             course=course,
