@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.effects.gyro_heading import GyroHeading
+from fusetune.analyze.effects.gyro_attitude import GyroAttitude
 from fusetune.analyze.effects.walking_regression import WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
@@ -39,7 +39,7 @@ class HeadingError:
 
 
 def true_heading_error(
-    observed: ObservedFlight, heading: GyroHeading, time: Times, error: Array
+    observed: ObservedFlight, heading: GyroAttitude, time: Times, error: Array
 ) -> HeadingError | None:
     """Of the attitude `heading` with its error (N,), rad, at `time` (N,), µs, taken out; None with too little GNSS."""
     table, steps_of = observed.flight.topic("vehicle_gps_position"), observed.replayed.steps

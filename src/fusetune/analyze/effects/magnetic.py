@@ -1,9 +1,9 @@
 """The field that turns with the vehicle: motors, hard iron, scale; and the declination.
 
-    m = (1 + s) ∘ R(t)ᵀ E + h + c u(t) + noise
+    m = (1 + S) R(t)ᵀ E + h + c u(t) + noise
 
 E is the earth's field, whose strength and dip the World Magnetic Model tells within some milligauss, R the attitude with
-a heading that the gyros alone turn (`gyro_heading`) and whose error is a constant rate, a share of the way turned, and a
+a heading that the gyros alone turn (`gyro_attitude`) and whose error is a constant rate, a share of the way turned, and a
 walk; u is the power of the motors (`motor_power`). From before arming to the air u jumps while E does not: that is what
 tells c from h.
 
@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.effects.declination import true_heading_error
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.gyro_heading import GyroHeading, gyro_heading
+from fusetune.analyze.effects.gyro_attitude import GyroAttitude, gyro_attitude
 from fusetune.analyze.effects.motor_power import OFF, MotorPower, motor_power
 from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
@@ -45,13 +45,18 @@ LARGEST_DECLINATION_ERROR_DEG = 2.0
 MODEL_ERROR_GAUSS = 0.005
 """Standard deviation of the field at a place from the model of the world's."""
 EXPECTED = np.array([
-    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003,
+    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003, *[0.02] * 6,
 ])  # fmt: skip
-"""Standard deviations beforehand: horizontal and vertical field, hard iron, motors, scale, drift rad/s, gyro scale."""
+"""Standard deviations beforehand: horizontal and vertical field, hard iron, motors, scale, drift rad/s, gyro scale,
+and what one axis shows of another."""
+STARTS = np.array([np.inf, 0.01, 0.01])
+"""The same, of heading and tilt at the beginning, rad."""
 FIELD_H, FIELD_V = 0, 1
 HARD, MOTOR, SCALE = slice(2, 5), slice(5, 8), slice(8, 11)
 DRIFT, GYRO_SCALE = 11, 12
-FASTEST_HZ = 25.0
+CROSSED = slice(13, 19)
+_OTHERS = ((1, 2), (0, 2), (0, 1))
+FASTEST_HZ = 12.5
 _ROUNDS = 3
 _KNOTS_S = 2.0
 _AXES = "XYZ"
@@ -65,7 +70,7 @@ class MagneticFit:
     power: MotorPower
     has_power: bool
     declination_deg: float
-    heading: GyroHeading
+    heading: GyroAttitude
     time: Times
     heading_error: Array
 
@@ -94,7 +99,7 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
     has_power = bool(np.count_nonzero(known) > 50 and np.ptp(power.power[known]) > 0.0)
     if has_power:
         time, field, power = time[known], field[known], MotorPower(power.kind, power.unit, power.power[known])
-    heading = gyro_heading(steps)
+    heading = gyro_attitude(steps, observed.airborne)
     fitted = _gauss_newton(heading, time, field, power.power if has_power else np.zeros(time.size), world)
     if fitted is None:
         return "too short a log for the magnetic field"
@@ -133,7 +138,7 @@ def _thinned(time: Times, field: Array) -> tuple[Times, Array]:
 
 
 def _gauss_newton(
-    heading: GyroHeading, time: Times, field: Array, power: Array, world: Array
+    heading: GyroAttitude, time: Times, field: Array, power: Array, world: Array
 ) -> tuple[WalkingFit, Array] | None:
     """The fit and the heading's error at the samples."""
     rotation, time_s = heading.rotation_at(time), np.asarray(time * 1e-6, np.float64)
@@ -158,15 +163,22 @@ def _gauss_newton(
             one[:, FIELD_H], one[:, FIELD_V] = gain[axis] * strong[:, axis], gain[axis] * down[:, axis]
             one[:, HARD.start + axis], one[:, MOTOR.start + axis] = 1.0, power
             one[:, SCALE.start + axis] = body[:, axis]
+            crossed = slice(CROSSED.start + 2 * axis, CROSSED.start + 2 * axis + 2)
+            one[:, crossed] = body[:, _OTHERS[axis]]
             turns = gain[axis] * across[:, axis]
             one[:, DRIFT], one[:, GYRO_SCALE] = turns * since_s, turns * turned
-            rows.append((one, turns, field[:, axis] - gain[axis] * body[:, axis] + turns * error))
-        design, walking = np.vstack([one for one, _, _ in rows]), np.concatenate([one for _, one, _ in rows])
+            # R'ᵀ (E' × e) of rotations e about north and east, which the tilt may be off by
+            tilts = gain[axis] * np.column_stack([
+                earth[2] * rotation[:, 1, axis] - seen[:, 1] * down[:, axis],
+                seen[:, 0] * down[:, axis] - earth[2] * rotation[:, 0, axis],
+            ])  # fmt: skip
+            rows.append((one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error))
+        design, walking = np.vstack([one for one, _, _ in rows]), np.vstack([one for _, one, _ in rows])
         offsets = earth_change(earth, world)
         target = np.concatenate([one for _, _, one in rows])
         # fields are told as changes of the world's, scales as they are
         target = target + design[:, :2] @ offsets + design[:, SCALE] @ scale
-        given = WalkingRows(stacked, target, design, walking[:, None], EXPECTED, _KNOTS_S)
+        given = WalkingRows(stacked, target, design, walking, EXPECTED, _KNOTS_S, starts=STARTS)
         fit = fit_walking(given) if fit is None or number == 1 else fit_walking(given, fit.ratio, fit.memory_s)
         if fit is None:
             return None

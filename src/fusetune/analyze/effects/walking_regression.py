@@ -53,6 +53,7 @@ class WalkingRows:
     expected : (P,) standard deviation around 0 that each constant has beforehand; infinite where nothing is known
     knots_s : from one knot to the next
     memories_s : the τ that are offered
+    starts : (S,) standard deviation with which each walk begins; anything if None
     """
 
     time_s: Array
@@ -62,6 +63,7 @@ class WalkingRows:
     expected: Array
     knots_s: float = 1.0
     memories_s: Sequence[float] = (WALKS_FOR_EVER,)
+    starts: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -201,10 +203,13 @@ class _Solved:
         step = rows.knots_s
         self.kept = 0.0 if memory_s <= 0.0 else math.exp(-step / memory_s)
         if math.isinf(memory_s):
-            self.gained, self.first = ratio * step, ratio * step * knots * _FIRST_OF_WALK
+            self.gained = ratio * step
+            self.first = np.full(states, self.gained * knots * _FIRST_OF_WALK)
+            if rows.starts is not None:
+                self.first = np.minimum(self.first, np.square(rows.starts / given.scale))
         else:
             stationary = 0.5 * ratio * memory_s
-            self.gained, self.first = stationary * (1.0 - self.kept**2), stationary
+            self.gained, self.first = stationary * (1.0 - self.kept**2), np.full(states, stationary)
         band = given.band.copy()
         expected = np.square(given.scale / rows.expected)
         corner = given.corner.copy()
@@ -219,7 +224,7 @@ class _Solved:
             self.projected = cho_solve_banded((factor, True), given.border, check_finite=False)
             corner -= np.einsum("ki,kj->ij", given.border, self.projected)
             log_determinant = 2.0 * float(np.sum(np.log(factor[0])))
-            log_determinant += states * ((knots - 1) * math.log(self.gained) + math.log(self.first))
+            log_determinant += states * (knots - 1) * math.log(self.gained) + float(np.sum(np.log(self.first)))
         else:
             self.projected = np.zeros((0, corner.shape[0]))
         self.normal = corner[:-1, :-1]
