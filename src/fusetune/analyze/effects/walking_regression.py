@@ -240,7 +240,8 @@ class _Solved:
     def fit(self) -> WalkingFit:
         given, rows = self.given, self.given.rows
         # x of the least squares for any constants: -(projected g), the last column that of the 1
-        course = -(self.projected[:, :-1] @ self.constants + self.projected[:, -1]).reshape(-1, self.states)
+        course = -(self.projected[:, :-1] @ self.constants + self.projected[:, -1])
+        course = course.reshape(given.knot_s.size, self.states)
         net, residual = self._net_rows(course)
         promised = self.noise * np.sqrt(np.diag(self.covariance))
         spread, blocks = self._jackknife(net, residual)
@@ -263,6 +264,8 @@ class _Solved:
         """Regressors less what the disturbance takes of them, and residuals: of measurements, then of its steps."""
         given, rows, states = self.given, self.given.rows, self.states
         parameters = rows.design.shape[1]
+        if not states:
+            return rows.design, rows.target - rows.design @ self.constants
         takes = -self.projected[:, :-1].reshape(-1, states, parameters)
         left, right = (1.0 - given.share)[:, None], given.share[:, None]
 
@@ -271,8 +274,6 @@ class _Solved:
             between = left[:, :, None] * flat[given.left] + right[:, :, None] * flat[given.left + 1]
             return np.asarray(np.einsum("ns,nsp->np", rows.walking, between))
 
-        if not states:
-            return rows.design, rows.target - rows.design @ self.constants
         net = rows.design + seen(takes)
         residual = rows.target - rows.design @ self.constants - seen(course)[:, 0]
         scale = 1.0 / math.sqrt(self.gained)
