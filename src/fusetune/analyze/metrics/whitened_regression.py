@@ -77,10 +77,14 @@ class Fit:
             without.append(np.linalg.lstsq(normal - part.T @ part, moment - part.T @ rest, rcond=None)[0])
         spread = np.sum((np.array(without) - np.mean(without, axis=0)) ** 2, axis=0)
         jackknife = (blocks.size - 1) / blocks.size * spread
+        return np.asarray(np.sqrt(np.maximum(jackknife, np.square(self.promised_errors())))), int(blocks.size)
+
+    def promised_errors(self) -> Array:
+        """What the residuals promise of each element, (P,): of an effect that shows but once there is no other."""
+        scaled, target = self.design * self.weight[:, None], self.residual * self.weight
         left = target - scaled @ self.solution
         variance = float(left @ left) / max(left.size - self.solution.size, 1)
-        promised = variance * np.diag(np.linalg.pinv(normal))
-        return np.asarray(np.sqrt(np.maximum(jackknife, promised))), int(blocks.size)
+        return np.asarray(np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(scaled.T @ scaled)), 0.0)))
 
 
 def generalised(rows: list[Rows], order: int) -> Fit:
