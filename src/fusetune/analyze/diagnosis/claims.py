@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterMetadata, as_float32
 
-FAR = 4.0
-"""A claimed noise is far off from this factor on: within it PX4's defaults serve sensors of many kinds."""
+FAR, NEAR, REJECTED_FROM = 4.0, 3.3, 0.1
+"""A claimed noise is far off from this factor on: within it PX4's defaults serve sensors of many kinds.
+One that is too small shows earlier, where the filter refuses measurements for it."""
 NOISES: Mapping[str, str] = {
     "gnss_vel": "EKF2_GPS_V_NOISE",
     "gnss_pos": "EKF2_GPS_P_NOISE",
@@ -31,6 +32,7 @@ class NoiseClaim:
     usual : its default in the release that flew
     measured : white noise of the readings, in the same unit
     effective : what the filter takes, with what the receiver reports where that is more
+    rejected : share of the source's test ratios above 1
     """
 
     parameter: str
@@ -38,6 +40,7 @@ class NoiseClaim:
     usual: float
     measured: float
     effective: float
+    rejected: float = 0.0
 
     @property
     def ratio(self) -> float:
@@ -52,11 +55,14 @@ class NoiseClaim:
     @property
     def too_small(self) -> bool:
         """Far less than the sensor does."""
-        return self.measured > FAR * self.effective
+        return self.measured > (FAR if self.rejected < REJECTED_FROM else NEAR) * self.effective
 
 
 def noise_claims(
-    parameters: Mapping[str, float], measured: Mapping[str, float], reported: Mapping[str, float]
+    parameters: Mapping[str, float],
+    measured: Mapping[str, float],
+    reported: Mapping[str, float],
+    rejected: Mapping[str, float],
 ) -> dict[str, NoiseClaim]:
     """Claims by source.
 
@@ -64,6 +70,7 @@ def noise_claims(
     ----------
     measured : white noise of the readings of each source
     reported : what a receiver reports of its own noise
+    rejected : share of the test ratios of each source above 1
     """
     found = {}
     for source, noise in measured.items():
@@ -72,7 +79,7 @@ def noise_claims(
         if not (np.isfinite(told) and np.isfinite(noise) and noise > 0.0):
             continue
         effective = max(told, reported.get(source, 0.0))
-        found[source] = NoiseClaim(name, told, PARAMETERS[name].default, noise, effective)
+        found[source] = NoiseClaim(name, told, PARAMETERS[name].default, noise, effective, rejected.get(source, 0.0))
     return found
 
 
@@ -86,14 +93,22 @@ class AtLimit:
     default: float
 
 
-def at_limits(parameters: Mapping[str, float]) -> tuple[AtLimit, ...]:
-    """Parameters that people tune and that stand at a bound which is not their default."""
+def at_limits(parameters: Mapping[str, float], release: tuple[int, int] | None) -> tuple[AtLimit, ...]:
+    """Parameters that people tune and that stand at a bound which is no default, of the release that flew or another."""
     found = []
     for name, value in parameters.items():
         known = PARAMETERS.get(name)
-        if known is None or not name.endswith(LIMITED) or known.default == value:
+        if known is None or not name.endswith(LIMITED) or value in _defaults(known, release):
             continue
         for bound, is_low in ((known.minimum, True), (known.maximum, False)):
             if bound is not None and np.isclose(value, bound, rtol=1e-5, atol=1e-9):
                 found.append(AtLimit(name, value, is_low, known.default))
     return tuple(found)
+
+
+def _defaults(known: ParameterMetadata, release: tuple[int, int] | None) -> set[float]:
+    """Default now and in the release that flew, as PX4 stores them."""
+    defaults = {known.default}
+    if release is not None and known.exists_in(release):
+        defaults.add(known.default_in(release))
+    return defaults | {as_float32(one) for one in defaults}

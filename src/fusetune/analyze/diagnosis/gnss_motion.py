@@ -35,7 +35,8 @@ class GnssMotion:
     fit : delay and its like
     arm, arm_error : (3,) antenna from the IMU, FRD, m
     heading, heading_error : turns the gyros' frame to NED, rad
-    bias, bias_error : (3,) of the accelerometer in the air, FRD, m/s²
+    bias_down, bias_down_error : of the accelerometer in the air, down the body, m/s²: what the vertical velocity
+        grows by against that of GNSS
     """
 
     fit: LaggedFit
@@ -43,8 +44,8 @@ class GnssMotion:
     arm_error: Array
     heading: float
     heading_error: float
-    bias: Array
-    bias_error: Array
+    bias_down: float
+    bias_down_error: float
 
 
 def gnss_velocities(table: TopicTable | None) -> tuple[Times, Array] | None:
@@ -100,9 +101,25 @@ def gnss_motion(
         fit.errors[1:4],
         float(np.arctan2(np.sin(angle), np.cos(angle))),
         float(fit.errors[0]),
-        -fit.values[4:7],
-        fit.errors[4:7],
+        *_bias_down(time - round(fit.delay_s * 1e6), measured, motion),
     )
+
+
+def _bias_down(at: Times, measured: Array, motion: Motion) -> tuple[float, float]:
+    """Growth of the inertial vertical velocity against the measured one, and how unlike it is in pieces of the flight."""
+    gained = motion.at(at, motion.free_velocity)[:, 2] - measured[:, 2]
+    since_s = (at - at[0]) * 1e-6
+    whole = float(np.polyfit(since_s, gained, 1)[0])
+    piece = (since_s / PIECE_S).astype(np.int64)
+    slopes = [
+        float(np.polyfit(since_s[piece == one], gained[piece == one], 1)[0])
+        for one in np.unique(piece)
+        if np.count_nonzero(piece == one) >= FEWEST_IN_PIECE
+    ]
+    return whole, float(np.std(slopes) / np.sqrt(len(slopes))) if len(slopes) > 1 else float("inf")
+
+
+PIECE_S, FEWEST_IN_PIECE = 8.0, 10
 
 
 def _biased(motion: Motion) -> Array:

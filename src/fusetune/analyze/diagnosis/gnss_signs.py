@@ -12,6 +12,7 @@ from fusetune.analyze.diagnosis.gnss_motion import FIX_3D
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
 from fusetune.px4.flight import TopicTable
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
@@ -19,6 +20,8 @@ Times = npt.NDArray[np.int64]
 SILENT_S, SILENT_STEPS = 1.5, 4.0
 """So long without a message, and so many of its usual intervals, a receiver is silent."""
 LOST_S = 1.0
+CLEARLY = 1.2
+"""A receiver that is at a limit now and then is as good as PX4 asks for."""
 JUMP_SIGMAS, LEAST_JUMP_M, LEAST_JUMP_M_S = 8.0, 2.0, 1.0
 """A jump is beyond what this receiver's own noise does in days, and beyond what matters."""
 WORSE = 2.0
@@ -76,9 +79,7 @@ class GnssSigns:
     position_noise: float
 
 
-def gnss_signs(
-    table: TopicTable | None, airborne: tuple[Interval, ...], parameters: Mapping[str, float]
-) -> GnssSigns | None:
+def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> GnssSigns | None:
     """Look at the messages; None without any in the air."""
     if table is None or not airborne or "fix_type" not in table:
         return None
@@ -90,15 +91,17 @@ def gnss_signs(
     good = in_air & fixed
     names = {"eph": "EKF2_REQ_EPH", "epv": "EKF2_REQ_EPV", "s_variance_m_s": "EKF2_REQ_SACC"}
     told = {name: table[name].astype(np.float64) for name in names if name in table}
-    limit = {name: parameters.get(parameter, np.nan) for name, parameter in names.items() if name in told}
+    # whoever raised what PX4 asks for flies with a poor receiver all the same
+    limit = {name: PARAMETERS[parameter].default for name, parameter in names.items() if name in told}
     if "hdop" in table and "vdop" in table:
         told["pdop"] = np.hypot(table["hdop"].astype(np.float64), table["vdop"].astype(np.float64))
-        limit["pdop"] = parameters.get("EKF2_REQ_PDOP", np.nan)
+        limit["pdop"] = PARAMETERS["EKF2_REQ_PDOP"].default
     usual = {name: _median(values[good]) for name, values in told.items()}
     smooth = {name: _smoothed(values[good]) for name, values in told.items()}
     beyond = np.zeros(np.count_nonzero(good), bool)
     for name, values in smooth.items():
-        beyond |= values > limit[name]
+        if name in names:
+            beyond |= values > CLEARLY * limit[name]
     satellites = _smoothed(table["satellites_used"][good].astype(np.float64)) if "satellites_used" in table else np.zeros(0)
     jamming, noise = (_indicator(table, name, in_air) for name in ("jamming_indicator", "noise_per_ms"))
     up = np.zeros(np.count_nonzero(in_air), bool)

@@ -32,7 +32,7 @@ class MagnetometerSigns:
     Attributes
     ----------
     strength : median of the readings' size over that of the field
-    field_gauss : strength of the field at the place
+    field_gauss, level_gauss : strength of the field at the place, and of its level part
     by_gnss : whether the heading is that of GNSS; else it is the magnetometer's own
     fits : causes held against the readings, by name (`field_fits`)
     noise : of an averaged reading, per axis, Gauss
@@ -46,6 +46,7 @@ class MagnetometerSigns:
 
     strength: float
     field_gauss: float
+    level_gauss: float
     by_gnss: bool
     fits: dict[str, FieldFit]
     noise: float
@@ -102,6 +103,7 @@ def magnetometer_signs(
     return MagnetometerSigns(
         strength=float(np.median(np.linalg.norm(readings.measured, axis=1))) / strength,
         field_gauss=strength,
+        level_gauss=float(np.hypot(earth[0], earth[1])),
         by_gnss=known is not None,
         fits=fits,
         noise=noise,

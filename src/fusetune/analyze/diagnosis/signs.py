@@ -34,8 +34,8 @@ STUCK_COLUMNS = {
     "mag": ("vehicle_magnetometer", ("magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]")),
     "baro": ("vehicle_air_data", ("baro_alt_meter",)),
     "gnss": ("vehicle_gps_position", ("latitude_deg", "longitude_deg", "altitude_msl_m", "vel_n_m_s", "vel_e_m_s")),
-    "range": ("distance_sensor", ("current_distance",)),
 }
+FRAME_NED = 1
 STUCK_S = 2.0
 """No sensor that works repeats all of its digits so long (fusetune's verdict asks the same of a log)."""
 
@@ -104,7 +104,7 @@ class Signs:
     @cached_property
     def gnss(self) -> GnssSigns | None:
         """Messages of the receiver."""
-        return gnss_signs(self.table("vehicle_gps_position"), self.airborne, self.parameters)
+        return gnss_signs(self.table("vehicle_gps_position"), self.airborne)
 
     @cached_property
     def gnss_sound(self) -> tuple[Interval, ...]:
@@ -182,6 +182,17 @@ class Signs:
         """Airspeed."""
         return None if self.motion is None else airspeed_signs(self.observed.flight, self.motion, self.airborne)
 
+    @property
+    def fused(self) -> set[str]:
+        """Sensors that the log holds and the filter may use beside GNSS."""
+        return {"ev"} if self.table("vehicle_visual_odometry") is not None else set()
+
+    @property
+    def vision_knows_north(self) -> bool:
+        """Whether vision says that its frame is north, east, down."""
+        table = self.table("vehicle_visual_odometry")
+        return table is not None and bool(np.any(table.get("pose_frame", np.zeros(1)) == FRAME_NED))
+
     @cached_property
     def ratios(self) -> dict[str, SourceRatios]:
         """Test ratios of the replay, or the vehicle's own where there is none."""
@@ -202,12 +213,14 @@ class Signs:
             measured["baro_hgt"] = self.barometer.noise
         if self.magnetometer is not None:
             measured["mag"] = self.magnetometer.reading_noise
-        return noise_claims(self.parameters, measured, reported)
+        rejected = {name: one.above_gate for name, one in self.ratios.items()}
+        return noise_claims(self.parameters, measured, reported, rejected)
 
     @cached_property
     def at_limits(self) -> tuple[AtLimit, ...]:
         """Parameters at a bound."""
-        return at_limits(self.parameters)
+        release = self.observed.flight.release
+        return at_limits(self.parameters, release[:2] if release is not None else None)
 
     @cached_property
     def stuck(self) -> dict[str, Standstill]:

@@ -32,7 +32,7 @@ class VisionSigns:
     turn, turn_error : heading of vision's frame against north, rad, by the heading of GNSS or, without it, the replay's
     by_gnss : whether it is that of GNSS
     position_noise, velocity_noise : robust white noise of a reading, m and m/s; NaN without
-    told_position, told_velocity : what the estimator is told of these, standard deviations
+    claimed_position, claimed_velocity : what the messages claim of these, standard deviations; NaN without
     """
 
     fit: LaggedFit
@@ -43,8 +43,8 @@ class VisionSigns:
     by_gnss: bool
     position_noise: float
     velocity_noise: float
-    told_position: float
-    told_velocity: float
+    claimed_position: float
+    claimed_velocity: float
 
 
 def vision_signs(
@@ -92,7 +92,7 @@ def vision_signs(
         return None
     along, aside = fit.values[:2]
     angle = first + float(np.arctan2(aside, along)) - heading
-    told_position, told_velocity = _told(samples, parameters)
+    claimed_position, claimed_velocity = _claimed(samples)
     return VisionSigns(
         fit,
         float(np.hypot(along, aside)),
@@ -102,8 +102,8 @@ def vision_signs(
         by_gnss,
         noises[0],
         noises[1],
-        told_position,
-        told_velocity,
+        claimed_position,
+        claimed_velocity,
     )
 
 
@@ -130,12 +130,10 @@ def _noise(values: Array) -> float:
     return float(np.median(np.abs(rest)) / 0.6745 / np.sqrt(20.0))
 
 
-def _told(samples: np.ndarray, parameters: Mapping[str, float]) -> tuple[float, float]:
-    """Standard deviations that the estimator takes: of the messages, no smaller than the parameters."""
-    by_parameter = parameters.get("EKF2_EV_NOISE_MD", 0.0) != 0.0
-    told = []
-    for name, parameter in (("position_var", "EKF2_EVP_NOISE"), ("velocity_var", "EKF2_EVV_NOISE")):
-        least = parameters.get(parameter, 0.1)
-        message = np.sqrt(np.nanmedian(samples[name])) if not by_parameter and np.isfinite(samples[name]).any() else 0.0
-        told.append(float(max(message, least)))
-    return told[0], told[1]
+def _claimed(samples: np.ndarray) -> list[float]:
+    """Standard deviations that the messages claim of position and velocity."""
+    claims = []
+    for name in ("position_var", "velocity_var"):
+        variance = samples[name][np.isfinite(samples[name]) & (samples[name] > 0.0)]
+        claims.append(float(np.sqrt(np.median(variance))) if variance.size else float("nan"))
+    return claims

@@ -1,0 +1,50 @@
+"""A magnetometer that is scaled wrongly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns
+from fusetune.analyze.diagnosis.signs import Signs
+
+OFF_FROM = 0.2
+"""Calibrations on real logs are within 0.14 of the field's strength on an axis that the flight shows."""
+REMEDY = "Calibrate the compass where there is no iron; check that the driver's scale is that of the sensor (CAL_MAGn_?SCALE)"
+
+
+def diagnose(signs: Signs) -> Diagnosis | None:
+    """By a factor per axis, or one for all, that explains the readings better than any field of the body."""
+    one = signs.magnetometer
+    if one is None:
+        return None
+    scale = scaled(one)
+    if scale is None:
+        return None
+    off = float(np.abs(scale - 1.0).max())
+    told = ", ".join(f"{axis} {value:.2f}" for axis, value in zip("xyz", scale, strict=True))
+    words = f"readings are the field times {told}"
+    return diagnosed(
+        signs, "magnetometer_scale", "The magnetometer is scaled wrongly", "fail" if off > 0.6 else "warning",
+        confidence(off, OFF_FROM), [Sign(words, off, OFF_FROM, "1", "replay")], touches=("mag",), remedy=REMEDY,
+        values={f"mag_scale_{axis}": round(float(value), 3) for axis, value in zip("xyz", scale, strict=True)},
+    )  # fmt: skip
+
+
+def scaled(one: MagnetometerSigns) -> np.ndarray | None:
+    """(3,) factors, where they explain the readings."""
+    fits = one.fits
+    noise2 = one.noise**2
+    as_told, body = (max(fits[name].left ** 2 - noise2, 1e-8) for name in ("as_told", "body_field"))
+    for name, least in (("one_scale", 0.3), ("scale", 0.4)):
+        left = max(fits[name].left ** 2 - noise2, 0.0)
+        scale = np.array([fits[name].values[f"scale_{axis}"] for axis in "xyz"])
+        if (scale <= 0.2).any() or float(np.abs(scale - 1.0).max()) < OFF_FROM:
+            continue
+        if left < least * as_told and left < 0.7 * body and one.by_gnss:
+            return scale
+        # without a heading only the strength tells, and that all axes share it
+        if name == "one_scale" and not one.by_gnss and left < 0.15 * as_told and left < body:
+            return scale
+    return None
