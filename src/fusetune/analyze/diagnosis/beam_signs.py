@@ -15,7 +15,8 @@ from fusetune.px4.flight import Flight
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
-STEP_M, STEP_SIGMAS, OVER_S = 0.4, 8.0, 0.15
+STEP_M, STEP_SIGMAS, AROUND = 0.2, 8.0, 5
+"""A step is between the medians of some readings before and after."""
 SHORT_SHARE = 0.6
 """A reading below this share of the height is of something nearer than the ground."""
 SAME_M = 0.03
@@ -66,9 +67,8 @@ def range_signs(flight: Flight, motion: Motion, airborne: tuple[Interval, ...]) 
     step = np.median(np.diff(time))
     near = np.diff(time) < 2.5 * step
     off = level - height
-    change = np.where(near, np.diff(off), 0.0)
-    noise = float(np.median(np.abs(change))) / 0.6745 / np.sqrt(2.0)
-    found = np.flatnonzero(np.abs(change) > max(STEP_M, STEP_SIGMAS * noise))
+    noise = float(np.median(np.abs(np.diff(off)[near]))) / 0.6745 / np.sqrt(2.0) if near.any() else 0.0
+    found, change = _steps(off, near, max(STEP_M, STEP_SIGMAS * noise * MEDIAN_ERROR))
     # where most readings are of something else the height of the ground is that of the largest
     ground = float(np.percentile(off, 80.0))
     short = level < SHORT_SHARE * (height + ground)
@@ -77,10 +77,28 @@ def range_signs(flight: Flight, motion: Motion, airborne: tuple[Interval, ...]) 
     rows = np.flatnonzero(short)
     return RangeSigns(
         samples=time.size,
-        steps=tuple((int(time[i + 1]), float(change[i])) for i in found),
+        steps=tuple((int(time[i]), float(change[i])) for i in found),
         short_share=float(np.mean(short)),
         constant_share=float(np.mean(np.abs(values - middle) < SAME_M)) if values.size else 0.0,
         short=(int(time[rows[0]]), int(time[rows[-1]]) + 1) if rows.size else None,
         short_m=middle,
         noise=noise,
     )
+
+
+MEDIAN_ERROR = float(np.sqrt(2.0 * np.pi / 2.0 / AROUND))
+"""Standard error of the difference of two medians, for noise of 1."""
+
+
+def _steps(off: Array, near: npt.NDArray[np.bool_], limit: float) -> tuple[npt.NDArray[np.int64], Array]:
+    """Places where the median of the readings after differs most from that before, and by how much, (N,)."""
+    change = np.zeros(off.size)
+    if off.size <= 2 * AROUND:
+        return np.zeros(0, np.int64), change
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(off, AROUND), axis=1)
+    change[AROUND : off.size - AROUND + 1] = middle[AROUND:] - middle[:-AROUND]
+    whole = np.convolve(near, np.ones(2 * AROUND - 1), mode="same")[: off.size - 1] >= 2 * AROUND - 1
+    change[1:] = np.where(whole, change[1:], 0.0)
+    size = np.abs(change)
+    largest = np.lib.stride_tricks.sliding_window_view(np.pad(size, AROUND), 2 * AROUND + 1).max(axis=1)
+    return np.flatnonzero((size > limit) & (size == largest)), change

@@ -9,8 +9,8 @@ import numpy as np
 
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterMetadata, as_float32
 
-FAR, NEAR, REJECTED_FROM = 4.0, 3.3, 0.1
-"""A claimed noise is far off from this factor on: within it PX4's defaults serve sensors of many kinds.
+FAR, NEAR, REJECTED_FROM = 3.7, 3.3, 0.1
+"""A claimed noise is far off from this factor on, as near to four as its estimate is sure: within it PX4's defaults serve sensors of many kinds.
 One that is too small shows earlier, where the filter refuses measurements for it."""
 NOISES: Mapping[str, str] = {
     "gnss_vel": "EKF2_GPS_V_NOISE",

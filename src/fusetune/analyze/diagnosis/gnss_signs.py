@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,8 @@ SILENT_S, SILENT_STEPS = 1.5, 4.0
 """So long without a message, and so many of its usual intervals, a receiver is silent."""
 LOST_S = 1.0
 CLEARLY = 1.2
-"""A receiver that is at a limit now and then is as good as PX4 asks for."""
+"""A receiver that is at a limit now and then is as good as PX4 asks for, one that fell there is not."""
+FELL = 2.5
 JUMP_SIGMAS, LEAST_JUMP_M, LEAST_JUMP_M_S = 8.0, 2.0, 1.0
 """A jump is beyond what this receiver's own noise does in days, and beyond what matters."""
 WORSE = 2.0
@@ -56,7 +58,8 @@ class GnssSigns:
     usual_satellites : median
     jamming, usual_jamming : `jamming_indicator`, largest median of five and best; NaN where the receiver does not tell
     noise, usual_noise : `noise_per_ms`, likewise
-    jammed : when either was up, µs
+    jammed : when either was up, or the receiver said that it is jammed (`jamming_state`), µs
+    warned : whether it said so
     jumps : in the air, while the reported accuracy stayed
     position_noise : robust white noise of a horizontal position, m, against the receiver's own velocity
     """
@@ -75,6 +78,7 @@ class GnssSigns:
     noise: float
     usual_noise: float
     jammed: Interval | None
+    warned: bool
     jumps: tuple[Jump, ...]
     position_noise: float
 
@@ -101,7 +105,7 @@ def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> Gnss
     beyond = np.zeros(np.count_nonzero(good), bool)
     for name, values in smooth.items():
         if name in names:
-            beyond |= values > CLEARLY * limit[name]
+            beyond |= is_poor(values, usual[name], limit[name])
     satellites = _smoothed(table["satellites_used"][good].astype(np.float64)) if "satellites_used" in table else np.zeros(0)
     jamming, noise = (_indicator(table, name, in_air) for name in ("jamming_indicator", "noise_per_ms"))
     up = np.zeros(np.count_nonzero(in_air), bool)
@@ -109,6 +113,9 @@ def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> Gnss
         if values.size:
             best = float(np.min(values))
             up |= (values > least) & (values > 1.3 * best + 10.0)
+    warned = np.zeros(up.size, bool)
+    if "jamming_state" in table:
+        warned = (table["jamming_state"][in_air] >= JAMMING_WARNING) & (table["jamming_state"][in_air] <= JAMMING_CRITICAL)
     jumps, position_noise = _jumps(table, time, good, told)
     return GnssSigns(
         samples=int(np.count_nonzero(in_air)),
@@ -124,14 +131,21 @@ def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> Gnss
         usual_jamming=float(jamming.min()) if jamming.size else np.nan,
         noise=float(noise.max()) if noise.size else np.nan,
         usual_noise=float(noise.min()) if noise.size else np.nan,
-        jammed=_span(time[in_air], up),
+        jammed=_span(time[in_air], up | warned),
+        warned=bool(warned.any()),
         jumps=jumps,
         position_noise=position_noise,
     )
 
 
+JAMMING_WARNING, JAMMING_CRITICAL = 2, 3
 JAMMED_FROM, NOISY_FROM = 60.0, 130.0
 """u-blox receivers give 0–255 for continuous-wave jamming, and some 80–100 of noise in the open."""
+
+
+def is_poor(worst: Array | float, usual: float, limit: float) -> Any:
+    """Whether an accuracy is beyond what PX4 asks for: clearly, or after it was far better."""
+    return (worst > CLEARLY * limit) | ((worst > limit) & (worst > FELL * usual))
 
 
 def _median(values: Array) -> float:

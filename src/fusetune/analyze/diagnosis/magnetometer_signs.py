@@ -42,6 +42,7 @@ class MagnetometerSigns:
     disturbed : when a field of the place came and went, µs
     disturbance : how strong it was, Gauss, median
     undisturbed : RMS of what is left of the readings outside of it, Gauss
+    compass_off : how far the readings alone would turn the heading in the air, 90 % of the time less, rad
     """
 
     strength: float
@@ -56,6 +57,7 @@ class MagnetometerSigns:
     disturbed: Interval | None
     disturbance: float
     undisturbed: float
+    compass_off: float
 
 
 def earth_field(flight: Flight) -> Array | None:
@@ -113,7 +115,16 @@ def magnetometer_signs(
         disturbed=span,
         disturbance=size,
         undisturbed=calm,
+        compass_off=_compass_off(readings, earth, at),
     )
+
+
+def _compass_off(readings: FieldReadings, earth: Array, heading: float) -> float:
+    """Angle from the level part of the readings to that of the field, 90 % of its sizes."""
+    level = np.einsum("nij,nj->ni", readings.rotation, readings.measured)[:, :2]
+    seen = np.arctan2(level[:, 1], level[:, 0]) + heading
+    off = seen - np.arctan2(earth[1], earth[0])
+    return float(np.percentile(np.abs(np.angle(np.exp(1j * off))), 90.0))
 
 
 def _readings(table: TopicTable, motion: Motion, intervals: tuple[Interval, ...]) -> tuple[FieldReadings, float, float] | None:
@@ -137,7 +148,7 @@ def _readings(table: TopicTable, motion: Motion, intervals: tuple[Interval, ...]
     return readings, noise, max(float(np.median(count)), 1.0)
 
 
-DISTURBED_FROM, SIGMAS = 0.15, 6.0
+DISTURBED_FROM, SIGMAS = 0.12, 6.0
 """A passing field matters from this share of the earth's on, and is more than this times the readings' noise."""
 MOST_OF_FLIGHT = 0.7
 

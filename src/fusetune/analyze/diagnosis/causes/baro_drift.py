@@ -6,7 +6,7 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-DRIFT_FROM_M, SIGMAS = 2.5, 3.0
+DRIFT_FROM_M, SIGMAS = 2.2, 1.5
 """Within minutes; healthy barometers and GNSS heights part by up to 1.8 m in that time."""
 AGREES = 0.6
 FAILS_FROM_M = 15.0

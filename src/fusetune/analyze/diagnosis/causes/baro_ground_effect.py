@@ -6,8 +6,8 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-DIP_FROM_M, SIGMAS = 1.6, 3.0
-"""Usual dips are below 1.2 m, and EKF2_GND_EFF_DZ of 4 m takes them; what is more shows in the height all the same."""
+DIP_FROM_M, SIGMAS = 1.3, 1.5
+"""Usual dips are below 1 m, and EKF2_GND_EFF_DZ of 4 m takes them; what is more shows in the height all the same."""
 MARGIN = 1.1
 FAILS_FROM_M = 8.0
 

@@ -9,7 +9,7 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.flow_signs import FlowSigns
 from fusetune.analyze.diagnosis.signs import Signs
 
-TURN_FROM_DEG, LEFT_FROM, SIGMAS = 20.0, 0.3, 3.0
+TURN_FROM_DEG, LEFT_FROM, SIGMAS = 9.0, 0.3, 2.5
 REMEDY = (
     "Compare SENS_FLOW_ROT with how the sensor sits, and see that the driver publishes the angular rate over the same time "
     "as the flow (`delta_angle`); without a gyro of its own let PX4 use the autopilot's"
@@ -19,7 +19,9 @@ REMEDY = (
 def not_turned(one: FlowSigns) -> bool:
     """Whether scale alone explains what is left: turning is left as much as the scale is off."""
     left = one.rotation - (1.0 - one.scale)
-    return abs(np.degrees(one.turn)) < TURN_FROM_DEG and bool((np.abs(left) < LEFT_FROM + SIGMAS * np.minimum(one.rotation_error, 0.1)).all())
+    turn = abs(float(np.degrees(one.turn)))
+    is_straight = turn < TURN_FROM_DEG + SIGMAS * min(float(np.degrees(one.turn_error)), 10.0)
+    return is_straight and bool((np.abs(left) < LEFT_FROM + SIGMAS * np.minimum(one.rotation_error, 0.1)).all())
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:

@@ -9,7 +9,7 @@ from fusetune.analyze.diagnosis.causes.flow_rotation import not_turned
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-OFF_FROM, LEAST_OFF, SIGMAS = 0.15, 0.1, 3.0
+OFF_FROM, LEAST_OFF, SIGMAS = 0.09, 0.05, 2.5
 """Lenses and focal lengths are known to some percent."""
 
 

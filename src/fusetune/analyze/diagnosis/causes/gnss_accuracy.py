@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
-from fusetune.analyze.diagnosis.gnss_signs import CLEARLY
+from fusetune.analyze.diagnosis.gnss_signs import is_poor
 from fusetune.analyze.diagnosis.signs import Signs
 
 LABELS = {
@@ -28,7 +28,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     found = []
     for name, (label, unit) in LABELS.items():
         worst, limit = gnss.worst.get(name, 0.0), gnss.limit.get(name, float("nan"))
-        if worst > CLEARLY * limit:
+        if is_poor(worst, gnss.usual.get(name, limit), limit):
             words = f"{label} falls to {worst:.2f} {unit}, PX4 asks for {limit:.2f}"
             found.append(Sign(words, worst, limit, unit))
     if not found:

@@ -25,6 +25,8 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         found.append(Sign(f"the jamming indicator rises from {gnss.usual_jamming:.0f} to {gnss.jamming:.0f}", gnss.jamming, JAMMED_FROM, ""))
     if gnss.noise > NOISY_FROM:
         found.append(Sign(f"the receiver's noise rises from {gnss.usual_noise:.0f} to {gnss.noise:.0f}", gnss.noise, NOISY_FROM, ""))
+    if gnss.warned:
+        found.append(Sign("the receiver itself says that it is jammed", 2.0, 1.0, ""))
     costs = []
     if gnss.satellites < LOST_SATELLITES * gnss.usual_satellites:
         costs.append(Sign(f"satellites fall from {gnss.usual_satellites:.0f} to {gnss.satellites:.0f}", gnss.satellites, gnss.usual_satellites, ""))

@@ -8,6 +8,8 @@ from fusetune.analyze.diagnosis.signs import Signs
 
 LOST_FROM_S, SHARE_FROM, RATE_FROM_HZ = 0.25, 0.1, 100.0
 """Loggers of healthy vehicles lose up to 8 % of the samples, one at a time."""
+SHARE_WHOLE = 0.004
+"""Where the log holds what the estimator took of every run (`ekf2_timestamps`), the estimator missed them as well."""
 REMEDY = (
     "A faster card, fewer logged topics (SDLOG_PROFILE), a look at the load (`top`): what the logger lost the filter had. If "
     "the messages of the IMU themselves stop, look for a driver that restarts, wiring and power"
@@ -28,8 +30,9 @@ def diagnose(signs: Signs) -> Diagnosis | None:
             words = f"{len(imu.gaps)} gaps in the IMU samples, {imu.lost_s:.2f} s in all"
             found.append(Sign(words, imu.lost_s, LOST_FROM_S, "s"))
             when = (imu.gaps[0][0], imu.gaps[-1][1])
-        if imu.lost_share > SHARE_FROM:
-            found.append(Sign(f"{imu.lost_share:.0%} of the IMU samples are missing", imu.lost_share, SHARE_FROM, "1"))
+        share_from = SHARE_WHOLE if signs.table("ekf2_timestamps") is not None else SHARE_FROM
+        if imu.lost_share > share_from:
+            found.append(Sign(f"{imu.lost_share:.1%} of the IMU samples are missing", imu.lost_share, share_from, "1"))
     if not found:
         return None
     return diagnosed(

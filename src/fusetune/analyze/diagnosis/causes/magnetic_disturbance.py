@@ -10,7 +10,7 @@ from fusetune.analyze.diagnosis.causes.motor_magnetic_field import in_step
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-PASSING_FROM, BODY_FROM, SCATTER_FROM, STRENGTH_FROM = 0.2, 0.18, 0.25, 0.3
+PASSING_FROM, BODY_FROM, SCATTER_FROM, STRENGTH_FROM = 0.14, 0.14, 0.25, 0.25
 """Of the earth's field: calibrated compasses of healthy flights, real and simulated, are off by a tenth, and in strength
 by as much."""
 FAILS_FROM = 0.7

@@ -9,8 +9,8 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns
 from fusetune.analyze.diagnosis.signs import Signs
 
-OFF_FROM = 0.2
-"""Calibrations on real logs are within 0.14 of the field's strength on an axis that the flight shows."""
+OFF_FROM = 0.1
+"""Calibrations are better where the flight shows them; where a field of the body explains as much, that is taken."""
 REMEDY = "Calibrate the compass where there is no iron; check that the driver's scale is that of the sensor (CAL_MAGn_?SCALE)"
 
 

@@ -10,8 +10,8 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns
 from fusetune.analyze.diagnosis.signs import Signs
 
-FIELD_FROM = 0.1
-"""Of the earth's field: heading moves by some 15° where the field is steep. Healthy vehicles show a tenth of it."""
+FIELD_FROM = 0.06
+"""Of the earth's field: heading moves by 8° where the field is steep. Healthy vehicles show half of it."""
 FAILS_FROM = 0.7
 FITS_BELOW = 0.4
 """What a field of the body leaves of the readings, at most; wrong scales look like one that turns with the heading."""
@@ -51,5 +51,5 @@ def in_step(one: MagnetometerSigns) -> np.ndarray | None:
         return step if size > FIELD_FROM * one.field_gauss and is_own and fits_body else None
     coefficient = np.array([fits["motor_field"].values[f"motor_field_{axis}"] for axis in "xyz"])
     explained = 1.0 - (fits["motor_field"].left / max(fits["body_field"].left, 1e-9)) ** 2
-    large = float(np.linalg.norm(coefficient)) > 2.0 * FIELD_FROM * one.field_gauss
+    large = float(np.linalg.norm(coefficient)) > 3.0 * FIELD_FROM * one.field_gauss
     return coefficient if large and explained > 0.5 and fits["body_field"].left > 0.06 * one.field_gauss else None

@@ -25,8 +25,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if not found:
         return None
     return diagnosed(
-        signs, "parameter_at_limit", "A parameter stands at a bound of its range" if values else "A state stands at its limit",
-        "warning" if values else "note",
+        signs, "parameter_at_limit", "A parameter stands at a bound of its range" if values else "A state stands at its limit", "warning",
         0.9 if values else 0.7, found, values=values,
         remedy="Find out why it was set there: what it was to hide is seldom cured by it. Start again from the default"
         if values

@@ -6,7 +6,7 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-WASH_FROM_M, SIGMAS = 1.5, 3.0
+WASH_FROM_M, SIGMAS = 1.2, 2.0
 """For a thrust of the weight; usual are some decimetres."""
 FAILS_FROM_M = 8.0
 REMEDY = (

@@ -6,7 +6,7 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-SHORT_FROM, CONSTANT_FROM = 0.05, 0.6
+SHORT_FROM, CONSTANT_FROM = 0.03, 0.6
 REMEDY = (
     "Clear the beam: legs, cables, a payload that swings, a dirty window. In fog or dust the sensor reads its own range; "
     "EKF2_RNG_FOG tells the filter from how near on"

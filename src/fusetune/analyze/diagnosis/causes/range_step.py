@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fusetune.analyze.diagnosis.beam_signs import STEP_M
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
@@ -19,7 +20,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if one is None or len(one.steps) < FEWEST:
         return None
     largest = max(abs(size) for _, size in one.steps)
-    usual = max(8.0 * one.noise, 0.4)
+    usual = max(STEP_M, 4.0 * one.noise)
     words = f"the distance jumps {len(one.steps)} times by up to {largest:.1f} m while the vehicle does not"
     return diagnosed(
         signs, "range_step", "The range finder sees steps below", "warning", confidence(largest, usual, 0.93),

@@ -6,8 +6,8 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-COEFFICIENT_FROM, TOGETHER = 0.3, 16.0
-"""Share of the dynamic pressure: 0.2 is usual for a box with a hole, 0.3 moves the height by 1.5 m at 10 m/s. χ² of three
+COEFFICIENT_FROM, TOGETHER = 0.2, 16.0
+"""Share of the dynamic pressure: 0.2 moves the height by 1 m at 10 m/s. χ² of three
 directions is above 16 by chance once in a thousand flights."""
 RANGE_FROM_M, LEAST_RANGE_M = 0.4, 0.15
 """Less than that no flight suffers from, whatever the coefficient."""
@@ -29,7 +29,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     found, values = [], {}
     for direction, effect in errors.speed.items():
         size = abs(effect.value)
-        if size < COEFFICIENT_FROM + effect.error or effect.range_m < LEAST_RANGE_M:
+        if size < COEFFICIENT_FROM + 0.5 * effect.error or effect.range_m < LEAST_RANGE_M:
             continue
         sign = "more" if effect.value > 0.0 else "less"
         words = f"flying {direction} the barometer reads up to {effect.range_m:.1f} m {sign} (coefficient {effect.value:+.2f} ± {2.0 * effect.error:.2f})"
@@ -46,7 +46,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return None
     return diagnosed(
         signs, "static_pressure", "The barometer follows the airspeed", "fail" if range_m > FAILS_FROM_M else "warning",
-        confidence(found[0].figure, 1.5 * COEFFICIENT_FROM, 0.95), found, touches=("baro", "gnss_hgt", "rng"), values=values,
+        confidence(found[0].figure, COEFFICIENT_FROM, 0.9), found, touches=("baro", "gnss_hgt", "rng"), values=values,
         remedy="Shield the barometer from the airflow (foam, a closed bay). Else fly forward, backward, left and right at "
         "speed in still air and set EKF2_PCOEF_*; they act only where wind is estimated (airspeed, sideslip or drag fusion)",
     )  # fmt: skip

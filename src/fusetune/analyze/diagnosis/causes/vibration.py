@@ -12,8 +12,8 @@ from fusetune.ekf2.numerics.constants import ONE_G
 SHAKES_FROM = ONE_G
 """RMS change between IMU samples; Flight Review draws its red line for the vibration metric at 1 g as well. Healthy
 real quadrotors show up to 0.9 g, simulated ones 0.3."""
-OFFSET_FROM, SIGMAS = 0.7, 4.0
-"""m/s² of bias that come with the thrust; calibrated accelerometers keep within 0.2, and EKF2_ABL_LIM is 0.4."""
+OFFSET_FROM, SIGMAS = 0.35, 4.0
+"""m/s² of bias that come with the thrust; calibrated accelerometers keep within 0.1, and EKF2_ABL_LIM is 0.4."""
 REMEDY = (
     "Mount the autopilot on an isolation mount (all six resonances above 25 Hz and below the motors), balance "
     "propellers, look for loose parts. Only then, if it has to fly: gate of the height source × 2, EKF2_ACC_NOISE "

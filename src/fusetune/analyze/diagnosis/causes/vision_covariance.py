@@ -8,7 +8,7 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-SMALL_FROM, LARGE_FROM = 2.0, 12.0
+SMALL_FROM, LARGE_FROM = 1.6, 12.0
 """White noise over claim, and claim over white noise: vision wanders besides, so a claim of a few times the noise is sound."""
 REMEDY = (
     "Let vision report variances that match its errors, or set EKF2_EV_NOISE_MD 1 and EKF2_EVP_NOISE, EKF2_EVV_NOISE, "

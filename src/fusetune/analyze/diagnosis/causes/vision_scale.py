@@ -6,7 +6,7 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-OFF_FROM, SIGMAS = 0.12, 3.0
+OFF_FROM, SIGMAS = 0.055, 3.0
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:

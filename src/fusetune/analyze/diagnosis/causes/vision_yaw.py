@@ -8,7 +8,7 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-TURN_FROM_DEG, SIGMAS = 8.0, 3.0
+TURN_FROM_DEG, SIGMAS = 6.0, 2.5
 FAILS_FROM_DEG = 45.0
 REMEDY = (
     "Say what frame vision is in: POSE_FRAME_NED only if it knows north, else POSE_FRAME_FRD, and leave bit 3 (yaw) of "

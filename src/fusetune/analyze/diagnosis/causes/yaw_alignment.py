@@ -11,8 +11,10 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.flight.intervals import inside
 
-OFF_DEG, POSSIBLE_DEG = 15.0, 25.0
-"""PX4's guide: more than 15° off ends in circles that widen; a field that can turn the needle by 25° will."""
+OFF_DEG = 13.0
+"""PX4's guide says 15° of the heading that the filter ends with, which the gyros hold back."""
+LEVEL_SHARE = 0.4
+"""Of a field that is more upright than that the heading feels little; it is a disturbance like others."""
 REMEDY = (
     "Calibrate the compass away from iron, look for what became magnetic or was moved near it (screws, batteries, power "
     "leads); check the heading on the ground before the next take-off"
@@ -30,20 +32,21 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if not body.left < 0.4 * one.fits["as_told"].left:
         return None
     level = float(np.hypot(body.values["body_field_x"], body.values["body_field_y"]))
-    earth = one.level_gauss
-    possible = float(np.degrees(np.arcsin(min(level / max(earth, 1e-6), 1.0))))
+    if level < LEVEL_SHARE * abs(body.values["body_field_z"]):
+        return None
+    shown = float(np.degrees(one.compass_off))
     start = signs.airborne[0][0]
     rows = inside(motion.time, ((start, start + 3_000_000),))
     off = np.angle(np.exp(1j * (motion.heading_off[rows] - gnss.heading)))
     happened = float(np.degrees(np.abs(np.median(off)))) if rows.any() else 0.0
-    if not (possible > POSSIBLE_DEG or (happened > OFF_DEG and possible > OFF_DEG)):
+    if shown < OFF_DEG:
         return None
-    found = [Sign(f"a field of the body can turn the heading by {possible:.0f}°", possible, OFF_DEG, "°", "replay")]
+    found = [Sign(f"a field of the body turns the compass by up to {shown:.0f}°", shown, OFF_DEG, "°", "replay")]
     if happened > OFF_DEG:
         found.append(Sign(f"the heading was {happened:.0f}° off at take-off", happened, OFF_DEG, "°", "replay"))
     return diagnosed(
         signs, "yaw_alignment", "The heading is far off from the start: the compass feels a field of the body", "fail" if happened > 30.0 else "warning",
-        confidence(possible, OFF_DEG), found, touches=("mag", "gnss_vel", "gnss_pos"), remedy=REMEDY,
+        confidence(shown, OFF_DEG), found, touches=("mag", "gnss_vel", "gnss_pos"), remedy=REMEDY,
         values={f"body_field_{axis}_gauss": round(body.values[f"body_field_{axis}"], 4) for axis in "xyz"}
         | {"heading_off_deg": round(happened, 1)},
     )  # fmt: skip
