@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from fusetune.analyze.diagnosis.causes.registry import CAUSES
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.experiments import AT_MOST, with_experiments
 from fusetune.analyze.diagnosis.explained_away import explained_away
 from fusetune.analyze.diagnosis.innovation_signs import GATE
 from fusetune.analyze.diagnosis.signs import Signs
@@ -17,14 +18,18 @@ UNKNOWN_FROM = 0.15
 SEVERITIES = ("note", "warning", "fail")
 
 
-def diagnose(observed: ObservedFlight) -> tuple[Diagnosis, ...]:
+def diagnose(observed: ObservedFlight, experiments: int = AT_MOST) -> tuple[Diagnosis, ...]:
     """What is wrong, what explains most first; empty where nothing is.
 
     A flight that cannot be replayed is asked, too: rules that need a replay say nothing then.
+
+    Parameters
+    ----------
+    experiments : how many of the first claims are tried by another replay at most
     """
     signs = Signs(observed)
     found = [one for cause in CAUSES.values() if (one := cause(signs)) is not None]
-    left = explained_away(found)
+    left = with_experiments(in_order(explained_away(found)), signs, experiments)
     if not any(one.severity != "note" for one in left):
         unknown = _unknown(signs)
         left += [unknown] if unknown is not None else []

@@ -33,7 +33,7 @@ MAKES: Mapping[str, tuple[str, ...]] = {
     "magnetometer_rotated": ("yaw_alignment", "magnetic_disturbance", "magnetometer_scale", "motor_magnetic_field", "vision_yaw"),
     "motor_magnetic_field": ("yaw_alignment", "magnetometer_scale"),
     "magnetometer_scale": ("yaw_alignment",),
-    "yaw_alignment": ("magnetometer_scale",),
+    "yaw_alignment": ("magnetometer_scale", "magnetic_disturbance"),
     "gnss_delay": ("noise_claim",),
     "gnss_lever_arm": ("noise_claim",),
     "range_obstruction": ("range_step", "flow_scale", "flow_delay", "flow_rotation"),

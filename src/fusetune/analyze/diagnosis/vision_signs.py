@@ -19,6 +19,8 @@ Times = npt.NDArray[np.int64]
 
 FASTEST_HZ = 10.0
 FEWEST = 60
+LEAST_SPEED_M_S = 0.5
+"""A vehicle that hovers moves less than the drift of what its IMU integrates."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class VisionSigns:
     turn, turn_error : heading of vision's frame against north, rad, by the heading of GNSS or, without it, the replay's
     by_gnss : whether it is that of GNSS
     position_noise, velocity_noise : robust white noise of a reading, m and m/s; NaN without
+    speed : RMS of the vehicle's level velocity less its mean, m/s
     claimed_position, claimed_velocity : what the messages claim of these, standard deviations; NaN without
     """
 
@@ -43,6 +46,7 @@ class VisionSigns:
     by_gnss: bool
     position_noise: float
     velocity_noise: float
+    speed: float
     claimed_position: float
     claimed_velocity: float
 
@@ -102,6 +106,7 @@ def vision_signs(
         by_gnss,
         noises[0],
         noises[1],
+        float(np.sqrt(np.sum(np.var(motion.at(at_time, motion.velocity)[:, :2], axis=0)))),
         claimed_position,
         claimed_velocity,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
-from fusetune.analyze.diagnosis.causes.magnetometer_scale import scaled
+from fusetune.analyze.diagnosis.causes.magnetometer_scale import scaled, scaled_down
 from fusetune.analyze.diagnosis.causes.motor_magnetic_field import in_step
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
@@ -40,7 +40,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     size = float(np.linalg.norm(body)) / earth
     if one.by_gnss and size > BODY_FROM and fits["body_field"].left < 0.4 * fits["as_told"].left:
         words = f"a constant field of the body of {size:.0%} of the earth's was not calibrated"
-        return _diagnosis(signs, "The compass feels a constant field of the body", [Sign(words, size, BODY_FROM, "1", "replay")], None)
+        return _diagnosis(signs, "The compass feels a constant field of the body", [Sign(words, size, BODY_FROM, "1", "replay")], None, 0.5 if scaled_down(one) is not None else 1.0)
     found = []
     if abs(one.strength - 1.0) > STRENGTH_FROM:
         words = f"the field is {one.strength:.2f} times as strong as the earth's there"
@@ -51,12 +51,14 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     return _diagnosis(signs, "The magnetometer is disturbed", found, None) if found else None
 
 
-def _diagnosis(signs: Signs, cause: str, found: list[Sign], when: tuple[int, int] | None) -> Diagnosis:
+def _diagnosis(
+    signs: Signs, cause: str, found: list[Sign], when: tuple[int, int] | None, most: float = 1.0
+) -> Diagnosis:
     worst = max(found, key=lambda one: one.figure / one.usual)
     # without a heading of its own the fit cannot be sure whose field it was; strength needs none
     sure = signs.magnetometer is not None and signs.magnetometer.by_gnss
     is_strong = any(one.figure > FAILS_FROM and (sure or one.origin == "vehicle") for one in found)
     return diagnosed(
-        signs, "magnetic_disturbance", cause, "fail" if is_strong else "warning", confidence(worst.figure, worst.usual),
+        signs, "magnetic_disturbance", cause, "fail" if is_strong else "warning", min(confidence(worst.figure, worst.usual), most),
         found, touches=("mag",), remedy=REMEDY, when=when, values={"field_share": round(found[0].figure, 3)},
     )  # fmt: skip

@@ -20,6 +20,8 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if one is None:
         return None
     scale = scaled(one)
+    is_sure = scale is not None
+    scale = scale if scale is not None else scaled_down(one)
     if scale is None:
         return None
     off = float(np.abs(scale - 1.0).max())
@@ -27,7 +29,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     words = f"readings are the field times {told}"
     return diagnosed(
         signs, "magnetometer_scale", "The magnetometer is scaled wrongly", "fail" if off > 0.6 else "warning",
-        confidence(off, OFF_FROM), [Sign(words, off, OFF_FROM, "1", "replay")], touches=("mag",), remedy=REMEDY,
+        confidence(off, OFF_FROM) if is_sure else 0.5, [Sign(words, off, OFF_FROM, "1", "replay")], touches=("mag",), remedy=REMEDY,
         values={f"mag_scale_{axis}": round(float(value), 3) for axis, value in zip("xyz", scale, strict=True)},
     )  # fmt: skip
 
@@ -48,3 +50,22 @@ def scaled(one: MagnetometerSigns) -> np.ndarray | None:
         if name == "one_scale" and not one.by_gnss and left < 0.15 * as_told and left < body:
             return scale
     return None
+
+
+def scaled_down(one: MagnetometerSigns) -> np.ndarray | None:
+    """(3,) factors of which only that of the down axis is off.
+
+    Where a vehicle hardly tilts, the field down the body is constant, and a wrong scale there is the same as a field of
+    the body along it: neither can be excluded, and both are told.
+    """
+    if not one.by_gnss:
+        return None
+    fits = one.fits
+    body = np.array([fits["body_field"].values[f"body_field_{axis}"] for axis in "xyz"])
+    scale = np.array([1.0, 1.0, fits["scale"].values["scale_z"]])
+    is_upright = float(np.hypot(body[0], body[1])) < UPRIGHT * abs(float(body[2]))
+    fits_well = fits["body_field"].left < 0.4 * fits["as_told"].left and fits["scale"].left < 0.6 * fits["as_told"].left
+    return scale if is_upright and fits_well and abs(scale[2] - 1.0) > OFF_FROM and scale[2] > 0.2 else None
+
+
+UPRIGHT = 0.4

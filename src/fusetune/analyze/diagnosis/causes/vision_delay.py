@@ -5,6 +5,7 @@ from __future__ import annotations
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
+from fusetune.analyze.diagnosis.vision_signs import LEAST_SPEED_M_S
 
 MATTERS_MS, SIGMAS = 25.0, 3.0
 SCALE_OFF = 0.2
@@ -13,7 +14,7 @@ SCALE_OFF = 0.2
 def diagnose(signs: Signs) -> Diagnosis | None:
     """By the time by which vision lags behind the motion; a wrong scale looks like one, so there is none beside it."""
     one = signs.vision
-    if one is None or abs(one.scale - 1.0) > SCALE_OFF:
+    if one is None or one.speed < LEAST_SPEED_M_S or abs(one.scale - 1.0) > SCALE_OFF:
         return None
     told = signs.parameters["EKF2_EV_DELAY"]
     value, error = 1e3 * one.fit.delay_s, 1e3 * one.fit.delay_error_s

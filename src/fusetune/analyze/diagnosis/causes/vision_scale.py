@@ -5,6 +5,7 @@ from __future__ import annotations
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
+from fusetune.analyze.diagnosis.vision_signs import LEAST_SPEED_M_S
 
 OFF_FROM, SIGMAS = 0.055, 3.0
 
@@ -12,7 +13,7 @@ OFF_FROM, SIGMAS = 0.055, 3.0
 def diagnose(signs: Signs) -> Diagnosis | None:
     """By the way by vision over the way by IMU."""
     one = signs.vision
-    if one is None:
+    if one is None or one.speed < LEAST_SPEED_M_S:
         return None
     off, level = abs(one.scale - 1.0), OFF_FROM + SIGMAS * one.scale_error
     if off < level or one.scale < 0.05:

@@ -7,6 +7,7 @@ import numpy as np
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
+from fusetune.analyze.diagnosis.vision_signs import LEAST_SPEED_M_S
 
 TURN_FROM_DEG, SIGMAS = 6.0, 2.5
 FAILS_FROM_DEG = 45.0
@@ -19,7 +20,7 @@ REMEDY = (
 def diagnose(signs: Signs) -> Diagnosis | None:
     """By the angle from the way by vision to the way by GNSS and IMU, where vision says that it knows north."""
     one = signs.vision
-    if one is None or not one.by_gnss or not signs.vision_knows_north:
+    if one is None or one.speed < LEAST_SPEED_M_S or not one.by_gnss or not signs.vision_knows_north:
         return None
     turn, error = abs(float(np.degrees(one.turn))), float(np.degrees(one.turn_error))
     if turn < TURN_FROM_DEG + SIGMAS * error:
