@@ -11,6 +11,9 @@ DONE = 0
 REFUSED = 1
 """All that could be done is: at least one log was refused, and the lines printed say why and what to do about it."""
 
+FOUND_FAILURE = 3
+"""A diagnosis found what nobody should fly with."""
+
 USER_ERROR = 2
 """Nothing more could be done, because of the command line or a file: one line says what to do."""
 
@@ -40,7 +43,7 @@ class Command(Protocol):
         Returns
         -------
         int
-            `DONE` or `REFUSED`
+            `DONE` or `REFUSED`; of `diagnose` as it says
 
         Raises
         ------

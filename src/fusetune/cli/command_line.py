@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, design, fidelity, replay, save, search, simulate, study
+from fusetune.cli import cards, design, diagnose, fidelity, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -21,6 +21,7 @@ COMMANDS: Mapping[str, Command] = {
     "save": save,
     "replay": replay,
     "fidelity": fidelity,
+    "diagnose": diagnose,
     "search": search,
 }
 """In the order of the pipeline."""
@@ -66,7 +67,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fusetune",
         description="Single steps of the pipeline; `snakemake` runs them all.",
-        epilog="Exit status: 0 all is done; 1 a log was refused; 2 the command or a file cannot be used.",
+        epilog="Exit status: 0 all is done; 1 a log was refused, or `diagnose` warns; 2 the command or a file cannot be used; "
+        "3 `diagnose` found a failure.",
     )
     parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")

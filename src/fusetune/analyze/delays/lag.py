@@ -20,36 +20,26 @@ that is wider.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import stdtrit
 
-from fusetune.analyze.metrics.likelihood import NORMAL_CONSISTENCY
+from fusetune.analyze.metrics.whitened_regression import Fit, Rows, generalised, order_of, runs
 
 Array = npt.NDArray[np.float64]
 
 LARGEST_CHANGE_S = 0.3
 """Further from what it is told no delay is looked for."""
-BLOCK_S = 5.0
-FEWEST_BLOCKS = 4
-MEMORY_S = 3.0
-"""Of the autoregressive model."""
-LONGEST_MEMORY = 40
 FASTEST_HZ = 20.0
 """Of a faster series not every sample is taken: motion of vehicles is slower."""
-_FEWEST_ROWS = 40
 _ROUNDS = 15
 _STANDS_S = 2e-4
 _GREATEST_STEP_S = 0.1
 _RATE_OVER_S = 0.04
 _PROBE_S = 0.015
 _LEAST_SLOPE = 0.25
-_HUBER = 2.0
-_GAP_STEPS = 1.5
 
 
 @dataclass(frozen=True)
@@ -102,7 +92,7 @@ def lag_of(series: LaggedSeries, told_s: float) -> Lag | None:
         fit = regression.at(delay_s)
         if fit is None:
             return None
-        change = float(np.clip(fit.change_s, -_GREATEST_STEP_S, _GREATEST_STEP_S))
+        change = float(np.clip(fit.solution[0], -_GREATEST_STEP_S, _GREATEST_STEP_S))
         delay_s += change
         if abs(delay_s - told_s) > LARGEST_CHANGE_S:
             return None
@@ -110,16 +100,16 @@ def lag_of(series: LaggedSeries, told_s: float) -> Lag | None:
             break
     else:
         return None
-    error = fit.standard_error()
+    errors = fit.standard_errors()
     around = [regression.at(delay_s + side) for side in (-_PROBE_S, _PROBE_S)]
-    if error is None or around[0] is None or around[1] is None:
+    if errors is None or around[0] is None or around[1] is None:
         return None
     # Noise in the rate makes each step too short, and the regression too sure of it, by the same factor.
-    slope = (around[0].change_s - around[1].change_s) / (2.0 * _PROBE_S)
+    slope = float(around[0].solution[0] - around[1].solution[0]) / (2.0 * _PROBE_S)
     if slope < _LEAST_SLOPE:
         return None
-    standard_error_s, blocks = error
-    return Lag(delay_s, standard_error_s / min(slope, 1.0), blocks - 1, fit.residual.size)
+    standard_errors, blocks = errors
+    return Lag(delay_s, float(standard_errors[0]) / min(slope, 1.0), blocks - 1, fit.residual.size)
 
 
 class _Regression:
@@ -130,12 +120,12 @@ class _Regression:
         every = max(1, int(1.0 / (FASTEST_HZ * step_s) + 0.5)) if step_s > 0.0 else 1
         self._series = series = replace(series, time=series.time[::every], measured=series.measured[::every])
         step_s *= every
-        self._runs = list(_runs(series.time))
-        self._order = int(np.clip(round(MEMORY_S / step_s), 2, LONGEST_MEMORY))
+        self._runs = list(runs(series.time))
+        self._order = order_of(step_s)
         self._half_s = min(0.5 * step_s, _RATE_OVER_S)
         self._seconds = series.motion_time * 1e-6
 
-    def at(self, delay_s: float) -> _Fit | None:
+    def at(self, delay_s: float) -> Fit | None:
         """The best change of a delay; None where there are too few samples."""
         series = self._series
         at: Array = np.asarray(series.time * 1e-6 - delay_s, np.float64)
@@ -146,8 +136,8 @@ class _Regression:
             used = inside[run]
             if np.count_nonzero(used) > 2 * self._order + 2 + series.differences:
                 one, other = (np.diff(part[run][used], series.differences, axis=0) for part in (left, design))
-                rows.append(_Rows(one, other, at[run][used][series.differences :]))
-        return _generalised(rows, self._order) if rows else None
+                rows.append(Rows(one, other, at[run][used][series.differences :]))
+        return generalised(rows, self._order) if rows else None
 
     def _looked_up(self, when: Array, values: Array) -> Array:
         flat = values.reshape(values.shape[0], -1)
@@ -167,99 +157,3 @@ class _Regression:
             columns.append(across)
         design = np.stack(columns, axis=2)
         return design if series.arms is None else np.concatenate([design, self._looked_up(at, series.arms)], axis=2)
-
-
-class _Rows(NamedTuple):
-    """A run of the series, differenced: what is left of the measurement, its regressors, times in s."""
-
-    left: Array
-    design: Array
-    when: Array
-
-
-def _runs(time: npt.NDArray[np.int64]) -> Iterator[slice]:
-    """Parts of the series without gaps, those that are long enough."""
-    if time.size < _FEWEST_ROWS:
-        return
-    step = np.diff(time)
-    cuts = np.flatnonzero(step > _GAP_STEPS * np.median(step)) + 1
-    for start, stop in zip([0, *cuts.tolist()], [*cuts.tolist(), time.size], strict=True):
-        if stop - start >= _FEWEST_ROWS:
-            yield slice(start, stop)
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """White rows of the regression, their weights, and the solution, whose first element is the change of the delay."""
-
-    design: Array
-    residual: Array
-    weight: Array
-    when: Array
-    solution: Array
-
-    @property
-    def change_s(self) -> float:
-        return float(self.solution[0])
-
-    def standard_error(self) -> tuple[float, int] | None:
-        """Of the change, s, and the number of blocks behind it; None where there are too few."""
-        scaled, target = self.design * self.weight[:, None], self.residual * self.weight
-        block = np.floor((self.when - self.when.min()) / BLOCK_S).astype(np.int64)
-        blocks = np.unique(block)
-        if blocks.size < FEWEST_BLOCKS:
-            return None
-        normal, moment = scaled.T @ scaled, scaled.T @ target
-        without = []
-        for one in blocks:
-            own = block == one
-            part, rest = scaled[own], target[own]
-            without.append(np.linalg.lstsq(normal - part.T @ part, moment - part.T @ rest, rcond=None)[0][0])
-        spread = float(np.sum((np.array(without) - np.mean(without)) ** 2))
-        jackknife = (blocks.size - 1) / blocks.size * spread
-        left = target - scaled @ self.solution
-        variance = float(left @ left) / max(left.size - self.solution.size, 1)
-        promised = variance * float(np.linalg.pinv(normal)[0, 0])
-        return float(np.sqrt(max(jackknife, promised))), int(blocks.size)
-
-
-def _generalised(rows: list[_Rows], order: int) -> _Fit:
-    """Least squares over white rows of usual size; the filter that makes them white is fitted to what is left."""
-    axes, parameters = rows[0].design.shape[1:]
-    solution: Array = np.zeros(parameters)
-    for _ in range(2):
-        white = [_whitened(rows, solution, axis, order) for axis in range(axes)]
-        residual, design, when = (np.concatenate([one[part] for one in white]) for part in range(3))
-        weight: Array = np.ones(residual.size)
-        for _ in range(3):
-            solution = np.asarray(np.linalg.lstsq(design * weight[:, None], residual * weight, rcond=None)[0])
-            left = np.asarray(np.abs(residual - design @ solution))
-            weight = np.asarray(np.sqrt(np.minimum(1.0, _HUBER / np.maximum(left, 1e-12))))
-    return _Fit(design, residual, weight, when, solution)
-
-
-def _whitened(rows: list[_Rows], solution: Array, axis: int, order: int) -> tuple[Array, Array, Array]:
-    """Rows and regressors of one axis through the filter that makes what is left white and of unit size; times."""
-    windows = [_windows(row.left[:, axis] - row.design[:, axis] @ solution, order) for row in rows]
-    past, now = np.concatenate([one[:, :-1] for one in windows]), np.concatenate([one[:, -1] for one in windows])
-    usual_size = 6.0 * _size(now)
-    usual = (np.abs(now) < usual_size) & (np.abs(past) < usual_size).all(axis=1)
-    if np.count_nonzero(usual) > 3 * order:
-        past, now = past[usual], now[usual]
-    makes_white = np.append(-np.linalg.lstsq(past.T @ past, past.T @ now, rcond=1e-12)[0], 1.0)
-    makes_white /= max(_size(now + past @ makes_white[:-1]), 1e-12)
-    return (
-        np.concatenate([_windows(row.left[:, axis], order) @ makes_white for row in rows]),
-        np.concatenate([_windows(row.design[:, axis], order) @ makes_white for row in rows]),
-        np.concatenate([row.when[order:] for row in rows]),
-    )
-
-
-def _windows(values: Array, order: int) -> Array:
-    """Each value behind those before it, (N − order, …, order + 1)."""
-    return np.lib.stride_tricks.sliding_window_view(values, order + 1, axis=0)
-
-
-def _size(values: Array) -> float:
-    """Robust standard deviation."""
-    return NORMAL_CONSISTENCY * float(np.median(np.abs(values - np.median(values))))

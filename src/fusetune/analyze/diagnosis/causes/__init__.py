@@ -1,1 +1,1 @@
-"""One cause each: its signs, its evidence, its remedy and where this is known from."""
+"""Causes, each a file: what shows it, how sure that is, and what to do about it."""

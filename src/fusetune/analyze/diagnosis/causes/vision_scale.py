@@ -1,0 +1,26 @@
+"""External vision is scaled wrongly, as with one camera."""
+
+from __future__ import annotations
+
+from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.signs import Signs
+from fusetune.analyze.diagnosis.vision_signs import LEAST_SPEED_M_S
+
+OFF_FROM, SIGMAS = 0.055, 3.0
+
+
+def diagnose(signs: Signs) -> Diagnosis | None:
+    """By the way by vision over the way by IMU."""
+    one = signs.vision
+    if one is None or one.speed < LEAST_SPEED_M_S:
+        return None
+    off, level = abs(one.scale - 1.0), OFF_FROM + SIGMAS * one.scale_error
+    if off < level or one.scale < 0.05:
+        return None
+    words = f"vision's way is {one.scale:.2f} (±{2.0 * one.scale_error:.2f}) times the vehicle's"
+    return diagnosed(
+        signs, "vision_scale", "Vision is scaled wrongly", "fail" if off > 0.4 else "warning", confidence(off, level, 0.95),
+        [Sign(words, off, OFF_FROM, "1", "replay")], touches=("ev",), values={"vision_scale": round(one.scale, 3)},
+        remedy=f"Give vision its scale (stereo, IMU or a known length), or divide by {one.scale:.2f} before it is sent",
+    )  # fmt: skip

@@ -1,0 +1,93 @@
+"""The diagnosis of log after log: one that cannot be read is told of, and the next one is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusetune.analyze.diagnosis.diagnose import diagnose
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis
+from fusetune.analyze.diagnosis.experiments import AT_MOST
+from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.analyze.reconstruction.settings import ReconstructionSettings
+from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
+from fusetune.errors import UserError
+from fusetune.px4.ulog.reader import read_ulog
+from fusetune.save.discovery import discover_logs, printable
+from fusetune.storage.files import AnyPath
+
+AS_FLOWN = ReplaySettings(None, ReconstructionSettings(), StartSettings())
+"""The log is repaired and started as the pipeline does it; what a filter predicts without a sensor is not asked."""
+_DAMAGED = (LookupError, ValueError, TypeError, ArithmeticError)
+"""What damage can end in that leaves no field of a topic in its place."""
+
+
+@dataclass(frozen=True)
+class DiagnosedLog:
+    """One log.
+
+    Attributes
+    ----------
+    log : as it can be printed
+    found : what is wrong, what explains most first
+    start_us, stop_us : of the log, µs since boot
+    error : why it could not be read, else None
+    """
+
+    log: str
+    found: tuple[Diagnosis, ...] = ()
+    start_us: int = 0
+    stop_us: int = 0
+    error: UserError | None = None
+
+    def document(self) -> dict[str, Any]:
+        """As JSON holds it."""
+        document: dict[str, Any] = {"log": self.log, "duration_s": round((self.stop_us - self.start_us) * 1e-6, 3)}
+        document["error"] = None if self.error is None else {"reason": self.error.reason, "remedy": self.error.remedy}
+        document["findings"] = [one.document(self.start_us) for one in self.found]
+        return document
+
+
+def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iterator[DiagnosedLog]:
+    """Diagnose logs one after the other, each when it is asked for.
+
+    Parameters
+    ----------
+    paths : logs, and folders that are searched for logs
+    experiments : as for `diagnose`
+    """
+    for path in map(Path, paths):
+        if not path.is_dir():
+            yield _diagnosed(path, printable(str(path)), experiments)
+            continue
+        try:
+            inside = discover_logs(path)
+        except OSError as error:
+            reason = f"cannot be listed ({error.strerror or error})"
+            yield DiagnosedLog(printable(str(path)), error=UserError(path, reason, "Mend its permissions"))
+            continue
+        for entry in inside.refused:
+            shown = printable(str(path / entry.shown))
+            yield DiagnosedLog(shown, error=UserError(shown, entry.reason, entry.remedy))
+        for log in inside.logs:
+            yield _diagnosed(Path(log.path), printable(str(path / log.shown)), experiments)
+        if not inside.refused and not inside.logs:
+            shown = printable(str(path))
+            yield DiagnosedLog(shown, error=UserError(shown, "holds no log", "Name a folder with .ulg files in it"))
+
+
+def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
+    try:
+        flight = read_ulog(path)
+        found = diagnose(ObservedFlight(flight, AS_FLOWN), experiments)
+    except UserError as error:
+        return DiagnosedLog(shown, error=error)
+    except OSError as error:
+        reason = f"cannot be read ({error.strerror or error})"
+        return DiagnosedLog(shown, error=UserError(shown, reason, "Mend its permissions, or copy it again"))
+    except _DAMAGED as error:
+        reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
+        return DiagnosedLog(shown, error=UserError(shown, reason, "Copy the log from the vehicle again"))
+    return DiagnosedLog(shown, found, flight.start_timestamp, flight.last_timestamp)

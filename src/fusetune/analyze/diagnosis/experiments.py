@@ -1,0 +1,222 @@
+"""The replay as an experiment: the flight once more with a claimed cause taken away.
+
+A wrong value is put right, a sensor that misleads is withheld where it does, a part that shakes is told to. If the cause is
+what it is said to be, the test ratios of the sources that it spoils fall; if they stay or grow, the claim was wrong. The
+sources that are compared are those that both replays have, over the same time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.innovation_signs import SourceRatios, replayed_ratios
+from fusetune.analyze.diagnosis.signs import Signs
+from fusetune.analyze.replaying.prepared_flight import PreparedFlight
+from fusetune.analyze.replaying.replay_flight import replay_set
+from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.px4.aid_sources import SENSORS
+from fusetune.px4.flight import Flight, TopicTable, select_rows
+
+AT_MOST = 2
+"""By default: with them a minute of flight is diagnosed in half a second."""
+FALLS, GROWS = 0.9, 1.25
+"""Mean test ratios are alike between these: what a replay changes by chance."""
+FALLS_BY, GROWS_BY = 0.001, 0.005
+"""Smaller differences of mean ratios say nothing."""
+SURER, LESS_SURE = 0.5, 0.6
+"""A claim that the experiment bears out loses half of its doubt, one that it contradicts keeps this of its confidence."""
+LEAST_CONFIDENCE = 0.4
+"""A claim below falls."""
+
+Edit = Callable[[Flight], Flight]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is done otherwise.
+
+    Attributes
+    ----------
+    words : what is done, as `with EKF2_GPS_DELAY 90`
+    judged : how the names of the sources begin whose ratios should fall
+    overrides : parameters
+    edit : of the flight, before it is replayed
+    """
+
+    words: str
+    judged: tuple[str, ...]
+    overrides: Mapping[str, float] = field(default_factory=dict)
+    edit: Edit | None = None
+
+
+def experiment_for(diagnosis: Diagnosis, signs: Signs) -> Experiment | None:
+    """The experiment that a claim asks for; None where no replay can tell."""
+    values = diagnosis.values
+    if diagnosis.id in PARAMETERS_OF:
+        judged, prefixes = PARAMETERS_OF[diagnosis.id]
+        overrides = {name: value for name, value in values.items() if name.startswith(prefixes)}
+        if not overrides:
+            return None
+        told = ", ".join(f"{name} {value:g}" for name, value in sorted(overrides.items()))
+        return Experiment(f"with {told}", judged, overrides)
+    if diagnosis.id in ("vibration", "accelerometer_clipping"):
+        noise = max(0.8, 2.0 * signs.parameters.get("EKF2_ACC_NOISE", 0.35))
+        return Experiment(f"with EKF2_ACC_NOISE {min(noise, 1.0):g}", ("gnss", "baro"), {"EKF2_ACC_NOISE": min(noise, 1.0)})
+    if diagnosis.id in WITHHELD or diagnosis.id == "sensor_stuck":
+        stuck = max(STUCK, key=lambda name: values.get(f"{name}_stuck_s", 0.0))
+        sensor, judged = WITHHELD.get(diagnosis.id, (stuck, STUCK[stuck]))
+        words = f"without {SENSORS[sensor].label} from {_at(signs, diagnosis.start_us)} to {_at(signs, diagnosis.stop_us)}"
+        return Experiment(words, judged, edit=lambda flight: _without(flight, sensor, diagnosis.start_us, diagnosis.stop_us))
+    if diagnosis.id == "motor_magnetic_field" and signs.motion is not None:
+        coefficient = np.array([values[f"motor_field_{axis}_gauss"] for axis in "xyz"])
+        motion = signs.motion
+        return Experiment(
+            "with the field of the motors taken out", ("mag",),
+            edit=lambda flight: _magnetometer(flight, lambda time, field: field - motion.at(time, motion.thrust)[:, None] * coefficient),
+        )  # fmt: skip
+    if diagnosis.id == "yaw_alignment":
+        body = np.array([values[f"body_field_{axis}_gauss"] for axis in "xyz"])
+        return Experiment(
+            "with the field of the body taken out", ("mag",), edit=lambda flight: _magnetometer(flight, lambda _, field: field - body)
+        )
+    if diagnosis.id == "magnetometer_scale":
+        scale = np.array([values[f"mag_scale_{axis}"] for axis in "xyz"])
+        return Experiment(
+            "with the magnetometer's scale put right", ("mag",), edit=lambda flight: _magnetometer(flight, lambda _, field: field / scale)
+        )
+    if diagnosis.id == "magnetometer_rotated" and signs.magnetometer is not None:
+        turn = signs.magnetometer.fits["mounting"].turn
+        if turn is not None:
+            return Experiment(
+                "with the magnetometer turned back", ("mag", "gnss_vel"),
+                edit=lambda flight: _magnetometer(flight, lambda _, field: field @ turn),
+            )  # fmt: skip
+    return None
+
+
+PARAMETERS_OF: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "gnss_delay": (("gnss_vel", "gnss_pos"), "EKF2_GPS_DELAY"),
+    "gnss_lever_arm": (("gnss_vel",), "EKF2_GPS_POS_"),
+    "flow_delay": (("optical_flow",), "EKF2_OF_DELAY"),
+    "vision_delay": (("ev",), "EKF2_EV_DELAY"),
+    "baro_ground_effect": (("baro",), "EKF2_GND_EFF_DZ"),
+}
+"""Cause → sources that should do better with the values that it tells to set, and how the names of those begin. Noises
+are not among them: a larger one makes each ratio smaller, right or wrong."""
+
+WITHHELD: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "gnss_glitch": ("gnss", ("baro", "mag", "ev")),
+    "gnss_accuracy": ("gnss", ("baro", "mag", "ev")),
+    "gnss_interference": ("gnss", ("baro", "mag", "ev")),
+    "magnetic_disturbance": ("mag", ("gnss_vel", "gnss_pos", "ev")),
+    "propeller_wash": ("baro", ("gnss", "rng", "ev_hgt")),
+    "baro_drift": ("baro", ("gnss", "rng", "ev_hgt")),
+    "static_pressure": ("baro", ("gnss", "rng", "ev_hgt")),
+    "range_obstruction": ("range", ("baro", "gnss_hgt", "optical_flow")),
+    "range_step": ("range", ("baro", "gnss_hgt", "optical_flow")),
+    "vision_yaw": ("ev", ("gnss", "mag")),
+    "vision_scale": ("ev", ("gnss", "mag")),
+    "vision_covariance": ("ev", ("gnss", "mag")),
+    "flow_scale": ("flow", ("gnss",)),
+    "flow_rotation": ("flow", ("gnss",)),
+    "airspeed_scale": ("airspeed", ("gnss", "sideslip")),
+}
+"""Cause → the sensor that is withheld while it holds, and the sources that should do better without it."""
+
+STUCK = {"mag": ("gnss_vel", "gnss_pos"), "baro": ("gnss_hgt", "rng"), "gnss": ("baro", "mag")}
+"""Sensor that repeats one value → the sources that should do better without it."""
+
+
+def _at(signs: Signs, time: int) -> str:
+    return f"{signs.observed.since_start_s(time):.0f} s"
+
+
+def _without(flight: Flight, sensor: str, start: int, stop: int) -> Flight:
+    """The flight without the messages of a sensor in some time."""
+    topics = dict(flight.topics)
+    for topic in SENSORS[sensor].topics:
+        for instance in flight.instances(topic.name):
+            table = topics[topic.name, instance]
+            time = table["timestamp"].astype(np.int64)
+            topics[topic.name, instance] = select_rows(table, (time < start) | (time >= stop))
+    return flight.with_topics(topics)
+
+
+def _magnetometer(flight: Flight, change: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Flight:
+    """The flight with other readings of the magnetometer, (N, 3) of its times."""
+    key = ("vehicle_magnetometer", 0)
+    table: TopicTable = dict(flight.topics[key])
+    names = [f"magnetometer_ga[{axis}]" for axis in range(3)]
+    field = np.column_stack([table[name].astype(np.float64) for name in names])
+    changed = change(table["timestamp"].astype(np.int64), field)
+    table |= {name: changed[:, axis].astype(np.float32) for axis, name in enumerate(names)}
+    return flight.with_topics(flight.topics | {key: table})
+
+
+def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
+    """The diagnosis with what its experiment showed; None where it fell, as it was where there is no experiment."""
+    experiment = experiment_for(diagnosis, signs)
+    if experiment is None:
+        return diagnosis
+    before = signs.ratios
+    after = replayed_ratios(_replayed(signs.observed.prepared, experiment), signs.airborne)
+    compared = _compared(before, after, experiment.judged)
+    if compared is None:
+        return diagnosis
+    was, now = compared
+    words = f"{experiment.words} the mean test ratio of {_named(before, after, experiment.judged)} goes from {was:.3f} to {now:.3f}"
+    signed = (*diagnosis.signs, Sign(words, now, was, "1", "replay"))
+    sure = diagnosis.confidence
+    if was - now > FALLS_BY and now < FALLS * was:
+        sure = 1.0 - SURER * (1.0 - sure)
+    elif now - was > GROWS_BY and now > GROWS * was:
+        sure *= LESS_SURE
+        if sure < LEAST_CONFIDENCE:
+            return None
+    return dataclasses.replace(diagnosis, signs=signed, confidence=round(sure, 3))
+
+
+def _replayed(prepared: PreparedFlight, experiment: Experiment) -> ReplayedSet:
+    if experiment.edit is not None:
+        stream = dataclasses.replace(prepared.reconstructed, flight=experiment.edit(prepared.reconstructed.flight))
+        prepared = prepared.with_stream(stream)
+    return replay_set(prepared, "experiment", experiment.overrides)
+
+
+def _shared(before: Mapping[str, SourceRatios], after: Mapping[str, SourceRatios], judged: tuple[str, ...]) -> list[str]:
+    return [name for name in before if name in after and name.startswith(judged)]
+
+
+def _named(before: Mapping[str, SourceRatios], after: Mapping[str, SourceRatios], judged: tuple[str, ...]) -> str:
+    return ", ".join(_shared(before, after, judged))
+
+
+def _compared(
+    before: Mapping[str, SourceRatios], after: Mapping[str, SourceRatios], judged: tuple[str, ...]
+) -> tuple[float, float] | None:
+    """Means of the mean ratios of the judged sources, each weighing alike."""
+    shared = _shared(before, after, judged)
+    if not shared:
+        return None
+    return float(np.mean([before[name].mean for name in shared])), float(np.mean([after[name].mean for name in shared]))
+
+
+def with_experiments(found: Sequence[Diagnosis], signs: Signs, at_most: int) -> list[Diagnosis]:
+    """Some diagnoses, the first ones with what their experiments showed."""
+    if not signs.is_replayed:
+        return list(found)
+    left: list[Diagnosis] = []
+    done = 0
+    for one in found:
+        if done >= at_most or experiment_for(one, signs) is None:
+            left.append(one)
+            continue
+        done += 1
+        after = tried(one, signs)
+        left += [after] if after is not None else []
+    return left

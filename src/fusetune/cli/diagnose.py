@@ -1,0 +1,72 @@
+"""`fusetune diagnose`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fusetune.cli.command import DONE, FOUND_FAILURE, USER_ERROR
+
+if TYPE_CHECKING:
+    from fusetune.analyze.diagnosis.diagnosed_logs import DiagnosedLog
+
+HELP = "tell what is wrong with a vehicle from its logs, since when, how sure, and what to do"
+WARNS = 1
+"""Exit status where there is no worse than a warning; of a log that cannot be read it is `USER_ERROR`, between the two."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Logs or folders of logs, and how to tell."""
+    parser.add_argument("logs", type=Path, nargs="+", metavar="LOG", help="log, or folder that is searched for logs")
+    parser.add_argument("--json", action="store_true", help="print a JSON list with one object for each log")
+    parser.add_argument(
+        "--experiments",
+        type=_number,
+        default=2,
+        metavar="N",
+        help="replay a flight at most N times with a claimed cause taken away (2)",
+    )
+    parser.epilog = (
+        "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot be read; "
+        "3 a failure."
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Diagnose all, whatever becomes of one; tell each when it is done.
+
+    Returns
+    -------
+    int
+        `FOUND_FAILURE`, `USER_ERROR`, `WARNS` or `DONE`: of the logs the largest
+    """
+    from fusetune.analyze.diagnosis.diagnosed_logs import diagnosed_logs
+    from fusetune.analyze.diagnosis.words import log_lines
+
+    status, before = DONE, "["
+    for one in diagnosed_logs(options.logs, options.experiments):
+        status = max(status, _status(one))
+        if options.json:
+            print(before, json.dumps(one.document(), ensure_ascii=False, allow_nan=False), sep="\n", flush=True)
+            before = ","
+        else:
+            print(*log_lines(one), sep="\n", flush=True)
+    if options.json:
+        print("]")
+    return status
+
+
+def _status(one: DiagnosedLog) -> int:
+    if one.error is not None:
+        return USER_ERROR
+    severities = {found.severity for found in one.found}
+    return FOUND_FAILURE if "fail" in severities else WARNS if "warning" in severities else DONE
+
+
+def _number(text: str) -> int:
+    """A whole number from 0."""
+    if not text.isascii() or not text.isdigit():
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0")
+    return int(text)
