@@ -21,6 +21,7 @@ include: "workflow/rules/design.smk"
 include: "workflow/rules/execute.smk"
 include: "workflow/rules/save.smk"
 include: "workflow/rules/search.smk"
+include: "workflow/rules/diagnose.smk"
 include: "workflow/rules/analyze.smk"
 include: "workflow/rules/apply.smk"
 include: "workflow/rules/report.smk"
@@ -38,6 +39,7 @@ localrules:
     decide,
     plot_summary,
     build_report,
+    join_health,
 
 
 rule all:
@@ -46,6 +48,7 @@ rule all:
         rules.design.output,
         rules.decide.output,
         rules.build_report.output,
+        rules.join_health.output,
 
 
 if MENDS_DELAYS:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from fusetune.analyze.delays.settings import DelaySettings
+from fusetune.analyze.effects.settings import EffectSettings
+from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings, WithholdingSettings
 from fusetune.analyze.scoring.settings import ScoringSettings
@@ -95,6 +97,8 @@ class Configuration:
     scoring: ScoringSettings = section(ScoringSettings)
     withheld: WithholdingSettings = section(WithholdingSettings)
     delays: DelaySettings = section(DelaySettings)
+    effects: EffectSettings = section(EffectSettings)
+    health: HealthSettings = section(HealthSettings)
     decision: DecisionSettings = section(DecisionSettings)
     seed: int = setting(1, "seed of the bootstrap of the decision", low=0)
 

@@ -14,7 +14,22 @@ with them mended."""
 FOUND = "found"
 """What a search found; on a flight, what it found without that flight."""
 
-RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, FOUND, "sets", "scoring", "fidelity", "delays")
+EFFECT_SETS = {
+    "antenna_mended": "gnss_antenna",
+    "static_pressure_mended": "static_pressure",
+    "ground_effect_mended": "ground_effect",
+    "drag_mended": "drag",
+    "declination_mended": "declination",
+    "range_arm_mended": "range_lever_arm",
+    "range_noise_mended": "range_noise",
+    "flow_arm_mended": "optical_flow",
+    "vision_arm_mended": "vision_lever_arm",
+}
+"""Set → the effect whose values it takes: what the vehicle flies now with these as the flights measure them."""
+
+RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, FOUND, *EFFECT_SETS, "sets", "scoring", "fidelity", "delays",
+    "health", "effects", "diagnosis", "sensor_noise",
+)  # fmt: skip
 """With the names of `sets.parquet`, `scoring.json` and the like, which a set so called would overwrite."""
 
 

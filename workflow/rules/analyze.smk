@@ -28,15 +28,17 @@ if MENDS_DELAYS:
         script:
             "../scripts/estimate_delays.py"
 
-    # Whether there are sets with mended delays is known when all flights have told.
+    # Whether there are sets with mended delays, or with other effects as measured, is known when all flights have told.
     checkpoint join_delays:
         input:
             present="results/save/present.json",
             flights="results/save/flights.parquet",
             listed="results/save/flights.csv",
             delays=of_replayable_flights("results/analyze/{flight}/delays.json"),
+            effects=of_replayable_flights("results/analyze/{flight}/effects.json"),
         output:
-            "results/analyze/delays.json",
+            delays="results/analyze/delays.json",
+            effects="results/analyze/effects.json",
         log:
             "results/logs/join_delays.log",
         conda:
@@ -47,8 +49,9 @@ if MENDS_DELAYS:
         params:
             settings=asdict(SETTINGS.delays),
             code=DIGEST["delays"],
+            effects_code=DIGEST["diagnose"],
         message:
-            "Analyze: compare the sensors' delays with what PX4 is told"
+            "Analyze: compare the sensors' delays and single effects with what PX4 is told"
         script:
             "../scripts/join_delays.py"
 
@@ -120,6 +123,7 @@ rule analyze_flight:
         kernels=KERNELS_READY,
         replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
         delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
+        effects=ancient("results/analyze/effects.json") if MENDS_DELAYS else [],
         present_replay=replay_files([PRESENT]) if MENDS_DELAYS else [],
         mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
         found="results/search/found.json" if SEARCH else [],

@@ -1,8 +1,8 @@
 # Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
 import csv
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
-from fusetune.analyze.flight_files import FLIGHT_FILES
+from fusetune.analyze.flight_files import DIAGNOSED_FILES, FLIGHT_FILES
 from fusetune.analyze.replaying.store.parts import PARTS
 from fusetune.storage.cells import as_it_was
 from fusetune.storage.checksum_file import check_checksum
@@ -70,7 +70,7 @@ def sets_of_analysis(names):
 
     def values(wildcards):
         around = {pset.name: pset.overrides for pset in present_found().sets} if SETS.around else {}
-        return {**overrides_of(names)(wildcards), **around}
+        return {**overrides_of(names)(wildcards), **around, **effect_overrides(wildcards)}
 
     return values
 
@@ -82,7 +82,28 @@ def mended_delays():
     """Parameters of delays that are proved wrong, with the values to set."""
     if not MENDS_DELAYS:
         return {}
-    return told_in_one_line(read_document, checkpoints.join_delays.get().output[0])["mended"]
+    return told_in_one_line(read_document, checkpoints.join_delays.get().output.delays)["mended"]
+
+
+def effect_values():
+    """Sets that take single effects as the flights measure them, with what they change; none beside a search."""
+    if not MENDS_DELAYS or not SETTINGS.effects.try_measured or SEARCH:
+        return {}
+    return told_in_one_line(read_document, checkpoints.join_delays.get().output.effects)["sets"]
+
+
+def effect_sets():
+    """Names of these, with the delays mended where any is proved wrong: a delay comes before all else."""
+    return [mended_name(name) if mended_delays() else name for name in effect_values()]
+
+
+def effect_overrides(wildcards):
+    """Params function: what they change."""
+    sets = replace(SETS, effects=effect_values())
+    present = present_found().parameters
+    if mended_delays():
+        return sets.mended(sets.effects, present, mended_delays())
+    return sets.overrides(sets.effects, present)
 
 
 def mended_sets():
@@ -96,13 +117,14 @@ def mended_sets():
 
 def scored_sets(wildcards):
     """Params function: names of all sets that are scored."""
-    return [*sets_found().scored, *mended_sets()]
+    return [*sets_found().scored, *mended_sets(), *effect_sets()]
 
 
 def set_descriptions(wildcards):
     """Params function: a line about each set."""
     around = present_found().sets if SETS.around else ()
-    return sets_found().described({pset.name: pset.description for pset in (*INPUTS.study.sets, *around)})
+    sets = replace(sets_found(), effects=effect_values())
+    return sets.described({pset.name: pset.description for pset in (*INPUTS.study.sets, *around)})
 
 
 def of_mended_sets(pattern):

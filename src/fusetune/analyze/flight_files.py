@@ -18,7 +18,13 @@ SAMPLES_FILE = "samples.parquet"
 SCORING_FILE = "scoring.json"
 DELAYS_FILE = "delays.json"
 SENSOR_NOISE_FILE = "sensor_noise.json"
+HEALTH_FILE = "health.json"
+EFFECTS_FILE = "effects.json"
+DIAGNOSIS_FILE = "diagnosis.json"
 ONBOARD_FILE = "onboard.innovations.parquet"
 FIDELITY_FILE = "fidelity.json"
+
+DIAGNOSED_FILES = (HEALTH_FILE, EFFECTS_FILE, SENSOR_NOISE_FILE, DIAGNOSIS_FILE)
+"""Of every flight that was saved, replayable or not."""
 
 FLIGHT_FILES = (*SCORE_TABLES.values(), SAMPLES_FILE, SCORING_FILE, ONBOARD_FILE, FIDELITY_FILE)

@@ -59,6 +59,7 @@ JOB_SOURCES = {
         "analyze/sensors",
         "analyze/smoothing",
     ),
+    "diagnose": (*BASE, "design", "ekf2", "save", "analyze"),
     "score": (*BASE, "ekf2", "save", *_SCORED),
     "apply": (*BASE, "analyze/delays", "analyze/trials", "design", "apply"),
     "search": (*TRIED, "apply"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,8 @@ from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
 from fusetune.save.log_folder import VERDICT_FILE
 from fusetune.storage.checksum_file import write_checksum
 from fusetune.storage.csv_file import write_csv
-from fusetune.storage.files import atomic_path
-from fusetune.storage.parquet import write_table
+from fusetune.storage.files import AnyPath, atomic_path
+from fusetune.storage.parquet import read_table, write_table
 
 SCHEMA = pa.schema(
     [
@@ -141,3 +141,11 @@ def _told(findings: Sequence[Finding]) -> dict[str, Any]:
 def _compact(finding: Finding) -> str:
     figure = "" if finding.figure is None else f" {finding.figure:.4g}"
     return f"{finding.id} {finding.severity}{figure}"
+
+
+def of_same_vehicle(flights_table: AnyPath, flights: Iterable[str], newest: str | None) -> list[str]:
+    """Flights of the vehicle that flew the newest, in their order; all where that is not known."""
+    if newest is None:
+        return list(flights)
+    rows = {row["flight"]: VehicleIdentity.from_row(row) for row in read_table(flights_table).to_pylist()}
+    return [name for name in flights if rows[name].is_same(rows[newest])]

@@ -23,7 +23,7 @@ from fusetune.design.parameter_sets import ParameterSet
 from fusetune.design.tunable_parameters import DELAY_SUFFIX
 from fusetune.errors import UserError
 from fusetune.px4.vehicle_identity import VehicleIdentity
-from fusetune.set_names import AS_FLOWN, PRESENT, mended_name
+from fusetune.set_names import AS_FLOWN, EFFECT_SETS, PRESENT, mended_name
 from fusetune.storage.documents import read_as, write_document
 from fusetune.storage.files import atomic_path
 
@@ -37,11 +37,13 @@ class FlightSets:
     study : sets of the study, name → values of the parameters that it varies
     around : parameters that are varied around the present values; the sets are known when the flights are listed
     searched : parameters that a set of a search may change; the sets are known when it has ended
+    effects : sets that take single effects as the flights measure them, name → values; known when all have told
     """
 
     study: Mapping[str, Mapping[str, float]]
     around: Collection[str] = ()
     searched: Collection[str] = ()
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def found(self, present: Present) -> FlightSets:
         """The same with the sets around the present values that the flights led to."""
@@ -71,7 +73,8 @@ class FlightSets:
         ----------
         present : those of the present set, `Present.parameters`
         """
-        known = {**self.study, PRESENT: present, AS_FLOWN: {}}
+        of_effects = {name: {**present, **values} for name, values in self.effects.items()}
+        known = {**self.study, **of_effects, PRESENT: present, AS_FLOWN: {}}
         return {name: dict(known[name]) for name in names}
 
     @property
@@ -104,10 +107,14 @@ class FlightSets:
     def described(self, descriptions: Mapping[str, str]) -> dict[str, str]:
         """A line about each set, those with mended delays, too."""
         plain = {PRESENT: "the configuration that flies now", **descriptions}
-        mended = {
-            mended_name(name): ", ".join(filter(None, (plain.get(name), "delays mended"))) for name in self.mendable
+        effects = {
+            name: f"the {EFFECT_SETS[name].replace('_', ' ')} as the flights measure it" for name in self.effects
         }
-        return {**descriptions, **mended}
+        mended = {
+            mended_name(name): ", ".join(filter(None, ({**plain, **effects}.get(name), "delays mended")))
+            for name in (*self.mendable, *effects)
+        }
+        return {**descriptions, **effects, **mended}
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from fusetune.analyze.delays.delayed_series import airspeed_series, flow_series, range_series, vision_series
 from fusetune.analyze.delays.inertial_motion import InertialMotion, inertial_motion
@@ -33,6 +35,7 @@ LAGGED: Mapping[str, Series] = {
 VELOCITIES = {"gnss": "gnss_vel"}
 ARM_PARAMETERS = {"gnss": ("EKF2_GPS_POS_X", "EKF2_GPS_POS_Y", "EKF2_GPS_POS_Z")}
 """Sensor of velocities → parameters that tell PX4 where it is."""
+IMU_PARAMETERS = ("EKF2_IMU_POS_X", "EKF2_IMU_POS_Y", "EKF2_IMU_POS_Z")
 
 
 @dataclass(frozen=True)
@@ -98,10 +101,15 @@ def sensor_delays(prepared: PreparedFlight, record: ReplayedSet) -> tuple[Sensor
 
 
 def velocity_place_of(record: ReplayedSet, sensor: str, intervals: Sequence[Interval]) -> VelocityPlace | None:
-    """Delay and place of a sensor of `VELOCITIES`, from a replay of any set; None where the flight does not tell."""
+    """Delay and place of a sensor of `VELOCITIES`, from a replay of any set; None where the flight does not tell.
+
+    The place is in the frame of PX4's parameters, in which the IMU has a place of its own (EKF2_IMU_POS_*).
+    """
     told_s = 1e-3 * _told(record, SENSORS[sensor].delay_parameter)
-    arm = [_told(record, one) for one in ARM_PARAMETERS[sensor]]
-    return velocity_place(record, VELOCITIES[sensor], intervals, told_s, arm)
+    imu = np.array([_told(record, one) for one in IMU_PARAMETERS])
+    arm = np.array([_told(record, one) for one in ARM_PARAMETERS[sensor]]) - imu
+    place = velocity_place(record, VELOCITIES[sensor], intervals, told_s, arm.tolist())
+    return None if place is None else replace(place, arm=place.arm + imu)
 
 
 def _told(record: ReplayedSet, parameter: str) -> float:

@@ -19,10 +19,9 @@ from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.analyze.metrics.random_effects import random_effects
 from fusetune.design.tunable_parameters import DELAY_LIMIT, reach_ms
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
-from fusetune.px4.vehicle_identity import VehicleIdentity
+from fusetune.save.flights_table import of_same_vehicle
 from fusetune.storage.documents import read_as, read_document, write_document
 from fusetune.storage.files import AnyPath, atomic_path
-from fusetune.storage.parquet import read_table
 
 STEP_MS = 10.0
 """A delay acts in steps of an update of the filter."""
@@ -141,9 +140,8 @@ def write_joined(
     newest : the flight whose parameters count as the present ones
     flights_table : `results/save/flights.parquet`, by which flights of other vehicles are left out; None leaves none
     """
-    if flights_table is not None and newest is not None:
-        rows = {row["flight"]: VehicleIdentity.from_row(row) for row in read_table(flights_table).to_pylist()}
-        files = {name: file for name, file in files.items() if rows[name].is_same(rows[newest])}
+    if flights_table is not None:
+        files = {name: files[name] for name in of_same_vehicle(flights_table, files, newest)}
     flights = {name: read_delays(read_document(file)["delays"]) for name, file in files.items()}
     found = join_delays(flights, newest, settings)
     with atomic_path(output) as temporary:

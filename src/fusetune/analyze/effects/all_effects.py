@@ -6,6 +6,7 @@ from fusetune.analyze.effects.airspeed import estimate_airspeed_scale
 from fusetune.analyze.effects.drag import estimate_drag, fit_drag
 from fusetune.analyze.effects.estimate import Effect
 from fusetune.analyze.effects.flow import estimate_flow
+from fusetune.analyze.effects.gnss_antenna import estimate_gnss_antenna
 from fusetune.analyze.effects.ground_effect import estimate_ground_effect
 from fusetune.analyze.effects.imu_arm import estimate_imu_arm
 from fusetune.analyze.effects.magnetic import estimate_magnetic
@@ -24,6 +25,7 @@ def all_effects(observed: ObservedFlight) -> tuple[Effect, ...]:
         estimate_static_pressure(observed, drag),
         estimate_ground_effect(observed),
         *estimate_magnetic(observed),
+        estimate_gnss_antenna(observed),
         estimate_range_arm(observed, ranged),
         estimate_range_noise(observed, ranged),
         estimate_flow(observed),

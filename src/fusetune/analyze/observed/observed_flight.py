@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from fusetune.analyze.delays.inertial_motion import InertialMotion, inertial_motion
+from fusetune.analyze.delays.sensor_delays import velocity_place_of
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.observed.body_motion import BodyMotion, body_motion
@@ -79,6 +81,11 @@ class ObservedFlight:
         if self.inertial is None or self.replayed.steps is None:
             return None
         return body_motion(self.replayed.steps(), self.inertial, self.flight, self.parameters)
+
+    @cached_property
+    def gnss_place(self) -> VelocityPlace | None:
+        """Delay and place of the GNSS antenna; None where the flight does not tell them."""
+        return velocity_place_of(self.replayed, "gnss", self.airborne)
 
     def since_start_s(self, timestamp: int) -> float:
         """Seconds from the start of the log, for a time in µs since boot."""

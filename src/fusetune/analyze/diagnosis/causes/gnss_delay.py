@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fusetune.analyze.delays.velocity_delay import velocity_delay
+from fusetune.analyze.delays.velocity_place import velocity_place
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
@@ -26,7 +26,8 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return None
     words = f"velocity lags behind the motion by {value:.0f} ms (±{2.0 * SIGMAS / 2.0 * error:.0f}), PX4 is told {told:.0f}"
     found = [Sign(words, abs(off), MATTERS_MS + SIGMAS * error, "ms", "replay")]
-    smooth = velocity_delay(signs.observed.replayed, "gnss_vel", signs.gnss_sound, told * 1e-3)
+    place = velocity_place(signs.observed.replayed, "gnss_vel", signs.gnss_sound, told * 1e-3)
+    smooth = None if place is None else place.lag
     if smooth is not None:
         again, spread = 1e3 * smooth.delay_s, 1e3 * smooth.standard_error_s
         if (again - told) * off <= 0.0 or abs(again - told) < 0.5 * MATTERS_MS + CONFIRMED_SIGMAS * spread:

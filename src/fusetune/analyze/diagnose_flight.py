@@ -1,0 +1,115 @@
+"""All that is told of a saved flight before any set is compared: health, single effects, noise of its sensors, causes.
+
+One process does it all: flight, replay and motion are shared. A flight that cannot be replayed is asked as well, and of
+a log that could not be read there is nothing to tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fusetune.analyze.diagnosis.diagnose import diagnose
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis
+from fusetune.analyze.effects.all_effects import all_effects
+from fusetune.analyze.effects.joined_effects import effects_document
+from fusetune.analyze.flight_files import DIAGNOSIS_FILE, EFFECTS_FILE, HEALTH_FILE, SENSOR_NOISE_FILE
+from fusetune.analyze.health.health_files import health_document
+from fusetune.analyze.health.health_row import HealthRow
+from fusetune.analyze.health.health_table import DEFAULTS, health_rows
+from fusetune.analyze.health.settings import HealthSettings
+from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
+from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise
+from fusetune.px4.flight import Flight
+from fusetune.px4.ulog.used_topics import is_used
+from fusetune.save.flight_folder import METADATA_FILE, load_flight, read_flight_document
+from fusetune.storage.documents import write_document
+from fusetune.storage.files import AnyPath, atomic_path
+
+Told = TypeVar("Told")
+
+REPLAYABLE = "replayable"
+
+_DAMAGED = (LookupError, ValueError, TypeError, ArithmeticError)
+"""What a topic or a field that is missing can end in."""
+
+
+def diagnose_flight(
+    flight_folder: AnyPath,
+    output_folder: AnyPath,
+    *,
+    replay: ReplaySettings = IN_USE,
+    health: HealthSettings = DEFAULTS,
+) -> tuple[Diagnosis, ...]:
+    """Write `health.json`, `effects.json`, `sensor_noise.json` and `diagnosis.json` of a saved flight.
+
+    Parameters
+    ----------
+    flight_folder : `results/save/<flight>`
+    output_folder : `results/analyze/<flight>`
+
+    Returns
+    -------
+    What is wrong, what explains most first
+
+    Raises
+    ------
+    UserError
+        The saved flight is missing or damaged.
+    """
+    name = Path(flight_folder).name
+    metadata = read_flight_document(Path(flight_folder) / METADATA_FILE)
+    is_replayable = metadata["verdict"]["status"] == REPLAYABLE
+    used = {entry["topic"] for entry in metadata.get("topics", ()) if is_used(entry["topic"])}
+    # of a log that could not be read nothing was saved
+    logged = load_flight(flight_folder, topics=used) if used else Flight(name)
+    observed = ObservedFlight(logged, replay)
+    asked = _Asked(is_replayable)
+    no_rows: tuple[HealthRow, ...] = ()
+    rows = asked.about("health", no_rows, lambda: health_rows(observed, health))
+    effects = all_effects(observed) if is_replayable else ()
+    noise = asked.about("sensor noise", None, lambda: sensor_noise(observed.flight, observed.airborne))
+    nothing: tuple[Diagnosis, ...] = ()
+    found = asked.about("diagnosis", nothing, lambda: diagnose(observed))
+    start_us = int(logged.start_timestamp)
+    documents = {
+        HEALTH_FILE: health_document(logged, rows),
+        EFFECTS_FILE: effects_document(name, effects),
+        SENSOR_NOISE_FILE: {"flight": name} if noise is None else noise.document(),
+        DIAGNOSIS_FILE: {
+            "flight": name,
+            "start_us": start_us,
+            "duration_s": logged.duration_s,
+            "replayable": is_replayable,
+            "diagnoses": [one.document(start_us) for one in found],
+            "not_told": asked.failed,
+        },
+    }
+    _write(Path(output_folder), documents)
+    return found
+
+
+class _Asked:
+    """Asks, and keeps what could not be answered for what a log that is no use for a replay lacks."""
+
+    def __init__(self, is_replayable: bool) -> None:
+        self._is_replayable = is_replayable
+        self.failed: dict[str, str] = {}
+
+    def about(self, what: str, nothing: Told, ask: Callable[[], Told]) -> Told:
+        try:
+            return ask()
+        except _DAMAGED as error:
+            # a flight whose verdict is sound has all that is asked for: then it is a fault of the program
+            if self._is_replayable:
+                raise
+            self.failed[what] = f"{type(error).__name__}: {error}"
+            return nothing
+
+
+def _write(folder: Path, documents: Mapping[str, Mapping[str, Any]]) -> None:
+    for file, document in documents.items():
+        with atomic_path(folder / file) as temporary:
+            write_document(temporary, dict(document))

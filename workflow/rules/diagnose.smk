@@ -1,0 +1,45 @@
+# What is told of each flight before any set is compared: of every log, replayable or not.
+
+
+rule diagnose_flight:
+    input:
+        flight="results/save/{flight}",
+        kernels=KERNELS_READY,
+    output:
+        expand("results/analyze/{{flight}}/{file}", file=DIAGNOSED_FILES),
+    log:
+        "results/logs/diagnose/{flight}.log",
+    benchmark:
+        "results/benchmarks/diagnose/{flight}.tsv"
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        **replay_resources(3),
+    params:
+        replay=asdict(SETTINGS.replay),
+        health=asdict(SETTINGS.health),
+        code=DIGEST["diagnose"],
+    message:
+        "Analyze: what is wrong on {wildcards.flight}"
+    script:
+        "../scripts/diagnose_flight.py"
+
+
+rule join_health:
+    input:
+        expand("results/analyze/{flight}/health.json", flight=LOGS),
+    output:
+        "results/analyze/health.parquet",
+    log:
+        "results/logs/join_health.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=LIBRARIES_MB,
+        runtime=of_its_logs(5, 0.001),
+    params:
+        code=DIGEST["diagnose"],
+    message:
+        "Analyze: the health of all flights in one table"
+    script:
+        "../scripts/join_health.py"
