@@ -27,9 +27,10 @@ EFFECT_SETS = {
 }
 """Set → the effect whose values it takes: what the vehicle flies now with these as the flights measure them."""
 
-RESERVED_SET_NAMES = (PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, FOUND, *EFFECT_SETS, "sets", "scoring", "fidelity", "delays",
-    "health", "effects", "diagnosis", "sensor_noise",
-)  # fmt: skip
+RESERVED_SET_NAMES = (
+    *(PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, FOUND, *EFFECT_SETS),
+    *("sets", "scoring", "fidelity", "delays", "health", "effects", "diagnosis", "sensor_noise"),
+)
 """With the names of `sets.parquet`, `scoring.json` and the like, which a set so called would overwrite."""
 
 

@@ -9,6 +9,8 @@ rule decide:
         replays=of_replayable_flights(ANALYZED_FILES),
         mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
+        effects="results/analyze/effects.json" if MENDS_DELAYS else [],
+        diagnoses=of_replayable_flights("results/analyze/{flight}/diagnosis.json"),
         found="results/search/found.json" if SEARCH else [],
         matters="results/search/sensitivity.json" if SEARCH else [],
         configuration=CONFIGURATION_FILES,

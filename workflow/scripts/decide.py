@@ -44,6 +44,8 @@ with logged_job(snakemake.log[0]):
         descriptions=descriptions,
         configuration_files=[Path(file) for file in snakemake.input.configuration],
         delays=Path(snakemake.input.delays) if snakemake.input.delays else None,
+        effects=snakemake.input.effects or None,
+        diagnoses=list(snakemake.input.diagnoses),
         recommended=found.recommended if found is not None else None,
         settings=settings,
     )

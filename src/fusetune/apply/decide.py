@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.delays.wrong_delays import read_joined
+from fusetune.analyze.effects.joined_effects import read_joined_effects
 from fusetune.apply.candidates import (
     Candidate,
     between_vetoed_and_present,
@@ -28,7 +29,9 @@ from fusetune.apply.consistency import (
 )
 from fusetune.apply.criteria import Criteria, criteria, metrics_of, paper_entries
 from fusetune.apply.delays import confirmed, delay_findings, delay_sentences
+from fusetune.apply.effect_findings import effect_findings
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, read_flights, read_left_out, white_shares
+from fusetune.apply.flight_problems import problem_findings, problem_sentence, read_diagnoses
 from fusetune.apply.missing_motion import missing_motion
 from fusetune.apply.next_steps import Situation, next_steps, refused_remedies, steps_sentence
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
@@ -69,6 +72,8 @@ def decide(
     descriptions: Mapping[str, str] | None = None,
     configuration_files: Sequence[AnyPath] = (),
     delays: AnyPath | None = None,
+    effects: AnyPath | None = None,
+    diagnoses: Sequence[AnyPath] = (),
     recommended: Recommended | None = None,
     settings: DecisionSettings | None = None,
 ) -> None:
@@ -90,6 +95,8 @@ def decide(
     descriptions : a line about each set, from the study
     configuration_files : hashed into the decision
     delays : `results/analyze/delays.json`, what the sensors' delays are; None where they were not estimated
+    effects : `results/analyze/effects.json`, what flights tell of single effects; None where they were not estimated
+    diagnoses : `results/analyze/<flight>/diagnosis.json` of the flights
     recommended : what one of the sets stands for, where that is a search's
 
     Raises
@@ -118,6 +125,8 @@ def decide(
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
+    problems = problem_findings([one for one in map(read_diagnoses, diagnoses) if vehicle.without(one.flight) is None])
+    measured = effect_findings(read_joined_effects(effects), choice, sets) if effects is not None else ()
     late = confirmed(delay_findings(read_joined(delays) if delays is not None else ()), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
@@ -140,6 +149,7 @@ def decide(
         settings,
     )
     sentences = (
+        problem_sentence(problems),
         delay_sentences(late),
         paragraph(choice, ranked, flights, settings),
         *minded,
@@ -158,7 +168,7 @@ def decide(
     decision["cautions"] = list(minded)
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
-    decision["findings"] = documents((*late, *findings))
+    decision["findings"] = documents((*problems, *late, *measured, *findings))
     decision["noises"] = [asdict(one) for one in noises]
     decision["provenance"] = provenance(configuration_files)
     decision["vehicle"] = vehicle.document(flights, newest.name if newest else None)

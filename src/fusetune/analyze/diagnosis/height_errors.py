@@ -16,7 +16,6 @@ from fusetune.analyze.diagnosis.motion import Motion
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.metrics.whitened_regression import Rows, generalised, order_of, runs
 from fusetune.ekf2.numerics.constants import ONE_G
-from fusetune.px4.flight import TopicTable
 
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]

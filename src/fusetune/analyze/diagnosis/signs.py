@@ -22,10 +22,10 @@ from fusetune.analyze.diagnosis.vision_signs import VisionSigns, vision_signs
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.px4.flight import TopicTable
-from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.px4.layouts.estimator_instances import instance_switches
-from fusetune.save.checks.magnetometer_mounting import magnetometer_mounting
+from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.save.checks.judged_flight import JudgedFlight
+from fusetune.save.checks.magnetometer_mounting import magnetometer_mounting
 from fusetune.save.checks.standstill import Standstill, flying_steps, standstill
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.save.verdict import Verdict, judge
