@@ -310,6 +310,12 @@ def _stuck(rng: np.random.Generator, _: Vehicle) -> Drawn:
     return [{"kind": "sensor_stuck", **when, "sensor": sensor}], duration
 
 
+def _whipsaw(rng: np.random.Generator, _: Vehicle) -> Drawn:
+    interval, duration = _between(rng, 0.6, 12.0), float(rng.uniform(12.0, 35.0))
+    when = {"start_s": float(rng.uniform(6.0, 14.0)), "duration_s": duration}
+    return [_told("EKF2_MULTI_IMU", 2), {"kind": "instance_whipsaw", **when, "interval_s": interval}], math.ceil(duration / interval)
+
+
 RANGE, FLOW = ("range_finder",), ("range_finder", "optical_flow")
 VISION, AIRSPEED = ("vision",), ("airspeed",)
 ANY = tuple(MOTIONS)
@@ -323,7 +329,8 @@ _KINDS = (
     Kind("accelerometer_clipping", "imu", "amplitude, m/s²", 175.0, "raw samples reach the range", _clipping, motions=ANY),
     Kind("gyro_bias", "imu", "change in flight over 3 °/s, or turn-on bias over 5 °/s", 1.0, "beyond what the guide tolerates",
          _gyro_bias),
-    Kind("yaw_alignment", "mag", "largest heading error, degrees", 15.0, "the guide's 15°", _yaw_alignment),
+    Kind("yaw_alignment", "mag", "largest heading error, degrees", 15.0, "the guide's 15°", _yaw_alignment,
+         sensors=()),
     Kind("magnetic_disturbance", "mag", "additional field, Gauss", 0.08, "a sixth of the earth's field",
          _magnetic_disturbance),
     Kind("motor_magnetic_field", "mag", "field at hover, Gauss", 0.035, "several times noise and calibration error",
@@ -364,6 +371,7 @@ _KINDS = (
     Kind("parameter_at_limit", "parameter", "bias over EKF2_ABL_LIM; 1.2 where a parameter is at a bound", 1.1,
          "the state is at its limit", _at_limit),
     Kind("imu_gaps", "imu", "share lost", 0.01, "more than a busy bus loses", _imu_gaps),
+    Kind("instance_whipsaw", "selector", "switches", 5.0, "more than a failure explains", _whipsaw),
     Kind("sensor_stuck", "stuck", "duration, s", 4.0, "dozens of equal samples", _stuck),
 )
 # fmt: on

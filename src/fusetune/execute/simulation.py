@@ -8,11 +8,12 @@ from pathlib import Path
 
 from fusetune.design.mission import Mission
 from fusetune.errors import UserError
+from fusetune.execute.instances import second_imu, with_second_instance
 from fusetune.execute.logger import ekf2_timestamps, logged_topics
 from fusetune.execute.parameters import flown_parameters
 from fusetune.execute.sensors.airspeed import airspeed_topics
 from fusetune.execute.sensors.barometer import vehicle_air_data
-from fusetune.execute.sensors.faults import DefaultProfile, Fault, ToldWrong, of_kind
+from fusetune.execute.sensors.faults import DefaultProfile, Fault, InstanceWhipsaw, ToldWrong, of_kind
 from fusetune.execute.sensors.gnss import vehicle_gps_position
 from fusetune.execute.sensors.imu import inertial_topics
 from fusetune.execute.sensors.magnetometer import vehicle_magnetometer
@@ -99,13 +100,17 @@ def fly(
         )
     truth = simulate_truth(plan, vehicle, seed)
     sensed = sensor_topics(truth, plan, mission, vehicle, faults, seed)
-    estimated: dict[TopicKey, TopicTable] = {}
+    each = [sensed]
+    if of_kind(faults, InstanceWhipsaw):
+        each.append(second_imu(sensed, truth, vehicle, faults, seed))
+    estimated: list[dict[TopicKey, TopicTable]] = [{} for _ in each]
     if with_estimator:
         # Loads the compiled estimator, which the sensors do without.
         from fusetune.execute.onboard_estimator import estimator_topics
 
-        estimated = estimator_topics(_flight(name, mission, vehicle, plan, flown, sensed))
-    everything = sensed | estimated | groundtruth_topics(truth, mission.home.geoid_undulation_m)
+        estimated = [estimator_topics(_flight(name, mission, vehicle, plan, flown, one)) for one in each]
+    flown_with = sensed | estimated[0] if len(each) == 1 else with_second_instance(each, estimated, truth, faults)
+    everything = flown_with | groundtruth_topics(truth, mission.home.geoid_undulation_m)
     logged, dropouts = logged_topics(everything, plan.events, faults, seed)
     flight = _flight(name, mission, vehicle, plan, flown, logged)
     flight.dropouts = dropouts

@@ -266,6 +266,13 @@ class ToldWrong:
     value: float = required("what it is told", low=-1e9, high=1e9)
 
 
+@dataclass(frozen=True)
+class InstanceWhipsaw(TimedFault):
+    """There are two IMUs with an estimator each, and the selector goes to and fro between them."""
+
+    interval_s: float = required("time from one switch to the next", unit="s", above=0.05, high=600)
+
+
 KINDS: dict[str, type[Any]] = {
     "gnss_outage": GnssOutage,
     "gnss_glitch": GnssGlitch,
@@ -295,6 +302,7 @@ KINDS: dict[str, type[Any]] = {
     "vision_covariance": VisionCovariance,
     "airspeed_scale": AirspeedScale,
     "sensor_stuck": SensorStuck,
+    "instance_whipsaw": InstanceWhipsaw,
     "told_wrong": ToldWrong,
     "logger_dropout": LoggerDropout,
     "default_profile": DefaultProfile,
@@ -329,6 +337,7 @@ Fault = (
     | VisionCovariance
     | AirspeedScale
     | SensorStuck
+    | InstanceWhipsaw
     | ToldWrong
     | LoggerDropout
     | DefaultProfile
