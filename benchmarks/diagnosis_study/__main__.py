@@ -1,18 +1,25 @@
 """Make the study and print its tables: `python -m benchmarks.diagnosis_study`, from the project's root.
 
-Flights are kept below the folder, so that a study which is stopped goes on. The tables of docs/diagnosis.md are renewed
-with `--write`.
+Flights and what was said of them are kept below the folder, so that a study which is stopped goes on, and only what a
+change of the sources touches is asked again. The tables of docs/diagnosis.md are renewed with `--write`.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.decision_study.tables import renew_tables
+
 from .cases import HEALTHY, PAIRS, Case, case_of
+from .estimates import estimates_table
 from .flights import fly_case, is_flown
 from .kinds import KINDS
+from .tables import study_tables
+from .verdicts import verdicts
+
+DOCUMENT = Path("docs/diagnosis.md")
 
 
 def main() -> None:
@@ -23,29 +30,39 @@ def main() -> None:
     for case in cases:
         if not is_flown(flights, case):
             print(fly_case(flights, case), flush=True)
+    if options.fly_only:
+        return
+    found = list(verdicts(flights, options.folder / "verdicts", cases))
+    tables = study_tables(found, estimates_table(found))
+    print("\n\n".join(tables.values()))
+    if options.write:
+        renew_tables(DOCUMENT, tables)
 
 
 def _cases(options: argparse.Namespace) -> Iterator[Case]:
-    """All cases, the first ones of every kind first."""
-    kinds: Sequence[str] = options.kinds if options.kinds is not None else list(KINDS)
-    counts = dict.fromkeys(kinds, options.seeds) | {HEALTHY: options.healthy, PAIRS: options.pairs}
-    largest = max(counts.values(), default=0)
-    for number in range(largest):
+    """All cases, the first ones of every group first; larger groups keep pace with the kinds."""
+    counts = dict.fromkeys(options.kinds, options.seeds) | {HEALTHY: options.healthy, PAIRS: options.pairs}
+    rounds = max(options.seeds, 1)
+    for number in range(rounds):
         for group, count in counts.items():
-            # Groups that are larger than a kind keep pace with the kinds.
-            step = max(count // max(options.seeds, 1), 1)
-            for one in range(number * step, min((number + 1) * step, count)):
+            for one in range(count * number // rounds, count * (number + 1) // rounds):
                 yield case_of(group, one)
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis_study", description=__doc__)
-    parser.add_argument("--kinds", nargs="*", help="kinds of faults; by default all")
+    parser.add_argument(
+        "--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), help="of faults; by default all"
+    )
     parser.add_argument("--seeds", type=int, default=20, help="flights of each kind")
     parser.add_argument("--healthy", type=int, default=200, help="flights without a fault")
     parser.add_argument("--pairs", type=int, default=50, help="flights with two faults")
-    parser.add_argument("--folder", type=Path, default=Path("results/diagnosis_study"), help="takes flights and verdicts")
+    parser.add_argument(
+        "--folder", type=Path, default=Path("results/diagnosis_study"), help="takes flights and what was said of them"
+    )
     parser.add_argument("--flights", type=Path, help="where the flights are, if not there")
+    parser.add_argument("--fly-only", action="store_true", help="make the flights and ask nothing")
+    parser.add_argument("--write", action="store_true", help="renew docs/diagnosis.md")
     return parser.parse_args()
 
 

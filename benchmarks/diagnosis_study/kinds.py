@@ -245,7 +245,9 @@ def _flow_scale(rng: np.random.Generator, _: Vehicle) -> Drawn:
 
 def _flow_rotation(rng: np.random.Generator, _: Vehicle) -> Drawn:
     if rng.random() < 0.6:
-        turned = float(rng.choice([90.0, 180.0, -90.0])) if rng.random() < 0.5 else _between(rng, 5.0, 60.0) * _sign(rng)
+        turned = (
+            float(rng.choice([90.0, 180.0, -90.0])) if rng.random() < 0.5 else _between(rng, 5.0, 60.0) * _sign(rng)
+        )
         return [{"kind": "flow_rotation", "turned_deg": turned}], abs(turned)
     return [{"kind": "flow_rotation", "gyro_share": float(rng.choice([0.0, -1.0]))}], 180.0
 
@@ -280,7 +282,9 @@ def _noise_claim(rng: np.random.Generator, vehicle: Vehicle) -> Drawn:
         return [_told(parameter, told)], told / default
     if rng.random() < 0.5:
         return [_told("EKF2_BARO_NOISE", max(vehicle.barometer.noise_m / factor, 0.011))], factor
-    return [_told("EKF2_MAG_NOISE", max(vehicle.magnetometer.noise_gauss / min(factor, 5.5), 0.00105))], min(factor, 5.5)
+    return [_told("EKF2_MAG_NOISE", max(vehicle.magnetometer.noise_gauss / min(factor, 5.5), 0.00105))], min(
+        factor, 5.5
+    )
 
 
 LARGEST = {
@@ -313,7 +317,9 @@ def _stuck(rng: np.random.Generator, _: Vehicle) -> Drawn:
 def _whipsaw(rng: np.random.Generator, _: Vehicle) -> Drawn:
     interval, duration = _between(rng, 0.6, 12.0), float(rng.uniform(12.0, 35.0))
     when = {"start_s": float(rng.uniform(6.0, 14.0)), "duration_s": duration}
-    return [_told("EKF2_MULTI_IMU", 2), {"kind": "instance_whipsaw", **when, "interval_s": interval}], math.ceil(duration / interval)
+    return [_told("EKF2_MULTI_IMU", 2), {"kind": "instance_whipsaw", **when, "interval_s": interval}], math.ceil(
+        duration / interval
+    )
 
 
 RANGE, FLOW = ("range_finder",), ("range_finder", "optical_flow")
@@ -326,9 +332,10 @@ _KINDS = (
     Kind("vibration", "imu", "amplitude over 8 m/s², or offset over 0.5 m/s² where aliased", 1.0,
          "vibration metric several times that of a sound frame; offset beyond what EKF2 tolerates as bias",
          _vibration, motions=ANY),
-    Kind("accelerometer_clipping", "imu", "amplitude, m/s²", 175.0, "raw samples reach the range", _clipping, motions=ANY),
-    Kind("gyro_bias", "imu", "change in flight over 3 °/s, or turn-on bias over 5 °/s", 1.0, "beyond what the guide tolerates",
-         _gyro_bias),
+    Kind("accelerometer_clipping", "imu", "amplitude, m/s²", 175.0, "raw samples reach the range", _clipping,
+         motions=ANY),
+    Kind("gyro_bias", "imu", "change in flight over 3 °/s, or turn-on bias over 5 °/s", 1.0,
+         "beyond what the guide tolerates", _gyro_bias),
     Kind("yaw_alignment", "mag", "largest heading error, degrees", 15.0, "the guide's 15°", _yaw_alignment,
          sensors=()),
     Kind("magnetic_disturbance", "mag", "additional field, Gauss", 0.08, "a sixth of the earth's field",

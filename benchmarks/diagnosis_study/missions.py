@@ -116,7 +116,9 @@ def aggressive(rng: np.random.Generator) -> list[Place]:
     up, speed, wide = rng.uniform(8.0, 11.0), rng.uniform(9.0, 11.0), rng.uniform(22.0, 28.0)
     swing = rng.uniform(70.0, 130.0)
     return [
-        Place((step + 1) * 11.0 if step < 6 else (12 - step) * 11.0, wide * (step % 2), up, speed, swing * (step % 3 - 1))
+        Place(
+            (step + 1) * 11.0 if step < 6 else (12 - step) * 11.0, wide * (step % 2), up, speed, swing * (step % 3 - 1)
+        )
         for step in range(12)
     ]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,13 @@ from fusetune.execute.vehicle import (
 
 BASE = Path("config/vehicles/quadrotor.yaml")
 RAW_RATE_HZ = 500
-SUITES: tuple[tuple[str, ...], ...] = ((), ("range_finder",), ("range_finder", "optical_flow"), ("vision",), ("airspeed",))
+SUITES: tuple[tuple[str, ...], ...] = (
+    (),
+    ("range_finder",),
+    ("range_finder", "optical_flow"),
+    ("vision",),
+    ("airspeed",),
+)
 SUITE_SHARES = (0.5, 0.15, 0.15, 0.12, 0.08)
 """Which sensors a vehicle has beside the usual ones, and how often."""
 AIRSPEED_WIND = 0.25
@@ -37,7 +44,7 @@ def draw_vehicle(rng: np.random.Generator, sensors: Collection[str] | None = Non
     wind
         Whether it flies in more than a breath of wind.
     """
-    base = load_vehicle(BASE)
+    base = _base()
     if sensors is None:
         sensors = SUITES[int(rng.choice(len(SUITES), p=SUITE_SHARES))]
     speed, turbulence = rng.uniform(0.0, 6.0), rng.uniform(0.0, 6.0)
@@ -81,8 +88,12 @@ def draw_vehicle(rng: np.random.Generator, sensors: Collection[str] | None = Non
             rate_hz=float(rng.choice([5.0, 10.0])),
             delay_ms=delay,
             antenna_position_m=antenna,
-            position=replace(gnss.position, noise=worse * gnss.position.noise, correlated=worse * gnss.position.correlated),
-            velocity=replace(gnss.velocity, noise=worse * gnss.velocity.noise, correlated=worse * gnss.velocity.correlated),
+            position=replace(
+                gnss.position, noise=worse * gnss.position.noise, correlated=worse * gnss.position.correlated
+            ),
+            velocity=replace(
+                gnss.velocity, noise=worse * gnss.velocity.noise, correlated=worse * gnss.velocity.correlated
+            ),
             satellites=int(rng.integers(13, 22)),
         ),
         range_finder=_range_finder() if "range_finder" in sensors else None,
@@ -92,6 +103,11 @@ def draw_vehicle(rng: np.random.Generator, sensors: Collection[str] | None = Non
         battery=Battery(4, float(rng.uniform(10.0, 25.0)), 0.5, 0.02, 0.15),
     )
     return replace(vehicle, parameters=_told(vehicle))
+
+
+@cache
+def _base() -> Vehicle:
+    return load_vehicle(BASE)
 
 
 def _range_finder() -> RangeFinder:

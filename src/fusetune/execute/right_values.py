@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from fusetune.execute.sensors.barometer import ground_effect_depth_m, standard_atmosphere
 from fusetune.execute.sensors.faults import (
     AirspeedScale,
@@ -72,7 +74,7 @@ def _positions(vehicle: Vehicle) -> dict[str, float]:
 
 def _drag(vehicle: Vehicle, altitude_m: float) -> dict[str, float]:
     """Ballistic coefficients (kg/m²) and momentum drag (1/s): PX4 has ½ ρ/BCOEF |v| v and MCOEF √(ρ/ρ₀) v."""
-    density = float(standard_atmosphere(altitude_m)[2])
+    density = float(standard_atmosphere(np.array(altitude_m))[2])
     airframe = vehicle.airframe
     drag = {"EKF2_MCOEF": airframe.linear_drag_1_s / math.sqrt(density / SEA_LEVEL_DENSITY_KG_M3)}
     if airframe.quadratic_drag_1_m > 0.0:
@@ -117,6 +119,9 @@ def _inertial(vehicle: Vehicle) -> dict[str, float]:
 
 def _scales(faults: Sequence[Fault]) -> dict[str, float]:
     """Readings over what they are of."""
-    scales = {"airspeed_scale": AirspeedScale, "flow_scale": FlowScale, "vision_scale": VisionScale}
-    values = {name: math.prod(fault.factor for fault in of_kind(faults, kind)) for name, kind in scales.items()}
-    return values | {"vision_yaw_deg": math.fsum(fault.turned_deg for fault in of_kind(faults, VisionYaw))}
+    return {
+        "airspeed_scale": math.prod(fault.factor for fault in of_kind(faults, AirspeedScale)),
+        "flow_scale": math.prod(fault.factor for fault in of_kind(faults, FlowScale)),
+        "vision_scale": math.prod(fault.factor for fault in of_kind(faults, VisionScale)),
+        "vision_yaw_deg": math.fsum(fault.turned_deg for fault in of_kind(faults, VisionYaw)),
+    }

@@ -18,7 +18,7 @@ from fusetune.execute.sensors.gnss import vehicle_gps_position
 from fusetune.execute.sensors.imu import inertial_topics
 from fusetune.execute.sensors.magnetometer import vehicle_magnetometer
 from fusetune.execute.sensors.optical_flow import vehicle_optical_flow
-from fusetune.execute.sensors.power import actuator_motors, battery_status
+from fusetune.execute.sensors.power import actuator_motors, battery_status, vehicle_thrust_setpoint
 from fusetune.execute.sensors.range_finder import distance_sensor
 from fusetune.execute.sensors.stuck import stick
 from fusetune.execute.sensors.vision import vehicle_visual_odometry
@@ -138,6 +138,7 @@ def sensor_topics(
         ("vehicle_imu_status", 0): inertial.status,
         ("actuator_motors", 0): actuator_motors(truth, vehicle.airframe),
     }
+    topics["vehicle_thrust_setpoint", 0] = vehicle_thrust_setpoint(topics["actuator_motors", 0])
     if vehicle.range_finder is not None:
         topics["distance_sensor", 0] = distance_sensor(truth, vehicle.range_finder, faults, seed)
     if vehicle.optical_flow is not None:

@@ -85,7 +85,7 @@ class DefaultProfile:
 
 @dataclass(frozen=True)
 class AliasedVibration:
-    """Shaking close to the IMU's sampling frequency, which shows as an offset that grows with the thrust, and a beat."""
+    """Shaking close to the IMU's sampling frequency: an offset that grows with the thrust, and a beat."""
 
     offset_m_s2: Vector = required("offset of the accelerometer at hover: forward, right, down", unit="m/s²", **_FINITE)
     beat_m_s2: float = setting(0.0, "amplitude of the beat along the same direction", unit="m/s²", low=0, high=100)
@@ -218,7 +218,9 @@ class FlowScale:
 class FlowRotation:
     """The flow sensor is turned about its axis, or its gyro does not tell how it turns."""
 
-    turned_deg: float = setting(0.0, "turn of flow against body, about the down axis", unit="degrees", low=-180, high=180)
+    turned_deg: float = setting(
+        0.0, "turn of flow against body, about the down axis", unit="degrees", low=-180, high=180
+    )
     gyro_share: float = setting(1.0, "reading of its gyro over the rate", low=-2, high=2)
 
 

@@ -100,9 +100,9 @@ def vehicle_gps_position(
         "rtcm_injection_rate": zeros,
         "automatic_gain_control": _between(QUIET_GAIN, JAMMED_GAIN, jammed).astype(np.uint16),
         "fix_type": np.full(samples, FIX_3D, np.uint8),
-        "jamming_state": (
-            JAMMING_OK + (jammed >= JAMMING_WARNS_FROM) + (jammed >= JAMMING_CRITICAL_FROM)
-        ).astype(np.uint8),
+        "jamming_state": (JAMMING_OK + (jammed >= JAMMING_WARNS_FROM) + (jammed >= JAMMING_CRITICAL_FROM)).astype(
+            np.uint8
+        ),
         "spoofing_state": np.ones(samples, np.uint8),
         "vel_ned_valid": np.ones(samples, np.bool_),
         "satellites_used": reported["satellites_used"],

@@ -58,9 +58,7 @@ def sensor_combined(truth: Truth, imu: Imu, faults: Sequence[Fault], seed: int) 
     return _integrated(truth, imu, faults, seed)[0]
 
 
-def _integrated(
-    truth: Truth, imu: Imu, faults: Sequence[Fault], seed: int
-) -> tuple[TopicTable, dict[str, np.ndarray]]:
+def _integrated(truth: Truth, imu: Imu, faults: Sequence[Fault], seed: int) -> tuple[TopicTable, dict[str, np.ndarray]]:
     """Integrated IMU samples in the layout of PX4's topic.
 
     Each raw sample is the mean of the true motion over its interval with scale, mounting and bias errors, noise and

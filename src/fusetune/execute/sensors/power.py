@@ -1,4 +1,4 @@
-"""What drives the vehicle (`actuator_motors`, `battery_status`): throttle and current."""
+"""What drives the vehicle (`vehicle_thrust_setpoint`, `actuator_motors`, `battery_status`): throttle and current."""
 
 from __future__ import annotations
 
@@ -32,6 +32,13 @@ def actuator_motors(truth: Truth, airframe: Airframe) -> TopicTable:
         **{f"control[{index}]": (control if index < MOTORS else nothing).copy() for index in range(OUTPUTS)},
         "reversible_flags": np.zeros(len(timestamp), np.uint16),
     }
+
+
+def vehicle_thrust_setpoint(motors: TopicTable) -> TopicTable:
+    """What the motors are asked for, along the body's down axis."""
+    nothing = np.zeros_like(motors["control[0]"])
+    thrust = {"xyz[0]": nothing, "xyz[1]": nothing.copy(), "xyz[2]": -motors["control[0]"]}
+    return {name: motors[name].copy() for name in ("timestamp", "timestamp_sample")} | thrust
 
 
 def battery_status(truth: Truth, airframe: Airframe, battery: Battery, seed: int) -> TopicTable:

@@ -1,4 +1,4 @@
-"""Range finder (`distance_sensor`): the distance to flat ground along the body's down axis, and what gets in its way."""
+"""Range finder (`distance_sensor`): the distance to flat ground along the body's down axis, and what is in its way."""
 
 from __future__ import annotations
 
