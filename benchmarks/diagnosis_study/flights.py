@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
+import tempfile
+from functools import cache
 from pathlib import Path
+
+from benchmarks.decision_study.collect import stamp
 
 from fusetune.execute.simulation import simulate
 from fusetune.save import save_log
-from fusetune.storage.files import atomic_path
+from fusetune.storage.digest import source_digest
 
 from .cases import Case
 
@@ -21,26 +26,40 @@ def folder_of(flights: Path, case: Case) -> Path:
 
 
 def is_flown(flights: Path, case: Case) -> bool:
-    """Whether it is there as a whole, from the same injection."""
-    file = folder_of(flights, case) / FAULT_FILE
-    return file.is_file() and json.loads(file.read_text(encoding="utf-8")) == _plain(case)
+    """Whether it is there as a whole, flown by the same simulation with the same injection."""
+    folder = folder_of(flights, case)
+    file = stamp(folder)
+    return folder.is_dir() and file.is_file() and file.read_text(encoding="utf-8") == _made_from(case)
 
 
 def fly_case(flights: Path, case: Case) -> Path:
-    """Fly a case unless it is there; `fault.json` comes last. Returns its folder."""
+    """Fly a case unless it is there; its folder appears as a whole and is returned."""
     folder = folder_of(flights, case)
     if is_flown(flights, case):
         return folder
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    log = folder / f"{case.name}.ulg"
-    simulate(case.mission, case.vehicle, {}, case.seed, case.faults, log)
-    save_log(log, folder / case.name)
-    with atomic_path(folder / FAULT_FILE) as temporary:
-        temporary.write_text(json.dumps(_plain(case), indent=1), encoding="utf-8")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".flying_", dir=folder.parent) as scratch:
+        made = Path(scratch, folder.name)
+        made.mkdir()
+        log = made / f"{case.name}.ulg"
+        simulate(case.mission, case.vehicle, {}, case.seed, case.faults, log)
+        save_log(log, made / case.name)
+        (made / FAULT_FILE).write_text(_document(case), encoding="utf-8")
+        stamp(folder).unlink(missing_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)
+        made.rename(folder)
+    stamp(folder).write_text(_made_from(case), encoding="utf-8")
     return folder
 
 
-def _plain(case: Case) -> object:
-    """The document as JSON gives it back."""
-    return json.loads(json.dumps(case.document()))
+def _document(case: Case) -> str:
+    return json.dumps(case.document(), indent=1)
+
+
+@cache
+def _simulation() -> str:
+    return source_digest("design", "execute")
+
+
+def _made_from(case: Case) -> str:
+    return hashlib.sha256(f"{_simulation()} {_document(case)} {case.mission} {case.vehicle}".encode()).hexdigest()

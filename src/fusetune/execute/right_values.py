@@ -22,6 +22,9 @@ from fusetune.execute.vehicle import Vehicle
 
 AXES = "xyz"
 SEA_LEVEL_DENSITY_KG_M3 = 1.225
+ALLAN_PEAK = 0.437 * math.sqrt(2.0)
+"""Largest Allan deviation of a Gauss–Markov process over its standard deviation, at 1.89 correlation times: 0.437 q √T
+where σ² = q² T / 2 (IEEE Std 952-1997, C.1.1.5)."""
 
 
 def right_values(vehicle: Vehicle, faults: Sequence[Fault], seed: int, altitude_m: float) -> dict[str, float]:
@@ -105,7 +108,7 @@ def _magnetometer(vehicle: Vehicle, faults: Sequence[Fault], seed: int) -> dict[
 
 
 def _inertial(vehicle: Vehicle) -> dict[str, float]:
-    """Noise densities and random walks of the sensors themselves, without vibration."""
+    """Noise densities, random walks and bias instabilities of the sensors themselves, without vibration."""
     units = {"gyro": ("rad_s", vehicle.imu.gyro), "accelerometer": ("m_s2", vehicle.imu.accelerometer)}
     return {
         f"{name}_{quantity}_{unit}_{per}": value
@@ -114,7 +117,7 @@ def _inertial(vehicle: Vehicle) -> dict[str, float]:
             ("noise_density", "per_root_hz", sensor.noise_density),
             ("bias_random_walk", "per_root_s", sensor.bias_random_walk),
         )
-    }
+    } | {f"{name}_bias_instability_{unit}": ALLAN_PEAK * sensor.bias_wander for name, (unit, sensor) in units.items()}
 
 
 def _scales(faults: Sequence[Fault]) -> dict[str, float]:

@@ -71,6 +71,8 @@ class InertialSensor:
         "standard deviation of the mounting error about each axis", unit="degrees", low=0, high=5
     )
     range: float = required("readings are clipped at plus and minus this", unit="unit", above=0, high=10000)
+    bias_wander: float = setting(0.0, "standard deviation of a Gauss–Markov bias", unit="unit", low=0, high=1)
+    bias_wander_time_s: float = setting(100.0, "correlation time of that bias", unit="s", above=0, high=10000)
 
 
 @dataclass(frozen=True)

@@ -227,6 +227,29 @@ def test_right_values_are_those_of_the_file_and_the_faults(vehicle: Vehicle) -> 
     assert right["motor_field_x_gauss_per_throttle"] == pytest.approx((0.042 + drawn) / 0.42)
     assert right["motor_field_x_gauss_per_a"] == pytest.approx((0.042 + drawn) / 21.0)
     assert right["gyro_noise_density_rad_s_per_root_hz"] == pytest.approx(0.00012)
+    assert right["gyro_bias_instability_rad_s"] == 0.0
+
+
+def test_a_wandering_bias_has_its_deviation_and_time_and_the_allan_peak_that_is_told(
+    truth: Truth, ideal_imu_vehicle: Vehicle
+) -> None:
+    gyro = dataclasses.replace(ideal_imu_vehicle.imu.gyro, bias_wander=0.02, bias_wander_time_s=0.5)
+    imu = dataclasses.replace(ideal_imu_vehicle.imu, gyro=gyro)
+    wander = [
+        stacked(sensor_combined(truth, one, (), SEED), "gyro_rad").astype(float) for one in (imu, ideal_imu_vehicle.imu)
+    ]
+    bias = wander[0] - wander[1]
+    # a hundred correlation times of three axes: the deviation is known to about 6 %
+    assert bias.std() == pytest.approx(0.02, rel=0.15)
+    lag = int(0.5 * imu.rate_hz)
+    assert np.mean(bias[lag:] * bias[:-lag]) / 0.02**2 == pytest.approx(math.exp(-1.0), abs=0.15)
+    # Allan deviation at 1.89 correlation times, from means over neighbouring intervals
+    span = int(1.89 * 0.5 * imu.rate_hz)
+    sums = np.cumsum(bias, axis=0)
+    means = (sums[span:] - sums[:-span]) / span
+    allan = math.sqrt(0.5 * float(np.mean((means[span:] - means[:-span]) ** 2)))
+    right = right_values(dataclasses.replace(ideal_imu_vehicle, imu=imu), (), SEED, 488.0)
+    assert allan == pytest.approx(right["gyro_bias_instability_rad_s"], rel=0.15)
 
 
 def test_told_errors_of_the_magnetometer_are_those_in_its_samples(truth: Truth, vehicle: Vehicle) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from fusetune.execute.noise import random_stream, random_walk, unit_vectors, white_noise
+from fusetune.execute.noise import gauss_markov, random_stream, random_walk, unit_vectors, white_noise
 from fusetune.execute.sensors.faults import (
     AccelerometerBias,
     AliasedVibration,
@@ -207,7 +207,11 @@ def _with_errors(true: np.ndarray, sensor: InertialSensor, step_s: float, seed: 
     bias = sensor.turn_on_bias * rng.standard_normal(3)
     drift = random_walk(rng, len(true), 3, step_s, sensor.bias_random_walk)
     noise = white_noise(rng, len(true), 3, step_s, sensor.noise_density)
-    return np.asarray(true @ (scale @ mounting).T + bias + drift + noise)
+    readings = np.asarray(true @ (scale @ mounting).T + bias + drift + noise)
+    if sensor.bias_wander > 0.0:
+        wander = random_stream(seed, f"{name} wander")
+        readings += gauss_markov(wander, len(true), 3, step_s, sensor.bias_wander, sensor.bias_wander_time_s)
+    return readings
 
 
 def _vibration_factor(after_takeoff_s: np.ndarray, faults: Sequence[Fault]) -> np.ndarray:
