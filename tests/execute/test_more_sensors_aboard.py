@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
+from pyulog import ULog
 
 from fusetune.design.mission import Mission
 from fusetune.execute.logger import NO_SAMPLE
@@ -15,6 +17,7 @@ from fusetune.execute.vehicle import AirspeedSensor, Battery, OpticalFlow, Range
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import instance_shares, instance_switches
 from fusetune.px4.parameters.ekf2_parameters import ParameterError
+from fusetune.px4.ulog.writer import write_ulog
 
 SEED = 5
 TOLD = {
@@ -127,3 +130,24 @@ def test_sensors_that_a_vehicle_lacks_leave_no_topic(mission: Mission, vehicle: 
     names = {name for name, _ in fly(mission, vehicle, {}, SEED, stuck, with_estimator=False).topics}
     assert not names & {"distance_sensor", "vehicle_optical_flow", "vehicle_visual_odometry", "airspeed"}
     assert {"actuator_motors", "vehicle_imu_status"} <= names
+
+
+@pytest.mark.parametrize(
+    ("log", "topics"),
+    [
+        ("Auterion__quadrotor_local.ulg", ("actuator_motors", "battery_status", "vehicle_imu_status",
+                                           "vehicle_thrust_setpoint")),
+        ("synthetic__mc_range.ulg", ("distance_sensor",)),
+        ("synthetic__mc_flow.ulg", ("vehicle_optical_flow",)),
+        ("synthetic__mc_vision.ulg", ("vehicle_visual_odometry",)),
+    ],
+)  # fmt: skip
+def test_fields_and_types_are_those_of_px4(
+    flight: Flight, log: str, topics: tuple[str, ...], shared_logs: Path, tmp_path: Path
+) -> None:
+    write_ulog(tmp_path / "own.ulg", flight)
+    own, theirs = ULog(str(tmp_path / "own.ulg"), list(topics)), ULog(str(shared_logs / log), list(topics))
+    for topic in topics:
+        expected = {field.field_name: field.type_str for field in theirs.get_dataset(topic).field_data}
+        for field in own.get_dataset(topic).field_data:
+            assert expected.get(field.field_name) == field.type_str, (topic, field.field_name)
