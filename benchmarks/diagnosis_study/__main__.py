@@ -12,7 +12,7 @@ from pathlib import Path
 
 from benchmarks.decision_study.tables import renew_tables
 
-from .cases import HEALTHY, PAIRS, Case, case_of
+from .cases import CALM, HEALTHY, PAIRS, Case, case_of
 from .estimates import estimates_table
 from .flights import fly_case, is_flown
 from .kinds import KINDS
@@ -41,7 +41,8 @@ def main() -> None:
 
 def _cases(options: argparse.Namespace) -> Iterator[Case]:
     """All cases, the first ones of every group first; larger groups keep pace with the kinds."""
-    counts = dict.fromkeys(options.kinds, options.seeds) | {HEALTHY: options.healthy, PAIRS: options.pairs}
+    counts = dict.fromkeys(options.kinds, options.seeds)
+    counts |= {HEALTHY: options.healthy, CALM: options.calm, PAIRS: options.pairs}
     rounds = max(options.seeds, 1)
     for number in range(rounds):
         for group, count in counts.items():
@@ -56,6 +57,7 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--seeds", type=int, default=20, help="flights of each kind")
     parser.add_argument("--healthy", type=int, default=200, help="flights without a fault")
+    parser.add_argument("--calm", type=int, default=20, help="flights for drag, in calm air")
     parser.add_argument("--pairs", type=int, default=50, help="flights with two faults")
     parser.add_argument(
         "--folder", type=Path, default=Path("results/diagnosis_study"), help="takes flights and what was said of them"

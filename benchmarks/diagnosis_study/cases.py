@@ -16,10 +16,11 @@ from fusetune.execute.sensors.faults import Fault, parse_faults
 from fusetune.execute.vehicle import Vehicle
 
 from .kinds import KINDS, Entry, Kind
-from .missions import ALONG_THE_NOSE, MOTIONS, draw_mission
+from .missions import ALONG_THE_NOSE, MOTIONS, drag_legs, draw_mission, mission_of
 from .vehicles import draw_vehicle
 
-HEALTHY, PAIRS = "healthy", "pairs"
+HEALTHY, CALM, PAIRS = "healthy", "calm", "pairs"
+"""Groups beside the kinds: without a fault; the guide's flight for drag in calm air, without one; with two."""
 FLIGHT_ALTITUDE_M = 7.0
 """Above home, about: the air is as dense a few metres higher."""
 DRAWS = 200
@@ -42,7 +43,7 @@ class Case:
 
     Attributes
     ----------
-    group : a kind, `healthy` or `pairs`; the folder of its flights
+    group : a kind, or one of the groups beside them; the folder of its flights
     number : within the group
     """
 
@@ -99,6 +100,9 @@ def case_of(group: str, number: int) -> Case:
     if group == HEALTHY:
         vehicle = draw_vehicle(rng)
         return Case(group, number, seed, draw_mission(rng, _flown_by(vehicle, tuple(MOTIONS))), vehicle, ())
+    if group == CALM:
+        vehicle = draw_vehicle(rng, (), wind=False)
+        return Case(group, number, seed, mission_of(rng, "drag_legs", drag_legs), vehicle, ())
     if group == PAIRS:
         return _pair(number, seed, rng)
     kind = KINDS[group]

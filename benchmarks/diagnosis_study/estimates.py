@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cases import HEALTHY
+from .cases import CALM, HEALTHY
 from .verdicts import Told, Verdict
 
 MARGIN = 1.1
 """The guide's: the dead zone is the dip and a tenth."""
+MENDS = {"ASPD_SCALE_1": "airspeed_scale", "SENS_FLOW_SCALE": "flow_scale"}
+"""Parameters that a reading is multiplied by, and what it is wrong by."""
 WITH_VALUE = 0.05
 """Relative errors are of true values that are at least this."""
 
@@ -23,18 +25,17 @@ class Quantity:
     Attributes
     ----------
     goal : largest error, in its unit or, where `relative`, over the true value
-    kinds : on whose visible flights it is judged, beside the healthy ones
+    groups : on whose flights it is judged, of those with a fault the visible ones
     least : true values below this are not judged; an effect that is not there has no relative error
     """
 
     name: str
     unit: str
     goal: float
-    kinds: tuple[str, ...]
+    groups: tuple[str, ...]
     holds: Callable[[str], bool]
     relative: bool = False
     least: float = 0.0
-    healthy: bool = False
 
 
 def _starts(*starts: str) -> Callable[[str], bool]:
@@ -46,16 +47,17 @@ QUANTITIES = (
     Quantity("delay of optical flow", "ms", 10.0, ("flow_delay",), _starts("EKF2_OF_DELAY")),
     Quantity("delay of vision", "ms", 10.0, ("vision_delay",), _starts("EKF2_EV_DELAY")),
     Quantity("lever arm of the GNSS antenna", "m", 0.1, ("gnss_lever_arm",), _starts("EKF2_GPS_POS")),
-    Quantity("lever arms of other sensors", "m", 0.1, (), _starts("EKF2_RNG_POS", "EKF2_OF_POS", "EKF2_EV_POS"),
-             healthy=True),
-    Quantity("BCOEF", "%", 0.05, (), _starts("EKF2_BCOEF"), relative=True, healthy=True),
-    Quantity("MCOEF", "%", 0.05, (), _starts("EKF2_MCOEF"), relative=True, healthy=True),
+    Quantity("places of other sensors", "m", 0.1, (HEALTHY,), _starts("EKF2_RNG_POS", "EKF2_OF_POS", "EKF2_EV_POS")),
+    Quantity("BCOEF, flown for it in calm air", "%", 0.05, (CALM,), _starts("EKF2_BCOEF"), relative=True),
+    Quantity("MCOEF, likewise", "%", 0.05, (CALM,), _starts("EKF2_MCOEF"), relative=True),
+    Quantity("BCOEF, any healthy flight", "%", 0.05, (HEALTHY,), _starts("EKF2_BCOEF"), relative=True),
+    Quantity("MCOEF, likewise", "%", 0.05, (HEALTHY,), _starts("EKF2_MCOEF"), relative=True),
     Quantity("static pressure", "%", 0.1, ("static_pressure",), _starts("EKF2_PCOEF"), relative=True, least=0.1),
     Quantity("ground effect", "%", 0.2, ("baro_ground_effect",), _starts("EKF2_GND_EFF_DZ"), relative=True, least=1.0),
     Quantity("motor field", "%", 0.1, ("motor_magnetic_field",), _starts("motor_field"), relative=True, least=0.02),
     Quantity("hard iron", "G", 0.02, ("yaw_alignment",), _starts("hard_iron")),
     Quantity("airspeed scale", "%", 0.05, ("airspeed_scale",), _starts("ASPD_SCALE", "airspeed_scale"), relative=True),
-    Quantity("flow scale", "%", 0.05, ("flow_scale",), _starts("flow_scale"), relative=True),
+    Quantity("flow scale", "%", 0.05, ("flow_scale",), _starts("SENS_FLOW_SCALE", "flow_scale"), relative=True),
     Quantity("vision scale", "%", 0.05, ("vision_scale",), _starts("vision_scale"), relative=True),
 )  # fmt: skip
 
@@ -73,8 +75,8 @@ def true_value(verdict: Verdict, name: str, unit: str) -> float | None:
     truth = verdict.fault["truth"]
     if name in truth:
         return float(truth[name]) * (MARGIN if name == "EKF2_GND_EFF_DZ" else 1.0)
-    if name == "ASPD_SCALE_1":
-        return 1.0 / float(truth["airspeed_scale"])
+    if name in MENDS:
+        return 1.0 / float(truth[MENDS[name]])
     if name.startswith("hard_iron_"):
         return float(truth[f"{name.removesuffix('_gauss')}_gauss"])
     if name.startswith("motor_field_"):
@@ -89,8 +91,7 @@ def compared(quantity: Quantity, verdicts: Iterable[Verdict]) -> tuple[list[Comp
     """Estimates of a quantity, and how many flights were asked."""
     found, asked = [], 0
     for verdict in verdicts:
-        is_own = verdict.group in quantity.kinds and verdict.is_visible
-        if not is_own and not (quantity.healthy and verdict.group == HEALTHY):
+        if verdict.group not in quantity.groups or (verdict.injected and not verdict.is_visible):
             continue
         asked += 1
         for one in _estimates(quantity, verdict):
@@ -125,7 +126,7 @@ def _estimates(quantity: Quantity, verdict: Verdict) -> list[Told]:
     told = [one for one in verdict.told if quantity.holds(one.name)]
     if told:
         return told
-    named = [one.values for one in verdict.named if one.id in quantity.kinds]
+    named = [one.values for one in verdict.named if one.id in quantity.groups]
     values = {name: value for one in named for name, value in one.items() if quantity.holds(name)}
     return [Told("diagnosis", name, "", value, np.nan, np.nan) for name, value in values.items()]
 

@@ -138,6 +138,13 @@ def climbs(rng: np.random.Generator) -> list[Place]:
     ]
 
 
+def drag_legs(rng: np.random.Generator) -> list[Place]:
+    """The guide's flight for drag: from rest to full speed forward, backward, right and left, nose one way."""
+    up, speed, far = rng.uniform(6.0, 8.0), rng.uniform(10.0, 12.0), rng.uniform(30.0, 36.0)
+    ends = ((far, 0.0), (0.0, 0.0), (0.0, far), (0.0, 0.0), (-far, 0.0))
+    return [Place(north, east, up, speed, 0.0, 0.1) for north, east in ends]
+
+
 MOTIONS: dict[str, Callable[[np.random.Generator], list[Place]]] = {
     "hover": hover,
     "survey": survey,
@@ -155,5 +162,10 @@ CLIMB_M = 6.0
 def draw_mission(rng: np.random.Generator, names: Sequence[str]) -> Mission:
     """One of the named missions with sizes, speeds and course of its own."""
     name = str(rng.choice(list(names)))
+    return mission_of(rng, name, MOTIONS[name])
+
+
+def mission_of(rng: np.random.Generator, name: str, motion: Callable[[np.random.Generator], list[Place]]) -> Mission:
+    """A mission of one motion."""
     course = float(rng.uniform(-180.0, 180.0))
-    return _mission(name, course, CLIMB_M, _turned(MOTIONS[name](rng), course))
+    return _mission(name, course, CLIMB_M, _turned(motion(rng), course))
