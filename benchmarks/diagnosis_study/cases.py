@@ -16,7 +16,7 @@ from fusetune.execute.sensors.faults import Fault, parse_faults
 from fusetune.execute.vehicle import Vehicle
 
 from .kinds import KINDS, Entry, Kind
-from .missions import ALONG_THE_NOSE, MOTIONS, drag_legs, draw_mission, mission_of
+from .missions import ALONG_THE_NOSE, MOTIONS, RECIPES, draw_mission
 from .vehicles import draw_vehicle
 
 HEALTHY, CALM, PAIRS = "healthy", "calm", "pairs"
@@ -102,14 +102,15 @@ def case_of(group: str, number: int) -> Case:
         return Case(group, number, seed, draw_mission(rng, _flown_by(vehicle, tuple(MOTIONS))), vehicle, ())
     if group == CALM:
         vehicle = draw_vehicle(rng, (), wind=False)
-        return Case(group, number, seed, mission_of(rng, "drag_legs", drag_legs), vehicle, ())
+        return Case(group, number, seed, draw_mission(rng, tuple(RECIPES)), vehicle, ())
     if group == PAIRS:
         return _pair(number, seed, rng)
     kind = KINDS[group]
     vehicle = draw_vehicle(rng, kind.sensors)
-    if not _flown_by(vehicle, kind.motions):
+    motions = kind.recipe or kind.motions
+    if not _flown_by(vehicle, motions):
         vehicle = replace(vehicle, airspeed=None)
-    mission = draw_mission(rng, _flown_by(vehicle, kind.motions))
+    mission = draw_mission(rng, _flown_by(vehicle, motions))
     return Case(group, number, seed, mission, vehicle, (_inject(kind, rng, vehicle),))
 
 

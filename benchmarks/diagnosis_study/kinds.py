@@ -15,7 +15,7 @@ import numpy as np
 
 from fusetune.execute.vehicle import Vehicle
 
-from .missions import ALONG_THE_NOSE, FAST, MOTIONS, MOVING
+from .missions import ALONG_THE_NOSE, FAST, MOTIONS, MOVING, RECIPES
 
 Entry = dict[str, Any]
 Drawn = tuple[list[Entry], float]
@@ -43,6 +43,7 @@ class Kind:
     draw : entries and magnitude, for a vehicle
     sensors : what the vehicle needs beside the usual sensors; None where that does not matter
     motions : missions that excite it
+    recipe : what the guide wants flown for it, instead of these where it is alone
     """
 
     id: str
@@ -53,6 +54,7 @@ class Kind:
     draw: Callable[[np.random.Generator, Vehicle], Drawn]
     sensors: tuple[str, ...] | None = None
     motions: tuple[str, ...] = MOVING
+    recipe: tuple[str, ...] = ()
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
@@ -353,7 +355,7 @@ _KINDS = (
     Kind("gnss_lever_arm", "gnss", "error, m", 0.2, "0.2 m/s at 1 rad/s", _lever_arm, motions=TURNING),
     Kind("baro_ground_effect", "baro", "dip at the ground, m", 1.5, "beyond drift and noise", _ground_effect),
     Kind("static_pressure", "baro", "height error at 8 m/s, m", 0.8, "beyond drift and noise", _static_pressure,
-         motions=FAST),
+         motions=FAST, recipe=tuple(RECIPES)),
     Kind("propeller_wash", "baro", "height error at hover, m", 1.5, "beyond drift and noise", _propeller_wash),
     Kind("baro_drift", "baro", "drift, m", 2.5, "four times the usual wander", _baro_drift),
     Kind("range_obstruction", "range", "seconds of it", 4.0, "longer than a flicker", _obstruction, RANGE),

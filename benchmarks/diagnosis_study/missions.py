@@ -153,6 +153,8 @@ MOTIONS: dict[str, Callable[[np.random.Generator], list[Place]]] = {
     "aggressive": aggressive,
     "climbs": climbs,
 }
+RECIPES = {"drag_legs": drag_legs}
+"""Flown where the guide asks for them."""
 MOVING = tuple(name for name in MOTIONS if name != "hover")
 FAST = ("stop_and_go", "sideways_box", "aggressive")
 ALONG_THE_NOSE = ("hover", "survey", "climbs")
@@ -162,10 +164,5 @@ CLIMB_M = 6.0
 def draw_mission(rng: np.random.Generator, names: Sequence[str]) -> Mission:
     """One of the named missions with sizes, speeds and course of its own."""
     name = str(rng.choice(list(names)))
-    return mission_of(rng, name, MOTIONS[name])
-
-
-def mission_of(rng: np.random.Generator, name: str, motion: Callable[[np.random.Generator], list[Place]]) -> Mission:
-    """A mission of one motion."""
     course = float(rng.uniform(-180.0, 180.0))
-    return _mission(name, course, CLIMB_M, _turned(motion(rng), course))
+    return _mission(name, course, CLIMB_M, _turned((MOTIONS | RECIPES)[name](rng), course))
