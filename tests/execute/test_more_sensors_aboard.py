@@ -11,7 +11,7 @@ from pyulog import ULog
 
 from fusetune.design.mission import Mission
 from fusetune.execute.logger import NO_SAMPLE
-from fusetune.execute.sensors.faults import Fault, InstanceWhipsaw, ToldWrong, parse_faults
+from fusetune.execute.sensors.faults import DefaultProfile, Fault, InstanceWhipsaw, ToldWrong, parse_faults
 from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import AirspeedSensor, Battery, OpticalFlow, RangeFinder, Vehicle, Vision
 from fusetune.px4.flight import Flight
@@ -88,6 +88,15 @@ def test_replay_timestamps_name_the_new_samples(flight: Flight) -> None:
                          ("vehicle_visual_odometry", "visual_odometry"), ("airspeed", "airspeed")):  # fmt: skip
         taken = int((runs[f"{field}_timestamp_rel"] != NO_SAMPLE).sum())
         assert abs(taken - len(flight.topics[topic, 0]["timestamp"])) <= 2, topic
+
+
+def test_the_default_profile_thins_the_new_topics_as_px4_does(mission: Mission, equipped: Vehicle) -> None:
+    thin = fly(mission, equipped, {}, SEED, (DefaultProfile(),), with_estimator=False)
+    assert ("vehicle_visual_odometry", 0) not in thin.topics
+    # PX4 v1.16's `add_default_topics`: every second, twice a second, ten times
+    for topic, rate_hz in (("distance_sensor", 1.0), ("vehicle_optical_flow", 2.0), ("actuator_motors", 10.0)):
+        step_us = np.median(np.diff(thin.topics[topic, 0]["timestamp"]))
+        assert step_us == pytest.approx(1e6 / rate_hz, rel=0.05), topic
 
 
 def test_a_parameter_told_wrong_is_what_the_log_says(mission: Mission, vehicle: Vehicle) -> None:
