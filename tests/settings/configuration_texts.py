@@ -64,9 +64,10 @@ def faults_text() -> str:
 def leaves(kind: type, place: str = "") -> Iterator[tuple[str, DeclaredSetting]]:
     """All settings with their places (`section.key`)."""
     for one in declared(kind):
-        entry = next(iter(get_args(one.kind)), None)
-        if is_dataclass(one.kind):
-            yield from leaves(one.kind, f"{place}{one.name}.")  # type: ignore[arg-type]
+        kind = without_none(one.kind)
+        entry = next(iter(get_args(kind)), None)
+        if is_dataclass(kind):
+            yield from leaves(kind, f"{place}{one.name}.")  # type: ignore[arg-type]
         elif is_dataclass(entry):
             yield from leaves(entry, f"{place}{one.name}[].")  # type: ignore[arg-type]
         else:

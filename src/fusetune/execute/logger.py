@@ -24,6 +24,14 @@ DEFAULT_INTERVAL_MS = {
     "vehicle_magnetometer": 500,
     "vehicle_air_data": 200,
     "vehicle_gps_position": 100,
+    "distance_sensor": 1000,
+    "vehicle_optical_flow": 500,
+    "airspeed": 1000,
+    "airspeed_validated": 200,
+    "vehicle_imu_status": 1000,
+    "actuator_motors": 100,
+    "vehicle_thrust_setpoint": 20,
+    "battery_status": 200,
     "vehicle_attitude": 50,
     "vehicle_local_position": 100,
     "estimator_states": 1000,
@@ -48,7 +56,7 @@ REPLAY_PROFILE_INTERVAL_MS = {
 }
 """The same when the profile for estimator replay is on: sensors and aid sources at full rate, the rest often enough."""
 SLOW_TOPIC_INTERVAL_US = 400_000
-REPLAY_ONLY_TOPICS = ("ekf2_timestamps",)
+REPLAY_ONLY_TOPICS = ("ekf2_timestamps", "vehicle_visual_odometry")
 
 
 def ekf2_timestamps(topics: dict[TopicKey, TopicTable]) -> TopicTable:

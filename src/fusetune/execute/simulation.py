@@ -8,13 +8,20 @@ from pathlib import Path
 
 from fusetune.design.mission import Mission
 from fusetune.errors import UserError
+from fusetune.execute.instances import second_imu, with_second_instance
 from fusetune.execute.logger import ekf2_timestamps, logged_topics
 from fusetune.execute.parameters import flown_parameters
+from fusetune.execute.sensors.airspeed import airspeed_topics
 from fusetune.execute.sensors.barometer import vehicle_air_data
-from fusetune.execute.sensors.faults import DefaultProfile, Fault, of_kind
+from fusetune.execute.sensors.faults import DefaultProfile, Fault, InstanceWhipsaw, ToldWrong, of_kind
 from fusetune.execute.sensors.gnss import vehicle_gps_position
-from fusetune.execute.sensors.imu import sensor_combined
+from fusetune.execute.sensors.imu import inertial_topics
 from fusetune.execute.sensors.magnetometer import vehicle_magnetometer
+from fusetune.execute.sensors.optical_flow import vehicle_optical_flow
+from fusetune.execute.sensors.power import actuator_motors, battery_status, vehicle_thrust_setpoint
+from fusetune.execute.sensors.range_finder import distance_sensor
+from fusetune.execute.sensors.stuck import stick
+from fusetune.execute.sensors.vision import vehicle_visual_odometry
 from fusetune.execute.vehicle import Vehicle
 from fusetune.execute.world.flight_plan import FlightPlan, plan_flight
 from fusetune.execute.world.groundtruth import groundtruth_topics
@@ -82,7 +89,8 @@ def fly(
 ) -> Flight:
     """The flight that `simulate` writes; without the estimator its topics are left out."""
     default_profile = bool(of_kind(faults, DefaultProfile))
-    flown = flown_parameters(vehicle, parameters, default_profile=default_profile)
+    told_wrong = {fault.parameter: fault.value for fault in of_kind(faults, ToldWrong)}
+    flown = flown_parameters(vehicle, {**parameters, **told_wrong}, default_profile=default_profile)
     plan = plan_flight(mission, vehicle.limits)
     if plan.events.end_s > LONGEST_FLIGHT_S:
         raise UserError(
@@ -92,13 +100,17 @@ def fly(
         )
     truth = simulate_truth(plan, vehicle, seed)
     sensed = sensor_topics(truth, plan, mission, vehicle, faults, seed)
-    estimated: dict[TopicKey, TopicTable] = {}
+    each = [sensed]
+    if of_kind(faults, InstanceWhipsaw):
+        each.append(second_imu(sensed, truth, vehicle, faults, seed))
+    estimated: list[dict[TopicKey, TopicTable]] = [{} for _ in each]
     if with_estimator:
         # Loads the compiled estimator, which the sensors do without.
         from fusetune.execute.onboard_estimator import estimator_topics
 
-        estimated = estimator_topics(_flight(name, mission, vehicle, plan, flown, sensed))
-    everything = sensed | estimated | groundtruth_topics(truth, mission.home.geoid_undulation_m)
+        estimated = [estimator_topics(_flight(name, mission, vehicle, plan, flown, one)) for one in each]
+    flown_with = sensed | estimated[0] if len(each) == 1 else with_second_instance(each, estimated, truth, faults)
+    everything = flown_with | groundtruth_topics(truth, mission.home.geoid_undulation_m)
     logged, dropouts = logged_topics(everything, plan.events, faults, seed)
     flight = _flight(name, mission, vehicle, plan, flown, logged)
     flight.dropouts = dropouts
@@ -108,21 +120,37 @@ def fly(
 def sensor_topics(
     truth: Truth, plan: FlightPlan, mission: Mission, vehicle: Vehicle, faults: Sequence[Fault], seed: int
 ) -> dict[TopicKey, TopicTable]:
-    """All that the estimator is fed with, at full rate."""
+    """All that the sensors and the autopilot around the estimator tell, at full rate."""
     undulation_m = mission.home.geoid_undulation_m
+    inertial = inertial_topics(truth, vehicle.imu, faults, seed)
     topics: dict[TopicKey, TopicTable] = {
-        ("sensor_combined", 0): sensor_combined(truth, vehicle.imu, faults, seed),
+        ("sensor_combined", 0): inertial.samples,
         ("vehicle_magnetometer", 0): vehicle_magnetometer(
             truth, vehicle.magnetometer, vehicle.environment, faults, seed
         ),
-        ("vehicle_air_data", 0): vehicle_air_data(truth, vehicle.barometer, undulation_m, seed),
+        ("vehicle_air_data", 0): vehicle_air_data(truth, vehicle.barometer, undulation_m, faults, seed),
         ("vehicle_gps_position", 0): vehicle_gps_position(
             truth, vehicle.gnss, vehicle.environment, undulation_m, faults, seed
         ),
         ("vehicle_land_detected", 0): vehicle_land_detected(plan, truth),
         ("vehicle_status", 0): vehicle_status(plan, truth),
         ("sensor_selection", 0): sensor_selection(truth),
+        ("vehicle_imu_status", 0): inertial.status,
+        ("actuator_motors", 0): actuator_motors(truth, vehicle.airframe),
     }
+    topics["vehicle_thrust_setpoint", 0] = vehicle_thrust_setpoint(topics["actuator_motors", 0])
+    if vehicle.range_finder is not None:
+        topics["distance_sensor", 0] = distance_sensor(truth, vehicle.range_finder, faults, seed)
+    if vehicle.optical_flow is not None:
+        topics["vehicle_optical_flow", 0] = vehicle_optical_flow(truth, vehicle.optical_flow, faults, seed)
+    if vehicle.vision is not None:
+        topics["vehicle_visual_odometry", 0] = vehicle_visual_odometry(truth, vehicle.vision, faults, seed)
+    if vehicle.airspeed is not None:
+        for name, table in airspeed_topics(truth, vehicle.airspeed, undulation_m, faults, seed).items():
+            topics[name, 0] = table
+    if vehicle.battery is not None:
+        topics["battery_status", 0] = battery_status(truth, vehicle.airframe, vehicle.battery, seed)
+    stick(topics, truth.events.takeoff_s, faults)
     topics["ekf2_timestamps", 0] = ekf2_timestamps(topics)
     return topics
 

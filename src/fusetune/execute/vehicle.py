@@ -71,6 +71,8 @@ class InertialSensor:
         "standard deviation of the mounting error about each axis", unit="degrees", low=0, high=5
     )
     range: float = required("readings are clipped at plus and minus this", unit="unit", above=0, high=10000)
+    bias_wander: float = setting(0.0, "standard deviation of a Gauss–Markov bias", unit="unit", low=0, high=1)
+    bias_wander_time_s: float = setting(100.0, "correlation time of that bias", unit="s", above=0, high=10000)
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,93 @@ class Gnss:
 
 
 @dataclass(frozen=True)
+class RangeFinder:
+    """Range finder that looks down; the ground is flat, as high as home.
+
+    A Benewake TFmini Plus has 1 cm repeatability, 5 cm accuracy below 6 m and 1 % beyond, up to 12 m (its data sheet).
+    """
+
+    rate_hz: float = required("rate of the samples", unit="Hz", low=1, high=100)
+    noise_m: float = required("white noise per sample", unit="m", low=0, high=2)
+    noise_share: float = required("white noise per sample over the distance", low=0, high=0.2)
+    minimum_m: float = required("shortest distance that is measured", unit="m", low=0, high=5)
+    maximum_m: float = required("longest distance that is measured", unit="m", above=0, high=200)
+    position_m: tuple[float, float, float] = required(
+        "sensor in the body frame: forward, right, down of the IMU", unit="m", low=-2, high=2
+    )
+    ground_distance_m: float = required("distance that it reads when the vehicle stands", unit="m", low=0, high=2)
+    delay_ms: float = required("from measurement to publication", unit="ms", low=0, high=300)
+
+
+@dataclass(frozen=True)
+class OpticalFlow:
+    """Optical flow sensor that looks down, with a gyro of its own.
+
+    A PixArt PAW3902 or PMW3901 follows 7.4 rad/s from 0.08 m on (their data sheets).
+    """
+
+    rate_hz: float = required("rate of the samples; each integrates from the one before", unit="Hz", low=2, high=150)
+    noise_rad_s: float = required("white noise of the flow per sample", unit="rad/s", low=0, high=2)
+    gyro_noise_rad_s: float = required("white noise of its gyro per sample", unit="rad/s", low=0, high=1)
+    quality: int = required("quality that it reports", low=0, high=255)
+    maximum_rate_rad_s: float = required("largest flow that it follows", unit="rad/s", above=0, high=100)
+    maximum_distance_m: float = required("largest distance from the ground", unit="m", above=0, high=200)
+    position_m: tuple[float, float, float] = required(
+        "sensor in the body frame: forward, right, down of the IMU", unit="m", low=-2, high=2
+    )
+    ground_distance_m: float = required("distance of the sensor from the ground on the ground", unit="m", low=0, high=2)
+    delay_ms: float = required("from the end of the integration to the sample time", unit="ms", low=0, high=300)
+
+
+@dataclass(frozen=True)
+class Vision:
+    """External vision: position, velocity and attitude of a camera in north, east, down.
+
+    Visual-inertial odometry drifts by about one percent of the way (Delmerico and Scaramuzza, ICRA 2018).
+    """
+
+    rate_hz: float = required("rate of the samples", unit="Hz", low=1, high=120)
+    position_noise_m: float = required("white noise of the position per sample and axis", unit="m", low=0, high=5)
+    position_wander_m: float = required(
+        "standard deviation of the Gauss–Markov error of the position per axis", unit="m", low=0, high=20
+    )
+    position_wander_time_s: float = required("correlation time of that error", unit="s", above=0, high=10000)
+    velocity_noise_m_s: float = required("white noise of the velocity per sample and axis", unit="m/s", low=0, high=5)
+    attitude_noise_deg: float = required("white noise of the attitude about each axis", unit="degrees", low=0, high=20)
+    claimed_position_m: float = required("standard deviation of the position that it claims", unit="m", low=0, high=20)
+    claimed_velocity_m_s: float = required("the same of the velocity", unit="m/s", low=0, high=10)
+    claimed_attitude_deg: float = required("the same of the attitude", unit="degrees", low=0, high=45)
+    position_m: tuple[float, float, float] = required(
+        "camera in the body frame: forward, right, down of the IMU", unit="m", low=-2, high=2
+    )
+    delay_ms: float = required("from the picture to the sample time", unit="ms", low=0, high=300)
+
+
+@dataclass(frozen=True)
+class AirspeedSensor:
+    """Pitot tube along the body's forward axis.
+
+    A Sensirion SDP33 repeats its zero to 0.1 Pa; what is left after zeroing and in the tube is some tenths of a pascal.
+    """
+
+    rate_hz: float = required("rate of the samples", unit="Hz", low=1, high=50)
+    noise_pa: float = required("white noise of the pressure per sample", unit="Pa", low=0, high=50)
+    offset_pa: float = required("standard deviation of what zeroing leaves", unit="Pa", low=0, high=50)
+    delay_ms: float = required("from the pressure at the tube to the sample time", unit="ms", low=0, high=300)
+
+
+@dataclass(frozen=True)
+class Battery:
+    """Battery with a current sensor."""
+
+    cells: int = required("cells in series", low=1, high=14)
+    hover_current_a: float = required("current at hover; it grows with the thrust", unit="A", above=0, high=1000)
+    avionics_current_a: float = required("current that always flows", unit="A", low=0, high=50)
+    resistance_ohm: float = required("internal resistance of all cells", unit="Ω", low=0, high=1)
+    current_noise_a: float = required("white noise of the current per sample", unit="A", low=0, high=50)
+
+
+@dataclass(frozen=True)
 class Vehicle:
     """A simulated vehicle."""
 
@@ -180,6 +269,11 @@ class Vehicle:
     magnetometer: Magnetometer = required()
     barometer: Barometer = required()
     gnss: Gnss = required()
+    range_finder: RangeFinder | None = setting(None, "range finder that looks down; without it there is none")
+    optical_flow: OpticalFlow | None = setting(None, "optical flow sensor; without it there is none")
+    vision: Vision | None = setting(None, "external vision; without it there is none")
+    airspeed: AirspeedSensor | None = setting(None, "pitot tube; without it there is none")
+    battery: Battery | None = setting(None, "battery with a current sensor; without it none is logged")
     parameters: dict[str, float] = setting(
         {}, "PX4 parameters that differ from PX4's defaults, whatever set is flown", pattern=PARAMETER_PATTERN
     )

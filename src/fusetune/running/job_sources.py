@@ -61,8 +61,8 @@ JOB_SOURCES = {
     ),
     "diagnose": (*BASE, "design", "ekf2", "save", "analyze"),
     "score": (*BASE, "ekf2", "save", *_SCORED),
-    "apply": (*BASE, "analyze/delays", "analyze/trials", "design", "apply"),
-    "search": (*TRIED, "apply"),
+    "apply": (*BASE, "analyze/delays", "analyze/effects", "analyze/trials", "design", "apply"),
+    "search": (*TRIED, "analyze/effects", "apply"),
     "report": (*BASE, "design", "apply", "report"),
 }
 """Kind of job → files and folders of the package."""

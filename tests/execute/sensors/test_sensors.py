@@ -162,7 +162,7 @@ def test_magnetic_disturbance_is_fixed_to_the_earth_and_limited_in_time(truth: T
 
 
 def test_errorless_barometer_tells_the_altitude_and_a_consistent_atmosphere(truth: Truth, vehicle: Vehicle) -> None:
-    table = vehicle_air_data(truth, errorless(vehicle).barometer, UNDULATION_M, SEED)
+    table = vehicle_air_data(truth, errorless(vehicle).barometer, UNDULATION_M, (), SEED)
     altitude = 488.0 - truth.at(table["timestamp_sample"], truth.position[:, 2])
     assert table["baro_alt_meter"] == pytest.approx(altitude, abs=1e-3)
     # ICAO standard atmosphere at 500 m: 954.61 hPa and 1.1673 kg/m³
@@ -173,7 +173,7 @@ def test_errorless_barometer_tells_the_altitude_and_a_consistent_atmosphere(trut
 
 def test_rotor_wash_makes_the_barometer_read_low_near_the_ground(truth: Truth, vehicle: Vehicle) -> None:
     barometer = dataclasses.replace(errorless(vehicle).barometer, ground_effect_m=2.0)
-    table = vehicle_air_data(truth, barometer, UNDULATION_M, SEED)
+    table = vehicle_air_data(truth, barometer, UNDULATION_M, (), SEED)
     error = table["baro_alt_meter"] - (488.0 - truth.at(table["timestamp_sample"], truth.position[:, 2]))
     after = table["timestamp_sample"] * 1e-6 - truth.events.takeoff_s
     assert np.allclose(error[after < -4.0], 0.0, atol=1e-3)
@@ -182,6 +182,6 @@ def test_rotor_wash_makes_the_barometer_read_low_near_the_ground(truth: Truth, v
 
 
 def test_same_seed_same_samples_other_seed_others(truth: Truth, vehicle: Vehicle, mission: Mission) -> None:
-    first, second, third = (vehicle_air_data(truth, vehicle.barometer, UNDULATION_M, seed) for seed in (1, 1, 2))
+    first, second, third = (vehicle_air_data(truth, vehicle.barometer, UNDULATION_M, (), seed) for seed in (1, 1, 2))
     assert np.array_equal(first["baro_alt_meter"], second["baro_alt_meter"])
     assert not np.array_equal(first["baro_alt_meter"][:50], third["baro_alt_meter"][:50])

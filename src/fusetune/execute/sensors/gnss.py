@@ -9,7 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fusetune.execute.noise import gauss_markov, random_stream
-from fusetune.execute.sensors.faults import Fault, GnssGlitch, GnssOutage, of_kind
+from fusetune.execute.sensors.faults import (
+    Fault,
+    GnssAccuracy,
+    GnssGlitch,
+    GnssInterference,
+    GnssOutage,
+    of_kind,
+)
 from fusetune.execute.sensors.sampling import sample_times
 from fusetune.execute.vehicle import Environment, Gnss, GnssError
 from fusetune.execute.world.truth import Truth
@@ -24,6 +31,17 @@ START_OF_FLIGHT_UTC_S = 10 * 3600
 """The flights begin at ten in the morning, UTC."""
 LOST_EPH_M, LOST_EPV_M, LOST_SPEED_ACCURACY_M_S, LOST_DOP = 4294.0, 3750.0, 20.0, 99.99
 """What a receiver reports when it has lost its position."""
+QUIET_JAMMING, QUIET_NOISE, QUIET_GAIN = 12, 90, 3000
+"""Jamming indicator (0–255), noise per ms and gain count of a u-blox M8 where nothing disturbs it."""
+JAMMED_JAMMING, JAMMED_NOISE, JAMMED_GAIN = 220, 210, 1100
+JAMMING_OK, JAMMING_WARNING, JAMMING_CRITICAL = 1, 2, 3
+JAMMING_WARNS_FROM, JAMMING_CRITICAL_FROM = 0.25, 0.6
+"""Strengths of interference from which the receiver says so."""
+JAMMED_ERROR_FACTOR = 8.0
+LOST_BY_JAMMER = 0.65
+"""Share of the satellites that the strongest jammer takes."""
+FLICKERS_FROM, FLICKER_S, FLICKER_SHARE = 0.4, 1.5, 0.6
+"""The fix goes and comes from that strength on, for so long at a time, up to that share of the time."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +66,9 @@ def vehicle_gps_position(
     samples = len(measured.sampled_us)
     lat, lon, height = truth.frame.to_geodetic(measured.position)
     velocity = measured.velocity_ned.astype(np.float32)
-    reported = _reported(gnss, samples, seed)
+    after_takeoff_s = measured.sampled_us * 1e-6 - truth.events.takeoff_s
+    jammed = _jamming(after_takeoff_s, faults)
+    reported = _reported(gnss, _error_factor(after_takeoff_s, faults), jammed, seed)
     zeros, nan = np.zeros(samples, np.float32), np.full(samples, np.nan, np.float32)
     midnight_s = calendar.timegm(environment.date.timetuple())
     table: TopicTable = {
@@ -66,8 +86,8 @@ def vehicle_gps_position(
         "epv": reported["epv"],
         "hdop": reported["hdop"],
         "vdop": reported["vdop"],
-        "noise_per_ms": np.full(samples, 90, np.int32),
-        "jamming_indicator": np.full(samples, 12, np.int32),
+        "noise_per_ms": _between(QUIET_NOISE, JAMMED_NOISE, jammed).astype(np.int32),
+        "jamming_indicator": _between(QUIET_JAMMING, JAMMED_JAMMING, jammed).astype(np.int32),
         "vel_m_s": np.hypot(velocity[:, 0], velocity[:, 1]),
         "vel_n_m_s": velocity[:, 0],
         "vel_e_m_s": velocity[:, 1],
@@ -78,9 +98,11 @@ def vehicle_gps_position(
         "heading_offset": nan.copy(),
         "heading_accuracy": nan.copy(),
         "rtcm_injection_rate": zeros,
-        "automatic_gain_control": np.full(samples, 3000, np.uint16),
+        "automatic_gain_control": _between(QUIET_GAIN, JAMMED_GAIN, jammed).astype(np.uint16),
         "fix_type": np.full(samples, FIX_3D, np.uint8),
-        "jamming_state": np.ones(samples, np.uint8),
+        "jamming_state": (JAMMING_OK + (jammed >= JAMMING_WARNS_FROM) + (jammed >= JAMMING_CRITICAL_FROM)).astype(
+            np.uint8
+        ),
         "spoofing_state": np.ones(samples, np.uint8),
         "vel_ned_valid": np.ones(samples, np.bool_),
         "satellites_used": reported["satellites_used"],
@@ -88,7 +110,36 @@ def vehicle_gps_position(
         "rtcm_crc_failed": np.zeros(samples, np.bool_),
         "rtcm_msg_used": np.zeros(samples, np.uint8),
     }
-    return _with_outages(table, measured.sampled_us * 1e-6 - truth.events.takeoff_s, faults)
+    _lose_fix(table, _flickers(after_takeoff_s, jammed, seed))
+    return _with_outages(table, after_takeoff_s, faults)
+
+
+def _between(quiet: float, jammed: float, strength: np.ndarray) -> np.ndarray:
+    return np.asarray(np.rint(quiet + (jammed - quiet) * strength))
+
+
+def _jamming(after_takeoff_s: np.ndarray, faults: Sequence[Fault]) -> np.ndarray:
+    """Strength of interference at each sample, 0 where there is none, (N,)."""
+    strength = np.zeros(len(after_takeoff_s))
+    for fault in of_kind(faults, GnssInterference):
+        strength[fault.holds(after_takeoff_s)] = fault.strength
+    return strength
+
+
+def _error_factor(after_takeoff_s: np.ndarray, faults: Sequence[Fault]) -> np.ndarray:
+    """How much larger errors and reported accuracies are than usual, (N,)."""
+    factor = 1.0 + (JAMMED_ERROR_FACTOR - 1.0) * _jamming(after_takeoff_s, faults)
+    for fault in of_kind(faults, GnssAccuracy):
+        factor[fault.holds(after_takeoff_s)] *= fault.factor
+    return np.asarray(factor)
+
+
+def _flickers(after_takeoff_s: np.ndarray, jammed: np.ndarray, seed: int) -> np.ndarray:
+    """When a jammed receiver has no fix, (N,) bool."""
+    slot = np.floor(after_takeoff_s / FLICKER_S).astype(np.int64)
+    draws = random_stream(seed, "gnss flicker").random(slot.max(initial=0) - slot.min(initial=0) + 1)
+    share = FLICKER_SHARE * np.maximum(jammed - FLICKERS_FROM, 0.0) / (1.0 - FLICKERS_FROM)
+    return np.asarray(draws[slot - slot.min(initial=0)] < share)
 
 
 def _measure(truth: Truth, gnss: Gnss, faults: Sequence[Fault], seed: int) -> _Measured:
@@ -103,8 +154,11 @@ def _measure(truth: Truth, gnss: Gnss, faults: Sequence[Fault], seed: int) -> _M
     velocity = truth.at(sampled_us, truth.velocity) + attitude.apply(turning)
     lat, lon, _ = truth.frame.to_geodetic(position)
     velocity_ned = np.einsum("nij,ni->nj", truth.frame.local_axes(lat, lon), velocity)
-    position = position + _error(gnss.position, gnss.rate_hz, len(sampled_us), random_stream(seed, "gnss position"))
-    velocity_ned = velocity_ned + _error(
+    factor = _error_factor(sampled_us * 1e-6 - truth.events.takeoff_s, faults)[:, None]
+    position = position + factor * _error(
+        gnss.position, gnss.rate_hz, len(sampled_us), random_stream(seed, "gnss position")
+    )
+    velocity_ned = velocity_ned + factor * _error(
         gnss.velocity, gnss.rate_hz, len(sampled_us), random_stream(seed, "gnss velocity")
     )
     for fault in of_kind(faults, GnssGlitch):
@@ -121,12 +175,13 @@ def _error(error: GnssError, rate_hz: float, samples: int, rng: np.random.Genera
     return np.asarray((correlated + white) * np.array([1.0, 1.0, error.vertical_factor]))
 
 
-def _reported(gnss: Gnss, samples: int, seed: int) -> TopicTable:
+def _reported(gnss: Gnss, worse: np.ndarray, jammed: np.ndarray, seed: int) -> TopicTable:
     """Accuracy figures as the receiver reports them: they wander slowly, together with the satellites in view."""
     rng = random_stream(seed, "gnss reported")
-    wander = gauss_markov(rng, samples, 1, 1.0 / gnss.rate_hz, 1.0, REPORT_CORRELATION_S)[:, 0]
-    factor = np.exp(gnss.reported.variation * wander)
-    satellites = np.rint(gnss.satellites - SATELLITE_DEVIATION * wander * (gnss.reported.variation > 0.0))
+    wander = gauss_markov(rng, len(worse), 1, 1.0 / gnss.rate_hz, 1.0, REPORT_CORRELATION_S)[:, 0]
+    factor = np.exp(gnss.reported.variation * wander) * worse
+    satellites = gnss.satellites - SATELLITE_DEVIATION * wander * (gnss.reported.variation > 0.0)
+    satellites = np.rint(satellites * (1.0 - LOST_BY_JAMMER * jammed))
     return {
         "eph": (gnss.reported.eph_m * factor).astype(np.float32),
         "epv": (gnss.reported.epv_m * factor).astype(np.float32),
@@ -143,20 +198,27 @@ def _with_outages(table: TopicTable, after_takeoff_s: np.ndarray, faults: Sequen
         on = fault.holds(after_takeoff_s)
         if fault.silent:
             silent |= on
-            continue
-        for column, value in (
-            ("fix_type", NO_FIX),
-            ("satellites_used", 2),
-            ("vel_ned_valid", False),
-            ("eph", LOST_EPH_M),
-            ("epv", LOST_EPV_M),
-            ("s_variance_m_s", LOST_SPEED_ACCURACY_M_S),
-            ("hdop", LOST_DOP),
-            ("vdop", LOST_DOP),
-        ):
-            table[column][on] = value
-        _freeze_position(table, on)
+        else:
+            _lose_fix(table, on)
     return select_rows(table, ~silent)
+
+
+def _lose_fix(table: TopicTable, on: np.ndarray) -> None:
+    """Let the receiver report no fix in some rows, (N,) bool."""
+    if not on.any():
+        return
+    for column, value in (
+        ("fix_type", NO_FIX),
+        ("satellites_used", 2),
+        ("vel_ned_valid", False),
+        ("eph", LOST_EPH_M),
+        ("epv", LOST_EPV_M),
+        ("s_variance_m_s", LOST_SPEED_ACCURACY_M_S),
+        ("hdop", LOST_DOP),
+        ("vdop", LOST_DOP),
+    ):
+        table[column][on] = value
+    _freeze_position(table, on)
 
 
 def _freeze_position(table: TopicTable, lost: np.ndarray) -> None:

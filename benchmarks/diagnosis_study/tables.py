@@ -1,0 +1,120 @@
+"""The tables of the study."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .cases import HEALTHY, PAIRS
+from .kinds import KINDS
+from .verdicts import Verdict
+
+NOTHING = "nothing"
+
+
+def kinds_table() -> str:
+    """What is injected, and from where on it is visible."""
+    rows = ["| injected | magnitude | visible from | because |", "| --- | --- | --- | --- |"]
+    rows += [f"| `{one.id}` | {one.magnitude} | {one.visible_from:g} | {one.why} |" for one in KINDS.values()]
+    return "\n".join(rows)
+
+
+def shares_table(verdicts: Sequence[Verdict]) -> str:
+    """How often the right cause stands first, and among the first two, of each kind and of all."""
+    rows = [
+        "| injected | flights | visible | first | among the first two | named of those not visible |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    by_kind = {kind: [one for one in verdicts if one.group == kind] for kind in KINDS}
+    for kind, own in by_kind.items():
+        if own:
+            rows.append(f"| `{kind}` | {_shares(own)} |")
+    rows.append(f"| **all** | {_shares([one for own in by_kind.values() for one in own])} |")
+    return "\n".join(rows)
+
+
+def _shares(own: Sequence[Verdict]) -> str:
+    visible = [one for one in own if one.is_visible]
+    faint = [one for one in own if not one.is_visible]
+    cells = [str(len(own)), str(len(visible)), _percent([_place(one) == 0 for one in visible])]
+    cells.append(_percent([_place(one) < 2 for one in visible]))
+    cells.append(_percent([_place(one) < len(one.named) for one in faint]))
+    return " | ".join(cells)
+
+
+def _place(verdict: Verdict) -> int:
+    """Where the injected cause stands; after all where it is not named."""
+    ids = [one.id for one in verdict.named]
+    return ids.index(verdict.injected[0]) if verdict.injected[0] in ids else max(len(ids), 2)
+
+
+def _percent(holds: Sequence[bool]) -> str:
+    return f"{100.0 * float(np.mean(holds)):.1f} %" if len(holds) else "–"
+
+
+def confusion_table(verdicts: Sequence[Verdict]) -> str:
+    """What is named first for what was injected, of visible faults."""
+    rows = ["| injected | named first, and how often |", "| --- | --- |"]
+    for kind in KINDS:
+        own = [one for one in verdicts if one.group == kind and one.is_visible]
+        if own:
+            rows.append(f"| `{kind}` | {_counted([one.named[0].id if one.named else NOTHING for one in own])} |")
+    return "\n".join(rows)
+
+
+def _counted(names: Sequence[str]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common())
+
+
+def healthy_table(verdicts: Sequence[Verdict]) -> str:
+    """False alarms."""
+    own = [one for one in verdicts if one.group == HEALTHY]
+    alarmed = [one for one in own if one.alarms]
+    causes = _counted([cause.id for one in alarmed for cause in one.alarms]) or NOTHING
+    rows = ["| healthy flights | with an alarm | share | causes named |", "| --- | --- | --- | --- |"]
+    share = _percent([bool(one.alarms) for one in own])
+    return "\n".join([*rows, f"| {len(own)} | {len(alarmed)} | {share} | {causes} |"])
+
+
+def pairs_table(verdicts: Sequence[Verdict]) -> str:
+    """Two faults at once."""
+    own = [one for one in verdicts if one.group == PAIRS]
+    named = [len({*one.injected} & {cause.id for cause in one.named}) for one in own]
+    missed = _counted([kind for one in own for kind in one.injected if kind not in {c.id for c in one.named}])
+    return "\n".join(
+        [
+            "| flights with two faults | both named | one named | missed |",
+            "| --- | --- | --- | --- |",
+            f"| {len(own)} | {_percent([count == 2 for count in named])} | {_percent([count == 1 for count in named])} "
+            f"| {missed or NOTHING} |",
+        ]
+    )
+
+
+def cost_table(verdicts: Sequence[Verdict]) -> str:
+    """CPU seconds of a diagnosis, and flights without an answer."""
+    answered = np.array([one.cpu_s for one in verdicts if not one.problem])
+    problems = _counted([one.problem for one in verdicts if one.problem]) or NOTHING
+    median, most = (float(np.percentile(answered, share)) if len(answered) else np.nan for share in (50.0, 95.0))
+    return "\n".join(
+        [
+            "| flights | CPU of a diagnosis, median | 95th percentile | without an answer |",
+            "| --- | --- | --- | --- |",
+            f"| {len(verdicts)} | {median:.2f} s | {most:.2f} s | {problems} |",
+        ]
+    )
+
+
+def study_tables(verdicts: Sequence[Verdict], estimates: str) -> Mapping[str, str]:
+    """All tables by the names of their places in docs/diagnosis.md."""
+    return {
+        "injected": kinds_table(),
+        "shares": shares_table(verdicts),
+        "confusion": confusion_table(verdicts),
+        "healthy": healthy_table(verdicts),
+        "pairs": pairs_table(verdicts),
+        "estimates": estimates,
+        "cost": cost_table(verdicts),
+    }
