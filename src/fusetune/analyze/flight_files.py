@@ -17,6 +17,7 @@ SCORE_TABLES = {
 SAMPLES_FILE = "samples.parquet"
 SCORING_FILE = "scoring.json"
 DELAYS_FILE = "delays.json"
+SENSOR_NOISE_FILE = "sensor_noise.json"
 ONBOARD_FILE = "onboard.innovations.parquet"
 FIDELITY_FILE = "fidelity.json"
 

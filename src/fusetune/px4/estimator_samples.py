@@ -29,6 +29,21 @@ def logged_share(flight: Flight, topic: str) -> float | None:
     topic
         `vehicle_magnetometer`, `vehicle_air_data` or another that `ekf2_timestamps` has a field for.
     """
+    named = taken_times(flight, topic)
+    if named is None:
+        return None
+    shares = [_share_in(named, flight.topics[topic, instance]["timestamp"]) for instance in flight.instances(topic)]
+    return max(shares, default=0.0)
+
+
+def taken_times(flight: Flight, topic: str) -> np.ndarray | None:
+    """Times of the samples of a sensor that the estimator took, µs to 0.1 ms, logged or not; None where none is named.
+
+    Parameters
+    ----------
+    topic
+        As for `logged_share`.
+    """
     updates = flight.topic("ekf2_timestamps")
     relative = None if updates is None else updates.get(RELATIVE_FIELDS.get(topic, ""))
     if updates is None or relative is None:
@@ -38,9 +53,7 @@ def logged_share(flight: Flight, topic: str) -> float | None:
         return None
     named = np.sort(updates["timestamp"][taken] + relative[taken].astype(np.int64) * RELATIVE_TICK_US)
     # one sample named by two updates may be rounded to two neighbouring units
-    named = named[np.append(True, np.diff(named) > _ROUNDING_US)]
-    shares = [_share_in(named, flight.topics[topic, instance]["timestamp"]) for instance in flight.instances(topic)]
-    return max(shares, default=0.0)
+    return named[np.append(True, np.diff(named) > _ROUNDING_US)]
 
 
 def _share_in(named: np.ndarray, logged: np.ndarray) -> float:

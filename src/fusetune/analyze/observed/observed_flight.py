@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from fusetune.analyze.delays.inertial_motion import InertialMotion, inertial_motion
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import airborne_intervals
+from fusetune.analyze.observed.body_motion import BodyMotion, body_motion
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare_flight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.px4.flight import Flight
+from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.set_names import AS_FLOWN
 
@@ -44,8 +47,8 @@ class ObservedFlight:
 
     @cached_property
     def airborne(self) -> tuple[Interval, ...]:
-        """When the vehicle was in the air, µs."""
-        return airborne_intervals(self.flight, {})
+        """When the vehicle was in the air, µs; as its estimator saw it where the log has no land detector."""
+        return airborne_intervals(self.flight, rows_of_primary(self.flight, "estimator_status_flags") or {})
 
     @cached_property
     def clear_of_ground(self) -> tuple[Interval, ...]:
@@ -62,6 +65,19 @@ class ObservedFlight:
     def replayed(self) -> ReplayedSet:
         """The replay with the parameters that flew."""
         return replay_set(self.prepared, AS_FLOWN, {})
+
+    @cached_property
+    def inertial(self) -> InertialMotion | None:
+        """The motion that the IMU alone tells; None where log and replay hardly overlap."""
+        imu = self.prepared.reconstructed.flight.topics["sensor_combined", 0]
+        return inertial_motion(imu, self.replayed.states())
+
+    @cached_property
+    def motion(self) -> BodyMotion | None:
+        """Velocity, attitude, specific force and height on an even grid; None where `inertial` is."""
+        if self.inertial is None or self.replayed.steps is None:
+            return None
+        return body_motion(self.replayed.steps(), self.inertial, self.flight, self.parameters)
 
     def since_start_s(self, timestamp: int) -> float:
         """Seconds from the start of the log, for a time in µs since boot."""

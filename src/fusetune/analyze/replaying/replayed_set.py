@@ -207,11 +207,19 @@ class ReplayedSet:
             if values is None or values.size < 2:
                 times[kind] = np.zeros(0, dtype=np.int64)
                 continue
-            # The counter is a byte that wraps in the log.
-            counts: npt.NDArray[np.int64] = values.astype(np.int64)
-            steps = np.subtract(counts[1:], counts[:-1]) & 0xFF
-            times[kind] = np.repeat(time[1:], steps)
+            times[kind] = counter_steps(time, values)
         return times
+
+
+def counter_steps(time: npt.NDArray[np.int64], counter: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Times at which a reset counter moved, one entry for every step: it is a byte that wraps in the log.
+
+    Parameters
+    ----------
+    time, counter : (N,) µs, and the counter as logged
+    """
+    counts: npt.NDArray[np.int64] = counter.astype(np.int64)
+    return np.repeat(time[1:].astype(np.int64), np.subtract(counts[1:], counts[:-1]) & 0xFF)
 
 
 def values_of(summary: Mapping[str, Any], part: str) -> dict[str, float]:

@@ -68,6 +68,25 @@ _FAULT_BITS = [
 ]
 """Bits of `filter_fault_flags` in the releases that had no `estimator_status_flags` yet."""
 
+_REJECT_BITS = [
+    "reject_hor_vel",
+    "reject_ver_vel",
+    "reject_hor_pos",
+    "reject_ver_pos",
+    "reject_mag_x",
+    "reject_mag_y",
+    "reject_mag_z",
+    "reject_yaw",
+    "reject_airspeed",
+    "reject_sideslip",
+    "reject_hagl",
+    "reject_optflow_x",
+    "reject_optflow_y",
+]
+"""Bits of `innovation_check_flags` from v1.11 on; before, one bit stood for velocity in all directions."""
+_SPLIT_VELOCITY = "pre_flt_fail_innov_heading"
+"""A field of `estimator_status` that came with v1.11, as the two bits did."""
+
 
 def control_bits(flags: Iterable[str]) -> int:
     """Bits of `estimator_status.control_mode_flags` that stand for flags of v1.16; 0 where it has none of them."""
@@ -96,7 +115,17 @@ def status_flags_of_status(table: TopicTable) -> TopicTable | None:
         if field in table:
             bits = table[field].astype(np.int64)
             flags.update({name: (bits >> bit & 1).astype(np.bool_) for bit, name in enumerate(names)})
-    return status_flags(flags)
+    return status_flags(flags | _rejections(table))
+
+
+def _rejections(table: TopicTable) -> TopicTable:
+    """Flags of what was rejected; a rejected velocity of before v1.11 counts as horizontal and vertical."""
+    if "innovation_check_flags" not in table:
+        return {}
+    bits = table["innovation_check_flags"].astype(np.int64)
+    if _SPLIT_VELOCITY not in table:
+        bits = bits & 1 | bits << 1
+    return {name: (bits >> bit & 1).astype(np.bool_) for bit, name in enumerate(_REJECT_BITS)}
 
 
 def states_of_status(table: TopicTable) -> TopicTable | None:

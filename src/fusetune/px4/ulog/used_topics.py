@@ -16,6 +16,7 @@ _USED_TOPICS = frozenset(
         "vehicle_attitude",
         "vehicle_attitude_groundtruth",
         "vehicle_imu",
+        "vehicle_imu_status",
         "vehicle_local_position",
         "vehicle_local_position_groundtruth",
         "vehicle_mocap_odometry",

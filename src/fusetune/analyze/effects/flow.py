@@ -1,0 +1,104 @@
+"""Optical flow: its scale (`SENS_FLOW_SCALE`) and where it sits (`EKF2_OF_POS_*`).
+
+    flow = s (sight(v + ω × p) + turning) + offset + e        sight = (v_y, −v_x) / distance
+
+The velocity is the replay's, the distance the range finder's or, without one, the height above take-off. A distance
+that is wrong by a share makes the scale wrong by nearly as much.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.effects.estimate import Effect, Estimate
+from fusetune.analyze.effects.range_finder import LARGEST_ARM_ERROR_M, measured_ranges
+from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
+from fusetune.analyze.effects.walking_regression import WalkingRows, fit_walking
+from fusetune.analyze.flight.intervals import inside
+from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.ekf2.feed.message_samples import flow_refusals, flow_samples, taken
+
+Array = npt.NDArray[np.float64]
+
+LARGEST_SCALE_ERROR = 0.03
+LEAST_DISTANCE_M = 0.8
+EXPECTED = np.array([np.inf, 1.0, 1.0, 1.0, 0.05, 0.05, 0.02])
+"""Standard deviations beforehand: scale; arm m; offsets rad/s; delay s."""
+_FEWEST = 200
+_WHAT_TO_FLY = "fly back and forth and sideways, two to five metres high above textured, even ground, and turn on the spot"
+
+
+def estimate_flow(observed: ObservedFlight) -> Effect:
+    """Scale and lever arm of the optical flow sensor."""
+    name, motion = "optical_flow", observed.motion
+    table = observed.flight.topic("vehicle_optical_flow")
+    if table is None or motion is None:
+        return refused(name, NO_MOTION if motion is None else "the log has no optical flow (`vehicle_optical_flow`)")
+    samples, _ = flow_samples(table)
+    time = samples["time_us"] - round(1e3 * observed.parameters.get("EKF2_OF_DELAY", 0.0))
+    usable = taken(table, flow_refusals(table)) & np.isfinite(samples["flow_rate"]).all(axis=1)
+    usable &= samples["quality"] > observed.parameters.get("EKF2_OF_QMIN", 0.0)
+    usable &= inside(time, observed.airborne) & motion.covers(time)
+    if np.count_nonzero(usable) < _FEWEST:
+        return refused(name, f"too few measurements of the flow in the air; {_WHAT_TO_FLY}")
+    time, flow = time[usable], np.asarray(samples["flow_rate"][usable], np.float64)
+    gyro = np.asarray(samples["gyro_rate"][usable], np.float64)
+    rate = motion.at(time, motion.body_rate)
+    gyro = np.where(np.isfinite(gyro), gyro, -rate)
+    ranges = measured_ranges(observed)
+    if ranges is not None:
+        distance = np.interp(time, *ranges)
+    else:
+        begin = float(np.interp(observed.airborne[0][0], motion.time, motion.height))
+        upright = motion.at(time, motion.rotation[:, 2, 2:])[:, 0]
+        distance = (motion.at(time, motion.height[:, None])[:, 0] - begin) / np.maximum(upright, 0.5)
+    near = distance > LEAST_DISTANCE_M
+    if np.count_nonzero(near) < _FEWEST:
+        return refused(name, f"too few measurements of the flow {LEAST_DISTANCE_M} m above ground; {_WHAT_TO_FLY}")
+    time, flow, gyro, rate, distance = time[near], flow[near], gyro[near], rate[near], distance[near]
+    body = np.einsum("nji,nj->ni", motion.at(time, motion.rotation), motion.at(time, motion.velocity))
+    sight = np.column_stack([body[:, 1], -body[:, 0]]) / distance[:, None]
+    time_s, zero, one = np.asarray(time * 1e-6, np.float64), np.zeros(time.size), np.ones(time.size)
+    design = []
+    arms = (
+        np.column_stack([rate[:, 2], zero, -rate[:, 0]]),  # (ω × p)_y
+        np.column_stack([zero, rate[:, 2], -rate[:, 1]]),  # −(ω × p)_x
+    )
+    for axis in range(2):
+        whole = sight[:, axis] + gyro[:, axis]
+        offset = [one, zero] if axis == 0 else [zero, one]
+        design.append(
+            np.column_stack([whole, arms[axis] / distance[:, None], *offset, -np.gradient(whole, time_s)])
+        )
+    rows = WalkingRows(
+        np.tile(time_s, 2), flow.ravel(order="F"), np.vstack(design), np.zeros((2 * time.size, 0)), EXPECTED
+    )
+    fit = fit_walking(rows)
+    if fit is None or fit.constants[0] <= 0.1:
+        return refused(name, f"the flow does not follow the motion; {_WHAT_TO_FLY}")
+    scale, half, error = float(fit.constants[0]), fit.half_width(0), float(fit.standard_error[0])
+    figures = {"residual_rad_s": fit.noise, "by_range": float(ranges is not None)}
+    estimates, missing = [], []
+    if error > LARGEST_SCALE_ERROR:
+        missing.append("SENS_FLOW_SCALE")
+    else:
+        told = told_value(observed.logged.parameters.initial, "SENS_FLOW_SCALE")
+        unit = 1.0 if told is None else told
+        estimates.append(
+            Estimate(
+                "SENS_FLOW_SCALE", "", told, unit / scale, unit / (scale + half), unit / (scale - half),
+                unit * error / scale**2, time.size,
+            )
+        )  # fmt: skip
+    for index, letter in enumerate("XYZ"):
+        arm = f"EKF2_OF_POS_{letter}"
+        spread, width = float(fit.standard_error[1 + index]) / scale, fit.half_width(1 + index) / scale
+        if spread > LARGEST_ARM_ERROR_M:
+            missing.append(arm)
+            continue
+        value = float(fit.constants[1 + index]) / scale + observed.parameters.get(f"EKF2_IMU_POS_{letter}", 0.0)
+        told_arm = observed.parameters.get(arm)
+        estimates.append(Estimate(arm, "m", told_arm, value, value - width, value + width, spread, time.size))
+    refusal = f"{', '.join(missing)} not told: {_WHAT_TO_FLY}" if missing else ""
+    return Effect(name, tuple(estimates), refusal, figures)

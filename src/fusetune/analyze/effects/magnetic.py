@@ -1,0 +1,346 @@
+"""The field that turns with the vehicle: motors, hard iron, scale; and the declination.
+
+    m = (1 + S) R(t)ᵀ E + h + c u(t) + noise
+
+E is the earth's field, whose strength and dip the World Magnetic Model tells within some milligauss, R the attitude with
+a heading that the gyros alone turn (`gyro_attitude`) and whose error is a constant rate, a share of the way turned, and a
+walk; u is the power of the motors (`motor_power`). From before arming to the air u jumps while E does not: that is what
+tells c from h.
+
+PX4 corrects what a sensor measures as rotation · scale · (data + power · COMP − OFF) (`Magnetometer::Correct`), so COMP
+falls by c and OFF rises by h, both over the scale.
+
+References
+----------
+PX4 v1.16, `src/lib/sensor_calibration/Magnetometer.hpp`; parameters CAL_MAGn_XCOMP (G of throttle, G/kA of current),
+CAL_MAGn_XOFF (G), CAL_MAGn_XSCALE, CAL_MAG_COMP_TYP, EKF2_MAG_DECL (degrees)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.effects.declination import true_heading_error
+from fusetune.analyze.effects.estimate import Effect, Estimate
+from fusetune.analyze.effects.gyro_attitude import GyroAttitude, gyro_attitude
+from fusetune.analyze.effects.motor_power import OFF, MotorPower, motor_power
+from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
+from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
+from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.ekf2.feed.message_samples import gnss_samples, mag_samples
+from fusetune.ekf2.numerics.world_magnetic_model import field_at
+
+Array = npt.NDArray[np.float64]
+Times = npt.NDArray[np.int64]
+
+LARGEST_FIELD_ERROR_GAUSS = 0.003
+"""Standard error of a field above which it is not told: about 1° of heading."""
+LARGEST_SCALE_ERROR = 0.01
+LARGEST_DECLINATION_ERROR_DEG = 2.0
+MODEL_ERROR_GAUSS = 0.005
+"""Standard deviation of the field at a place from the model of the world's."""
+EXPECTED = np.array([
+    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003, *[0.02] * 6,
+])  # fmt: skip
+"""Standard deviations beforehand: horizontal and vertical field, hard iron, motors, scale, drift rad/s, gyro scale,
+and what one axis shows of another."""
+STARTS = np.array([np.inf, 0.01, 0.01])
+"""The same, of heading and tilt at the beginning, rad."""
+FIELD_H, FIELD_V = 0, 1
+HARD, MOTOR, SCALE = slice(2, 5), slice(5, 8), slice(8, 11)
+DRIFT, GYRO_SCALE = 11, 12
+CROSSED = slice(13, 19)
+_OTHERS = ((1, 2), (0, 2), (0, 1))
+FASTEST_HZ = 12.5
+_ROUNDS = 3
+_KNOTS_S = 2.0
+_AXES = "XYZ"
+
+
+@dataclass(frozen=True)
+class MagneticFit:
+    """What was found: `fit` with its constants in the order of `EXPECTED`, and the motors' power at the samples."""
+
+    fit: WalkingFit
+    power: MotorPower
+    has_power: bool
+    declination_deg: float
+    heading: GyroAttitude
+    time: Times
+    heading_error: Array
+
+
+def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
+    """Fit all of it; a refusal in words where the log does not hold what it takes."""
+    table = observed.flight.topic("vehicle_magnetometer")
+    if table is None or table["timestamp"].size < 100:
+        return "the log has too few messages of the magnetometer (`vehicle_magnetometer`)"
+    if observed.replayed.steps is None:
+        return NO_MOTION
+    world = _world_field(observed)
+    if world is None:
+        return "the log has no position from which the earth's field would follow"
+    steps = observed.replayed.steps()
+    samples = mag_samples(table)
+    delay_us = round(1e3 * observed.parameters.get("EKF2_MAG_DELAY", 0.0))
+    time, field = _thinned(samples["time_us"] - delay_us, np.asarray(samples["mag"], np.float64))
+    aligned = _aligned_from(observed)
+    inside = (time > max(int(steps.time[0]), aligned)) & (time < steps.time[-1]) & np.isfinite(field).all(axis=1)
+    time, field = time[inside], field[inside]
+    if time.size < 50:
+        return "magnetometer and attitude hardly overlap"
+    power = motor_power(observed, time)
+    known = np.isfinite(power.power)
+    has_power = bool(np.count_nonzero(known) > 50 and np.ptp(power.power[known]) > 0.0)
+    if has_power:
+        time, field, power = time[known], field[known], MotorPower(power.kind, power.unit, power.power[known])
+    heading = gyro_attitude(steps, observed.airborne)
+    fitted = _gauss_newton(heading, time, field, power.power if has_power else np.zeros(time.size), world)
+    if fitted is None:
+        return "too short a log for the magnetic field"
+    return MagneticFit(fitted[0], power, has_power, math.degrees(math.atan2(world[1], world[0])), heading, time, fitted[1])
+
+
+def _world_field(observed: ObservedFlight) -> Array | None:
+    table = observed.flight.topic("vehicle_gps_position")
+    if table is None:
+        return None
+    samples = gnss_samples(table)
+    good = (samples["fix_type"] >= 3) & np.isfinite(samples["lat_deg"]) & np.isfinite(samples["lon_deg"])
+    if not good.any():
+        return None
+    place = int(np.argmax(good))
+    declination, inclination, strength = field_at(float(samples["lat_deg"][place]), float(samples["lon_deg"][place]))
+    level = strength * math.cos(inclination)
+    return np.array([level * math.cos(declination), level * math.sin(declination), strength * math.sin(inclination)])
+
+
+def _aligned_from(observed: ObservedFlight) -> int:
+    """When the replay's tilt was known, µs."""
+    flags = observed.replayed.flags
+    if "cs_tilt_align" not in flags or not np.any(flags["cs_tilt_align"]):
+        return 0
+    return int(flags["timestamp"][int(np.argmax(np.asarray(flags["cs_tilt_align"], bool)))])
+
+
+def _thinned(time: Times, field: Array) -> tuple[Times, Array]:
+    """Means of so many neighbours that no more than `FASTEST_HZ` are left."""
+    step_s = float(np.median(np.diff(time))) * 1e-6
+    every = max(1, round(1.0 / (FASTEST_HZ * max(step_s, 1e-3))))
+    rows = time.size // every * every
+    means = field[:rows].reshape(-1, every, 3).mean(axis=1)
+    return np.rint(time[:rows].reshape(-1, every).mean(axis=1)).astype(np.int64), means
+
+
+def _gauss_newton(
+    heading: GyroAttitude, time: Times, field: Array, power: Array, world: Array
+) -> tuple[WalkingFit, Array] | None:
+    """The fit and the heading's error at the samples."""
+    rotation, time_s = heading.rotation_at(time), np.asarray(time * 1e-6, np.float64)
+    since_s, turned = time_s - time_s[0], heading.turned_at(time)
+    level, scale = math.hypot(world[0], world[1]), np.zeros(3)
+    error = np.full(time.size, _first_error(rotation, field, world))
+    earth, fit = world.copy(), None
+    stacked = np.tile(time_s, 3)
+    for number in range(_ROUNDS):
+        cosine, sine = np.cos(error), np.sin(error)
+        # the earth's field as the attitude with the wrong heading sees it, and its change with that heading
+        seen = np.column_stack([cosine * earth[0] + sine * earth[1], cosine * earth[1] - sine * earth[0]])
+        unit = seen / max(float(np.hypot(earth[0], earth[1])), 1e-6)
+        down = rotation[:, 2]
+        body = rotation[:, 0] * seen[:, :1] + rotation[:, 1] * seen[:, 1:] + down * earth[2]
+        across = rotation[:, 0] * seen[:, 1:] - rotation[:, 1] * seen[:, :1]
+        strong = rotation[:, 0] * unit[:, :1] + rotation[:, 1] * unit[:, 1:]
+        gain = 1.0 + scale
+        rows = []
+        for axis in range(3):
+            one = np.zeros((time.size, EXPECTED.size))
+            one[:, FIELD_H], one[:, FIELD_V] = gain[axis] * strong[:, axis], gain[axis] * down[:, axis]
+            one[:, HARD.start + axis], one[:, MOTOR.start + axis] = 1.0, power
+            one[:, SCALE.start + axis] = body[:, axis]
+            crossed = slice(CROSSED.start + 2 * axis, CROSSED.start + 2 * axis + 2)
+            one[:, crossed] = body[:, _OTHERS[axis]]
+            turns = gain[axis] * across[:, axis]
+            one[:, DRIFT], one[:, GYRO_SCALE] = turns * since_s, turns * turned
+            # R'ᵀ (E' × e) of rotations e about north and east, which the tilt may be off by
+            tilts = gain[axis] * np.column_stack([
+                earth[2] * rotation[:, 1, axis] - seen[:, 1] * down[:, axis],
+                seen[:, 0] * down[:, axis] - earth[2] * rotation[:, 0, axis],
+            ])  # fmt: skip
+            rows.append((one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error))
+        design, walking = np.vstack([one for one, _, _ in rows]), np.vstack([one for _, one, _ in rows])
+        offsets = earth_change(earth, world)
+        target = np.concatenate([one for _, _, one in rows])
+        # fields are told as changes of the world's, scales as they are
+        target = target + design[:, :2] @ offsets + design[:, SCALE] @ scale
+        given = WalkingRows(stacked, target, design, walking, EXPECTED, _KNOTS_S, starts=STARTS)
+        fit = fit_walking(given) if fit is None or number == 1 else fit_walking(given, fit.ratio, fit.memory_s)
+        if fit is None:
+            return None
+        scale = fit.constants[SCALE].copy()
+        factor = (level + fit.constants[FIELD_H]) / level
+        earth = np.array([world[0] * factor, world[1] * factor, world[2] + fit.constants[FIELD_V]])
+        error = np.interp(time_s, fit.knot_s, fit.course[:, 0])
+        error = error + fit.constants[DRIFT] * since_s + fit.constants[GYRO_SCALE] * turned
+    assert fit is not None
+    return fit, error
+
+
+def earth_change(earth: Array, world: Array) -> Array:
+    """By how much a field is stronger than another in the horizontal and in the vertical, (2,)."""
+    return np.array([math.hypot(*earth[:2]) - math.hypot(*world[:2]), earth[2] - world[2]])
+
+
+def _first_error(rotation: Array, field: Array, world: Array) -> float:
+    """Error of the heading by the first samples."""
+    first = np.einsum("nij,nj->ni", rotation[:20], field[:20]).mean(axis=0)
+    # true = Rz(error) · attitude
+    return float(math.atan2(world[1], world[0]) - math.atan2(first[1], first[0]))
+
+
+def estimate_magnetic(observed: ObservedFlight) -> tuple[Effect, ...]:
+    """Effects `motor_magnetic_field`, `hard_iron`, `magnetometer_scale` and `declination`."""
+    found = fit_magnetic(observed)
+    if isinstance(found, str):
+        return tuple(refused(name, found) for name in ("motor_magnetic_field", "hard_iron", "magnetometer_scale", "declination"))
+    figures = {"noise_gauss": found.fit.noise, "heading_walk_deg_sqrt_s": math.degrees(found.fit.walk)}
+    calibration = _Calibration.of(observed)
+    return (
+        _motor(found, calibration, figures),
+        _hard_iron(found, calibration, figures),
+        _scale(found, calibration, figures),
+        _declination(observed, found),
+    )
+
+
+@dataclass(frozen=True)
+class _Calibration:
+    """What PX4 is told of the magnetometer: parameters by name, and their prefix; empty where its axes are turned."""
+
+    values: dict[str, float]
+    prefix: str
+
+    @classmethod
+    def of(cls, observed: ObservedFlight) -> _Calibration:
+        logged = observed.logged.parameters.initial
+        table = observed.flight.topic("vehicle_magnetometer")
+        device = int(table["device_id"][0]) if table is not None and "device_id" in table else 0
+        for number in range(4):
+            prefix = f"CAL_MAG{number}_"
+            rotation = logged.get(f"{prefix}ROT", -1)
+            turned = logged.get("SENS_BOARD_ROT", 0) if rotation == -1 else rotation
+            same = device and int(logged.get(f"{prefix}ID", 0)) & 0xFFFFFFFF == device & 0xFFFFFFFF
+            if same and turned == 0:
+                return cls({name: float(value) for name, value in logged.items() if name.startswith(prefix)}, prefix)
+        return cls({}, "")
+
+    def told(self, name: str, default: float) -> float:
+        return self.values.get(self.prefix + name, default)
+
+
+def _motor(found: MagneticFit, calibration: _Calibration, figures: dict[str, float]) -> Effect:
+    name = "motor_magnetic_field"
+    if not found.has_power:
+        return refused(name, "the log tells neither what the motors draw nor when they stand still: log from boot", **figures)
+    span = float(np.ptp(np.percentile(found.power.power, [1.0, 99.0])))
+    figures = figures | {"power_span": span, "CAL_MAG_COMP_TYP": float(found.power.kind)}
+    errors = found.fit.standard_error[MOTOR]
+    if float(np.max(errors)) * span > LARGEST_FIELD_ERROR_GAUSS:
+        why = (
+            "the field of the motors cannot be told from that of the body; log from boot, stand still for ten seconds"
+            " before arming, then hover, climb fast and sink, and turn on the spot"
+        )
+        return refused(name, why, **figures)
+    is_px4 = found.power.kind != OFF and calibration.prefix != ""
+    estimates = []
+    for axis, letter in enumerate(_AXES):
+        index = MOTOR.start + axis
+        if is_px4:
+            factor, told = -1.0 / calibration.told(f"{letter}SCALE", 1.0), calibration.told(f"{letter}COMP", 0.0)
+            label = f"{calibration.prefix}{letter}COMP"
+        else:
+            factor, told, label = 1.0, 0.0, f"motor_field_{letter.lower()}"
+        estimates.append(_shifted(found.fit, index, label, found.power.unit, told, factor, known=is_px4))
+    return Effect(name, tuple(estimates), "", figures)
+
+
+def _shifted(
+    fit: WalkingFit, index: int, name: str, unit: str, told: float, factor: float, *, known: bool
+) -> Estimate:
+    value, half = told + factor * float(fit.constants[index]), abs(factor) * fit.half_width(index)
+    error = abs(factor) * float(fit.standard_error[index])
+    count = int(fit.residual.size)
+    return Estimate(name, unit, told if known else None, value, value - half, value + half, error, count)
+
+
+def _hard_iron(found: MagneticFit, calibration: _Calibration, figures: dict[str, float]) -> Effect:
+    estimates, missing = [], []
+    for axis, letter in enumerate(_AXES):
+        index = HARD.start + axis
+        if found.fit.standard_error[index] > LARGEST_FIELD_ERROR_GAUSS * 5.0 / 3.0:
+            missing.append(letter)
+        elif calibration.prefix:
+            told, factor = calibration.told(f"{letter}OFF", 0.0), 1.0 / calibration.told(f"{letter}SCALE", 1.0)
+            estimates.append(
+                _shifted(found.fit, index, f"{calibration.prefix}{letter}OFF", "G", told, factor, known=True)
+            )
+        else:
+            estimates.append(_shifted(found.fit, index, f"hard_iron_{letter.lower()}", "G", 0.0, 1.0, known=False))
+    refusal = ""
+    if missing:
+        refusal = f"hard iron along {', '.join(missing)} not told: turn once on the spot in both directions, tilt far"
+    return Effect("hard_iron", tuple(estimates), refusal, figures)
+
+
+def _scale(found: MagneticFit, calibration: _Calibration, figures: dict[str, float]) -> Effect:
+    estimates, missing = [], []
+    for axis, letter in enumerate(_AXES):
+        index = SCALE.start + axis
+        error = float(found.fit.standard_error[index])
+        if error > LARGEST_SCALE_ERROR:
+            missing.append(letter)
+            continue
+        told = calibration.told(f"{letter}SCALE", 1.0)
+        value, half = 1.0 + float(found.fit.constants[index]), found.fit.half_width(index)
+        name = f"{calibration.prefix}{letter}SCALE" if calibration.prefix else f"magnetometer_scale_{letter.lower()}"
+        count = int(found.fit.residual.size)
+        estimates.append(
+            Estimate(
+                name, "", told if calibration.prefix else None, told / value, told / (value + half),
+                told / max(value - half, 0.1), told * error / value**2, count,
+            )
+        )  # fmt: skip
+    refusal = f"scale along {', '.join(missing)} not told: turn on all headings, tilt far" if missing else ""
+    return Effect("magnetometer_scale", tuple(estimates), refusal, figures)
+
+
+def _declination(observed: ObservedFlight, found: MagneticFit) -> Effect:
+    """How far the heading by the magnetometer is from the one that GNSS velocities tell, on the model's declination."""
+    name, told = "declination", told_value(dict(observed.parameters), "EKF2_MAG_DECL")
+    error = true_heading_error(observed, found.heading, found.time, found.heading_error)
+    if error is None or error.standard_error > LARGEST_DECLINATION_ERROR_DEG:
+        figures = {} if error is None else {"standard_error_deg": error.standard_error}
+        why = "GNSS velocities do not tell the heading; fly straight legs with hard starts and stops, on several headings"
+        return refused(name, why, **figures)
+    value = found.declination_deg + error.value
+    return Effect(
+        name,
+        (
+            Estimate(
+                "EKF2_MAG_DECL", "deg", told, value, value - error.half_width, value + error.half_width,
+                error.standard_error, error.n,
+            ),
+        ),
+        "",
+        {"world_model_deg": found.declination_deg},
+    )  # fmt: skip
+
+
+def airborne_span(observed: ObservedFlight) -> Interval | None:
+    """From the first to the last time in the air, µs."""
+    return (observed.airborne[0][0], observed.airborne[-1][1]) if observed.airborne else None

@@ -1,0 +1,134 @@
+"""How the vehicle moved and what its accelerometers felt, on an even grid: what the tuners of effects share.
+
+Attitude and slow velocity are the replay's, the fast velocity is the IMU's alone (`analyze/delays/inertial_motion`).
+The height is made of the IMU and of GNSS vertical velocities, without the barometer: an error of the barometer must
+not hide in what it is compared with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.delays.inertial_motion import InertialMotion, slow_part
+from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.replaying.replayed_set import ReplayedSteps
+from fusetune.ekf2.feed.message_samples import gnss_refusals, gnss_samples, taken
+from fusetune.px4.flight import Flight
+
+Array = npt.NDArray[np.float64]
+Times = npt.NDArray[np.int64]
+
+EVERY_S = 0.1
+HEIGHT_KNOTS_S = 5.0
+"""Over so long the IMU alone knows the vertical velocity."""
+_FEWEST_FIXES = 20
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Means over intervals of `EVERY_S`, stamped at their middles; K rows in order of time, without gaps of the IMU.
+
+    Attributes
+    ----------
+    time : (K,) µs
+    rotation : (K, 3, 3) body → NED
+    velocity : (K, 3) of the IMU, NED, m/s
+    specific_force : (K, 3) body, m/s², less the mean of the accelerometer bias that the replay found
+    body_rate : (K, 3) FRD, rad/s, less the mean of the gyro bias
+    height : (K,) above the first row, m; drifts
+    by_gnss : whether GNSS vertical velocities bound the drift; otherwise it is the replay's velocity
+    """
+
+    time: Times
+    rotation: Array
+    velocity: Array
+    specific_force: Array
+    body_rate: Array
+    height: Array
+    by_gnss: bool
+
+    @property
+    def time_s(self) -> Array:
+        """(K,) s since boot."""
+        return np.asarray(self.time * 1e-6, np.float64)
+
+    def within(self, intervals: tuple[Interval, ...]) -> npt.NDArray[np.bool_]:
+        """Rows that lie in intervals, µs."""
+        return inside(self.time, intervals)
+
+    def at(self, time: Times, values: Array) -> Array:
+        """Values (K, …) of the motion at other times (N,), µs → (N, …); the ends hold outside."""
+        flat = values.reshape(values.shape[0], -1)
+        found = np.column_stack([np.interp(time, self.time, column) for column in flat.T])
+        return found.reshape(time.size, *values.shape[1:])
+
+    def covers(self, time: Times) -> npt.NDArray[np.bool_]:
+        """Times (N,), µs, at which it is known."""
+        return np.asarray((time >= self.time[0]) & (time <= self.time[-1]))
+
+
+def body_motion(
+    steps: ReplayedSteps, motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]
+) -> BodyMotion:
+    """Put a replay's motion on the grid.
+
+    Parameters
+    ----------
+    steps : of the replay; those between the first and last row of `motion` are used
+    flight : canonical; its GNSS velocities bound the height
+    """
+    first, last = np.searchsorted(steps.time, (motion.time[0], motion.time[-1] + 1))
+    steps = steps.rows(slice(int(first), int(last)))
+    place = ((steps.time - steps.time[0]) // round(EVERY_S * 1e6)).astype(np.int64)
+    bins, begin = np.unique(place, return_index=True)
+    count = np.diff(np.append(begin, place.size))
+
+    def mean(values: Array) -> Array:
+        flat = values.reshape(values.shape[0], -1)
+        return np.asarray(np.add.reduceat(flat, begin, axis=0) / count[:, None]).reshape(-1, *values.shape[1:])
+
+    def of_imu(values: Array, seconds: Array, bias: Array) -> Array:
+        summed = np.add.reduceat(values, begin, axis=0) / np.add.reduceat(seconds, begin)[:, None]
+        return np.asarray(summed - bias.mean(axis=0))
+
+    # an interval of the IMU ends at its step: its middle is half a step earlier
+    half_us = 0.5 * float(np.median(np.diff(steps.time)))
+    time = np.rint(mean(steps.time[:, None] - float(steps.time[0]))[:, 0] + steps.time[0] - half_us).astype(np.int64)
+    vertical, by_gnss = _vertical_velocity(motion, flight, parameters)
+    climbed = np.concatenate([[0.0], np.cumsum(-0.5 * (vertical[1:] + vertical[:-1]) * np.diff(motion.time) * 1e-6)])
+    velocity = np.column_stack([np.interp(time, motion.time, one) for one in motion.bounded_velocity.T])
+    velocity[:, 2] = np.interp(time, motion.time, vertical)
+    return BodyMotion(
+        time=time,
+        rotation=mean(motion.rotation),
+        velocity=velocity,
+        specific_force=of_imu(steps.delta_velocity, steps.delta_velocity_dt, steps.accel_bias),
+        body_rate=of_imu(steps.delta_angle, steps.delta_angle_dt, steps.gyro_bias),
+        height=np.interp(time, motion.time, climbed),
+        by_gnss=by_gnss,
+    )
+
+
+def _vertical_velocity(
+    motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]
+) -> tuple[Array, bool]:
+    """(M,) down, m/s: fast part of the IMU, slow part of GNSS or, where there is too little of it, of the replay."""
+    table = flight.topic("vehicle_gps_position")
+    inertial = motion.velocity[:, 2]
+    if table is None:
+        return motion.bounded_velocity[:, 2], False
+    samples = gnss_samples(table)
+    delay_us = round(1e3 * parameters.get("EKF2_GPS_DELAY", 0.0))
+    time, down = samples["time_us"] - delay_us, samples["vel"][:, 2]
+    usable = taken(table, gnss_refusals(table, flight.release)) & np.isfinite(down) & (samples["fix_type"] >= 3)
+    usable &= (time >= motion.time[0]) & (time <= motion.time[-1])
+    if np.count_nonzero(usable) < _FEWEST_FIXES:
+        return motion.bounded_velocity[:, 2], False
+    time = time[usable]
+    off = (np.interp(time, motion.time, inertial) - down[usable])[:, None]
+    drift = slow_part(time, off, HEIGHT_KNOTS_S)[:, 0]
+    return np.asarray(inertial - np.interp(motion.time, time, drift)), True

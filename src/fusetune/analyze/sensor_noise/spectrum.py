@@ -1,0 +1,140 @@
+"""Spectral densities of a sensor at rest and in flight, and the tones that stand out of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import binary_closing, percentile_filter
+from scipy.signal import welch
+
+from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
+
+Array = npt.NDArray[np.float64]
+
+SEGMENT_S = 2.5
+"""Length of Welch's segments: 0.4 Hz apart, and a flight of a minute has nearly fifty of them."""
+FEWEST_SEGMENTS = 4
+LOWEST_TONE_HZ = 15.0
+"""Below it a vehicle flies: its own motion, and its controller's."""
+UPPER_SHARE = 0.9
+"""Of the Nyquist frequency; up to there the broad-band level is read."""
+_BASELINE_HZ = 40.0
+_BASELINE_PERCENTILE = 30.0
+"""The level around a tone is that of the lower third: the shaking of four rotors may fill half of the band."""
+_ONE_TONE_HZ = 3.0
+"""Peaks nearer to each other are one tone."""
+_TONE = 3.0
+"""A tone stands so many times above the level around it, or six standard deviations where the segments are few."""
+_SIGNIFICANT = 6.0
+_CORRELATION_OF_SEGMENTS = 0.8
+"""Independent segments per segment at half overlap with Hann's window (Welch 1967)."""
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """One-sided spectral density.
+
+    Attributes
+    ----------
+    frequency_hz : (F,)
+    density : (F, axes), unit²/Hz
+    segments : how many were averaged
+    """
+
+    frequency_hz: Array
+    density: Array
+    segments: int
+
+    @property
+    def total(self) -> Array:
+        """(F,) sum over the axes, unit²/Hz."""
+        return np.asarray(self.density.sum(axis=1))
+
+    @property
+    def resolution_hz(self) -> float:
+        """Distance of two frequencies, Hz."""
+        return float(self.frequency_hz[1] - self.frequency_hz[0])
+
+    def broadband(self, lowest_hz: float) -> float:
+        """Level between the tones, mean of the axes, unit²/Hz: the median from `lowest_hz` to 0.9 of Nyquist.
+
+        A median of averaged densities, which are spread like χ² with f = 2 s degrees of freedom, s the independent
+        segments, is (1 − 2/9f)³ times their mean (Wilson and Hilferty); that is put right.
+        """
+        highest = UPPER_SHARE * float(self.frequency_hz[-1])
+        band = (self.frequency_hz >= min(lowest_hz, 0.5 * highest)) & (self.frequency_hz <= highest)
+        freedom = 2.0 * max(_CORRELATION_OF_SEGMENTS * self.segments, 1.0)
+        below = (1.0 - 2.0 / (9.0 * freedom)) ** 3
+        return float(np.mean(np.median(self.density[band], axis=0))) / below
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A narrow part of a spectrum that stands out.
+
+    Attributes
+    ----------
+    frequency_hz : centre of its power
+    amplitude : of a sine with its power, all axes together, unit of the sensor
+    above : how many times its density stands above the level around it
+    """
+
+    frequency_hz: float
+    amplitude: float
+    above: float
+
+
+def spectrum(series: SensorSeries, intervals: Sequence[Interval]) -> Spectrum | None:
+    """Welch's estimate over all stretches without a gap inside the intervals, µs; None where they are too short."""
+    length = segment_length(series)
+    pieces = series.pieces(intervals, length * series.step_s)
+    density, segments, frequency = np.zeros((length // 2 + 1, series.values.shape[1])), 0, np.zeros(0)
+    for piece in pieces:
+        count = 1 + (len(piece) - length) // (length // 2)
+        if count < 1:
+            continue
+        frequency, one = welch(piece, 1.0 / series.step_s, nperseg=length, axis=0)
+        density += one * count
+        segments += count
+    if segments < FEWEST_SEGMENTS:
+        return None
+    return Spectrum(frequency[1:], (density / segments)[1:], segments)
+
+
+def segment_length(series: SensorSeries) -> int:
+    """Samples of a segment, a power of two."""
+    return int(2 ** round(math.log2(max(SEGMENT_S * series.rate_hz, 16.0))))
+
+
+def tones(found: Spectrum) -> tuple[Tone, ...]:
+    """Tones above 15 Hz, the strongest first."""
+    width = max(int(_BASELINE_HZ / found.resolution_hz) | 1, 5)
+    level = found.total
+    if len(level) <= width:
+        return ()
+    smooth = np.convolve(np.pad(level, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
+    base = percentile_filter(smooth, _BASELINE_PERCENTILE, size=width, mode="nearest")
+    ratio = smooth / np.maximum(base, np.finfo(float).tiny)
+    least = max(_TONE, 1.0 + _SIGNIFICANT / math.sqrt(_CORRELATION_OF_SEGMENTS * found.segments))
+    high = (ratio > 1.0 + 0.5 * (least - 1.0)) & (found.frequency_hz >= LOWEST_TONE_HZ)
+    # rotors turn some per cent apart, and what they shake at is told as one
+    closed = binary_closing(np.pad(high, width), np.ones(max(int(_ONE_TONE_HZ / found.resolution_hz), 1), np.bool_))[
+        width:-width
+    ]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], closed, [False]])))
+    runs = zip(edges[::2], edges[1::2], strict=True)
+    listed = [
+        _tone(found, level - base, ratio, run) for run in (slice(*run) for run in runs) if ratio[run].max() >= least
+    ]
+    return tuple(sorted(listed, key=lambda one: -one.amplitude))
+
+
+def _tone(found: Spectrum, excess: Array, ratio: Array, run: slice) -> Tone:
+    power = np.maximum(excess[run], 0.0)
+    frequency = float(power @ found.frequency_hz[run] / power.sum())
+    return Tone(frequency, math.sqrt(2.0 * float(power.sum()) * found.resolution_hz), float(ratio[run].max()))

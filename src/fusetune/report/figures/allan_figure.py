@@ -1,0 +1,81 @@
+"""Allan deviations of the sensors that stood still, with intervals and what was fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from fusetune.analyze.sensor_noise.allan import KINDS, AllanCurve
+from fusetune.analyze.sensor_noise.allan_fit import FLAT, NAMES, AllanFigures, freedom_of_mixture, interval
+from fusetune.analyze.sensor_noise.pooled import PooledSensor
+from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise
+from fusetune.analyze.sensor_noise.sensor_series import Sensor
+from fusetune.report.figures.drawing import empty_figure, new_figure
+
+MEASURED_COLOUR, FITTED_COLOUR = "#0072B2", "#D55E00"
+_COLUMNS = 3
+_UNITS: Mapping[str, str] = {"white": "/√Hz", "flicker": "", "walk": "/√s"}
+_SIGNS: Mapping[str, str] = {"white": "N", "flicker": "B", "walk": "K"}
+NOT_STILL = (
+    "Nowhere in this log does the vehicle stand still for three seconds: the noise at rest is not known.\n"
+    "A log from boot on (SDLOG_MODE 2), with the vehicle left alone before arming, tells it."
+)
+
+
+def draw_allan(noise: SensorNoise) -> Figure:
+    """Of one flight."""
+    return _draw([(one.sensor, one.curve, one.figures) for one in noise.sensors.values()])
+
+
+def draw_pooled_allan(pooled: tuple[PooledSensor, ...]) -> Figure:
+    """Of several flights of one vehicle."""
+    return _draw([(one.sensor, one.curve, one.figures) for one in pooled if one.curve and one.figures])
+
+
+def _draw(found: list[tuple[Sensor, AllanCurve, AllanFigures]]) -> Figure:
+    shown = [one for one in found if len(one[1].factors)]
+    if not shown:
+        return empty_figure(NOT_STILL)
+    columns = min(_COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
+    figure = new_figure(3.5 * columns, 3.2 * rows)
+    for place, (sensor, curve, figures) in enumerate(shown):
+        _curve(figure.add_subplot(rows, columns, place + 1), sensor, curve, figures)
+    return figure
+
+
+def _curve(axes: Axes, sensor: Sensor, curve: AllanCurve, figures: AllanFigures) -> None:
+    tau = curve.tau_s
+    low, high = interval(curve.deviation, freedom_of_mixture(curve, figures))
+    axes.fill_between(tau, low, high, color=MEASURED_COLOUR, alpha=0.2, linewidth=0.0, label="95 % interval")
+    axes.plot(tau, curve.deviation, "o-", color=MEASURED_COLOUR, markersize=3.0, linewidth=0.9, label="measured")
+    if figures.noise_density.value is not None:
+        fitted = np.geomspace(figures.from_s, tau[-1], 60)
+        axes.plot(fitted, figures.deviation(fitted), color=FITTED_COLOUR, linewidth=1.2, label="fitted")
+    if figures.bias_instability.value is not None:
+        axes.axhline(figures.bias_instability.value * np.sqrt(FLAT), color="#666666", linewidth=0.7, linestyle=":")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel("averaging time τ [s]")
+    axes.set_ylabel(f"Allan deviation [{sensor.unit}]")
+    axes.set_title(f"{sensor.label}, longest {curve.longest_s:.0f} s")
+    axes.text(0.04, 0.04, _words(sensor, figures), ha="left", va="bottom", fontsize=6.5, transform=axes.transAxes)
+    axes.legend(loc="upper right", fontsize=7)
+
+
+def _words(sensor: Sensor, figures: AllanFigures) -> str:
+    lines = []
+    for kind in KINDS:
+        figure, unit = figures.of(kind), f"{sensor.unit}{_UNITS[kind]}"
+        if figure.value is not None:
+            lines.append(f"{_SIGNS[kind]} = {figure.value:.3g} ({figure.low:.3g} to {figure.high:.3g}) {unit}")
+        elif figure.high is not None:
+            lines.append(f"{_SIGNS[kind]} not told, at most {figure.high:.2g} {unit}")
+        else:
+            lines.append(f"{NAMES[kind]} not told")
+    return "\n".join(lines)
