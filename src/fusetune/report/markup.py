@@ -110,6 +110,6 @@ def details(summary: str, *parts: str, kind: str = "") -> str:
     return f"<details><summary>{escape(summary)}{mark}</summary>{''.join(parts)}</details>"
 
 
-def mark(text: str, kind: str) -> str:
-    """A short word in a coloured field."""
-    return f'<span class="tag {escape(kind)}">{escape(text)}</span>'
+def severity_mark(severity: str, words: str) -> str:
+    """Words on the colour of a severity."""
+    return f'<span class="tag is-{escape(severity)}">{escape(words)}</span>'

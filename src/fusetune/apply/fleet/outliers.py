@@ -76,9 +76,7 @@ def outliers(table: FleetTable) -> tuple[Outlier, ...]:
     ]
     figures = {(one.id, one.unit): one for one in table.figures}
     kept = [
-        one
-        for one in named
-        if abs(one.z) >= SMALLEST_Z and figures[one.id, one.unit].matters(one.value, one.usual)
+        one for one in named if abs(one.z) >= SMALLEST_Z and figures[one.id, one.unit].matters(one.value, one.usual)
     ]
     return tuple(sorted(kept, key=lambda one: (-abs(one.z), one.flight, one.id)))
 

@@ -1,4 +1,4 @@
-"""A flight in time: its phases, when which finding holds, height, speed, and the test ratios of the vehicle's filter."""
+"""A flight in time: its phases, when which finding holds, height, speed, and test ratios of the vehicle's filter."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from matplotlib.figure import Figure
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, OnboardSamples, onboard_samples
-from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.report.figures.drawing import new_figure
 from fusetune.report.severity_words import SEVERITY_COLOURS
+
+AID_TOPICS = tuple(source.topic for source in MEASURED_SOURCES.values())
 
 Array = npt.NDArray[np.float64]
 
@@ -34,9 +36,11 @@ TIMELINE_TOPICS = (
 """What is read of a saved flight."""
 
 _SMALLEST_RATIO = 1e-3
-_LARGEST_RATIO = 1e3
+_LARGEST_RATIO = 1e4
 _MOST_POINTS = 1500
 _LANE_INCH = 0.2
+_FEW = 2
+"""An estimator of which the log holds so many times more samples than of the primary one is drawn instead."""
 _SHADED = ("fail", "warning")
 
 
@@ -64,7 +68,7 @@ def draw_timeline(logged: Flight, bars: Sequence[Bar]) -> Figure:
     heights = (lanes * _LANE_INCH + 0.2, 1.25, 1.25, 1.9)
     total = sum(heights) + 1.5
     figure = new_figure(10.0, total, layout=None)
-    room = {"left": 0.2, "right": 0.985, "top": 1.0 - 0.35 / total, "bottom": 0.5 / total, "hspace": 0.28}
+    room = {"left": 0.25, "right": 0.985, "top": 1.0 - 0.35 / total, "bottom": 0.5 / total, "hspace": 0.28}
     grid = figure.add_gridspec(4, 1, height_ratios=heights, **room)
     top = figure.add_subplot(grid[0])
     panels = [top, *(figure.add_subplot(grid[row], sharex=top) for row in (1, 2, 3))]
@@ -98,14 +102,18 @@ def _lanes(axes: Axes, flight: Flight, airborne: Sequence[Interval], bars: Seque
         axes.barh(row, (stop - start) * 1e-6, 0.4, left=_seconds(flight, start), color="#9FB3C8", linewidth=0)
     axes.set_yticks(range(row + 1), [*(bar.words for bar in bars), "in the air" if airborne else "not known to fly"])
     for label, bar in zip(axes.get_yticklabels(), bars, strict=False):
-        label.set_fontweight("bold" if bar.is_cause else "normal")
+        label.set(fontweight="bold" if bar.is_cause else "normal", fontsize=8 if bar.is_cause else 7)
     axes.set_ylim(row + 0.6, -0.6)
     axes.grid(visible=False, axis="y")
 
 
 def _shade(axes: Axes, flight: Flight, airborne: Sequence[Interval], bars: Sequence[Bar]) -> None:
     """Grey on the ground, in the colour of a cause while it holds."""
-    edges = [0.0, *(_seconds(flight, edge) for one in airborne for edge in one), _seconds(flight, flight.last_timestamp)]
+    edges = [
+        0.0,
+        *(_seconds(flight, edge) for one in airborne for edge in one),
+        _seconds(flight, flight.last_timestamp),
+    ]
     for start, stop in zip(edges[::2], edges[1::2], strict=True) if airborne else ():
         axes.axvspan(start, stop, color="#000000", alpha=0.06, linewidth=0)
     for bar in bars:
@@ -114,7 +122,7 @@ def _shade(axes: Axes, flight: Flight, airborne: Sequence[Interval], bars: Seque
 
 
 def _height(axes: Axes, flight: Flight) -> None:
-    axes.set_ylabel("height [m]")
+    axes.set_ylabel("height above\nthe origin [m]")
     position = flight.topic("vehicle_local_position")
     if position is None or not position["timestamp"].size:
         _say(axes, "the log holds no local position")
@@ -139,21 +147,41 @@ def _speed(axes: Axes, flight: Flight) -> None:
 
 
 def _ratios(axes: Axes, flight: Flight) -> None:
-    samples = onboard_samples(flight)
-    for source in REPORTED_SOURCES:
-        found = _largest(samples, source.name)
+    samples, instance = _fullest_samples(flight)
+    if instance is not None:
+        axes.set_title(f"of estimator {instance}: the log holds few samples of the primary one", fontsize=8)
+    largest = 1.0
+    for name, source in MEASURED_SOURCES.items():
+        found = _largest(samples, name)
         if found is not None:
             time, ratio = found
-            axes.plot((time - flight.start_timestamp) * 1e-6, ratio, linewidth=0.9, label=AID_SOURCES[source.name].label)
+            largest = max(largest, float(ratio.max()))
+            axes.plot((time - flight.start_timestamp) * 1e-6, ratio, linewidth=0.9, label=source.label)
     axes.set_ylabel("test ratio [–]")
     if not axes.lines:
         _say(axes, "the log holds no innovations of the vehicle's own filter")
         return
     axes.set_yscale("log")
     axes.minorticks_off()
-    axes.set_ylim(_SMALLEST_RATIO, _LARGEST_RATIO)
+    # room above for the legend
+    axes.set_ylim(_SMALLEST_RATIO, 300.0 * largest)
     axes.axhline(1.0, color="#CC0000", linewidth=0.8, linestyle="--")
     axes.legend(loc="upper left", ncols=5, fontsize=7, borderaxespad=0.2, labelspacing=0.2)
+
+
+def _fullest_samples(flight: Flight) -> tuple[OnboardSamples, int | None]:
+    """Of the estimator that was primary at each time; of the one the log holds most of, where it is silent on that."""
+    primary = onboard_samples(flight)
+    instances = {one for topic in AID_TOPICS for one in flight.instances(topic)}
+    counted = {one: _count(onboard_samples(flight, one)) for one in sorted(instances)} if len(instances) > 1 else {}
+    most = max(counted, key=lambda one: counted[one], default=None)
+    if most is None or counted[most] <= _FEW * _count(primary):
+        return primary, None
+    return onboard_samples(flight, most), most
+
+
+def _count(samples: OnboardSamples) -> int:
+    return sum(samples[key].timestamp_sample.size for key in samples)
 
 
 def _largest(samples: OnboardSamples, source: str) -> tuple[npt.NDArray[np.int64], Array] | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
 from fusetune.report.flight_page.flight_results import Document, FlightResults
-from fusetune.report.markup import bullets, mark, number, paragraph, section
+from fusetune.report.markup import bullets, number, paragraph, section, severity_mark
 from fusetune.report.severity_words import SEVERITY_WORDS, FlightTimes, confidence_words, worst_of
 
 _NAMED_ROWS = 3
@@ -31,26 +31,30 @@ def _found(results: FlightResults) -> str:
     facts = _facts(first, results.times) + _what_to_do(first)
     also = ""
     if others:
-        also = "<p>Also: " + "; ".join(_also(one) for one in others) + ".</p>"
-    return _box(severity, _sentence(first["cause"]), mark(SEVERITY_WORDS[first["severity"]], first["severity"]), facts,
-                also)  # fmt: skip
+        also = "<p>Also: " + "; ".join(_heading(one) for one in others) + ".</p>"
+    return _box(severity, _heading(first), facts, also)
 
 
 def _unexplained(results: FlightResults) -> str:
     rows = results.problems
     count = len(rows)
-    title = "Something is off, and no known cause explains it"
+    title = escape("Something is off, and no known cause explains it")
     text = f"{count} figure{'s lie' if count != 1 else ' lies'} beyond the limit. The first of them:"
-    named = [_sentence(row["found"]) + (f" {row['remedy']}." if row["remedy"] else "") for row in rows[:_NAMED_ROWS]]
+    named = [
+        _sentence(row["found"]) + (f" {row['remedy']}." if row["remedy"] else "")
+        for row in results.problem_subjects[:_NAMED_ROWS]
+    ]
     return _box(rows[0]["severity"], title, paragraph(text), bullets(named))
 
 
 def _box(severity: str, title: str, *parts: str) -> str:
-    return f'<section class="decision {severity}"><h2>{escape(title)}</h2>{"".join(parts)}</section>'
+    return f'<section class="decision is-{severity}"><h2>{title}</h2>{"".join(parts)}</section>'
 
 
-def _also(diagnosis: Document) -> str:
-    return f"{escape(diagnosis['cause'].rstrip('.'))} {mark(SEVERITY_WORDS[diagnosis['severity']], diagnosis['severity'])}"
+def _heading(diagnosis: Document) -> str:
+    """The cause with its severity beside."""
+    severity = diagnosis["severity"]
+    return f"{escape(diagnosis['cause'].strip().rstrip('.'))} {severity_mark(severity, SEVERITY_WORDS[severity])}"
 
 
 def causes_section(results: FlightResults) -> str:
@@ -58,24 +62,24 @@ def causes_section(results: FlightResults) -> str:
     if not results.diagnoses:
         return ""
     order = "What explains most of the trouble stands first." if len(results.diagnoses) > 1 else ""
-    parts = [_cause(one, results.times) for one in results.diagnoses]
+    parts = [_cause(one, results.times, is_told=place == 0) for place, one in enumerate(results.diagnoses)]
     return section("Why", paragraph(order, "note") if order else "", *parts)
 
 
-def _cause(diagnosis: Document, times: FlightTimes) -> str:
-    severity = diagnosis["severity"]
-    heading = f"<h3>{escape(_sentence(diagnosis['cause']))} {mark(SEVERITY_WORDS[severity], severity)}</h3>"
+def _cause(diagnosis: Document, times: FlightTimes, is_told: bool) -> str:
+    """One cause; when, how sure and what to do are left out where the head of the page has told them."""
     seen = [one for one in diagnosis["evidence"] if one["origin"] != "replay"]
     replayed = [one for one in diagnosis["evidence"] if one["origin"] == "replay"]
     parts = [
-        _facts(diagnosis, times),
+        "" if is_told else _facts(diagnosis, times),
         _headed("What the log shows", bullets([_sign(one) for one in seen])),
         _headed("What the replay shows", bullets([_sign(one) for one in replayed])),
-        _headed("Values", bullets(list(_values(diagnosis["values"])))),
-        _headed("What to do", _what_to_do(diagnosis)),
+        _headed("Values to set, or measured", bullets(list(_values(diagnosis["values"])))),
+        "" if is_told else _headed("What to do", _what_to_do(diagnosis)),
         paragraph(f"The signs are known from: {diagnosis['source']}", "note") if diagnosis["source"] else "",
     ]
-    return f'<div class="cause {severity}" id="{escape(diagnosis["id"])}">{heading}{"".join(parts)}</div>'
+    kind = f"cause is-{diagnosis['severity']}"
+    return f'<div class="{kind}" id="{escape(diagnosis["id"])}"><h3>{_heading(diagnosis)}</h3>{"".join(parts)}</div>'
 
 
 def _headed(title: str, inside: str) -> str:
@@ -110,8 +114,3 @@ def _sentence(text: str) -> str:
     """With a full stop."""
     text = text.strip()
     return text if text.endswith((".", "!", "?")) else f"{text}."
-
-
-def names_of(diagnoses: Sequence[Document]) -> list[str]:
-    """Causes, plainly."""
-    return [str(one["cause"]).rstrip(".") for one in diagnoses]

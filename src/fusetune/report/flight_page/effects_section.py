@@ -74,4 +74,4 @@ def _advice(told: float | None, lower: float, upper: float, value: float) -> Cel
         return Cell("measured; no parameter says it", "quiet")
     if lower <= told <= upper:
         return Cell("agrees with what flies", "good")
-    return Cell(f"try {number(value).text}", "warning")
+    return Cell(f"try {number(value).text}", "is-warning")

@@ -14,6 +14,9 @@ from fusetune.storage.files import AnyPath
 
 HEALTH_FILE, DIAGNOSIS_FILE, EFFECTS_FILE = "health.json", "diagnosis.json", "effects.json"
 
+_SUMS = ("status",)
+"""Groups of figures that say again what the aid sources say."""
+
 Document = Mapping[str, Any]
 
 
@@ -51,6 +54,22 @@ class FlightResults:
         """Rows of the health table beyond their limits, failures first."""
         found = [row for row in self.health if row["severity"] in ("warning", "fail")]
         return tuple(sorted(found, key=lambda row: rank(row["severity"])))
+
+    @property
+    def problem_subjects(self) -> tuple[Document, ...]:
+        """Of each source, sensor or part of the filter that has a row beyond its limit the worst one.
+
+        Failures first, what the filter's status only sums up after what it is made of, then by when they begin.
+        """
+
+        def order(row: Document) -> tuple[int, bool, float]:
+            begins = math.inf if row["start_us"] is None else row["start_us"]
+            return rank(row["severity"]), row["group"] in _SUMS, begins
+
+        first: dict[str, Document] = {}
+        for row in sorted(self.problems, key=order):
+            first.setdefault(row["id"].partition(".")[0], row)
+        return tuple(first.values())
 
     def since_start_s(self, row: Document) -> tuple[float, float] | None:
         """When a row of the health table holds, seconds from the start of the log."""

@@ -18,7 +18,10 @@ def health_table_section(results: FlightResults) -> str:
     parts = []
     if problems:
         head = ("", "what", "limit", "when", "what to do")
-        parts.append(table(head, [_problem_row(row, results) for row in problems]))
+        alike: dict[str, list[Document]] = defaultdict(list)
+        for row in problems:
+            alike[row["id"]].append(row)
+        parts.append(table(head, [_problem_row(rows, results) for rows in alike.values()]))
     else:
         parts.append(paragraph("No figure lies beyond its limit."))
     groups: dict[str, list[Document]] = defaultdict(list)
@@ -36,11 +39,15 @@ def health_table_section(results: FlightResults) -> str:
     return section("Health of sensors and filter", *parts)
 
 
-def _problem_row(row: Document, results: FlightResults) -> tuple[Cell | str, ...]:
+def _problem_row(alike: list[Document], results: FlightResults) -> tuple[Cell | str, ...]:
+    """A figure that lies beyond its limit, the worst of the instances told."""
+    row, *others = alike
     when = results.since_start_s(row)
+    words = str(row["found"]) + (" (from the replay)" if row["origin"] == "replay" else "")
+    also = ", ".join(str(one["instance"]) for one in others if one["instance"] is not None)
     return (
-        Cell(_TOLD[row["severity"]], f"short {row['severity']}"),
-        str(row["found"]) + (" (from the replay)" if row["origin"] == "replay" else ""),
+        Cell(_TOLD[row["severity"]], f"short is-{row['severity']}"),
+        words + (f"; beyond it on instance {also}, too" if also else ""),
         number(row["threshold"]),
         Cell("" if when is None else _span(*when), "short"),
         str(row["remedy"]),
@@ -59,7 +66,7 @@ def _group(group: str, rows: list[Document]) -> str:
     head = ("figure", *(("instance",) if several else ()), "value", "unit", "limit", "told by")
     told = [
         (
-            Cell(figure_words(row["id"]), row["severity"] if row["severity"] in _TOLD else ""),
+            Cell(figure_words(row["id"]), f"is-{row['severity']}" if row["severity"] in _TOLD else ""),
             *((number(row["instance"]),) if several else ()),
             number(row["figure"]),
             Cell(str(row["unit"]), "quiet"),

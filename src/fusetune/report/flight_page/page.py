@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
-from html import escape
 from pathlib import Path
 
 from fusetune.analyze.flight_files import SENSOR_NOISE_FILE
@@ -16,8 +14,8 @@ from fusetune.report.flight_page.effects_section import effects_section
 from fusetune.report.flight_page.flight_results import FlightResults, read_flight_results
 from fusetune.report.flight_page.health_table import health_table_section
 from fusetune.report.flight_page.sensors_section import sensors_section
-from fusetune.report.html_page import PageHead, write_page
-from fusetune.report.markup import figure, link, section
+from fusetune.report.html_page import PageHead, page_links, write_page
+from fusetune.report.markup import figure, section
 from fusetune.report.severity_words import cause_words
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.documents import read_document
@@ -26,6 +24,7 @@ from fusetune.storage.files import AnyPath
 TIMELINE_FILE = "timeline.png"
 
 _MOST_ROWS_DRAWN = 8
+_LONGEST_LABEL = 46
 _TIMELINE = (
     "Bold: causes, thin: figures beyond their limits, over the part of the flight that they are about. Grey: on the "
     "ground. The dashed line is the gate: beyond it the filter rejects a sample."
@@ -56,17 +55,13 @@ def plot_flight_timeline(flight_folder: AnyPath, analyze_folder: AnyPath, output
 def _bars(results: FlightResults) -> Iterator[Bar]:
     for one in results.diagnoses:
         yield Bar(cause_words(one["id"]), one["severity"], one["since_s"], one["until_s"])
-    drawn: set[str] = set()
-    for row in results.problems:
-        when = results.since_start_s(row)
-        words = figure_words(row["id"])
-        if when is not None and words not in drawn and len(drawn) < _MOST_ROWS_DRAWN:
-            drawn.add(words)
-            yield Bar(_shortened(words), row["severity"], *when, is_cause=False)
+    timed = [(row, when) for row in results.problem_subjects if (when := results.since_start_s(row)) is not None]
+    for row, when in timed[:_MOST_ROWS_DRAWN]:
+        yield Bar(_shortened(figure_words(row["id"])), row["severity"], *when, is_cause=False)
 
 
-def _shortened(words: str, most: int = 38) -> str:
-    return words if len(words) <= most else words[: most - 1].rstrip() + "…"
+def _shortened(words: str) -> str:
+    return words if len(words) <= _LONGEST_LABEL else words[: _LONGEST_LABEL - 1].rstrip() + "…"
 
 
 def build_flight_page(
@@ -103,10 +98,3 @@ def build_flight_page(
             results.date.replace("T", " ").replace("Z", " UTC"))  # fmt: skip
     Path(output).parent.mkdir(parents=True, exist_ok=True)
     write_page(output, PageHead(results.flight, results.flight, ", ".join(one for one in told if one)), sections)
-
-
-def page_links(pages: Mapping[str, AnyPath], page: AnyPath) -> str:
-    """A line of links from one page to others, each relative to where that page lies."""
-    folder = Path(page).parent
-    links = "".join(link(words, os.path.relpath(target, folder)) for words, target in pages.items())
-    return f'<nav aria-label="{escape("other pages")}">{links}</nav>' if links else ""

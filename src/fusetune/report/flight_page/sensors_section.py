@@ -40,7 +40,7 @@ def sensors_section(noise: Document, figure_folder: Path) -> str:
     for name, sensor in noise["sensors"].items():
         picture = figure_folder / f"sensor_{name}.png"
         if picture.exists():
-            parts.append(details(str(sensor["label"]).capitalize(), figure(picture, _OF_SENSOR)))
+            parts.append(details(f"{sensor['sensor']}: {sensor['topic']}", figure(picture, _OF_SENSOR)))
     return section("The sensors themselves", *parts) if parts else ""
 
 
@@ -53,6 +53,6 @@ def _starting_row(one: Document) -> tuple[Cell | str, ...]:
         number(one["flown"]),
         number(one["at_rest"]),
         number(one["in_flight"]),
-        Cell(start.text, "number warning" if changed else "number"),
+        Cell(start.text, "number is-warning" if changed else "number"),
         str(one["words"]),
     )
