@@ -209,6 +209,9 @@ def _told_steps(
     found = []
     for (start, chance), before, stop in zip(edges[1:], starts, starts[2:], strict=False):
         first, last = flights[known[start]], flights[known[start - 1]]
+        medians = float(np.median(series[before:start])), float(np.median(series[start:stop]))
+        if not figure.matters(medians[1], medians[0]):
+            continue
         found.append(
             Change(
                 first.vehicle,
@@ -216,8 +219,7 @@ def _told_steps(
                 figure.unit,
                 first.name,
                 first.date,
-                float(np.median(series[before:start])),
-                float(np.median(series[start:stop])),
+                *medians,
                 start - before,
                 stop - start,
                 chance,

@@ -21,6 +21,8 @@ SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 OF_FLIGHT = "flight"
 """Group of figures that say what was flown; they are no matter of health."""
+BIT_FIELDS = ("filter.faults",)
+"""Figures that are flags: judged, and no quantity that could be spread or change."""
 WORTH_A_LOOK = 0.05
 """A rate that is 199.9 Hz on all flights and 199.8 Hz on one is another beyond doubt, and nobody's concern."""
 
@@ -79,7 +81,7 @@ class FleetTable:
     ----------
     flights : F flights by date, those without a date last
     figures : K figures in the order of the health table
-    values : (F, K), NaN where a flight does not tell the figure
+    values : (F, K), NaN where a flight does not tell the figure, and of `BIT_FIELDS`
     severities : (F, K), places in `SEVERITIES`
     """
 
@@ -125,7 +127,7 @@ def read_fleet_table(health_table: AnyPath) -> FleetTable:
     values = np.full((len(flights), len(names)), np.nan)
     severities = np.zeros(values.shape, dtype=np.int8)
     if len(kept):
-        found = kept["figure"].to_numpy(dtype=np.float64)
+        found = kept["figure"].where(~kept["id"].isin(BIT_FIELDS)).to_numpy(dtype=np.float64)
         values[row, column] = np.where(np.isfinite(found), found, np.nan)
         severities[row, column] = kept["rank"].to_numpy(dtype=np.int8)
     return FleetTable(flights, names, values, severities)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -13,13 +14,14 @@ from scipy.stats import false_discovery_control, t
 from fusetune.apply.fleet.distribution import robust_scale
 from fusetune.apply.fleet.flights import OF_FLIGHT, SEVERITIES, FleetTable
 
-FEWEST_FLIGHTS = 8
+FEWEST_FLIGHTS = 10
 """Of fewer flights the spread is too little known for one of them to stand out."""
 SMALLEST_Z = 3.5
 """From here on Iglewicz and Hoaglin (How to detect and handle outliers, 1993) label a value; chance asks for more."""
 FALSE_SHARE = 0.05
 """Of what is named, at most so much is chance."""
 
+MOST_ALIKE = 0.2
 _ROUNDING = 1e-9
 _EFFICIENCY_OF_QN = 0.82
 _VARIANCE_OF_MEDIAN = 0.5 * math.pi
@@ -32,8 +34,8 @@ class Outlier:
 
     Attributes
     ----------
-    value, usual : of the flight, and the others' median
-    z : (value − median) / scale, both of the others; of logarithms where a figure is above zero on all flights
+    value, usual : of the flight, and the vehicle's median
+    z : (value − median) / Qn; of logarithms where a figure is above zero on all flights
     chance : share of such findings that would be chance (Benjamini and Yekutieli's adjusted p)
     severity : how the health table judges the value
     """
@@ -51,9 +53,10 @@ class Outlier:
 def outliers(table: FleetTable) -> tuple[Outlier, ...]:
     """All that stand out, the farthest first.
 
-    Each flight is compared with the others of its vehicle, for vehicles differ in more than what is wrong with them. z
-    follows Student's t with as many degrees of freedom as Qn is efficient; the chances of all figures and flights
-    together are corrected for their number, however they depend on each other.
+    Each flight is compared with all of its vehicle, for vehicles differ in more than what is wrong with them; median
+    and Qn hardly notice that it is among them. z follows Student's t with as many degrees of freedom as Qn is
+    efficient; the chances of all figures and flights together are corrected for their number, however they depend on
+    each other. What more than `MOST_ALIKE` of a vehicle's flights show is another way of flying, and no outlier.
 
     References
     ----------
@@ -78,26 +81,35 @@ def outliers(table: FleetTable) -> tuple[Outlier, ...]:
     kept = [
         one for one in named if abs(one.z) >= SMALLEST_Z and figures[one.id, one.unit].matters(one.value, one.usual)
     ]
-    return tuple(sorted(kept, key=lambda one: (-abs(one.z), one.flight, one.id)))
+    vehicles = {one.name: one.vehicle for one in table.flights}
+    alike = Counter((vehicles[one.flight], one.id, one.unit) for one in kept)
+    of_one = Counter(vehicles.values())
+    few = [
+        one
+        for one in kept
+        if alike[vehicles[one.flight], one.id, one.unit] <= MOST_ALIKE * of_one[vehicles[one.flight]]
+    ]
+    return tuple(sorted(few, key=lambda one: (-abs(one.z), one.flight, one.id)))
 
 
 def _compared(table: FleetTable, rows: npt.NDArray[np.intp], column: int) -> Iterator[tuple[Outlier, float]]:
-    """Each flight of a vehicle against the others in one figure, with the chance of that comparison by itself."""
+    """Each flight of a vehicle against all of them in one figure, with the chance of that comparison by itself."""
     figure, values = table.figures[column], table.values[:, column]
     known = rows[np.isfinite(values[rows])]
     if known.size < FEWEST_FLIGHTS or figure.group == OF_FLIGHT:
         return
     scaled = np.log(values[known]) if np.all(values[known] > 0.0) else values[known]
-    for place, row in enumerate(known):
-        others = np.delete(scaled, place)
-        scale = robust_scale(others)
-        # distances that rounding alone makes are none
-        if scale <= _ROUNDING * float(np.max(np.abs(others))):
-            continue
-        z = float((scaled[place] - np.median(others)) / scale)
-        widened = abs(z) / math.sqrt(1.0 + _VARIANCE_OF_MEDIAN / others.size)
-        chance = 2.0 * float(t.sf(widened, _EFFICIENCY_OF_QN * (others.size - 1)))
-        usual = float(np.median(np.delete(values[known], place)))
+    centre, scale = float(np.median(scaled)), robust_scale(scaled)
+    # distances that rounding alone makes are none
+    if scale <= _ROUNDING * float(np.max(np.abs(scaled))):
+        return
+    usual = float(np.median(values[known]))
+    for row, place in zip(known, scaled, strict=True):
+        z = (float(place) - centre) / scale
+        widened = abs(z) / math.sqrt(1.0 + _VARIANCE_OF_MEDIAN / known.size)
+        chance = 2.0 * float(t.sf(widened, _EFFICIENCY_OF_QN * (known.size - 1)))
         severity = SEVERITIES[table.severities[row, column]]
-        told = Outlier(table.flights[row].name, figure.id, figure.unit, float(values[row]), usual, z, 1.0, severity)
-        yield told, chance
+        yield (
+            Outlier(table.flights[row].name, figure.id, figure.unit, float(values[row]), usual, z, 1.0, severity),
+            chance,
+        )

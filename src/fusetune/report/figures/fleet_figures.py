@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from fusetune.apply.fleet.flights import SEVERITIES, FleetTable
@@ -40,7 +41,7 @@ def draw_trends(table: FleetTable, columns: Sequence[int], changes: Sequence[Map
     """
     rows = np.flatnonzero([bool(one.date) for one in table.flights])
     colours = vehicle_colours(table)
-    figure, panels = _panels(len(columns))
+    figure, panels = _panels(len(columns), foot=0.16 * -(-min(len(colours), 8) // 4))
     for axes, column in zip(panels, columns, strict=True):
         name = table.figures[column]
         values = table.values[rows, column]
@@ -58,7 +59,17 @@ def draw_trends(table: FleetTable, columns: Sequence[int], changes: Sequence[Map
         axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
         axes.yaxis.set_major_locator(MaxNLocator(4))
         axes.set_xlabel("flight, by date")
+    _legend(figure, colours)
     return figure
+
+
+def _legend(figure: Figure, colours: Mapping[str, str]) -> None:
+    """Vehicles in a line at the bottom; those that share a colour as one."""
+    named = {colour: vehicle for vehicle, colour in reversed(colours.items())}
+    labels = {colour: vehicle if colour != _OTHERS_COLOUR else "others" for colour, vehicle in named.items()}
+    points = [Line2D([], [], marker="o", linestyle="", color=colour, markersize=4) for colour in reversed(labels)]
+    words = list(reversed(labels.values()))
+    figure.legend(points, words, loc="lower center", ncols=4, fontsize=7, borderaxespad=0.3)
 
 
 def vehicle_colours(table: FleetTable) -> dict[str, str]:
@@ -118,11 +129,12 @@ def _title(figure: str, unit: str) -> str:
     return words if len(words) <= _TITLE_WIDTH else words[: _TITLE_WIDTH - 1].rstrip() + "…"
 
 
-def _panels(count: int) -> tuple[Figure, list[Axes]]:
+def _panels(count: int, foot: float = 0.0) -> tuple[Figure, list[Axes]]:
+    """So many panels; `foot` is room below them, inch."""
     rows = -(-count // _COLUMNS)
-    width, height = _COLUMNS * _PANEL_INCH[0], rows * _PANEL_INCH[1] + 0.1
+    width, height = _COLUMNS * _PANEL_INCH[0], rows * _PANEL_INCH[1] + 0.1 + foot
     figure = new_figure(width, height, layout=None)
-    margins = {"left": 0.05, "right": 0.99, "top": 1.0 - 0.25 / height, "bottom": 0.42 / height}
+    margins = {"left": 0.05, "right": 0.99, "top": 1.0 - 0.25 / height, "bottom": (0.42 + foot) / height}
     grid = figure.subplots(rows, _COLUMNS, squeeze=False, gridspec_kw=margins | {"hspace": 0.62, "wspace": 0.2})
     for place, axes in enumerate(grid.flat):
         axes.set_visible(place < count)

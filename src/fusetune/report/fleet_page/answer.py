@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from html import escape
 
 from fusetune.report.figure_words import figure_words
+from fusetune.report.fleet_page.change_points import change_points
 from fusetune.report.fleet_page.fleet_results import FleetResults, count_words, listed
 from fusetune.report.markup import bullets, number
 from fusetune.report.severity_words import cause_words, worst_of
@@ -54,17 +55,16 @@ def _unexplained(results: FleetResults) -> Iterator[str]:
 
 
 def _changes(results: FleetResults) -> Iterator[str]:
-    for one in results.changes[:_NAMED_CHANGES]:
-        along = f", with another {' and '.join(one['along'])}" if one["along"] else ""
+    points = change_points(results)
+    for point in points[:_NAMED_CHANGES]:
+        one = point.changes[0]
         unit = f" {one['unit']}" if one["unit"] else ""
-        yield (
-            f"{figure_words(one['id'])} of {one['vehicle']}: {number(one['before']).text} before, "
-            f"{number(one['after']).text}{unit} since {one['flight']} ({one['date'][:10]}){along}."
-        )
-    more = len(results.changes) - _NAMED_CHANGES
+        before, after = number(one["before"]).text, number(one["after"]).text
+        yield f"{point.in_words} {figure_words(one['id'])} was {before} before and is {after}{unit} since."
+    more = len(points) - _NAMED_CHANGES
     if more > 0:
-        yield f"{count_words(more, 'more figure')} changed, below."
-    if not results.changes:
+        yield f"{count_words(more, 'more change')}, below."
+    if not points:
         yield "No figure of a vehicle changed over time beyond chance."
 
 

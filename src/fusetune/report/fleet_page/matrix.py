@@ -32,9 +32,10 @@ def matrix_section(results: FleetResults) -> str:
 
 def _table(flights: list[Document], results: FleetResults) -> str:
     causes = [one["id"] for one in results.causes]
-    titles = "".join(f"<th>{title}</th>" for title in ("flight", "date", "vehicle", "firmware"))
-    titles += '<th class="number">fail</th><th class="number">warn</th>'
+    titles = "<th>flight</th>"
     titles += "".join(f'<th class="turned"><span>{escape(cause_words(one))}</span></th>' for one in causes)
+    titles += '<th class="number">fail</th><th class="number">warn</th>'
+    titles += "".join(f"<th>{title}</th>" for title in ("date", "vehicle", "firmware"))
     rows = "".join(f"<tr>{_row(one, causes, results)}</tr>" for one in flights)
     return (
         f'<div class="scroll"><table class="matrix"><thead><tr>{titles}</tr></thead><tbody>{rows}</tbody></table></div>'
@@ -44,11 +45,12 @@ def _table(flights: list[Document], results: FleetResults) -> str:
 def _row(flight: Document, causes: list[str], results: FleetResults) -> str:
     name, counts = flight["name"], flight["counts"]
     title = link(name, results.links[name]) if name in results.links else escape(name)
-    told = "".join(f'<td class="short">{escape(flight[one] or "–")}</td>' for one in ("vehicle", "firmware"))
+    words = (flight["date"][:10], flight["vehicle"], flight["firmware"])
+    told = "".join(f'<td class="short">{escape(one or "–")}</td>' for one in words)
     found = {one["id"]: one for one in reversed(flight["findings"])}
     marks = "".join(_mark(found.get(cause)) for cause in causes)
     numbers = "".join(_count(counts[severity], severity) for severity in ("fail", "warning"))
-    return f'<td class="short">{title}</td><td class="short">{escape(flight["date"][:10] or "–")}</td>{told}{numbers}{marks}'
+    return f'<td class="short">{title}</td>{marks}{numbers}{told}'
 
 
 def _count(count: int, severity: str) -> str:

@@ -110,7 +110,7 @@ def _is_spread(one: Document) -> bool:
 
 
 def _trend_columns(results: FleetResults) -> list[int]:
-    """Figures that changed, then those that lie beyond their limits on most flights."""
+    """Figures that changed, then of each subject the one that lies beyond its limit on most flights."""
     dated = np.array([bool(one.date) for one in results.table.flights], dtype=bool)
     if np.count_nonzero(dated) < _FEWEST_FLIGHTS_DRAWN:
         return []
@@ -121,5 +121,7 @@ def _trend_columns(results: FleetResults) -> list[int]:
         return int(one["verdict"]["counts"].get("fail", 0) + one["verdict"]["counts"].get("warning", 0))
 
     troubled = sorted((one for one in results.figures if beyond(one) and _is_spread(one)), key=beyond, reverse=True)
-    columns = dict.fromkeys([*changed, *(places[one["id"], one["unit"]] for one in troubled)])
-    return list(columns)[:_MOST_TRENDS]
+    worst: dict[str, int] = {}
+    for one in troubled:
+        worst.setdefault(one["id"].partition(".")[0], places[one["id"], one["unit"]])
+    return list(dict.fromkeys([*changed, *worst.values()]))[:_MOST_TRENDS]

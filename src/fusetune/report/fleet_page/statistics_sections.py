@@ -9,6 +9,7 @@ from pathlib import Path
 from fusetune.apply.fleet.changes import FEWEST_A_SIDE, LEVEL
 from fusetune.apply.fleet.outliers import FALSE_SHARE, FEWEST_FLIGHTS
 from fusetune.report.figure_words import figure_words
+from fusetune.report.fleet_page.change_points import change_points
 from fusetune.report.fleet_page.fleet_results import Document, FleetResults, count_words, listed
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
 
@@ -18,9 +19,14 @@ _MOST_NAMED_FIGURES = 6
 def changes_section(results: FleetResults, trends: Path) -> str:
     """Steps and drifts in tables, and the picture of the trends."""
     parts = []
-    if results.changes:
-        head = ("since", "date", "figure", "before", "after", "unit", "vehicle", "along with it", "chance")
-        parts.append(table(head, [_change_row(one, results) for one in results.changes], "Steps"))
+    for point in change_points(results):
+        head = ("figure", "before", "after", "unit", "flights before", "after", "chance")
+        rows = [_change_row(one) for one in point.changes]
+        parts.append(paragraph(point.in_words))
+        parts.append(table(head, rows[:_MOST_NAMED_FIGURES]))
+        if len(rows) > _MOST_NAMED_FIGURES:
+            rest = rows[_MOST_NAMED_FIGURES:]
+            parts.append(details(count_words(len(rest), "more figure"), table(head, rest)))
     if results.drifts:
         head = ("figure", "per ten flights", "interval", "unit", "flights", "vehicle", "chance")
         parts.append(table(head, [_drift_row(one) for one in results.drifts], "Drifts"))
@@ -44,16 +50,14 @@ def changes_section(results: FleetResults, trends: Path) -> str:
     return section("What changed, and when", *parts)
 
 
-def _change_row(one: Document, results: FleetResults) -> tuple[Cell | str, ...]:
+def _change_row(one: Document) -> tuple[Cell | str, ...]:
     return (
-        Cell(one["flight"], "short", results.links.get(one["flight"], "")),
-        Cell(one["date"][:10], "short"),
         figure_words(one["id"]),
         number(one["before"]),
         number(one["after"]),
         Cell(one["unit"], "quiet"),
-        one["vehicle"],
-        ", ".join(f"another {what}" for what in one["along"]),
+        number(one["flights_before"]),
+        number(one["flights_after"]),
         number(one["chance"], 2),
     )
 
@@ -79,8 +83,8 @@ def outliers_section(results: FleetResults) -> str:
         few = f"Only vehicles with {FEWEST_FLIGHTS} flights and more have been asked."
         return section("Flights that stand out", paragraph(f"No flight differs from the others of its vehicle. {few}"))
     text = (
-        f"Compared with the other flights of the vehicle; at most {100 * FALSE_SHARE:.0f} % of what is named is chance. "
-        "To be unlike the others is not to be wrong: the limits say that."
+        f"Compared with the other flights of the vehicle; at most {100 * FALSE_SHARE:.0f} % of what is named is "
+        "chance. To be unlike the others is not to be wrong: the limits say that."
     )
     head = ("figure", "this flight", "usually", "unit", "robust z", "judged")
     parts = [paragraph(text, "note")]
@@ -102,21 +106,36 @@ def outliers_section(results: FleetResults) -> str:
 
 
 def verdicts_section(results: FleetResults) -> str:
-    """Figures beyond their limits on some flight, and the flights that this hangs on."""
-    rows = [_verdict_row(one) for one in results.figures if one["verdict"]["worst"] in ("warning", "fail")]
-    if not rows:
+    """Flights that alone make the fleet's verdict worse, and behind a click each figure beyond its limit."""
+    beyond = [one for one in results.figures if one["verdict"]["worst"] in ("warning", "fail")]
+    if not beyond:
         return section("What verdicts hang on", paragraph("On no flight does a figure lie beyond its limit."))
     text = (
-        "Each flight was left out in turn: named are those without which the figure would be judged otherwise, or that "
-        "move its mean by more than the mean is known."
+        "Each flight was left out in turn. Without those named here, figures of the fleet would be judged otherwise: "
+        "look at them first."
     )
+    driven: dict[str, list[str]] = defaultdict(list)
+    for one in beyond:
+        for flight in _judged_otherwise(one["verdict"]):
+            driven[flight].append(figure_words(one["id"]))
+    order = sorted(driven.items(), key=lambda item: (-len(item[1]), item[0]))
+    rows = [
+        (Cell(flight, "short", results.links.get(flight, "")), number(len(words)), listed(words, _MOST_NAMED_FIGURES))
+        for flight, words in order
+    ]
+    parts = [paragraph(text, "note"), table(("flight", "figures", "which"), rows)] if rows else []
+    if not rows:
+        parts.append(paragraph("No single flight decides how a figure is judged."))
     head = ("figure", "worst", "typical", "flights", "fail", "warning", "hangs on")
-    return section("What verdicts hang on", paragraph(text, "note"), table(head, rows))
+    summary = f"{count_words(len(beyond), 'figure')} beyond the limit on some flight"
+    return section(
+        "What verdicts hang on", *parts, details(summary, table(head, [_verdict_row(one) for one in beyond]))
+    )
 
 
 def _verdict_row(one: Document) -> tuple[Cell | str, ...]:
     verdict = one["verdict"]
-    judged = [driver["flight"] for driver in verdict["drivers"] if _is_judged_otherwise(driver, verdict)]
+    judged = _judged_otherwise(verdict)
     moved = [driver["flight"] for driver in verdict["drivers"] if driver["flight"] not in judged]
     words = [listed(judged)] if judged else []
     words += [f"its mean on {listed(moved)}"] if moved else []
@@ -131,8 +150,10 @@ def _verdict_row(one: Document) -> tuple[Cell | str, ...]:
     )
 
 
-def _is_judged_otherwise(driver: Document, verdict: Document) -> bool:
-    return (driver["worst"], driver["typical"]) != (verdict["worst"], verdict["typical"])
+def _judged_otherwise(verdict: Document) -> list[str]:
+    """Flights without which the worst or the typical severity is another."""
+    told = (verdict["worst"], verdict["typical"])
+    return [driver["flight"] for driver in verdict["drivers"] if (driver["worst"], driver["typical"]) != told]
 
 
 def histograms_section(pictures: Sequence[Path]) -> str:
