@@ -9,6 +9,7 @@ import pytest
 
 from fusetune.px4.flight import Flight, ParameterHistory, TopicTable
 from fusetune.px4.layouts.estimator_instances import of_one_instance
+from fusetune.px4.layouts.onboard_innovations import tables_of_test_ratios
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
 
@@ -166,6 +167,24 @@ def test_status_flags_before_v1_12_from_bits() -> None:
     assert flags["fs_bad_acc_vertical"].tolist() == [False, True]
 
 
+@pytest.mark.parametrize("split", [True, False], ids=["v1.11", "v1.10"])
+def test_rejections_before_v1_12_from_bits(split: bool) -> None:
+    """Velocity has two bits from v1.11 on, horizontal and vertical; before, one, and all others are a bit lower."""
+    bits = [0b1, 0b100, 1 << 7] if split else [0b1, 0b10, 1 << 6]
+    status = {
+        "timestamp": TIME[:3],
+        "control_mode_flags": np.zeros(3, np.uint32),
+        "innovation_check_flags": np.array(bits, np.uint16),
+    }
+    if split:
+        status["pre_flt_fail_innov_heading"] = np.zeros(3, np.bool_)
+    flags = canonical_topic("estimator_status", status, "estimator_status_flags")
+    assert flags["reject_hor_vel"].tolist() == [True, False, False]
+    assert flags["reject_ver_vel"].tolist() == [not split, False, False]
+    assert flags["reject_hor_pos"].tolist() == [False, True, False]
+    assert flags["reject_yaw"].tolist() == [False, False, True]
+
+
 def innovation_flight(**innovations: np.ndarray) -> Flight:
     rows = len(next(iter(innovations.values())))
     time = np.arange(rows, dtype=np.int64) * 500_000 + 1_000_000
@@ -206,6 +225,33 @@ def test_instances_with_aid_source_topics_of_their_own_stay_as_they_are() -> Non
     flight.topics["estimator_aid_src_baro_hgt", 0] = own
     result = canonical(flight)
     assert result.topics["estimator_aid_src_baro_hgt", 0] is own
+
+
+def test_test_ratios_alone_tell_of_the_sources_that_the_flags_name() -> None:
+    """One ratio for both horizontal axes, in the first; a row for each new sample; what is no number is no ratio."""
+    time = np.arange(6, dtype=np.int64) * 500_000 + 1_000_000
+    ratios = {
+        "timestamp": time,
+        "gps_hvel[0]": np.array([0.1, 0.1, 0.4, 1.5, 0.3, np.inf], np.float32),
+        "gps_hvel[1]": np.full(6, np.nan, np.float32),
+        "gps_vvel": np.array([0.2, 0.2, 0.2, 0.1, 0.1, 0.0], np.float32),
+        "ev_hvel[0]": np.full(6, 0.7, np.float32),
+        "ev_hvel[1]": np.zeros(6, np.float32),
+        "ev_vvel": np.zeros(6, np.float32),
+    }
+    status = {"timestamp": time, "control_mode_flags": np.array([1 << 2] * 4 + [0, 1 << 2], np.uint32)}
+    flight = Flight("thinned", {("estimator_innovation_test_ratios", 1): ratios, ("estimator_status", 1): status})
+    tables = tables_of_test_ratios(flight, 1)
+    assert list(tables) == [("estimator_aid_src_gnss_vel", 1)]
+    aid = tables["estimator_aid_src_gnss_vel", 1]
+    # the second repeats the first, in the fifth GNSS is not fused, in the last nothing is known
+    assert aid["timestamp"].tolist() == time[[0, 2, 3]].tolist()
+    np.testing.assert_allclose(aid["test_ratio[0]"], [0.1, 0.4, 1.5])
+    np.testing.assert_allclose(aid["test_ratio[2]"], [0.2, 0.2, 0.1])
+    assert aid["innovation_rejected"].tolist() == [False, False, True]
+    assert aid["fused"].tolist() == [True, True, False]
+    assert np.isnan(aid["innovation[0]"]).all()
+    assert not tables_of_test_ratios(flight, 0)
 
 
 def test_old_height_slot_belongs_to_the_active_height_source() -> None:

@@ -24,6 +24,7 @@ Figures = npt.NDArray[np.float64]
 
 GROUP = "aid source"
 UNFILTERED = "innovation² / (gate² × innovation variance) of each sample, the largest of the axes"
+AS_LOGGED = "estimator_innovation_test_ratios, unfiltered; the innovations were thinned apart from their variances"
 _CLEAR_OF_GROUND = frozenset({"height", "heading", "field", "flow"})
 """Quantities that ground effect and the fields near the ground falsify."""
 _OUT_OF_RANGE = frozenset({"rng_hgt", "optical_flow", "airspeed", "sideslip", "drag", "aux_vel", "gravity"})
@@ -43,7 +44,7 @@ def aid_source_rows(health: JudgedHealth, samples: Samples, instance: int, origi
         axes = {axis: samples[source.name, axis] for axis in range(source.axes) if (source.name, axis) in samples}
         if axes:
             yield from _source_rows(health, source, axes, instance, origin)
-            if source.name not in _OTHER_WAYS.values():
+            if source.name not in _OTHER_WAYS.values() and (source.name, 0) in samples:
                 yield _unfused_row(health, source, samples, told, instance, origin)
         elif instance == health.primary and _may_fuse(health, source):
             yield Subject(source.name, source.label, GROUP, instance, origin).lacking(
@@ -81,7 +82,8 @@ def _source_rows(
         if not known.any():
             yield subject.lacking("raised_share", "its test ratios are not logged")
             continue
-        evidence: dict[str, int | str] = {"ratio": UNFILTERED, "samples": int(known.sum())}
+        ratio_is = AS_LOGGED if np.isnan(first.innovation).all() else UNFILTERED
+        evidence: dict[str, int | str] = {"ratio": ratio_is, "samples": int(known.sum())}
         yield from ratio_rows(
             health,
             subject,

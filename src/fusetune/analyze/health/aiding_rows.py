@@ -15,6 +15,7 @@ from fusetune.analyze.health.over_time import time_set
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
 from fusetune.px4.aid_sources import HORIZONTAL_AIDING
+from fusetune.px4.flight import TopicTable
 
 _SAYS_SO = (
     "cs_inertial_dead_reckoning",
@@ -60,7 +61,8 @@ def aiding_rows(
         when=longest,
         evidence={"logged_every_s": round(usual, 3)},
     )
-    silent = [(_unsaid(health, flags, gap, usual), gap) for gap in gaps]
+    own = health.topic("vehicle_local_position") if origin == "vehicle" and instance == health.primary else None
+    silent = [(_unsaid(health, flags, own, gap, usual), gap) for gap in gaps]
     worst = max(silent, key=lambda one: one[0], default=(0.0, None))
     yield subject.judged(
         "unflagged_loss_s",
@@ -84,8 +86,10 @@ def _gaps(time: np.ndarray, within: tuple[Interval, ...], longer_than_s: float) 
     return found
 
 
-def _unsaid(health: JudgedHealth, flags: Flags | None, gap: Interval, usual_s: float) -> float:
-    """Seconds of a gap in which neither a flag nor the local position says that nothing aids the filter."""
+def _unsaid(
+    health: JudgedHealth, flags: Flags | None, local: TopicTable | None, gap: Interval, usual_s: float
+) -> float:
+    """Seconds of a gap in which neither a flag nor the filter's local position says that nothing aids it."""
     # EKF2 says so after a second itself
     start = gap[0] + int((health.limits.unaided_s[0] + usual_s) * 1e6)
     if start >= gap[1]:
@@ -95,7 +99,6 @@ def _unsaid(health: JudgedHealth, flags: Flags | None, gap: Interval, usual_s: f
     known = [flags[name].astype(bool) for name in _SAYS_SO if name in flags] if flags is not None else []
     if known and flags is not None:
         told = time_set(flags["timestamp"], np.logical_or.reduce(known), end, ((start, gap[1]),)).value
-    local = health.topic("vehicle_local_position")
     if local is not None and "xy_valid" in local:
         invalid = ~local["xy_valid"].astype(bool)
         if "dead_reckoning" in local:

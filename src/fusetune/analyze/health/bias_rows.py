@@ -12,7 +12,8 @@ from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
-from fusetune.px4.layouts.bias_states import BiasStates
+from fusetune.px4.flight import Flight
+from fusetune.px4.layouts.bias_states import BiasStates, bias_limits
 
 _WARM_UP = "Calibrate the gyro at working temperature, insulate the IMU or let it warm up"
 _VIBRATION = "Calibrate the accelerometer; where it moves in flight, look at vibration and clipping"
@@ -30,9 +31,12 @@ def bias_rows(
         return
     flying = inside(biases.time, health.airborne)
     evidence = {"interval_s": biases.interval_s}
+    # a replay has the parameters of v1.16, whatever flew
+    flew = health.flight if origin == "vehicle" else Flight("replay")
+    gyro_limit, accel_limit = bias_limits(flew, instance, health.parameters)
     sensors = (
-        ("gyro", biases.gyro, "rad/s", limits.gyro_bias, limits.gyro_bias_change, "EKF2_GYR_B_LIM", _WARM_UP),
-        ("accel", biases.accel, "m/s²", limits.accel_bias, np.inf, "EKF2_ABL_LIM", _VIBRATION),
+        ("gyro", biases.gyro, "rad/s", limits.gyro_bias, limits.gyro_bias_change, gyro_limit, _WARM_UP),
+        ("accel", biases.accel, "m/s²", limits.accel_bias, np.inf, accel_limit, _VIBRATION),
     )
     for name, values, unit, level, change_level, limit, remedy in sensors:
         medians = np.median(values[clear], axis=0)
@@ -50,7 +54,7 @@ def bias_rows(
                 remedy=remedy,
                 evidence=evidence | dict(zip("xyz", map(float, axes), strict=True)),
             )
-        yield _at_limit(health, subject, name, values[flying], health.parameters[limit], remedy)
+        yield _at_limit(health, subject, name, values[flying], limit, remedy)
 
 
 def _at_limit(

@@ -14,7 +14,7 @@ from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.over_time import at, time_set
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
-from fusetune.px4.flight import TopicTable
+from fusetune.px4.flight import TopicTable, field_names
 
 GROUP = "filter"
 Flags = Mapping[str, npt.NDArray[Any]]
@@ -40,9 +40,10 @@ def fault_row(health: JudgedHealth, flags: Flags | None, instance: int, origin: 
     named: dict[str, Any] = {}
     times = []
     end = health.flight.last_timestamp
-    for name, values in (flags or {}).items():
-        if flags is not None and name.startswith("fs_") and values.any():
-            found = time_set(flags["timestamp"], values.astype(bool), end, ((0, end + 1),))
+    known = flags or {}
+    for name, values in known.items():
+        if name.startswith("fs_") and values.any():
+            found = time_set(known["timestamp"], values.astype(bool), end, ((0, end + 1),))
             named[name] = round(found.value, 3)
             times += list(found.when or ())
     if bits is None and flags is None:
@@ -159,4 +160,5 @@ def output_rows(health: JudgedHealth, instance: int) -> Iterator[HealthRow]:
 def _with_output_errors(health: JudgedHealth, instance: int) -> Iterator[TopicTable | None]:
     for name in ("estimator_status", "ekf2_innovations"):
         table = health.topic(name, instance)
-        yield table if table is not None and "output_tracking_error[2]" in table else None
+        whole = table is not None and len(field_names(table, "output_tracking_error")) == len(_OUTPUT_ERRORS)
+        yield table if whole else None

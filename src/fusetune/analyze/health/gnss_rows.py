@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import inside
-from fusetune.analyze.health.gnss_drift import DRIFT_TIME_CONSTANT_S, Drift, drift_at_rest
+from fusetune.analyze.health.gnss_drift import DRIFT_TIME_CONSTANT_S, drift_at_rest
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.over_time import at, share_of, span, time_set
@@ -47,7 +47,7 @@ _LEAST_FIX = 3
 
 
 class Rest(NamedTuple):
-    """One of EKF2's checks of a vehicle that stands: its row, parameter, bit, what is typical, and where it is logged."""
+    """One of EKF2's checks of a vehicle that stands: row, parameter, bit, what is typical, and where it is logged."""
 
     name: str
     label: str
@@ -109,7 +109,7 @@ def _minimum_row(
 ) -> HealthRow:
     """The value that all but a few samples keep to, against the limit; a failure where half are beyond."""
     limit = health.parameters[minimum.parameter] if minimum.parameter else float(_LEAST_FIX)
-    is_checked = minimum.bit is None or bool(int(health.parameters["EKF2_GPS_CHECK"]) >> minimum.bit & 1)
+    is_checked = _is_checked(health, minimum.bit)
     known = np.isfinite(values)
     if not known.any():
         return subject.lacking(minimum.name, f"{minimum.label} is not reported")
@@ -142,6 +142,11 @@ def _minimum_row(
             "checked": is_checked,
         },
     )
+
+
+def _is_checked(health: JudgedHealth, bit: int | None) -> bool:
+    """Whether EKF2 was told to look at it; what has no bit it always does."""
+    return bit is None or bool(int(health.parameters["EKF2_GPS_CHECK"]) >> bit & 1)
 
 
 def _rest_rows(health: JudgedHealth, subject: Subject, table: TopicTable, is_used: bool) -> Iterator[HealthRow]:
@@ -186,7 +191,7 @@ def _rest_row(
             "median": float(np.median(values)),
             "limit": health.parameters[rest.parameter],
             "typical": rest.typical,
-            "checked": bool(int(health.parameters["EKF2_GPS_CHECK"]) >> rest.bit & 1),
+            "checked": _is_checked(health, rest.bit),
             "told_by_filter": is_told,
         },
     )
@@ -195,7 +200,8 @@ def _rest_row(
 def _at_rest(health: JudgedHealth, time: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """Whether the filter takes the vehicle to stand on the ground, at some times (N,), µs."""
     flags, landed = health.topic("estimator_status_flags", health.primary), health.topic("vehicle_land_detected")
-    table = flags if flags is not None and flags.get("cs_vehicle_at_rest", np.zeros(1)).any() else landed
+    tells = flags is not None and {"cs_vehicle_at_rest", "cs_in_air"} <= set(flags)
+    table = flags if flags is not None and tells and flags["cs_vehicle_at_rest"].any() else landed
     if table is None:
         return np.zeros(time.shape, bool)
     if table is flags:

@@ -12,6 +12,7 @@ from fusetune.analyze.health.gnss_rows import check_row, gnss_rows
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.imu_rows import clipping_rows, vibration_rows
 from fusetune.analyze.health.instance_rows import instance_rows
+from fusetune.analyze.health.instance_samples import instance_samples
 from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.receiver_rows import receiver_rows
 from fusetune.analyze.health.replay_rows import replay_rows
@@ -20,7 +21,7 @@ from fusetune.analyze.health.sensor_rows import aid_sensor_rows, imu_rows
 from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.health.status_rows import rejection_rows, status_ratio_rows
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
+from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
 from fusetune.px4.aid_sources import SENSOR_TOPICS
 from fusetune.px4.layouts.bias_states import bias_states
@@ -73,7 +74,7 @@ def _rows(health: JudgedHealth) -> Iterator[HealthRow]:
 
 
 def _rows_of_instance(health: JudgedHealth, instance: int) -> Iterator[HealthRow]:
-    samples, flags = onboard_samples(health.flight, instance), health.topic("estimator_status_flags", instance)
+    samples, flags = instance_samples(health.flight, instance), health.topic("estimator_status_flags", instance)
     if samples:
         yield from aid_source_rows(health, samples, instance, "vehicle")
         yield from aiding_rows(health, samples, flags, instance, "vehicle")

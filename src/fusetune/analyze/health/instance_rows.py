@@ -12,7 +12,7 @@ from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.over_time import span
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
-from fusetune.px4.layouts.estimator_instances import instance_shares, instance_switches
+from fusetune.px4.layouts.estimator_instances import instance_shares, instance_switches, selector_status
 
 _REMEDY = "See which sensors the instances differ in; the rows of each instance tell which of them is worse"
 
@@ -21,7 +21,7 @@ def instance_rows(health: JudgedHealth) -> Iterator[HealthRow]:
     """Number of instances, share of each as the primary one, changes in flight, most of them within some seconds."""
     subject = Subject("instances", "estimator instances", "filter")
     yield subject.told("count", "in the log:", float(len(health.instances)))
-    if not health.logged.has("estimator_selector_status"):
+    if selector_status(health.logged) is None:
         yield subject.lacking("switches", "none is selected: there is but one")
         return
     for instance, share in instance_shares(health.logged).items():

@@ -10,7 +10,6 @@ from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.px4.flight import Flight, TopicTable, row_count
 from fusetune.px4.layouts.estimator_instances import primary_instance
-from fusetune.px4.parameters.ekf2_parameters import complete
 
 INSTANCE_TOPICS = ("estimator_status", "estimator_states", "estimator_innovations", "ekf2_innovations")
 """Each estimator instance publishes one of them at least."""
@@ -33,10 +32,10 @@ class JudgedHealth:
         """In the layout of its release."""
         return self.observed.logged
 
-    @cached_property
+    @property
     def parameters(self) -> dict[str, float]:
         """Parameters of the estimator that the log begins with, in the names of v1.16."""
-        return complete(self.flight.parameters.initial, {}, self.flight.release)
+        return self.observed.parameters
 
     @cached_property
     def airborne(self) -> tuple[Interval, ...]:

@@ -60,7 +60,9 @@ def receiver_rows(health: JudgedHealth) -> Iterator[HealthRow]:
 def _receivers(health: JudgedHealth) -> list[TopicTable]:
     for topic in _TOPICS:
         found = (health.logged.topics[topic, one] for one in health.logged.instances(topic))
-        tables = [vehicle_gps_position(table) for table in found if row_count(table) and "eph" in table]
+        tables = [
+            vehicle_gps_position(table) for table in found if row_count(table) and {"eph", "fix_type"} <= set(table)
+        ]
         if tables:
             return tables
     return []

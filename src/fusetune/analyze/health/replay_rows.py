@@ -11,10 +11,10 @@ from fusetune.analyze.health.aiding_rows import aiding_rows
 from fusetune.analyze.health.bias_rows import bias_rows
 from fusetune.analyze.health.filter_rows import alignment_rows, fault_row
 from fusetune.analyze.health.health_row import HealthRow
+from fusetune.analyze.health.instance_samples import instance_samples
 from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.reset_rows import rows_of_resets
 from fusetune.analyze.health.subject import Subject
-from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.px4.layouts.bias_states import BiasStates
 from fusetune.save.thresholds import VerdictThresholds
@@ -25,7 +25,7 @@ _LIMITS = VerdictThresholds()
 
 def replay_rows(health: JudgedHealth) -> Iterator[HealthRow]:
     """Rows of the parts of the estimator of which no instance logged anything."""
-    lacks_samples = not any(len(onboard_samples(health.flight, one)) for one in health.instances)
+    lacks_samples = not any(len(instance_samples(health.flight, one)) for one in health.instances)
     lacks_flags = not any(health.topic("estimator_status_flags", one) is not None for one in health.instances)
     lacks_states = not any(health.topic("estimator_states", one) is not None for one in health.instances)
     if not (lacks_samples or lacks_flags or lacks_states):

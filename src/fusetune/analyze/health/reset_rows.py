@@ -17,6 +17,7 @@ from fusetune.analyze.replaying.replayed_set import RESET_COUNTERS, counter_step
 
 Times = npt.NDArray[np.int64]
 
+_TOLD_TIMES = 20
 _STATUS_COUNTERS = {
     "horizontal_position": "reset_count_pos_ne",
     "height": "reset_count_pod_d",
@@ -63,8 +64,17 @@ def rows_of_resets(
             Levels(limit),
             remedy="See which source was rejected or lost before",
             when=span(settled),
-            evidence={"in_flight": int(in_flight.size), "in_log": int(all_times.size), **(events or {})},
+            evidence={
+                "in_flight": int(in_flight.size),
+                "in_log": int(all_times.size),
+                "at_s": _times_in_words(health, in_flight),
+                **(events or {}),
+            },
         )
+
+
+def _times_in_words(health: JudgedHealth, times: Times) -> str:
+    return " ".join(f"{health.observed.since_start_s(int(one)):.2f}" for one in times[:_TOLD_TIMES])
 
 
 def _events(health: JudgedHealth, instance: int) -> dict[str, int]:

@@ -172,15 +172,14 @@ def _height_row(health: JudgedHealth, rates: dict[str, float]) -> HealthRow:
         return subject.lacking("rate_hz", "no source of height in the log")
     best = max(rates, key=lambda name: rates[name])
     topic = next(aid.topic for aid in AIDS if aid.label == best)
-    # to the next sample the logger rounds its interval
-    if rates[best] < 0.9 * least and taken_times(health.flight, topic) is None:
+    if rates[best] < least and taken_times(health.flight, topic) is None:
         return subject.lacking("rate_hz", f"the log holds {rates[best]:.3g} samples a second: {_LOG_ALL}")
     return subject.judged(
         "rate_hz",
         f"samples a second of its fastest source ({best}):",
         rates[best],
         "Hz",
-        Levels(0.9 * least),
+        Levels(least),
         least=True,
         remedy=_CHECK,
     )

@@ -38,7 +38,7 @@ class HealthSettings:
         (0.05, 0.5), "warning and failure: share of raised test ratios, those above 1 among them", low=0, high=1
     )
     """PX4's, who takes those above 1 away first."""
-    fewest_samples: float = setting(10.0, "of fewer samples the shares are told and not judged", low=1)
+    fewest_samples: int = setting(10, "of fewer samples the shares are told and not judged", low=1)
     rejected_share: tuple[float, float] = setting(
         (0.0, 0.01), "warning and failure: share of samples, or of the time, that was rejected", low=0, high=1
     )
@@ -69,11 +69,11 @@ class HealthSettings:
     gyro_vibration: tuple[float, float] = setting(
         (0.6, 3.0), "warnings: mean and peak of the gyro's vibration metric", unit="rad/s", low=0
     )
-    """PX4's of before the units changed, 2.4e-3 and 1.2e-2 rad in 4 ms."""
+    """The geometric middle of PX4's first ones, 6e-4 and 3e-3 rad in 4 ms, and its present ones, 2.4 and 12 rad/s."""
     accel_vibration: tuple[float, float] = setting(
         (18.0, 90.0), "warnings: mean and peak of the accelerometer's vibration metric", unit="m/s²", low=0
     )
-    """PX4's of before the units changed, 0.072 and 0.36 m/s in 4 ms."""
+    """Likewise of 0.018 and 0.09 m/s in 4 ms, and 72 and 360 m/s²."""
     clipped: tuple[float, float] = setting(
         (0.0, 100.0), "warning and failure: clipped accelerometer samples in flight, clear of the ground", low=0
     )

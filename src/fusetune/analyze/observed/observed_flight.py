@@ -16,6 +16,7 @@ from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.set_names import AS_FLOWN
 
 GROUND_EFFECT_US = 5_000_000
@@ -43,7 +44,7 @@ class ObservedFlight:
     @cached_property
     def parameters(self) -> dict[str, float]:
         """Parameters of the estimator that the log begins with, those that it lacks at their defaults."""
-        return self.prepared.parameters({})
+        return complete(self.flight.parameters.initial, {}, self.flight.release)
 
     @cached_property
     def airborne(self) -> tuple[Interval, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +12,8 @@ from fusetune.px4.flight import Flight, TopicTable, row_count, stacked
 from fusetune.px4.layouts.state_layout import UPDATE_INTERVAL_S, state_layout, tells_bias_rates
 
 _GYRO, _ACCEL = slice(10, 13), slice(13, 16)
+_FIXED_GYRO_LIMIT, _GYRO_LIMIT_PARAMETER = math.radians(20.0), (1, 14)
+"""Up to the release in which EKF2_GYR_B_LIM came."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,25 @@ def bias_states(flight: Flight, instance: int) -> BiasStates | None:
         return None
     interval = 1.0 if layout.has_bias_rates else update_interval_s(flight, time, states, rates)
     return BiasStates(time, states[:, _GYRO] / interval, states[:, _ACCEL] / interval, interval)
+
+
+def bias_limits(flight: Flight, instance: int, parameters: Mapping[str, float]) -> tuple[float, float]:
+    """Largest biases that the estimator of a flight could find along an axis, rad/s and m/s².
+
+    Parameters
+    ----------
+    parameters : in the names of v1.16, for logs that do not tell the limits themselves
+    """
+    told = flight.topic("estimator_sensor_bias", instance)
+    gyro, accel = (
+        float(np.median(told[name])) if told is not None and name in told and row_count(told) else 0.0
+        for name in ("gyro_bias_limit", "accel_bias_limit")
+    )
+    is_fixed = flight.release is not None and flight.release[:2] < _GYRO_LIMIT_PARAMETER
+    return (
+        gyro or (_FIXED_GYRO_LIMIT if is_fixed else parameters["EKF2_GYR_B_LIM"]),
+        accel or parameters["EKF2_ABL_LIM"],
+    )
 
 
 def update_interval_s(flight: Flight, time: np.ndarray, states: np.ndarray, rates: TopicTable | None) -> float:

@@ -10,13 +10,19 @@ FULL_IMU_RATE_HZ = 100.0
 """From this rate on `vehicle_imu` can be replayed; by default it is logged twice a second."""
 
 
+def selector_status(flight: Flight) -> TopicTable | None:
+    """Messages of the selector; None where the log has none that name the primary instance."""
+    selector = flight.topic("estimator_selector_status")
+    return selector if selector is not None and len(selector.get("primary_instance", ())) else None
+
+
 def primary_instance(flight: Flight) -> int:
     """The instance that the selector names in most of its messages; 0 where the log has no selector.
 
     It stands for the flight where that has to be one of one estimator, see `of_one_instance`.
     """
-    selector = flight.topic("estimator_selector_status")
-    if selector is None or not len(selector["primary_instance"]):
+    selector = selector_status(flight)
+    if selector is None:
         return 0
     chosen = np.asarray(selector["primary_instance"], np.int64)
     return int(np.argmax(np.bincount(chosen)))
@@ -24,8 +30,8 @@ def primary_instance(flight: Flight) -> int:
 
 def primary_instance_at(flight: Flight, timestamps: np.ndarray) -> np.ndarray:
     """The instance that was primary at each time (µs); before the first message of the selector: its first choice."""
-    selector = flight.topic("estimator_selector_status")
-    if selector is None or not len(selector["primary_instance"]):
+    selector = selector_status(flight)
+    if selector is None:
         return np.zeros(len(timestamps), np.int64)
     rows = np.searchsorted(selector["timestamp"], timestamps, side="right") - 1
     return np.asarray(selector["primary_instance"], np.int64)[np.maximum(rows, 0)]
@@ -50,7 +56,7 @@ def of_one_instance(flight: Flight) -> Flight:
 
 def instance_switches(flight: Flight) -> np.ndarray:
     """Times (µs) at which another instance became the primary one."""
-    selector = flight.topic("estimator_selector_status")
+    selector = selector_status(flight)
     if selector is None:
         return np.zeros(0, np.int64)
     changed = np.flatnonzero(np.diff(np.asarray(selector["primary_instance"], np.int64))) + 1
@@ -81,8 +87,8 @@ def magnetometer_instance(flight: Flight) -> int:
 
 def instance_shares(flight: Flight) -> dict[int, float]:
     """Share of the log in which each estimator instance was the primary one."""
-    selector = flight.topic("estimator_selector_status")
-    if selector is None or not row_count(selector):
+    selector = selector_status(flight)
+    if selector is None:
         return {0: 1.0}
     start = np.asarray(selector["timestamp"], np.int64)
     stop = np.append(start[1:], max(flight.last_timestamp, int(start[-1]) + 1))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows, stacked
-from fusetune.px4.layouts.estimator_instances import primary_instance_at
+from fusetune.px4.layouts.estimator_instances import primary_instance_at, selector_status
 from fusetune.px4.layouts.state_layout import (
     UPDATE_INTERVAL_S,
     StateLayout,
@@ -101,7 +101,7 @@ class Handover:
 
 def logged_handovers(flight: Flight) -> tuple[Handover, ...]:
     """Changes of the primary instance for which the log holds a state of the new one, in order of time."""
-    selector = flight.topic("estimator_selector_status")
+    selector = selector_status(flight)
     if selector is None or row_count(selector) < 2:
         return ()
     chosen, times = selector["primary_instance"].astype(np.int64), selector["timestamp"].astype(np.int64)

@@ -53,6 +53,52 @@ def aid_source_tables(flight: Flight) -> dict[TopicKey, TopicTable]:
     return tables
 
 
+def tables_of_test_ratios(flight: Flight, instance: int) -> dict[TopicKey, TopicTable]:
+    """`estimator_aid_src_*` of one estimator instance from its test ratios alone (v1.11 on); none where it logged none.
+
+    For logs in which the logger took innovations and their variances at different updates, as of several instances it
+    mostly does, so that few can be put together. Innovations and variances are unknown (NaN). Ratios are those of the
+    filter, not low-pass filtered, with one for all axes of a group in its first; rows as in `aid_source_tables`, while
+    the control flags name the source.
+    """
+    ratios = flight.topic("estimator_innovation_test_ratios", instance)
+    if ratios is None or not row_count(ratios):
+        return {}
+    time = ratios["timestamp"]
+    sampled = ratios.get("timestamp_sample", time)
+    has_mag_heading = flight.release is None or flight.release[:2] < NO_MAG_HEADING
+    flags = _control_flags(flight, instance, time)
+    series = _Series(time, sampled, ratios, {}, ratios, flags, False, has_mag_heading)
+    tables = ((source.topic, _of_test_ratios(name, source, series)) for name, source in _SOURCES.items())
+    return {(topic, instance): table for topic, table in tables if table is not None}
+
+
+def _of_test_ratios(name: str, source: AidSource, series: _Series) -> TopicTable | None:
+    columns = series.columns(source)
+    if not columns or any(column not in series.ratios for column in columns):
+        return None
+    ratio = np.column_stack([series.ratios[column] for column in columns]).astype(np.float64)
+    ratio[~np.isfinite(ratio)] = 0.0
+    known = np.broadcast_to(np.any(ratio > 0.0, axis=1, keepdims=True), ratio.shape).astype(np.float64)
+    every = np.arange(len(ratio))
+    rows = _new_sample_rows(ratio, known, _belongs(name, source, series) & _active(source, series, every))
+    if not len(rows):
+        return None
+    rejected = np.any(ratio[rows] > 1.0, axis=1)
+    table: TopicTable = {
+        "timestamp": series.timestamp[rows],
+        "timestamp_sample": series.timestamp_sample[rows],
+        "innovation_rejected": rejected,
+        "fused": ~rejected,
+    }
+    unknown = np.full(len(rows), np.nan, np.float32)
+    for axis in range(len(columns)):
+        column = f"[{axis}]" if len(columns) > 1 else ""
+        table |= {f"innovation{column}": unknown, f"innovation_variance{column}": unknown}
+        table[f"test_ratio{column}"] = ratio[rows, axis].astype(np.float32)
+    return table
+
+
 @dataclass(frozen=True)
 class _Series:
     """Innovation columns of one estimator instance on common rows."""
