@@ -206,10 +206,11 @@ def test_no_limit_is_no_limit() -> None:
 def test_what_later_rooms_read_is_kept() -> None:
     from fusetune.analyze.analyze_flight import COMPARED_TOPICS, REFERENCE_TOPICS
     from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
+    from fusetune.analyze.sensor_noise.sensor_noise import SENSOR_NOISE_TOPICS
 
-    for topic in (*REPLAY_TOPICS, *COMPARED_TOPICS, *REFERENCE_TOPICS):
+    for topic in (*REPLAY_TOPICS, *COMPARED_TOPICS, *REFERENCE_TOPICS, *SENSOR_NOISE_TOPICS):
         assert is_used(topic), topic
-    assert not is_used("actuator_outputs")
+    assert not is_used("cpuload")
 
 
 def test_a_definition_that_comes_late_is_taken(tmp_path: Path) -> None:

@@ -2,12 +2,13 @@
 
 White noise of density N, flicker of bias instability B and a random walk of density K add up to
 
-    σ²(τ) = N² / τ + (2 ln 2 / π) B² + K² τ / 3        (IEEE Std 952-1997, annex C)
+    σ²(τ) = N² / τ + (2 ln 2 / π) B² + K² τ / 3
 
-The three are fitted to the whole curve by generalised least squares, none of them negative: reading them off where the
-slope is −1/2, 0 and +1/2 takes for one what the neighbours add, and needs a record long enough for each slope to stand
-alone. The values of a curve scatter by their equivalent degrees of freedom and are correlated, for they are made of the
-same samples: with S the spectral density of the fitted noise and H the Allan filter, cov ∝ ∫ S² Hₐ H_b df.
+(`allan_model`). The three are fitted to the whole curve by generalised least squares, none of them negative: reading
+them off where the slope is −1/2, 0 and +1/2 takes for one what the neighbours add, and needs a record long enough for
+each slope to stand alone. The values of a curve scatter by their equivalent degrees of freedom and are correlated, for
+they are made of the same samples: with S the spectral density of the fitted noise and H the Allan filter,
+cov ∝ ∫ S² Hₐ H_b df.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
-from fusetune.analyze.sensor_noise.allan import KINDS, AllanCurve, NoiseKind, degrees_of_freedom
+from fusetune.analyze.sensor_noise.allan import FEWEST_MEANS, KINDS, AllanCurve, NoiseKind, degrees_of_freedom
+from fusetune.analyze.sensor_noise.allan_model import FLICKER, NoiseModel
 
 Array = npt.NDArray[np.float64]
 
@@ -32,8 +34,6 @@ NAMES: Mapping[NoiseKind, str] = {
     "flicker": "bias instability",
     "walk": "rate random walk",
 }
-FLAT = 2.0 * math.log(2.0) / math.pi
-"""σ² of flicker noise over B²."""
 CONFIDENCE = 0.95
 NORMAL = 1.96
 """Standard deviations to either side that hold 95 % of a normal variable."""
@@ -42,10 +42,18 @@ DISTINCT = 3.0
 FEWEST_VALUES = 5
 """Octaves that a fit of three parts needs."""
 _ITERATIONS = 6
-_MOST_LEFT_OUT = 3
+_MOST_LEFT_OUT = 5
 """Octaves at the short end that may follow the sensor's own low-pass filter and not the noise."""
-_MISFIT = 4.0
+_MISFIT = 2.5
 """χ² per degree of freedom from which the short end is suspected."""
+FEWEST_FOR_CORRELATION_TIME = 10
+"""Octaves over which flicker noise and one correlation time look different."""
+SUSPECT = 1.5
+"""χ² per degree of freedom from which other correlations of the bias are tried …"""
+CLEARLY = 9.0
+"""… of which one is taken when it lessens χ² by so much: three standard deviations, for one more parameter."""
+_FINER = (1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0)
+"""Octaves to either side that are tried after each round."""
 _FREQUENCIES = 1000
 USUAL_TAU_S: Mapping[NoiseKind, float] = {"white": 0.5, "flicker": 60.0, "walk": 300.0}
 """Where MEMS sensors as on autopilots usually show each part (about a second; the bottom at a minute, the rise after
@@ -86,6 +94,7 @@ class AllanFigures:
     random_walk : K, u/√s (= u √Hz)
     from_s : shortest τ that was fitted, s
     misfit : χ² per degree of freedom of the fit; the intervals are widened by its root where it is above 1
+    model : how the bias wanders: as flicker noise, or with one correlation time where a long record says so
     """
 
     noise_density: NoiseFigure
@@ -93,6 +102,7 @@ class AllanFigures:
     random_walk: NoiseFigure
     from_s: float
     misfit: float
+    model: NoiseModel = FLICKER
 
     def of(self, kind: NoiseKind) -> NoiseFigure:
         """The figure of one kind of noise."""
@@ -101,36 +111,52 @@ class AllanFigures:
     def deviation(self, tau_s: Array) -> Array:
         """The fitted deviation at averaging times (T,), s, of the parts that have a value."""
         parts = [self.of(kind).value or 0.0 for kind in KINDS]
-        return np.asarray(np.sqrt(_shapes(tau_s) @ np.square(parts)))
+        return np.asarray(np.sqrt(self.model.variances(tau_s) @ np.square(parts)))
 
     def document(self) -> dict[str, Any]:
         """As a JSON object."""
         parts = ("noise_density", "bias_instability", "random_walk")
         figures = {name: getattr(self, name).document() for name in parts}
-        return {**figures, "from_s": self.from_s, "misfit": self.misfit}
+        correlation_s = self.model.correlation_s
+        return {**figures, "from_s": self.from_s, "misfit": self.misfit, "correlation_time_s": correlation_s}
 
 
 def allan_figures(curve: AllanCurve) -> AllanFigures:
     """Fit the three parts to a curve.
 
-    Where the curve bends at its short end, as a sensor's own low-pass filter makes it, up to three octaves are left
+    Where the curve bends at its short end, as a sensor's own low-pass filter makes it, up to five octaves are left
     out.
     """
     usable = np.flatnonzero(curve.variance > 0.0)
     if len(usable) < FEWEST_VALUES:
         return _refused(curve)
-    best = _fit(curve, usable)
+    best = _with_correlation_time(curve, _fit(curve, usable, FLICKER))
     for left_out in range(1, _MOST_LEFT_OUT + 1):
         if best.misfit < _MISFIT or len(usable) - left_out < FEWEST_VALUES:
             break
-        other = _fit(curve, usable[left_out:])
+        other = _with_correlation_time(curve, _fit(curve, usable[left_out:], FLICKER))
         best = other if other.misfit < best.misfit else best
     scale = max(best.misfit, 1.0)
     told = {
         kind: _figure(curve, kind, float(part), float(variance) * scale)
         for kind, part, variance in zip(KINDS, best.parts, best.variances, strict=True)
     }
-    return AllanFigures(told["white"], told["flicker"], told["walk"], best.from_s, best.misfit)
+    return AllanFigures(told["white"], told["flicker"], told["walk"], best.from_s, best.misfit, best.model)
+
+
+def _with_correlation_time(curve: AllanCurve, best: _Fit) -> _Fit:
+    """The fit with the correlation time that fits best, where flicker noise fits a long record clearly worse."""
+    if len(best.rows) < FEWEST_FOR_CORRELATION_TIME or best.misfit < SUSPECT:
+        return best
+    flicker, tried = best, curve.tau_s[best.rows][2:-2]
+    for finer in _FINER:
+        for correlation_s in tried:
+            other = _fit(curve, best.rows, NoiseModel(float(correlation_s)))
+            best = other if other.chi2 < min(best.chi2, flicker.chi2 - CLEARLY) else best
+        if best.model.correlation_s is None:
+            return flicker
+        tried = best.model.correlation_s * 2.0 ** np.array([-finer, finer])
+    return best
 
 
 def interval(deviation: Array, freedom: Array) -> tuple[Array, Array]:
@@ -145,7 +171,7 @@ def interval(deviation: Array, freedom: Array) -> tuple[Array, Array]:
 def freedom_of_mixture(curve: AllanCurve, figures: AllanFigures) -> Array:
     """(T,) degrees of freedom, those of the kinds of noise by their share at each τ."""
     parts = np.array([(figures.of(kind).value or 0.0) ** 2 for kind in KINDS])
-    return _mixed_freedom(curve, np.arange(len(curve.factors)), parts)
+    return _mixed_freedom(curve, np.arange(len(curve.factors)), figures.model, parts)
 
 
 @lru_cache(maxsize=16)
@@ -161,22 +187,29 @@ def needed_s(kind: NoiseKind, tau_s: float) -> float:
 
 @dataclass(frozen=True)
 class _Fit:
+    rows: npt.NDArray[np.int64]
+    model: NoiseModel
     parts: Array
     variances: Array
     from_s: float
-    misfit: float
+    chi2: float
+
+    @property
+    def misfit(self) -> float:
+        """χ² per degree of freedom."""
+        return self.chi2 / max(len(self.rows) - len(KINDS), 1)
 
 
-def _fit(curve: AllanCurve, rows: npt.NDArray[np.int64]) -> _Fit:
+def _fit(curve: AllanCurve, rows: npt.NDArray[np.int64], model: NoiseModel) -> _Fit:
     tau, measured = curve.tau_s[rows], curve.variance[rows]
-    shapes = _shapes(tau)
+    shapes = model.variances(tau)
     weights = np.sqrt(curve.freedom["white"][rows] / 2.0)
     parts = nnls(shapes / measured[:, None] * weights[:, None], weights)[0]
     whitened, target = shapes, measured
     for _ in range(_ITERATIONS):
         expected = shapes @ parts
-        deviation = expected * np.sqrt(2.0 / _mixed_freedom(curve, rows, parts))
-        correlation = _correlation(tuple(curve.factors[rows].tolist()), curve.step_s, parts)
+        deviation = expected * np.sqrt(2.0 / _mixed_freedom(curve, rows, model, parts))
+        correlation = _correlation(tuple(curve.factors[rows].tolist()), curve.step_s, model, parts)
         # numpy's own small inverse: the triangular solver of BLAS waits for its threads longer than it works
         whitening = np.linalg.inv(np.linalg.cholesky(correlation + 1e-6 * np.eye(len(rows))))
         whitened = whitening @ (shapes / deviation[:, None])
@@ -187,8 +220,7 @@ def _fit(curve: AllanCurve, rows: npt.NDArray[np.int64]) -> _Fit:
     residual = target - whitened @ parts
     size = np.linalg.norm(whitened, axis=0)
     covariance = np.linalg.inv(whitened.T @ whitened / np.outer(size, size)) / np.outer(size, size)
-    misfit = float(residual @ residual) / max(len(rows) - len(KINDS), 1)
-    return _Fit(parts, np.diag(covariance), float(tau[0]), misfit)
+    return _Fit(rows, model, parts, np.diag(covariance), float(tau[0]), float(residual @ residual))
 
 
 def _positive(matrix: Array, target: Array) -> Array:
@@ -197,25 +229,18 @@ def _positive(matrix: Array, target: Array) -> Array:
     return np.asarray(nnls(matrix / size, target)[0] / size)
 
 
-def _shapes(tau_s: Array) -> Array:
-    """σ²(τ) of each kind at unit N², B², K², (T, 3)."""
-    return np.column_stack([1.0 / tau_s, np.full_like(tau_s, FLAT), tau_s / 3.0])
-
-
-def _mixed_freedom(curve: AllanCurve, rows: npt.NDArray[np.int64], parts: Array) -> Array:
-    shares = _shapes(curve.tau_s[rows]) * parts
+def _mixed_freedom(curve: AllanCurve, rows: npt.NDArray[np.int64], model: NoiseModel, parts: Array) -> Array:
+    shares = model.variances(curve.tau_s[rows]) * parts
     total = shares.sum(axis=1)
     shares = np.where(total[:, None] > 0.0, shares / np.where(total > 0.0, total, 1.0)[:, None], [1.0, 0.0, 0.0])
     kinds = np.column_stack([curve.freedom[kind][rows] for kind in KINDS])
     return np.maximum((shares * kinds).sum(axis=1), 1.0)
 
 
-def _correlation(factors: tuple[int, ...], step_s: float, parts: Array) -> Array:
+def _correlation(factors: tuple[int, ...], step_s: float, model: NoiseModel, parts: Array) -> Array:
     """Of the values of a curve among each other, (T, T), under the fitted noise."""
     frequency, width, filters = _allan_filters(factors)
-    f = frequency / step_s
-    white, flicker, walk = parts
-    density = 2.0 * white + flicker / (math.pi * f) + walk / (2.0 * math.pi**2 * f**2)
+    density = model.density(frequency / step_s, parts)
     weighted = filters * (density / density.max() * np.sqrt(width))
     # not by BLAS, whose threads wait for each other longer than this takes
     product = np.einsum("if,jf->ij", weighted, weighted)
@@ -258,12 +283,19 @@ def _figure(curve: AllanCurve, kind: NoiseKind, part: float, variance: float) ->
 
 def _refusal(curve: AllanCurve, kind: NoiseKind) -> str:
     needs = needed_s(kind, USUAL_TAU_S[kind])
-    words = f"the log stands still for only {curve.longest_s:.0f} s: the {NAMES[kind]}"
     if curve.longest_s < needs:
-        return f"{words} needs about {needs:.0f} s"
+        return _too_short(curve, kind, needs)
     return f"in {curve.longest_s:.0f} s of standing still the {NAMES[kind]} does not rise above the rest of the noise"
 
 
+def _too_short(curve: AllanCurve, kind: NoiseKind, needs_s: float) -> str:
+    return f"the log stands still for only {curve.longest_s:.0f} s: the {NAMES[kind]} needs about {needs_s:.0f} s"
+
+
 def _refused(curve: AllanCurve) -> AllanFigures:
-    white, flicker, walk = (NoiseFigure(None, 0.0, None, 0.0, _refusal(curve, kind)) for kind in KINDS)
+    fewest_s = FEWEST_MEANS * 2 ** (FEWEST_VALUES - 1) * curve.step_s
+    white, flicker, walk = (
+        NoiseFigure(None, 0.0, None, 0.0, _too_short(curve, kind, max(fewest_s, needed_s(kind, USUAL_TAU_S[kind]))))
+        for kind in KINDS
+    )
     return AllanFigures(white, flicker, walk, curve.step_s, 0.0)

@@ -163,16 +163,17 @@ def _slope(tracks: _Tracks, tone: Tone, throttle: Array) -> float | None:
 def _fundamental(found: Sequence[Tone], slopes: Sequence[float | None], rate_hz: float) -> float | None:
     """Frequency whose multiples explain most tones; one that follows the throttle needs no multiple.
 
-    Folded multiples lie anywhere, so that by chance some tone is near to one: of them only the second counts here, which
-    two blades make.
+    Folded multiples lie anywhere, so that by chance some tone is near to one: of them only the second counts, which two
+    blades make, and for half.
     """
     best, most = None, 1.0
     for tone, slope in zip(found, slopes, strict=True):
         if tone.frequency_hz < LOWEST_FUNDAMENTAL_HZ or (slope is not None and slope < 0.0):
             continue
         shown = [_multiple_of(one.frequency_hz, tone.frequency_hz, rate_hz) for one in found]
-        multiples = {multiple for multiple, folded in shown if multiple and (not folded or multiple == _OF_TWO_BLADES)}
-        score = len(multiples) + (1.0 if slope is not None else 0.0)
+        score = float(len({multiple for multiple, folded in shown if multiple and not folded}))
+        score += 0.5 if (_OF_TWO_BLADES, True) in shown else 0.0
+        score += 1.0 if slope is not None else 0.0
         if score > most:
             best, most = tone.frequency_hz, score
     return best

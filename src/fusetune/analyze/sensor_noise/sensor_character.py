@@ -21,8 +21,6 @@ from fusetune.save.checks.standstill import Standstill, standstill
 
 STUCK_S = {"gyro": 0.1, "accel": 0.1, "mag": 2.0, "baro": 2.0, "gnss_vel": 5.0, "gnss_pos": 5.0}
 """One value held for longer is told as stuck; shorter, it may be the sensor's steps."""
-WHOLE = 0.9
-"""A sample that is a mean over less of the sampling interval has had its neighbours thinned away."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ def sensor_character(
     command : of the motors; None where the log has none
     """
     pieces = series.pieces(still, SHORTEST_S)
-    scaled = _as_whole_means(series, pieces)
+    scaled = [one * series.shorter_mean for one in pieces]
     curve = allan_curve(scaled, series.step_s)
     axes = range(series.values.shape[1])
     by_axis = tuple(allan_figures(allan_curve([one[:, i] for one in scaled], series.step_s)) for i in axes)
@@ -116,18 +114,6 @@ def sensor_character(
         vibration=vibration(series, rest, flight, airborne, command) if has_spectrum else None,
         stuck=_stuck(series, airborne),
     )
-
-
-def _as_whole_means(series: SensorSeries, pieces: list[np.ndarray]) -> list[np.ndarray]:
-    """Deviations as they would be if each sample were a mean over the whole interval, for white noise.
-
-    Of a log that holds one sample of several the noise of a sample is that of a shorter mean, larger by the root of how
-    much shorter it is.
-    """
-    share = series.averaged_s / series.step_s
-    if not 0.0 < share < WHOLE:
-        return pieces
-    return [(one - one.mean(axis=0)) * np.sqrt(share) for one in pieces]
 
 
 def _wander(series: SensorSeries, pieces: list[np.ndarray]) -> float | None:

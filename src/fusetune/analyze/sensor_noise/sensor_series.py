@@ -12,21 +12,23 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.px4.flight import Flight, TopicTable, field_names, row_count, stacked
+from fusetune.px4.layouts.logged_state import METRES_PER_DEGREE
 from fusetune.px4.sample_times import measurement_time
 
 Array = npt.NDArray[np.float64]
 SensorName = Literal["gyro", "accel", "mag", "baro", "gnss_vel", "gnss_pos"]
 BODY, EARTH = ("x", "y", "z"), ("north", "east", "down")
 
-METRES_PER_DEGREE = 111_194.93
-"""Of latitude, on PX4's sphere of 6371 km."""
 FEWEST_SAMPLES = 50
 FULLER = 1.2
 """Another topic is taken when it holds so many times the samples."""
 GAP_STEPS = 1.5
-"""From so many sampling intervals on there is a gap: the stretch ends there."""
+"""From so many sampling intervals on there is a gap: the stretch ends there. Lost samples are not made up for: a mean
+of the neighbours of a tone near half the rate is wrong by its whole amplitude, and that is noise in the whole band."""
 MOST_IMU_HZ = 1000.0
 """Faster samples are averaged to about this: what EKF2 integrates over milliseconds is not told by microseconds."""
+WHOLE = 0.9
+"""A sample that is a mean over less of the sampling interval has had its neighbours thinned away."""
 _FIX_3D = 3
 
 
@@ -85,6 +87,16 @@ class SensorSeries:
     def rate_hz(self) -> float:
         """Usual rate, Hz."""
         return 1.0 / self.step_s
+
+    @property
+    def shorter_mean(self) -> float:
+        """Root of the share of the sampling interval that a sample is a mean over; 1 where that is all or unknown.
+
+        Of a log that holds one sample of several the noise of a sample is that of a shorter mean, larger by the root of
+        how much shorter it is: times this, white noise has the density of the sensor.
+        """
+        share = self.averaged_s / self.step_s
+        return float(np.sqrt(share)) if 0.0 < share < WHOLE else 1.0
 
     def pieces(self, intervals: Iterable[Interval], shortest_s: float) -> list[Array]:
         """Values without a gap inside the intervals (µs), each (n, axes) and not shorter than `shortest_s`."""

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_closing, percentile_filter
+from scipy.ndimage import binary_closing, percentile_filter, uniform_filter1d
 from scipy.signal import welch
+from scipy.stats import chi2
 
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
@@ -21,8 +22,13 @@ SEGMENT_S = 2.5
 FEWEST_SEGMENTS = 4
 LOWEST_TONE_HZ = 15.0
 """Below it a vehicle flies: its own motion, and its controller's."""
+LOWEST_FLOOR_HZ = 10.0
+FLOOR = 0.2
+_SMOOTHED_HZ = 2.0
+_BINS_OF_HANN = 1.5
+"""Noise bandwidth of Hann's window, in frequencies."""
 UPPER_SHARE = 0.9
-"""Of the Nyquist frequency; up to there the broad-band level is read."""
+"""Of the Nyquist frequency; up to there the floor is read."""
 _BASELINE_HZ = 40.0
 _BASELINE_PERCENTILE = 30.0
 """The level around a tone is that of the lower third: the shaking of four rotors may fill half of the band."""
@@ -60,17 +66,21 @@ class Spectrum:
         """Distance of two frequencies, Hz."""
         return float(self.frequency_hz[1] - self.frequency_hz[0])
 
-    def broadband(self, lowest_hz: float) -> float:
-        """Level between the tones, mean of the axes, unit²/Hz: the median from `lowest_hz` to 0.9 of Nyquist.
+    def broadband(self) -> float:
+        """Floor of the spectrum above the vehicle's motion, mean of the axes, unit²/Hz.
 
-        A median of averaged densities, which are spread like χ² with f = 2 s degrees of freedom, s the independent
-        segments, is (1 − 2/9f)³ times their mean (Wilson and Hilferty); that is put right.
+        The lower fifth of the densities from 10 Hz to 0.9 of Nyquist, each a mean over 2 Hz: motion falls to the floor
+        from below, and the shaking of motors, which does not add up over time as white noise does, stands on it. The
+        lower fifth of white noise lies below its mean by what χ² has for the degrees of freedom of such a mean; that is
+        put right.
         """
         highest = UPPER_SHARE * float(self.frequency_hz[-1])
-        band = (self.frequency_hz >= min(lowest_hz, 0.5 * highest)) & (self.frequency_hz <= highest)
-        freedom = 2.0 * max(_CORRELATION_OF_SEGMENTS * self.segments, 1.0)
-        below = (1.0 - 2.0 / (9.0 * freedom)) ** 3
-        return float(np.mean(np.median(self.density[band], axis=0))) / below
+        band = (self.frequency_hz >= min(LOWEST_FLOOR_HZ, 0.5 * highest)) & (self.frequency_hz <= highest)
+        together = max(round(_SMOOTHED_HZ / self.resolution_hz), 1)
+        independent = max(_CORRELATION_OF_SEGMENTS * self.segments, 1.0) * max(together / _BINS_OF_HANN, 1.0)
+        below = float(chi2.ppf(FLOOR, 2.0 * independent)) / (2.0 * independent)
+        smooth = uniform_filter1d(self.density, together, axis=0, mode="nearest")
+        return float(np.mean(np.quantile(smooth[band], FLOOR, axis=0))) / below
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def standing_still(
     if len(edges) < 2:
         return ()
     begins, ends = edges[:-1], edges[1:]
-    turning, shaking = _in_windows(gyro, edges), _in_windows(accel, edges)
+    turning, shaking = _Windowed(gyro, edges), _Windowed(accel, edges)
     away = [(start - CLEAR_OF_FLIGHT_US, stop + CLEAR_OF_FLIGHT_US) for start, stop in (*airborne, *_armed(flight))]
     grounded = ~inside((begins + ends) // 2, away) & turning.is_full & shaking.is_full
     still = grounded & (turning.spread > 0.0) & (shaking.spread > 0.0)
@@ -90,10 +90,6 @@ class _Windowed:
         gaps = np.concatenate([[0], np.cumsum(np.diff(series.time) > GAP_STEPS * series.step_s * 1e6)])
         padded = np.append(gaps, gaps[-1])
         self.is_full = (padded[bounds[1:]] == padded[bounds[:-1]]) & (counts >= 2)
-
-
-def _in_windows(series: SensorSeries, edges: npt.NDArray[np.int64]) -> _Windowed:
-    return _Windowed(series, edges)
 
 
 def _armed(flight: Flight) -> tuple[Interval, ...]:

@@ -42,6 +42,8 @@ HORIZONTAL = 2
 """Axes of GNSS that the parameters are about; the vertical ones are worse by a factor that PX4 has built in."""
 _DIGITS = 2
 MORE_IN_FLIGHT = 1.2
+TOO_LITTLE = 1.2
+"""Noise above what PX4 is told by more than flights of one vehicle differ."""
 MORE = (
     "Scale errors, wrong delays and what else the filter's model leaves out usually ask for more than the sensor's "
     "noise: go lower only with sets that are compared on flights"
@@ -70,7 +72,7 @@ class StartingNoise:
     in_flight : that the noise in flight asks for; None where that is not known
     least : the larger of the two; None where neither is known
     flown : what the vehicle flew with
-    start_with : `least` where the vehicle flew with less, else what flew; within PX4's limits
+    start_with : `least` where the vehicle flew with clearly less, else what flew; within PX4's limits
     words : what to make of it
     """
 
@@ -146,7 +148,7 @@ def _of_white(
     rest = _Interval.of(figure, update_s)
     flight = None if seen is None else per_update(seen, update_s)
     if flight is None:
-        words = "The log has too little of the flight to tell what that asks for."
+        words = "What the flight asks for is not known: the log has too little of it in one piece, or loses samples."
     elif rest.value is None:
         words = f"How much of the noise in flight is the sensor's own is not known: {figure.refusal}."
     elif flight > MORE_IN_FLIGHT * rest.value:
@@ -207,7 +209,7 @@ def _noise(
     metadata, present = ALL_PARAMETERS[parameter], float(flown[parameter])
     least = max((one for one in (rest.value, in_flight) if one is not None), default=None)
     start = present
-    if least is not None and least > present:
+    if least is not None and least > TOO_LITTLE * present:
         start = float(f"{min(least, metadata.maximum or math.inf):.{_DIGITS}g}")
         words += f" PX4 is told {present:.2g}, less than the noise that is there: begin with {start:g}."
         if metadata.maximum is not None and least > metadata.maximum:

@@ -11,7 +11,7 @@ from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.sensor_noise.motor_commands import MotorCommand
 from fusetune.analyze.sensor_noise.motor_harmonics import MOST_HARMONIC, MotorTones, motor_tones, shown_at
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
-from fusetune.analyze.sensor_noise.spectrum import LOWEST_TONE_HZ, Spectrum, tones
+from fusetune.analyze.sensor_noise.spectrum import Spectrum, tones
 
 LIMITED = 2.0
 """In flight so many times the broad-band noise at rest: vibration, not the sensor, then makes three quarters of it."""
@@ -73,14 +73,14 @@ def vibration(
     airborne : µs
     command : of the motors; None where the log has none
     """
-    rest, flight = _density(at_rest), _density(in_flight)
+    rest, flight = _density(series, at_rest), _density(series, in_flight)
     limited = None if rest is None or flight is None else flight >= LIMITED * rest
     found = motor_tones(series, airborne, tones(in_flight) if in_flight is not None else (), command)
     return Vibration(flight, rest, limited, found, _aliasing(series, found))
 
 
-def _density(found: Spectrum | None) -> float | None:
-    return None if found is None else math.sqrt(0.5 * found.broadband(LOWEST_TONE_HZ))
+def _density(series: SensorSeries, found: Spectrum | None) -> float | None:
+    return None if found is None else math.sqrt(0.5 * found.broadband()) * series.shorter_mean
 
 
 def _aliasing(series: SensorSeries, found: MotorTones) -> str:

@@ -11,8 +11,15 @@ from fusetune.px4.ulog.reading_limits import ReadingLimits
 _USED_TOPICS = frozenset(
     {
         *ESTIMATOR_TOPICS,
+        "actuator_controls_0",
+        "actuator_motors",
+        "actuator_outputs",
         "ekf2_innovations",
+        "sensor_accel",
+        "sensor_accel_fifo",
         "sensor_gps",
+        "sensor_gyro",
+        "sensor_gyro_fifo",
         "vehicle_attitude",
         "vehicle_attitude_groundtruth",
         "vehicle_imu",
@@ -20,6 +27,7 @@ _USED_TOPICS = frozenset(
         "vehicle_local_position",
         "vehicle_local_position_groundtruth",
         "vehicle_mocap_odometry",
+        "vehicle_thrust_setpoint",
     }
 )
 _USED_PREFIX = "estimator_"

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from fusetune.analyze.sensor_noise.allan import KINDS, AllanCurve
-from fusetune.analyze.sensor_noise.allan_fit import FLAT, NAMES, AllanFigures, freedom_of_mixture, interval
+from fusetune.analyze.sensor_noise.allan_fit import NAMES, AllanFigures, freedom_of_mixture, interval
+from fusetune.analyze.sensor_noise.allan_model import FLAT
 from fusetune.analyze.sensor_noise.pooled import PooledSensor
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise
 from fusetune.analyze.sensor_noise.sensor_series import Sensor
@@ -42,7 +43,16 @@ def _draw(found: list[tuple[Sensor, AllanCurve, AllanFigures]]) -> Figure:
         return empty_figure(NOT_STILL)
     columns = min(_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
-    figure = new_figure(3.5 * columns, 3.2 * rows)
+    width, height = 3.6 * columns, 3.2 * rows
+    figure = new_figure(width, height, layout=None)
+    figure.subplots_adjust(
+        left=0.75 / width,
+        right=1.0 - 0.1 / width,
+        top=1.0 - 0.25 / height,
+        bottom=0.45 / height,
+        wspace=0.3,
+        hspace=0.32,
+    )
     for place, (sensor, curve, figures) in enumerate(shown):
         _curve(figure.add_subplot(rows, columns, place + 1), sensor, curve, figures)
     return figure

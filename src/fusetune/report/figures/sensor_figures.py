@@ -47,9 +47,12 @@ def draw_sensor(noise: SensorNoise, name: SensorName) -> Figure:
     """
     character = noise.sensors[name]
     axes = character.sensor.axes
-    figure = new_figure(10.0, 1.6 + 1.35 * len(axes) + (1.2 if len(axes) == 1 else 0.0))
-    outer = figure.add_gridspec(1, 2, width_ratios=(1.45, 1.0))
-    left, right = outer[0].subgridspec(len(axes), 1), outer[1].subgridspec(2, 2)
+    height = 1.6 + 1.35 * len(axes) + (1.2 if len(axes) == 1 else 0.0)
+    figure = new_figure(10.0, height, layout=None)
+    margins = {"left": 0.065, "right": 0.99, "top": 1.0 - 0.25 / height, "bottom": 0.48 / height, "wspace": 0.13}
+    outer = figure.add_gridspec(1, 2, width_ratios=(1.45, 1.0), **margins)
+    left = outer[0].subgridspec(len(axes), 1, hspace=0.1)
+    right = outer[1].subgridspec(2, 2, hspace=0.5, wspace=0.38)
     panels: list[Axes] = []
     for row in range(len(axes)):
         panel = figure.add_subplot(left[row], sharex=panels[0] if panels else None)
@@ -68,8 +71,11 @@ def draw_sensor(noise: SensorNoise, name: SensorName) -> Figure:
 def draw_pooled_sensor(pooled: PooledSensor) -> Figure:
     """One device over several flights: a box for each flight, and the histogram of all together."""
     shares = [share for share in pooled.flights if share.at_rest or share.in_flight]
-    figure = new_figure(10.0, max(2.6, 1.2 + 0.32 * len(shares)))
-    grid = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0))
+    height = max(2.6, 1.2 + 0.32 * len(shares))
+    figure = new_figure(10.0, height, layout=None)
+    names = 0.03 + 0.0068 * max((len(share.flight) for share in shares), default=0)
+    margins = {"left": names, "right": 0.99, "top": 1.0 - 0.25 / height, "bottom": 0.48 / height, "wspace": 0.17}
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.6, 1.0), **margins)
     axes = figure.add_subplot(grid[0])
     rows: list[tuple[Array, float, str]] = []
     for place, share in enumerate(shares):
@@ -101,7 +107,8 @@ def _sequence(axes: Axes, noise: SensorNoise, character: SensorCharacter, row: i
     wild = _outliers(noise, character)[:, row]
     axes.plot(time[wild], values[wild], "x", color=OUTLIER_COLOUR, markersize=4.0, markeredgewidth=0.9)
     if wild.any():
-        axes.text(0.995, 0.93, f"{wild.sum()} outliers (×)", ha="right", va="top", transform=axes.transAxes, fontsize=7)
+        words = f"{wild.sum()} outlier{'s' if wild.sum() > 1 else ''} (×)"
+        axes.text(0.995, 0.93, words, ha="right", va="top", transform=axes.transAxes, fontsize=7)
     axes.set_ylabel(f"{character.sensor.axes[row]} [{character.sensor.unit}]")
     axes.margins(x=0.01)
 

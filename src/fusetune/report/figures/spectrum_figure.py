@@ -21,7 +21,11 @@ def draw_spectra(noise: SensorNoise) -> Figure:
     shown = [one for one in noise.sensors.values() if one.rest_spectrum or one.flight_spectrum]
     if not shown:
         return empty_figure("The log holds too few samples in a row for a spectrum.")
-    figure = new_figure(3.5 * len(shown), 3.4)
+    width, height = 3.6 * len(shown), 3.4
+    figure = new_figure(width, height, layout=None)
+    figure.subplots_adjust(
+        left=0.7 / width, right=1.0 - 0.1 / width, top=1.0 - 0.25 / height, bottom=0.45 / height, wspace=0.28
+    )
     for place, character in enumerate(shown):
         _spectrum(figure.add_subplot(1, len(shown), place + 1), character)
     return figure
@@ -50,7 +54,8 @@ def _spectrum(axes: Axes, character: SensorCharacter) -> None:
                 va="bottom",
                 fontsize=6.5,
             )
-        axes.axvspan(flight.frequency_hz[0], LOWEST_TONE_HZ, color="#DDDDDD", alpha=0.5, linewidth=0.0)
+        moved = min(LOWEST_TONE_HZ, float(flight.frequency_hz[-1]))
+        axes.axvspan(float(flight.frequency_hz[0]), moved, color="#DDDDDD", alpha=0.5, linewidth=0.0)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.margins(y=0.15)
