@@ -2,10 +2,10 @@
 
     m = (1 + S) R(t)ᵀ E + h + c u(t) + noise
 
-E is the earth's field, whose strength and dip the World Magnetic Model tells within some milligauss, R the attitude with
-a heading that the gyros alone turn (`gyro_attitude`) and whose error is a constant rate, a share of the way turned, and a
-walk; u is the power of the motors (`motor_power`). From before arming to the air u jumps while E does not: that is what
-tells c from h.
+E is the earth's field, whose strength and dip the World Magnetic Model tells within some milligauss, R the attitude
+that the gyros alone turn (`gyro_attitude`) and whose error is a constant rate, a share of the way turned, and a walk; u
+is the power of the motors (`motor_power`). From before arming to the air u jumps while E does not: that is what tells c
+from h.
 
 PX4 corrects what a sensor measures as rotation · scale · (data + power · COMP − OFF) (`Magnetometer::Correct`), so COMP
 falls by c and OFF rises by h, both over the scale.
@@ -30,7 +30,6 @@ from fusetune.analyze.effects.gyro_attitude import GyroAttitude, gyro_attitude
 from fusetune.analyze.effects.motor_power import OFF, MotorPower, motor_power
 from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
-from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.feed.message_samples import gnss_samples, mag_samples
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
@@ -40,36 +39,55 @@ Times = npt.NDArray[np.int64]
 
 LARGEST_FIELD_ERROR_GAUSS = 0.003
 """Standard error of a field above which it is not told: about 1° of heading."""
-LARGEST_SCALE_ERROR = 0.01
+LARGEST_IRON_ERROR_GAUSS = 0.005
+LEAST_TURN_DEG = 150.0
+"""Of all headings; what is seen from one side is nearly one with the earth's field."""
+LARGEST_NOISE_GAUSS = 0.05
+"""Residual above which the model does not hold; noisy magnetometers have a tenth of it."""
+LARGEST_SCALE_ERROR = 0.04
 LARGEST_DECLINATION_ERROR_DEG = 2.0
+NORMAL_95 = 1.96
 MODEL_ERROR_GAUSS = 0.005
 """Standard deviation of the field at a place from the model of the world's."""
 EXPECTED = np.array([
-    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003, *[0.02] * 6,
+    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003, *[0.02] * 6, 0.01,
 ])  # fmt: skip
 """Standard deviations beforehand: horizontal and vertical field, hard iron, motors, scale, drift rad/s, gyro scale,
-and what one axis shows of another."""
+what one axis shows of another, delay s."""
 STARTS = np.array([np.inf, 0.01, 0.01])
 """The same, of heading and tilt at the beginning, rad."""
 FIELD_H, FIELD_V = 0, 1
 HARD, MOTOR, SCALE = slice(2, 5), slice(5, 8), slice(8, 11)
 DRIFT, GYRO_SCALE = 11, 12
 CROSSED = slice(13, 19)
+DELAY = 19
 _OTHERS = ((1, 2), (0, 2), (0, 1))
 FASTEST_HZ = 12.5
 _ROUNDS = 3
+_FEWEST = 100
 _KNOTS_S = 2.0
 _AXES = "XYZ"
 
 
 @dataclass(frozen=True)
 class MagneticFit:
-    """What was found: `fit` with its constants in the order of `EXPECTED`, and the motors' power at the samples."""
+    """What was found.
+
+    Attributes
+    ----------
+    fit : constants in the order of `EXPECTED`
+    power : of the motors at the samples, where `has_power`
+    declination_deg, level_gauss : of the world's field, and its horizontal strength
+    turned : from the leftmost to the rightmost heading, rad
+    heading, heading_error : the attitude, and by how much its heading is off at `time`, (N,) rad
+    """
 
     fit: WalkingFit
     power: MotorPower
     has_power: bool
     declination_deg: float
+    level_gauss: float
+    turned: float
     heading: GyroAttitude
     time: Times
     heading_error: Array
@@ -88,22 +106,37 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
     steps = observed.replayed.steps()
     samples = mag_samples(table)
     delay_us = round(1e3 * observed.parameters.get("EKF2_MAG_DELAY", 0.0))
-    time, field = _thinned(samples["time_us"] - delay_us, np.asarray(samples["mag"], np.float64))
-    aligned = _aligned_from(observed)
-    inside = (time > max(int(steps.time[0]), aligned)) & (time < steps.time[-1]) & np.isfinite(field).all(axis=1)
-    time, field = time[inside], field[inside]
-    if time.size < 50:
+    time, field = samples["time_us"] - delay_us, np.asarray(samples["mag"], np.float64)
+    inside = (time > max(int(steps.time[0]), _aligned_from(observed))) & (time < steps.time[-1])
+    inside &= np.isfinite(field).all(axis=1) & (np.diff(time, prepend=time[0] - 1) > 0)
+    attitude = gyro_attitude(steps, observed.airborne)
+    time, field, rotation = _thinned(time[inside], field[inside], attitude)
+    if time.size < _FEWEST:
         return "magnetometer and attitude hardly overlap"
     power = motor_power(observed, time)
     known = np.isfinite(power.power)
     has_power = bool(np.count_nonzero(known) > 50 and np.ptp(power.power[known]) > 0.0)
     if has_power:
-        time, field, power = time[known], field[known], MotorPower(power.kind, power.unit, power.power[known])
-    heading = gyro_attitude(steps, observed.airborne)
-    fitted = _gauss_newton(heading, time, field, power.power if has_power else np.zeros(time.size), world)
+        time, field, rotation = time[known], field[known], rotation[known]
+        power = MotorPower(power.kind, power.unit, power.power[known])
+    drawn = power.power if has_power else np.zeros(time.size)
+    fitted = _gauss_newton(time, field, rotation, attitude.turned_at(time), drawn, world)
     if fitted is None:
         return "too short a log for the magnetic field"
-    return MagneticFit(fitted[0], power, has_power, math.degrees(math.atan2(world[1], world[0])), heading, time, fitted[1])
+    if fitted[0].noise > LARGEST_NOISE_GAUSS:
+        why = f"the magnetometer is {fitted[0].noise:.2f} G off the earth's field as the vehicle turns"
+        return f"{why}: see first whether it is mounted as PX4 is told, or disturbed from outside"
+    return MagneticFit(
+        fitted[0],
+        power,
+        has_power,
+        math.degrees(math.atan2(world[1], world[0])),
+        math.hypot(*world[:2]),
+        float(np.ptp(attitude.turned_at(time))),
+        attitude,
+        time,
+        fitted[1],
+    )
 
 
 def _world_field(observed: ObservedFlight) -> Array | None:
@@ -128,24 +161,26 @@ def _aligned_from(observed: ObservedFlight) -> int:
     return int(flags["timestamp"][int(np.argmax(np.asarray(flags["cs_tilt_align"], bool)))])
 
 
-def _thinned(time: Times, field: Array) -> tuple[Times, Array]:
-    """Means of so many neighbours that no more than `FASTEST_HZ` are left."""
-    step_s = float(np.median(np.diff(time))) * 1e-6
+def _thinned(time: Times, field: Array, attitude: GyroAttitude) -> tuple[Times, Array, Array]:
+    """Means of so many neighbours that no more than `FASTEST_HZ` are left: times, fields and rotations."""
+    step_s = float(np.median(np.diff(time))) * 1e-6 if time.size > 1 else 1.0
     every = max(1, round(1.0 / (FASTEST_HZ * max(step_s, 1e-3))))
     rows = time.size // every * every
-    means = field[:rows].reshape(-1, every, 3).mean(axis=1)
-    return np.rint(time[:rows].reshape(-1, every).mean(axis=1)).astype(np.int64), means
+    rotation = attitude.rotation_at(time[:rows]) if rows else np.zeros((0, 3, 3))
+    means = (field[:rows].reshape(-1, every, 3).mean(axis=1), rotation.reshape(-1, every, 3, 3).mean(axis=1))
+    return np.rint(time[:rows].reshape(-1, every).mean(axis=1)).astype(np.int64), *means
 
 
 def _gauss_newton(
-    heading: GyroAttitude, time: Times, field: Array, power: Array, world: Array
+    time: Times, field: Array, rotation: Array, turned: Array, power: Array, world: Array
 ) -> tuple[WalkingFit, Array] | None:
     """The fit and the heading's error at the samples."""
-    rotation, time_s = heading.rotation_at(time), np.asarray(time * 1e-6, np.float64)
-    since_s, turned = time_s - time_s[0], heading.turned_at(time)
+    time_s = np.asarray(time * 1e-6, np.float64)
+    since_s = time_s - time_s[0]
     level, scale = math.hypot(world[0], world[1]), np.zeros(3)
     error = np.full(time.size, _first_error(rotation, field, world))
-    earth, fit = world.copy(), None
+    earth = world.copy()
+    fit: WalkingFit | None = None
     stacked = np.tile(time_s, 3)
     for number in range(_ROUNDS):
         cosine, sine = np.cos(error), np.sin(error)
@@ -166,20 +201,23 @@ def _gauss_newton(
             crossed = slice(CROSSED.start + 2 * axis, CROSSED.start + 2 * axis + 2)
             one[:, crossed] = body[:, _OTHERS[axis]]
             turns = gain[axis] * across[:, axis]
+            one[:, DELAY] = -gain[axis] * np.gradient(body[:, axis], time_s)
             one[:, DRIFT], one[:, GYRO_SCALE] = turns * since_s, turns * turned
             # R'ᵀ (E' × e) of rotations e about north and east, which the tilt may be off by
             tilts = gain[axis] * np.column_stack([
                 earth[2] * rotation[:, 1, axis] - seen[:, 1] * down[:, axis],
                 seen[:, 0] * down[:, axis] - earth[2] * rotation[:, 0, axis],
             ])  # fmt: skip
-            rows.append((one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error))
+            rows.append(
+                (one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error)
+            )
         design, walking = np.vstack([one for one, _, _ in rows]), np.vstack([one for _, one, _ in rows])
         offsets = earth_change(earth, world)
         target = np.concatenate([one for _, _, one in rows])
         # fields are told as changes of the world's, scales as they are
         target = target + design[:, :2] @ offsets + design[:, SCALE] @ scale
         given = WalkingRows(stacked, target, design, walking, EXPECTED, _KNOTS_S, starts=STARTS)
-        fit = fit_walking(given) if fit is None or number == 1 else fit_walking(given, fit.ratio, fit.memory_s)
+        fit = fit_walking(given, fit, refined=number == 1)
         if fit is None:
             return None
         scale = fit.constants[SCALE].copy()
@@ -207,7 +245,9 @@ def estimate_magnetic(observed: ObservedFlight) -> tuple[Effect, ...]:
     """Effects `motor_magnetic_field`, `hard_iron`, `magnetometer_scale` and `declination`."""
     found = fit_magnetic(observed)
     if isinstance(found, str):
-        return tuple(refused(name, found) for name in ("motor_magnetic_field", "hard_iron", "magnetometer_scale", "declination"))
+        return tuple(
+            refused(name, found) for name in ("motor_magnetic_field", "hard_iron", "magnetometer_scale", "declination")
+        )
     figures = {"noise_gauss": found.fit.noise, "heading_walk_deg_sqrt_s": math.degrees(found.fit.walk)}
     calibration = _Calibration.of(observed)
     return (
@@ -246,7 +286,9 @@ class _Calibration:
 def _motor(found: MagneticFit, calibration: _Calibration, figures: dict[str, float]) -> Effect:
     name = "motor_magnetic_field"
     if not found.has_power:
-        return refused(name, "the log tells neither what the motors draw nor when they stand still: log from boot", **figures)
+        return refused(
+            name, "the log tells neither what the motors draw nor when they stand still: log from boot", **figures
+        )
     span = float(np.ptp(np.percentile(found.power.power, [1.0, 99.0])))
     figures = figures | {"power_span": span, "CAL_MAG_COMP_TYP": float(found.power.kind)}
     errors = found.fit.standard_error[MOTOR]
@@ -269,9 +311,7 @@ def _motor(found: MagneticFit, calibration: _Calibration, figures: dict[str, flo
     return Effect(name, tuple(estimates), "", figures)
 
 
-def _shifted(
-    fit: WalkingFit, index: int, name: str, unit: str, told: float, factor: float, *, known: bool
-) -> Estimate:
+def _shifted(fit: WalkingFit, index: int, name: str, unit: str, told: float, factor: float, *, known: bool) -> Estimate:
     value, half = told + factor * float(fit.constants[index]), abs(factor) * fit.half_width(index)
     error = abs(factor) * float(fit.standard_error[index])
     count = int(fit.residual.size)
@@ -282,7 +322,8 @@ def _hard_iron(found: MagneticFit, calibration: _Calibration, figures: dict[str,
     estimates, missing = [], []
     for axis, letter in enumerate(_AXES):
         index = HARD.start + axis
-        if found.fit.standard_error[index] > LARGEST_FIELD_ERROR_GAUSS * 5.0 / 3.0:
+        one_sided = axis < 2 and math.degrees(found.turned) < LEAST_TURN_DEG
+        if one_sided or found.fit.standard_error[index] > LARGEST_IRON_ERROR_GAUSS:
             missing.append(letter)
         elif calibration.prefix:
             told, factor = calibration.told(f"{letter}OFF", 0.0), 1.0 / calibration.told(f"{letter}SCALE", 1.0)
@@ -323,24 +364,26 @@ def _declination(observed: ObservedFlight, found: MagneticFit) -> Effect:
     """How far the heading by the magnetometer is from the one that GNSS velocities tell, on the model's declination."""
     name, told = "declination", told_value(dict(observed.parameters), "EKF2_MAG_DECL")
     error = true_heading_error(observed, found.heading, found.time, found.heading_error)
-    if error is None or error.standard_error > LARGEST_DECLINATION_ERROR_DEG:
-        figures = {} if error is None else {"standard_error_deg": error.standard_error}
-        why = "GNSS velocities do not tell the heading; fly straight legs with hard starts and stops, on several headings"
+    # a hard iron that is off turns the magnetometer's own heading
+    level = found.fit.standard_error[HARD][:2].max() / found.level_gauss
+    total = math.inf if error is None else math.hypot(error.standard_error, math.degrees(float(level)))
+    if error is None or total > LARGEST_DECLINATION_ERROR_DEG:
+        figures = {} if error is None else {"standard_error_deg": total}
+        why = (
+            "GNSS velocities do not tell the heading; fly straight legs with hard starts and stops, on several headings"
+        )
         return refused(name, why, **figures)
-    value = found.declination_deg + error.value
+    value, half = (
+        found.declination_deg + error.value,
+        math.hypot(error.half_width, NORMAL_95 * math.degrees(float(level))),
+    )
     return Effect(
         name,
         (
             Estimate(
-                "EKF2_MAG_DECL", "deg", told, value, value - error.half_width, value + error.half_width,
-                error.standard_error, error.n,
+                "EKF2_MAG_DECL", "deg", told, value, value - half, value + half, total, error.n,
             ),
         ),
         "",
         {"world_model_deg": found.declination_deg},
     )  # fmt: skip
-
-
-def airborne_span(observed: ObservedFlight) -> Interval | None:
-    """From the first to the last time in the air, µs."""
-    return (observed.airborne[0][0], observed.airborne[-1][1]) if observed.airborne else None

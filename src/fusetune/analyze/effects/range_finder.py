@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import stdtrit
 
+from fusetune.analyze.delays.delayed_series import measured_distances
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.told import NO_MOTION, refused
 from fusetune.analyze.effects.walking_regression import BLOCK_S, WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.ekf2.feed.message_samples import range_refusals, range_samples, taken
 from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import (
     DT_MAX_S,
     DT_MIN_S,
@@ -38,6 +38,9 @@ LARGEST_WALK_M_SQRT_S = 0.25
 """Of ground and height reference; on rougher ground the noise of the sensor cannot be told from it."""
 LEAST_DISTANCE_RATIO = 2.0
 """From the smallest to the largest distance, for the share that grows with it."""
+NOISE_UNCERTAINTY = 1.6
+"""Factor on the standard errors of the noises, by which errors were larger on made flights (docs/effects.md): what of
+the noise the walk takes along is known on the average alone."""
 GATE_SIGMAS = 3.0
 DELAY_S, SCALE, TILT_RAD = 0.02, 0.02, 0.005
 """Standard deviations beforehand of errors of delay, scale and mounting; a sensor that looks aslant, or an attitude
@@ -62,18 +65,11 @@ class RangeFit:
 
 def measured_ranges(observed: ObservedFlight) -> tuple[Times, Array] | None:
     """Times of measurement, µs, and distances, m, of the range finder that looks down; None without one."""
-    for instance in range(4):
-        table = observed.flight.topics.get(("distance_sensor", instance))
-        if table is None:
-            continue
-        samples, limits = range_samples(table)
-        distance = np.asarray(samples["range"], np.float64)
-        usable = taken(table, range_refusals(table)) & np.isfinite(distance) & (samples["quality"] != 0)
-        usable &= ~(distance <= limits[:, 0]) & ~(distance >= limits[:, 1])
-        if np.count_nonzero(usable) > 2:
-            delay_us = round(1e3 * observed.parameters.get("EKF2_RNG_DELAY", 0.0))
-            return samples["time_us"][usable] - delay_us, distance[usable]
-    return None
+    found = measured_distances(observed.flight)
+    if found is None:
+        return None
+    time, distance = found
+    return time - round(1e3 * observed.parameters.get("EKF2_RNG_DELAY", 0.0)), np.asarray(distance, np.float64)
 
 
 def fit_range(observed: ObservedFlight) -> RangeFit | str:
@@ -88,20 +84,21 @@ def fit_range(observed: ObservedFlight) -> RangeFit | str:
     time, distance = time[used], distance[used]
     if time.size < _FEWEST:
         return "too few distances in the air"
-    down = motion.at(time, motion.rotation[:, 2])
+    down = motion.rotation_at(time)[:, 2]
     upright = down[:, 2] > _STEEPEST
     time, distance, down = time[upright], distance[upright], down[upright]
     if time.size < _FEWEST:
         return "too few distances in the air"
-    height = motion.at(time, motion.height[:, None])[:, 0]
+    height = -motion.way_at(time)[:, 2]
     measured = distance * down[:, 2]
-    vertical = motion.at(time, motion.velocity[:, 2:])[:, 0]
+    vertical = motion.velocity_at(time)[:, 2]
     # a sensor that is later than told shows where the vehicle was
     far = height - height[0] + measured[0]
     design = np.column_stack([-down, vertical, far, far[:, None] * down[:, :2]])
     expected = np.array([1.0, 1.0, 1.0, DELAY_S, SCALE, TILT_RAD, TILT_RAD])
     time_s = np.asarray(time * 1e-6, np.float64)
-    weight = np.ones(time.size)
+    weight: Array = np.ones(time.size)
+    noise: Array = np.zeros(time.size)
     fit: WalkingFit | None = None
     for _ in range(2):
         columns = (measured - height) * weight, design * weight[:, None], weight[:, None]
@@ -113,6 +110,7 @@ def fit_range(observed: ObservedFlight) -> RangeFit | str:
         white, share = _variances(np.square(noise), distance, grows=True)
         deviation = np.sqrt(white + share * np.square(distance))
         weight = float(np.median(deviation)) / np.maximum(deviation, 1e-4)
+    assert fit is not None
     return RangeFit(time, distance, noise, fit)
 
 
@@ -191,7 +189,7 @@ def _noises(
     parts = [block == one for one in np.unique(block)]
     whole = _variances(squares, distance, grows=grows)
     left_out = np.array([_variances(squares[~own], distance[~own], grows=grows) for own in parts])
-    spread = np.sqrt((len(parts) - 1) * np.var(left_out, axis=0))
+    spread = NOISE_UNCERTAINTY * np.sqrt((len(parts) - 1) * np.var(left_out, axis=0))
     return float(whole[0]), float(whole[1]), (float(spread[0]), float(spread[1]), float(len(parts) - 1))
 
 
@@ -230,17 +228,17 @@ def _gate(observed: ObservedFlight, fitted: RangeFit, white: float, share: float
     assert motion is not None
     states = observed.replayed.states()
     time, distance = fitted.time, fitted.distance
-    cosine = motion.at(time, motion.rotation[:, 2])[:, 2]
+    cosine = motion.rotation_at(time)[:, 2, 2]
     height = distance * cosine
     step_s = np.diff(time) * 1e-6
     kept = (step_s >= DT_MIN_S) & (step_s <= DT_MAX_S)
     if np.count_nonzero(kept) < _FEWEST:
         return None
-    rate = -np.diff(height)[kept] / step_s[kept] - motion.at(time, motion.velocity[:, 2:])[1:][kept, 0]
+    rate = -np.diff(height)[kept] / step_s[kept] - motion.velocity_at(time)[1:][kept, 2]
     vertical = np.interp(time[1:][kept], states.time, states.velocity_variance[:, 2])
     variance = 2.0 * (white + share * np.square(distance[1:][kept])) / np.square(step_s[kept]) + vertical
     ratio = np.sign(rate) * np.square(rate) / np.maximum(variance, 1e-9)
-    filtered, blocks = 0.0, {}
+    filtered, blocks = 0.0, dict[int, float]()
     place = np.floor((time[1:][kept] - time[0]) * 1e-6 / (2.0 * BLOCK_S)).astype(np.int64)
     for value, dt, block in zip(ratio.tolist(), step_s[kept].tolist(), place.tolist(), strict=True):
         filtered += dt / (dt + SIGNED_TEST_RATIO_TAU) * (value - filtered)

@@ -26,10 +26,11 @@ Array = npt.NDArray[np.float64]
 DIRECTIONS = ("XP", "XN", "YP", "YN", "Z")
 WASH_M_PER_G = 0.5
 """Standard deviation beforehand of what one g more of thrust does to the barometer, m."""
-LARGEST_ERROR = 0.06
+LARGEST_ERROR = 0.1
 """Standard error of a coefficient above which it is not told; PX4 takes −0.5 to 0.5."""
 LEAST_SPEED_M_S = 3.0
 _KNOTS_S = 2.0
+_FEWEST = 300
 _WHAT_TO_FLY = (
     "fly forward, backward, left and right between rest and full speed at constant height, several times each, in"
     " still air, with good GNSS"
@@ -75,15 +76,13 @@ def estimate_static_pressure(observed: ObservedFlight, fitted: DragFit | str | N
     if fit is None:
         return refused(name, f"too short a time in the air away from the ground; {_WHAT_TO_FLY}", **figures)
     figures |= {"noise_m": fit.noise, "walk_m_sqrt_s": fit.walk, "wash_m_per_g": float(fit.constants[-1])}
+    figures["wash_error_m_per_g"] = float(fit.standard_error[-1])
     names = [f"EKF2_PCOEF_{one}" for one in DIRECTIONS]
     known = [index for index in range(len(names)) if fit.standard_error[index] <= LARGEST_ERROR]
     estimates = tuple(estimate_of(fit, one, names[one], "", observed.parameters.get(names[one])) for one in known)
     missing = ", ".join(names[one] for one in range(len(names)) if one not in known)
     refusal = f"{missing} not told: too little air from there; {_WHAT_TO_FLY}" if missing else ""
     return Effect(name, estimates, refusal, figures)
-
-
-_FEWEST = 300
 
 
 def pressure_heights(air: Array, limit: float) -> Array:

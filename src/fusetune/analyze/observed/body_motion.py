@@ -1,8 +1,8 @@
 """How the vehicle moved and what its accelerometers felt, on an even grid: what the tuners of effects share.
 
-Attitude and slow velocity are the replay's, the fast velocity is the IMU's alone (`analyze/delays/inertial_motion`).
-The height is made of the IMU and of GNSS vertical velocities, without the barometer: an error of the barometer must
-not hide in what it is compared with.
+The attitude is the replay's, the fast velocity the IMU's alone (`analyze/delays/inertial_motion`), the slow one that of
+GNSS; the way and the height are their integral. No other source goes in: an error of the barometer, of the optical flow
+or of vision must not hide in what it is compared with. Without GNSS the slow velocity is the replay's.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from fusetune.analyze.delays.inertial_motion import InertialMotion, slow_part
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.replaying.replayed_set import ReplayedSteps
+from fusetune.analyze.smoothing.smoothed_velocity import NORMAL_QUARTILE, OUTLIER_SIGMAS
 from fusetune.ekf2.feed.message_samples import gnss_refusals, gnss_samples, taken
 from fusetune.px4.flight import Flight
 
@@ -23,8 +24,8 @@ Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
 EVERY_S = 0.1
-HEIGHT_KNOTS_S = 5.0
-"""Over so long the IMU alone knows the vertical velocity."""
+VELOCITY_KNOTS_S = 5.0
+"""Over so long the IMU alone knows the velocity."""
 _FEWEST_FIXES = 20
 
 
@@ -40,7 +41,9 @@ class BodyMotion:
     specific_force : (K, 3) body, m/s², less the mean of the accelerometer bias that the replay found
     body_rate : (K, 3) FRD, rad/s, less the mean of the gyro bias
     height : (K,) above the first row, m; drifts
-    by_gnss : whether GNSS vertical velocities bound the drift; otherwise it is the replay's velocity
+    by_gnss : whether GNSS velocities bound the drift; otherwise it is the replay's velocity
+    fast_time, fast_rotation, fast_velocity, fast_way, fast_rate : (M, …) time, attitude, velocity, the way north, east,
+        down, and body rate at every update of the filter: a sensor's lever arm shows in what is faster than the grid
     """
 
     time: Times
@@ -50,6 +53,11 @@ class BodyMotion:
     body_rate: Array
     height: Array
     by_gnss: bool
+    fast_time: Times
+    fast_rotation: Array
+    fast_velocity: Array
+    fast_way: Array
+    fast_rate: Array
 
     @property
     def time_s(self) -> Array:
@@ -62,9 +70,23 @@ class BodyMotion:
 
     def at(self, time: Times, values: Array) -> Array:
         """Values (K, …) of the motion at other times (N,), µs → (N, …); the ends hold outside."""
-        flat = values.reshape(values.shape[0], -1)
-        found = np.column_stack([np.interp(time, self.time, column) for column in flat.T])
-        return found.reshape(time.size, *values.shape[1:])
+        return _interpolated(time, self.time, values)
+
+    def rotation_at(self, time: Times) -> Array:
+        """(N, 3, 3) body → NED at times (N,), µs."""
+        return _interpolated(time, self.fast_time, self.fast_rotation)
+
+    def velocity_at(self, time: Times) -> Array:
+        """(N, 3) NED, m/s, at times (N,), µs."""
+        return _interpolated(time, self.fast_time, self.fast_velocity)
+
+    def way_at(self, time: Times) -> Array:
+        """(N, 3) travelled north, east and down from the first row, m, at times (N,), µs; drifts."""
+        return _interpolated(time, self.fast_time, self.fast_way)
+
+    def rate_at(self, time: Times) -> Array:
+        """(N, 3) body rate, rad/s, at times (N,), µs."""
+        return _interpolated(time, self.fast_time, self.fast_rate)
 
     def covers(self, time: Times) -> npt.NDArray[np.bool_]:
         """Times (N,), µs, at which it is known."""
@@ -84,7 +106,7 @@ def body_motion(
     first, last = np.searchsorted(steps.time, (motion.time[0], motion.time[-1] + 1))
     steps = steps.rows(slice(int(first), int(last)))
     place = ((steps.time - steps.time[0]) // round(EVERY_S * 1e6)).astype(np.int64)
-    bins, begin = np.unique(place, return_index=True)
+    _, begin = np.unique(place, return_index=True)
     count = np.diff(np.append(begin, place.size))
 
     def mean(values: Array) -> Array:
@@ -97,38 +119,54 @@ def body_motion(
 
     # an interval of the IMU ends at its step: its middle is half a step earlier
     half_us = 0.5 * float(np.median(np.diff(steps.time)))
-    time = np.rint(mean(steps.time[:, None] - float(steps.time[0]))[:, 0] + steps.time[0] - half_us).astype(np.int64)
-    vertical, by_gnss = _vertical_velocity(motion, flight, parameters)
-    climbed = np.concatenate([[0.0], np.cumsum(-0.5 * (vertical[1:] + vertical[:-1]) * np.diff(motion.time) * 1e-6)])
-    velocity = np.column_stack([np.interp(time, motion.time, one) for one in motion.bounded_velocity.T])
-    velocity[:, 2] = np.interp(time, motion.time, vertical)
+    since: Array = np.asarray(steps.time[:, None] - steps.time[0], np.float64)
+    time = np.rint(mean(since)[:, 0] + steps.time[0] - half_us).astype(np.int64)
+    fast, by_gnss = _bounded_velocity(motion, flight, parameters)
+    moved = 0.5 * (fast[1:] + fast[:-1]) * np.diff(motion.time)[:, None] * 1e-6
+    way = np.vstack([np.zeros(3), np.cumsum(moved, axis=0)])
     return BodyMotion(
         time=time,
         rotation=mean(motion.rotation),
-        velocity=velocity,
+        velocity=_interpolated(time, motion.time, fast),
         specific_force=of_imu(steps.delta_velocity, steps.delta_velocity_dt, steps.accel_bias),
         body_rate=of_imu(steps.delta_angle, steps.delta_angle_dt, steps.gyro_bias),
-        height=np.interp(time, motion.time, climbed),
+        height=-np.interp(time, motion.time, way[:, 2]),
         by_gnss=by_gnss,
+        fast_time=motion.time,
+        fast_rotation=motion.rotation,
+        fast_velocity=fast,
+        fast_way=way,
+        fast_rate=motion.body_rate - steps.gyro_bias.mean(axis=0),
     )
 
 
-def _vertical_velocity(
-    motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]
-) -> tuple[Array, bool]:
-    """(M,) down, m/s: fast part of the IMU, slow part of GNSS or, where there is too little of it, of the replay."""
+def _interpolated(time: Times, known: Times, values: Array) -> Array:
+    flat = values.reshape(values.shape[0], -1)
+    found = np.column_stack([np.interp(time, known, column) for column in flat.T])
+    return found.reshape(time.size, *values.shape[1:])
+
+
+def _bounded_velocity(motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]) -> tuple[Array, bool]:
+    """(M, 3) NED, m/s: fast part of the IMU, slow part of GNSS or, where there is too little of it, of the replay.
+
+    The replay follows every source that is fused, a wrong one, too; so nothing can be judged by it where GNSS is there.
+    """
     table = flight.topic("vehicle_gps_position")
-    inertial = motion.velocity[:, 2]
     if table is None:
-        return motion.bounded_velocity[:, 2], False
+        return motion.bounded_velocity, False
     samples = gnss_samples(table)
-    delay_us = round(1e3 * parameters.get("EKF2_GPS_DELAY", 0.0))
-    time, down = samples["time_us"] - delay_us, samples["vel"][:, 2]
-    usable = taken(table, gnss_refusals(table, flight.release)) & np.isfinite(down) & (samples["fix_type"] >= 3)
-    usable &= (time >= motion.time[0]) & (time <= motion.time[-1])
+    time = samples["time_us"] - round(1e3 * parameters.get("EKF2_GPS_DELAY", 0.0))
+    usable = taken(table, gnss_refusals(table, flight.release)) & (samples["fix_type"] >= 3)
+    usable &= np.isfinite(samples["vel"]).all(axis=1) & (time >= motion.time[0]) & (time <= motion.time[-1])
     if np.count_nonzero(usable) < _FEWEST_FIXES:
-        return motion.bounded_velocity[:, 2], False
+        return motion.bounded_velocity, False
     time = time[usable]
-    off = (np.interp(time, motion.time, inertial) - down[usable])[:, None]
-    drift = slow_part(time, off, HEIGHT_KNOTS_S)[:, 0]
-    return np.asarray(inertial - np.interp(motion.time, time, drift)), True
+    off = _interpolated(time, motion.time, motion.velocity) - samples["vel"][usable]
+    drift = slow_part(time, off, VELOCITY_KNOTS_S)
+    # once more without what lies far off: a glitch must not bend the reference
+    left = np.abs(off - drift)
+    near = (left <= OUTLIER_SIGMAS * np.median(left, axis=0) / NORMAL_QUARTILE).all(axis=1)
+    if _FEWEST_FIXES <= np.count_nonzero(near) < near.size:
+        time = time[near]
+        drift = slow_part(time, off[near], VELOCITY_KNOTS_S)
+    return motion.velocity - _interpolated(motion.time, time, drift), True
