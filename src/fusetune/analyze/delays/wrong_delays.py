@@ -16,8 +16,8 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.delays.sensor_delays import CONFIDENCE, SensorDelay, read_delays
 from fusetune.analyze.delays.settings import DelaySettings
-from fusetune.design.tunable_parameters import DELAY_LIMIT, reach_ms
 from fusetune.analyze.metrics.random_effects import random_effects
+from fusetune.design.tunable_parameters import DELAY_LIMIT, reach_ms
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.storage.documents import read_as, read_document, write_document

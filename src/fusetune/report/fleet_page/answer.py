@@ -24,6 +24,8 @@ def fleet_answer(results: FleetResults) -> str:
         kind, title = "fail", f"{severities['fail']} of {total} show what must be mended before flying again"
     elif severities["warning"]:
         kind, title = "warning", f"{severities['warning']} of {total} show something to mend"
+    elif troubled := sum(one["counts"]["fail"] > 0 for one in results.flights):
+        kind, title = "warning", f"{troubled} of {total} have figures far beyond their limits"
     else:
         kind, title = "pass", f"No cause of trouble shows on {total}"
     said = bullets([*_causes(results), *_unexplained(results), *_changes(results), *_outliers(results)])

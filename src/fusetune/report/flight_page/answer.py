@@ -102,7 +102,8 @@ def _sign(sign: Mapping[str, Any]) -> str:
     words = str(sign["words"]).rstrip(".")
     if not isinstance(usual, int | float) or not math.isfinite(usual):
         return words
-    return f"{words} (usual: up to {number(usual).text} {sign['unit']}".rstrip() + ")"
+    unit = "" if sign["unit"] == "1" else f" {sign['unit']}"
+    return f"{words} (usual: up to {number(usual).text}{unit.rstrip()})"
 
 
 def _values(values: Mapping[str, float]) -> Iterator[str]:

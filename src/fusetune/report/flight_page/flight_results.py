@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fusetune.analyze.flight_files import DIAGNOSIS_FILE, EFFECTS_FILE, HEALTH_FILE
 from fusetune.report.severity_words import FlightTimes, rank
 from fusetune.storage.documents import read_as
 from fusetune.storage.files import AnyPath
 
-HEALTH_FILE, DIAGNOSIS_FILE, EFFECTS_FILE = "health.json", "diagnosis.json", "effects.json"
 
 _SUMS = ("status",)
 """Groups of figures that say again what the aid sources say."""
