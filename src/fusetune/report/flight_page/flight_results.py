@@ -13,7 +13,6 @@ from fusetune.report.severity_words import FlightTimes, rank
 from fusetune.storage.documents import read_as
 from fusetune.storage.files import AnyPath
 
-
 _SUMS = ("status",)
 """Groups of figures that say again what the aid sources say."""
 
