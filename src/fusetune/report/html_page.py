@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
+from fusetune.report.markup import link
 from fusetune.storage.files import AnyPath, atomic_path
 
 STYLE_SHEET = Path(__file__).with_name("page.css")
@@ -36,3 +38,10 @@ def write_page(output: AnyPath, head: PageHead, sections: Sequence[str]) -> None
     )
     with atomic_path(output) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def page_links(pages: Mapping[str, AnyPath], page: AnyPath) -> str:
+    """A line of links from one page to others, each relative to where that page lies."""
+    folder = Path(page).parent
+    links = "".join(link(words, os.path.relpath(target, folder)) for words, target in pages.items())
+    return f'<nav aria-label="other pages">{links}</nav>' if links else ""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from urllib.parse import quote
 
 from fusetune.storage.files import AnyPath
 
@@ -14,10 +15,13 @@ _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 
 @dataclass(frozen=True)
 class Cell:
-    """A table cell; `kind` is a class of the style sheet ("good", "bad", "best", "quiet", "number")."""
+    """A table cell; `kind` is a class of the style sheet ("good", "bad", "best", "quiet", "number"), `link` the page
+    beside this one that it leads to, `hint` what is told where the pointer rests."""
 
     text: str
     kind: str = ""
+    link: str = ""
+    hint: str = ""
 
 
 def number(value: object, digits: int = 3, kind: str = "number") -> Cell:
@@ -59,7 +63,13 @@ def _cell(cell: Cell | str) -> str:
     if isinstance(cell, str):
         return f"<td>{escape(cell)}</td>"
     kind = f' class="{escape(cell.kind)}"' if cell.kind else ""
-    return f"<td{kind}>{escape(cell.text)}</td>"
+    hint = f' title="{escape(cell.hint)}"' if cell.hint else ""
+    return f"<td{kind}{hint}>{link(cell.text, cell.link) if cell.link else escape(cell.text)}</td>"
+
+
+def link(text: str, page: AnyPath) -> str:
+    """Leads to another page, named relative to this one."""
+    return f'<a href="{quote(Path(page).as_posix())}">{escape(text)}</a>'
 
 
 def figure(path: AnyPath, caption: str) -> str:
@@ -98,3 +108,8 @@ def details(summary: str, *parts: str, kind: str = "") -> str:
     """A part that opens on a click; printing opens all."""
     mark = f' <span class="{escape(kind)}">●</span>' if kind else ""
     return f"<details><summary>{escape(summary)}{mark}</summary>{''.join(parts)}</details>"
+
+
+def severity_mark(severity: str, words: str) -> str:
+    """Words on the colour of a severity."""
+    return f'<span class="tag is-{escape(severity)}">{escape(words)}</span>'

@@ -1,0 +1,65 @@
+"""Which flight shows which cause."""
+
+from __future__ import annotations
+
+from html import escape
+
+from fusetune.report.fleet_page.fleet_results import Document, FleetResults, count_words
+from fusetune.report.markup import details, link, paragraph, section
+from fusetune.report.severity_words import SEVERITY_WORDS, cause_words, confidence_words, worst_of
+
+_MOST_CLEAN_SHOWN = 12
+"""More flights without any trouble are behind a click."""
+
+
+def matrix_section(results: FleetResults) -> str:
+    """Flights, worst first, against causes, the most frequent first; with a link to each flight's page."""
+    flights = results.worst_first
+    clean = [one for one in flights if not results.has_trouble(one)]
+    shown = [one for one in flights if one not in clean] if len(clean) > _MOST_CLEAN_SHOWN else list(flights)
+    text = (
+        "A field is red where the flight must not be repeated like this, orange where something is to be mended, blue "
+        "where it is worth knowing; where the pointer rests it says how sure. Beside: figures of the health table "
+        "beyond their limits."
+    )
+    parts = [paragraph(text, "note")]
+    if shown:
+        parts.append(_table(shown, results))
+    if len(shown) < len(flights):
+        parts.append(details(f"{count_words(len(clean), 'flight')} without any trouble", _table(clean, results)))
+    return section("Which flights have what", *parts)
+
+
+def _table(flights: list[Document], results: FleetResults) -> str:
+    causes = [one["id"] for one in results.causes]
+    titles = "<th>flight</th>"
+    titles += "".join(f'<th class="turned"><span>{escape(cause_words(one))}</span></th>' for one in causes)
+    titles += '<th class="number">fail</th><th class="number">warn</th>'
+    titles += "".join(f"<th>{title}</th>" for title in ("date", "vehicle", "firmware"))
+    rows = "".join(f"<tr>{_row(one, causes, results)}</tr>" for one in flights)
+    return (
+        f'<div class="scroll"><table class="matrix"><thead><tr>{titles}</tr></thead><tbody>{rows}</tbody></table></div>'
+    )
+
+
+def _row(flight: Document, causes: list[str], results: FleetResults) -> str:
+    name, counts = flight["name"], flight["counts"]
+    title = link(name, results.links[name]) if name in results.links else escape(name)
+    words = (flight["date"][:10], flight["vehicle"], flight["firmware"])
+    told = "".join(f'<td class="short">{escape(one or "–")}</td>' for one in words)
+    found = {one["id"]: one for one in reversed(flight["findings"])}
+    marks = "".join(_mark(found.get(cause)) for cause in causes)
+    numbers = "".join(_count(counts[severity], severity) for severity in ("fail", "warning"))
+    return f'<td class="short">{title}</td>{marks}{numbers}{told}'
+
+
+def _count(count: int, severity: str) -> str:
+    return f'<td class="number {f"is-{severity}" if count else "quiet"}">{count}</td>'
+
+
+def _mark(finding: Document | None) -> str:
+    if finding is None:
+        return '<td class="mark"></td>'
+    severity = worst_of([finding])
+    hint = f"{finding['cause']} – {SEVERITY_WORDS[severity]}, {confidence_words(finding['confidence'])}"
+    return f'<td class="mark" title="{escape(hint)}"><span class="spot is-{severity}"></span></td>'

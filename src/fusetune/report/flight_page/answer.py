@@ -1,0 +1,117 @@
+"""The head of a flight's page: what is wrong, and what to do first; then each cause with its evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from html import escape
+from typing import Any
+
+from fusetune.report.flight_page.flight_results import Document, FlightResults
+from fusetune.report.markup import bullets, number, paragraph, section, severity_mark
+from fusetune.report.severity_words import SEVERITY_WORDS, FlightTimes, confidence_words, worst_of
+
+_NAMED_ROWS = 3
+
+
+def answer_section(results: FlightResults) -> str:
+    """The answer in a box: the cause that explains most, when, how sure, what to do."""
+    if results.diagnoses:
+        return _found(results)
+    if results.problems:
+        return _unexplained(results)
+    title = "Nothing wrong was found on this flight"
+    text = "No cause shows, and every figure of sensors and filter lies within its limit. What the log does not tell "
+    return _box("pass", title, paragraph(text + "stands at the end of the health table."))
+
+
+def _found(results: FlightResults) -> str:
+    first, *others = results.diagnoses
+    severity = worst_of(list(results.diagnoses))
+    facts = _facts(first, results.times) + _what_to_do(first)
+    also = ""
+    if others:
+        also = "<p>Also: " + "; ".join(_heading(one) for one in others) + ".</p>"
+    return _box(severity, _heading(first), facts, also)
+
+
+def _unexplained(results: FlightResults) -> str:
+    rows = results.problems
+    count = len(rows)
+    title = escape("Something is off, and no known cause explains it")
+    text = f"{count} figure{'s lie' if count != 1 else ' lies'} beyond the limit. The first of them:"
+    named = [
+        _sentence(row["found"]) + (f" {row['remedy']}." if row["remedy"] else "")
+        for row in results.problem_subjects[:_NAMED_ROWS]
+    ]
+    return _box(rows[0]["severity"], title, paragraph(text), bullets(named))
+
+
+def _box(severity: str, title: str, *parts: str) -> str:
+    return f'<section class="decision is-{severity}"><h2>{title}</h2>{"".join(parts)}</section>'
+
+
+def _heading(diagnosis: Document) -> str:
+    """The cause with its severity beside."""
+    severity = diagnosis["severity"]
+    return f"{escape(diagnosis['cause'].strip().rstrip('.'))} {severity_mark(severity, SEVERITY_WORDS[severity])}"
+
+
+def causes_section(results: FlightResults) -> str:
+    """Each cause: what was seen, what the replay showed, values; empty where there is none."""
+    if not results.diagnoses:
+        return ""
+    order = "What explains most of the trouble stands first." if len(results.diagnoses) > 1 else ""
+    parts = [_cause(one, results.times, is_told=place == 0) for place, one in enumerate(results.diagnoses)]
+    return section("Why", paragraph(order, "note") if order else "", *parts)
+
+
+def _cause(diagnosis: Document, times: FlightTimes, is_told: bool) -> str:
+    """One cause; when, how sure and what to do are left out where the head of the page has told them."""
+    seen = [one for one in diagnosis["evidence"] if one["origin"] != "replay"]
+    replayed = [one for one in diagnosis["evidence"] if one["origin"] == "replay"]
+    parts = [
+        "" if is_told else _facts(diagnosis, times),
+        _headed("What the log shows", bullets([_sign(one) for one in seen])),
+        _headed("What the replay shows", bullets([_sign(one) for one in replayed])),
+        _headed("Values to set, or measured", bullets(list(_values(diagnosis["values"])))),
+        "" if is_told else _headed("What to do", _what_to_do(diagnosis)),
+        paragraph(f"The signs are known from: {diagnosis['source']}", "note") if diagnosis["source"] else "",
+    ]
+    kind = f"cause is-{diagnosis['severity']}"
+    return f'<div class="{kind}" id="{escape(diagnosis["id"])}"><h3>{_heading(diagnosis)}</h3>{"".join(parts)}</div>'
+
+
+def _headed(title: str, inside: str) -> str:
+    return f"<h4>{escape(title)}</h4>{inside}" if inside else ""
+
+
+def _facts(diagnosis: Document, times: FlightTimes) -> str:
+    when = times.in_words(diagnosis["since_s"], diagnosis["until_s"])
+    facts = (("when", when), ("how sure", confidence_words(diagnosis["confidence"])))
+    return '<dl class="facts">' + "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts) + "</dl>"
+
+
+def _what_to_do(diagnosis: Document) -> str:
+    return paragraph(_sentence(diagnosis["remedy"])) if diagnosis["remedy"] else ""
+
+
+def _sign(sign: Mapping[str, Any]) -> str:
+    """What was seen, with the level up to which it is usual."""
+    usual = sign["usual"]
+    words = str(sign["words"]).rstrip(".")
+    if not isinstance(usual, int | float) or not math.isfinite(usual):
+        return words
+    unit = "" if sign["unit"] == "1" else f" {sign['unit']}"
+    return f"{words} (usual: up to {number(usual).text}{unit.rstrip()})"
+
+
+def _values(values: Mapping[str, float]) -> Iterator[str]:
+    for name, value in values.items():
+        yield f"{name} = {number(value, 4).text}"
+
+
+def _sentence(text: str) -> str:
+    """With a full stop."""
+    text = text.strip()
+    return text if text.endswith((".", "!", "?")) else f"{text}."

@@ -1,0 +1,100 @@
+"""Puts the page of a flight together: one file that needs no network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from fusetune.analyze.flight_files import SENSOR_NOISE_FILE
+from fusetune.report.figure_words import figure_words
+from fusetune.report.figures.drawing import figure_style, save_png
+from fusetune.report.figures.timeline_figure import TIMELINE_TOPICS, Bar, draw_timeline
+from fusetune.report.flight_page.answer import answer_section, causes_section
+from fusetune.report.flight_page.effects_section import effects_section
+from fusetune.report.flight_page.flight_results import FlightResults, read_flight_results
+from fusetune.report.flight_page.health_table import health_table_section
+from fusetune.report.flight_page.sensors_section import sensors_section
+from fusetune.report.html_page import PageHead, page_links, write_page
+from fusetune.report.markup import figure, section
+from fusetune.report.severity_words import cause_words
+from fusetune.save.flight_folder import load_flight
+from fusetune.storage.documents import read_document
+from fusetune.storage.files import AnyPath
+
+TIMELINE_FILE = "timeline.png"
+
+_MOST_ROWS_DRAWN = 8
+_LONGEST_LABEL = 46
+_TIMELINE = (
+    "Bold: causes, thin: figures beyond their limits, over the part of the flight that they are about. Grey: on the "
+    "ground. The dashed line is the gate: beyond it the filter rejects a sample."
+)
+
+
+def plot_flight_timeline(flight_folder: AnyPath, analyze_folder: AnyPath, output: AnyPath) -> None:
+    """Draw when what was found on a flight.
+
+    Parameters
+    ----------
+    flight_folder : `results/save/<flight>`
+    analyze_folder : `results/analyze/<flight>` with `health.json`, `diagnosis.json` and `effects.json`
+    output : the picture, `TIMELINE_FILE` in the folder of the flight's figures
+
+    Raises
+    ------
+    UserError
+        The saved flight or a document is missing or damaged.
+    """
+    results = read_flight_results(analyze_folder)
+    logged = load_flight(flight_folder, topics=TIMELINE_TOPICS)
+    Path(output).parent.mkdir(parents=True, exist_ok=True)
+    with figure_style():
+        save_png(draw_timeline(logged, tuple(_bars(results))), output)
+
+
+def _bars(results: FlightResults) -> Iterator[Bar]:
+    for one in results.diagnoses:
+        yield Bar(cause_words(one["id"]), one["severity"], one["since_s"], one["until_s"])
+    timed = [(row, when) for row in results.problem_subjects if (when := results.since_start_s(row)) is not None]
+    for row, when in timed[:_MOST_ROWS_DRAWN]:
+        yield Bar(_shortened(figure_words(row["id"])), row["severity"], *when, is_cause=False)
+
+
+def _shortened(words: str) -> str:
+    return words if len(words) <= _LONGEST_LABEL else words[: _LONGEST_LABEL - 1].rstrip() + "…"
+
+
+def build_flight_page(
+    analyze_folder: AnyPath, figure_folder: AnyPath, output: AnyPath, pages: Mapping[str, AnyPath] | None = None
+) -> None:
+    """Write the page of a flight as one HTML file with its figures inside.
+
+    Parameters
+    ----------
+    analyze_folder : `results/analyze/<flight>` with `health.json`, `diagnosis.json` and `effects.json`, and
+        `sensor_noise.json` where the sensors are characterised
+    figure_folder : with `TIMELINE_FILE` and what `plot_sensor_noise` drew; a picture that is missing is left out
+    output : `results/report/flights/<flight>.html`
+    pages : words → other pages that it leads to, as `{"All flights": "results/fleet.html"}`
+
+    Raises
+    ------
+    UserError
+        A document is missing or damaged.
+    """
+    results = read_flight_results(analyze_folder)
+    figures, noise = Path(figure_folder), Path(analyze_folder) / SENSOR_NOISE_FILE
+    timeline = figures / TIMELINE_FILE
+    sections = (
+        page_links(pages or {}, output),
+        answer_section(results),
+        section("The flight", figure(timeline, _TIMELINE)) if timeline.exists() else "",
+        causes_section(results),
+        effects_section(results),
+        health_table_section(results),
+        sensors_section(read_document(noise), figures) if noise.exists() else "",
+    )
+    told = (results.vehicle or "unknown vehicle", results.firmware or "unknown firmware", results.mission,
+            results.date.replace("T", " ").replace("Z", " UTC"))  # fmt: skip
+    Path(output).parent.mkdir(parents=True, exist_ok=True)
+    write_page(output, PageHead(results.flight, results.flight, ", ".join(one for one in told if one)), sections)
