@@ -40,6 +40,8 @@ localrules:
     plot_summary,
     build_report,
     join_health,
+    join_fleet,
+    fleet_page,
 
 
 rule all:
@@ -49,6 +51,7 @@ rule all:
         rules.decide.output,
         rules.build_report.output,
         rules.join_health.output,
+        rules.fleet_page.output,
 
 
 if MENDS_DELAYS:

@@ -43,3 +43,24 @@ rule join_health:
         "Analyze: the health of all flights in one table"
     script:
         "../scripts/join_health.py"
+
+
+rule join_fleet:
+    input:
+        health="results/analyze/health.parquet",
+        diagnoses=expand("results/analyze/{flight}/diagnosis.json", flight=LOGS),
+    output:
+        "results/apply/fleet.json",
+    log:
+        "results/logs/join_fleet.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=LIBRARIES_MB,
+        runtime=of_its_logs(5, 0.001),
+    params:
+        code=DIGEST["apply"],
+    message:
+        "Apply: what all flights have in common, and what changed"
+    script:
+        "../scripts/join_fleet.py"

@@ -42,6 +42,60 @@ rule plot_flight:
         "../scripts/plot_flight.py"
 
 
+rule flight_page:
+    input:
+        flight="results/save/{flight}",
+        diagnosis="results/analyze/{flight}/diagnosis.json",
+        told=expand("results/analyze/{{flight}}/{file}", file=DIAGNOSED_FILES),
+    output:
+        report(
+            "results/report/flights/{flight}.html",
+            caption="../report/flight_page.rst",
+            category="Flights",
+            labels={"flight": "{flight}"},
+        ),
+    log:
+        "results/logs/flight_page/{flight}.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB, 3.0),
+        runtime=of_its_logs(5, 0.05),
+    params:
+        code=DIGEST["report"],
+    message:
+        "Report: the page of {wildcards.flight}"
+    script:
+        "../scripts/flight_page.py"
+
+
+rule fleet_page:
+    input:
+        fleet="results/apply/fleet.json",
+        health="results/analyze/health.parquet",
+        pages=expand("results/report/flights/{flight}.html", flight=LOGS),
+    output:
+        report(
+            "results/fleet.html",
+            caption="../report/fleet_page.rst",
+            category="Flights",
+            labels={"flight": "all flights"},
+        ),
+    log:
+        "results/logs/fleet_page.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
+        runtime=of_its_logs(10, 0.01),
+    params:
+        code=DIGEST["report"],
+    message:
+        "Report: the page of all flights"
+    script:
+        "../scripts/fleet_page.py"
+
+
 rule plot_summary:
     input:
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
@@ -80,6 +134,9 @@ rule build_report:
         summary=rules.plot_summary.output,
         decision="results/apply/decision.json",
         sensitivity="results/apply/sensitivity.json",
+        diagnoses=expand("results/analyze/{flight}/diagnosis.json", flight=LOGS),
+        pages=expand("results/report/flights/{flight}.html", flight=LOGS),
+        fleet="results/fleet.html",
     output:
         report(
             "results/report.html",

@@ -18,4 +18,7 @@ with logged_job(snakemake.log[0]):
         Path(snakemake.input.decision).parent,
         Path(snakemake.input.summary[0]).parent,
         Path(snakemake.output[0]),
+        list(snakemake.input.diagnoses),
+        list(snakemake.input.pages),
+        snakemake.input.fleet,
     )

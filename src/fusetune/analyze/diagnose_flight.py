@@ -21,7 +21,7 @@ from fusetune.analyze.health.health_table import DEFAULTS, health_rows
 from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
-from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise
+from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise, sensor_noise
 from fusetune.px4.flight import Flight
 from fusetune.px4.ulog.used_topics import is_used
 from fusetune.save.flight_folder import METADATA_FILE, load_flight, read_flight_document
@@ -70,14 +70,15 @@ def diagnose_flight(
     no_rows: tuple[HealthRow, ...] = ()
     rows = asked.about("health", no_rows, lambda: health_rows(observed, health))
     effects = all_effects(observed) if is_replayable else ()
-    noise = asked.about("sensor noise", None, lambda: sensor_noise(observed.flight, observed.airborne))
+    untold = SensorNoise(name, int(logged.start_timestamp), (), (), {}, (), 0.0)
+    noise = asked.about("sensor noise", untold, lambda: sensor_noise(observed.flight, observed.airborne))
     nothing: tuple[Diagnosis, ...] = ()
     found = asked.about("diagnosis", nothing, lambda: diagnose(observed))
     start_us = int(logged.start_timestamp)
     documents = {
         HEALTH_FILE: health_document(logged, rows),
         EFFECTS_FILE: effects_document(name, effects),
-        SENSOR_NOISE_FILE: {"flight": name} if noise is None else noise.document(),
+        SENSOR_NOISE_FILE: noise.document(),
         DIAGNOSIS_FILE: {
             "flight": name,
             "start_us": start_us,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from fusetune.report.html_page import PageHead, write_page
+from fusetune.report.html_page import PageHead, page_links, write_page
 from fusetune.report.results import read_results
 from fusetune.report.sections.decision_sections import decision_section, sets_section
 from fusetune.report.sections.evidence_sections import (
@@ -22,10 +22,12 @@ from fusetune.report.sections.flight_sections import (
     provenance_section,
     single_flights_section,
 )
+from fusetune.report.sections.health_section import health_section
 from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.sensitivity_section import sensitivity_section
 from fusetune.report.sections.trust_section import trust_section
 from fusetune.report.sections.truth_section import truth_section
+from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
 
@@ -36,6 +38,9 @@ def build_report(
     apply_folder: AnyPath,
     figure_folder: AnyPath,
     output: AnyPath,
+    diagnoses: Sequence[AnyPath] = (),
+    flight_pages: Sequence[AnyPath] = (),
+    fleet_page: AnyPath | None = None,
 ) -> None:
     """Write the report as one HTML file with its figures inside.
 
@@ -47,12 +52,17 @@ def build_report(
     apply_folder : `results/apply`
     figure_folder : holds `SUMMARY_FIGURES` (`plot_summary`)
     output : `results/report.html`
+    diagnoses : `results/analyze/<flight>/diagnosis.json` of all flights
+    flight_pages : `results/report/flights/<flight>.html`
+    fleet_page : `results/fleet.html`
     """
     results = read_results(analyze_folders, apply_folder)
     figures = Path(figure_folder)
     pictures = flight_figure_paths([Path(folder).name for folder in analyze_folders], flight_figures)
     sections = (
+        page_links({"All flights": fleet_page} if fleet_page is not None else {}, output),
         decision_section(results),
+        health_section([*map(read_document, diagnoses)], {Path(one).stem: one for one in flight_pages}, output),
         next_steps_section(results, figures),
         findings_section(results),
         evidence_section(results, figures),

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from fusetune.analyze.flight_files import SENSOR_NOISE_FILE
+from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise_of
 from fusetune.report.figure_words import figure_words
 from fusetune.report.figures.drawing import figure_style, save_png
+from fusetune.report.figures.noise_figures import plot_sensor_noise
 from fusetune.report.figures.timeline_figure import TIMELINE_TOPICS, Bar, draw_timeline
 from fusetune.report.flight_page.answer import answer_section, causes_section
 from fusetune.report.flight_page.effects_section import effects_section
@@ -17,7 +19,7 @@ from fusetune.report.flight_page.sensors_section import sensors_section
 from fusetune.report.html_page import PageHead, page_links, write_page
 from fusetune.report.markup import figure, section
 from fusetune.report.severity_words import cause_words
-from fusetune.save.flight_folder import load_flight
+from fusetune.save.flight_folder import METADATA_FILE, load_flight, read_flight_document
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
@@ -62,6 +64,28 @@ def _bars(results: FlightResults) -> Iterator[Bar]:
 
 def _shortened(words: str) -> str:
     return words if len(words) <= _LONGEST_LABEL else words[: _LONGEST_LABEL - 1].rstrip() + "…"
+
+
+def build_drawn_flight_page(
+    flight_folder: AnyPath,
+    analyze_folder: AnyPath,
+    figure_folder: AnyPath,
+    output: AnyPath,
+    pages: Mapping[str, AnyPath] | None = None,
+) -> None:
+    """Draw the figures of a saved flight, where anything of it could be read, and write its page.
+
+    Parameters
+    ----------
+    flight_folder : `results/save/<flight>`
+    analyze_folder, output, pages : as of `build_flight_page`
+    figure_folder : takes the figures
+    """
+    if "topics" in read_flight_document(Path(flight_folder) / METADATA_FILE):
+        plot_flight_timeline(flight_folder, analyze_folder, Path(figure_folder) / TIMELINE_FILE)
+        if read_document(Path(analyze_folder) / SENSOR_NOISE_FILE)["sensors"]:
+            plot_sensor_noise(sensor_noise_of(flight_folder), figure_folder)
+    build_flight_page(analyze_folder, figure_folder, output, pages)
 
 
 def build_flight_page(
