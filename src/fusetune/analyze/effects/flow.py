@@ -44,20 +44,20 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
         return refused(name, f"too few measurements of the flow in the air; {_WHAT_TO_FLY}")
     time, flow = time[usable], np.asarray(samples["flow_rate"][usable], np.float64)
     gyro = np.asarray(samples["gyro_rate"][usable], np.float64)
-    rate = motion.at(time, motion.body_rate)
+    rate = motion.rate_at(time)
     gyro = np.where(np.isfinite(gyro), gyro, -rate)
     ranges = measured_ranges(observed)
     if ranges is not None:
         distance = np.interp(time, *ranges)
     else:
         begin = float(np.interp(observed.airborne[0][0], motion.time, motion.height))
-        upright = motion.at(time, motion.rotation[:, 2, 2:])[:, 0]
+        upright = motion.rotation_at(time)[:, 2, 2]
         distance = (motion.at(time, motion.height[:, None])[:, 0] - begin) / np.maximum(upright, 0.5)
     near = distance > LEAST_DISTANCE_M
     if np.count_nonzero(near) < _FEWEST:
         return refused(name, f"too few measurements of the flow {LEAST_DISTANCE_M} m above ground; {_WHAT_TO_FLY}")
     time, flow, gyro, rate, distance = time[near], flow[near], gyro[near], rate[near], distance[near]
-    body = np.einsum("nji,nj->ni", motion.at(time, motion.rotation), motion.at(time, motion.velocity))
+    body = np.einsum("nji,nj->ni", motion.rotation_at(time), motion.velocity_at(time))
     sight = np.column_stack([body[:, 1], -body[:, 0]]) / distance[:, None]
     time_s, zero, one = np.asarray(time * 1e-6, np.float64), np.zeros(time.size), np.ones(time.size)
     design = []

@@ -49,7 +49,7 @@ def estimate_ground_effect(observed: ObservedFlight) -> Effect:
     if not observed.airborne:
         return refused(name, f"the vehicle did not fly; {_WHAT_TO_FLY}")
     time, altitude = rows
-    height = motion.at(time, motion.height[:, None])[:, 0]
+    height = -motion.way_at(time)[:, 2]
     target, flies, used, above = _phases(observed, time, altitude - height, height)
     near = flies & used & (above < NEAR_M)
     figures = {"near_s": float(np.count_nonzero(near)) * _step_s(time), "flights": float(len(observed.airborne))}

@@ -30,7 +30,6 @@ from fusetune.analyze.effects.gyro_attitude import GyroAttitude, gyro_attitude
 from fusetune.analyze.effects.motor_power import OFF, MotorPower, motor_power
 from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
-from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.feed.message_samples import gnss_samples, mag_samples
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
@@ -42,22 +41,25 @@ LARGEST_FIELD_ERROR_GAUSS = 0.003
 """Standard error of a field above which it is not told: about 1° of heading."""
 LARGEST_SCALE_ERROR = 0.01
 LARGEST_DECLINATION_ERROR_DEG = 2.0
+NORMAL_95 = 1.96
 MODEL_ERROR_GAUSS = 0.005
 """Standard deviation of the field at a place from the model of the world's."""
 EXPECTED = np.array([
-    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003, *[0.02] * 6,
+    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003, *[0.02] * 6, 0.01,
 ])  # fmt: skip
 """Standard deviations beforehand: horizontal and vertical field, hard iron, motors, scale, drift rad/s, gyro scale,
-and what one axis shows of another."""
+what one axis shows of another, delay s."""
 STARTS = np.array([np.inf, 0.01, 0.01])
 """The same, of heading and tilt at the beginning, rad."""
 FIELD_H, FIELD_V = 0, 1
 HARD, MOTOR, SCALE = slice(2, 5), slice(5, 8), slice(8, 11)
 DRIFT, GYRO_SCALE = 11, 12
 CROSSED = slice(13, 19)
+DELAY = 19
 _OTHERS = ((1, 2), (0, 2), (0, 1))
 FASTEST_HZ = 12.5
 _ROUNDS = 3
+_FEWEST = 100
 _KNOTS_S = 2.0
 _AXES = "XYZ"
 
@@ -70,6 +72,7 @@ class MagneticFit:
     power: MotorPower
     has_power: bool
     declination_deg: float
+    level_gauss: float
     heading: GyroAttitude
     time: Times
     heading_error: Array
@@ -88,22 +91,24 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
     steps = observed.replayed.steps()
     samples = mag_samples(table)
     delay_us = round(1e3 * observed.parameters.get("EKF2_MAG_DELAY", 0.0))
-    time, field = _thinned(samples["time_us"] - delay_us, np.asarray(samples["mag"], np.float64))
-    aligned = _aligned_from(observed)
-    inside = (time > max(int(steps.time[0]), aligned)) & (time < steps.time[-1]) & np.isfinite(field).all(axis=1)
-    time, field = time[inside], field[inside]
-    if time.size < 50:
+    time, field = samples["time_us"] - delay_us, np.asarray(samples["mag"], np.float64)
+    inside = (time > max(int(steps.time[0]), _aligned_from(observed))) & (time < steps.time[-1])
+    inside &= np.isfinite(field).all(axis=1) & (np.diff(time, prepend=time[0] - 1) > 0)
+    attitude = gyro_attitude(steps, observed.airborne)
+    time, field, rotation = _thinned(time[inside], field[inside], attitude)
+    if time.size < _FEWEST:
         return "magnetometer and attitude hardly overlap"
     power = motor_power(observed, time)
     known = np.isfinite(power.power)
     has_power = bool(np.count_nonzero(known) > 50 and np.ptp(power.power[known]) > 0.0)
     if has_power:
-        time, field, power = time[known], field[known], MotorPower(power.kind, power.unit, power.power[known])
-    heading = gyro_attitude(steps, observed.airborne)
-    fitted = _gauss_newton(heading, time, field, power.power if has_power else np.zeros(time.size), world)
+        time, field, rotation = time[known], field[known], rotation[known]
+        power = MotorPower(power.kind, power.unit, power.power[known])
+    drawn = power.power if has_power else np.zeros(time.size)
+    fitted = _gauss_newton(time, field, rotation, attitude.turned_at(time), drawn, world)
     if fitted is None:
         return "too short a log for the magnetic field"
-    return MagneticFit(fitted[0], power, has_power, math.degrees(math.atan2(world[1], world[0])), heading, time, fitted[1])
+    return MagneticFit(fitted[0], power, has_power, math.degrees(math.atan2(world[1], world[0])), math.hypot(*world[:2]), attitude, time, fitted[1])
 
 
 def _world_field(observed: ObservedFlight) -> Array | None:
@@ -128,21 +133,22 @@ def _aligned_from(observed: ObservedFlight) -> int:
     return int(flags["timestamp"][int(np.argmax(np.asarray(flags["cs_tilt_align"], bool)))])
 
 
-def _thinned(time: Times, field: Array) -> tuple[Times, Array]:
-    """Means of so many neighbours that no more than `FASTEST_HZ` are left."""
-    step_s = float(np.median(np.diff(time))) * 1e-6
+def _thinned(time: Times, field: Array, attitude: GyroAttitude) -> tuple[Times, Array, Array]:
+    """Means of so many neighbours that no more than `FASTEST_HZ` are left: times, fields and rotations."""
+    step_s = float(np.median(np.diff(time))) * 1e-6 if time.size > 1 else 1.0
     every = max(1, round(1.0 / (FASTEST_HZ * max(step_s, 1e-3))))
     rows = time.size // every * every
-    means = field[:rows].reshape(-1, every, 3).mean(axis=1)
-    return np.rint(time[:rows].reshape(-1, every).mean(axis=1)).astype(np.int64), means
+    rotation = attitude.rotation_at(time[:rows]) if rows else np.zeros((0, 3, 3))
+    means = (field[:rows].reshape(-1, every, 3).mean(axis=1), rotation.reshape(-1, every, 3, 3).mean(axis=1))
+    return np.rint(time[:rows].reshape(-1, every).mean(axis=1)).astype(np.int64), *means
 
 
 def _gauss_newton(
-    heading: GyroAttitude, time: Times, field: Array, power: Array, world: Array
+    time: Times, field: Array, rotation: Array, turned: Array, power: Array, world: Array
 ) -> tuple[WalkingFit, Array] | None:
     """The fit and the heading's error at the samples."""
-    rotation, time_s = heading.rotation_at(time), np.asarray(time * 1e-6, np.float64)
-    since_s, turned = time_s - time_s[0], heading.turned_at(time)
+    time_s = np.asarray(time * 1e-6, np.float64)
+    since_s = time_s - time_s[0]
     level, scale = math.hypot(world[0], world[1]), np.zeros(3)
     error = np.full(time.size, _first_error(rotation, field, world))
     earth, fit = world.copy(), None
@@ -166,6 +172,7 @@ def _gauss_newton(
             crossed = slice(CROSSED.start + 2 * axis, CROSSED.start + 2 * axis + 2)
             one[:, crossed] = body[:, _OTHERS[axis]]
             turns = gain[axis] * across[:, axis]
+            one[:, DELAY] = -gain[axis] * np.gradient(body[:, axis], time_s)
             one[:, DRIFT], one[:, GYRO_SCALE] = turns * since_s, turns * turned
             # R'ᵀ (E' × e) of rotations e about north and east, which the tilt may be off by
             tilts = gain[axis] * np.column_stack([
@@ -323,24 +330,21 @@ def _declination(observed: ObservedFlight, found: MagneticFit) -> Effect:
     """How far the heading by the magnetometer is from the one that GNSS velocities tell, on the model's declination."""
     name, told = "declination", told_value(dict(observed.parameters), "EKF2_MAG_DECL")
     error = true_heading_error(observed, found.heading, found.time, found.heading_error)
-    if error is None or error.standard_error > LARGEST_DECLINATION_ERROR_DEG:
-        figures = {} if error is None else {"standard_error_deg": error.standard_error}
+    # a hard iron that is off turns the magnetometer's own heading
+    level = found.fit.standard_error[HARD][:2].max() / found.level_gauss
+    total = math.inf if error is None else math.hypot(error.standard_error, math.degrees(float(level)))
+    if error is None or total > LARGEST_DECLINATION_ERROR_DEG:
+        figures = {} if error is None else {"standard_error_deg": total}
         why = "GNSS velocities do not tell the heading; fly straight legs with hard starts and stops, on several headings"
         return refused(name, why, **figures)
-    value = found.declination_deg + error.value
+    value, half = found.declination_deg + error.value, math.hypot(error.half_width, NORMAL_95 * math.degrees(float(level)))
     return Effect(
         name,
         (
             Estimate(
-                "EKF2_MAG_DECL", "deg", told, value, value - error.half_width, value + error.half_width,
-                error.standard_error, error.n,
+                "EKF2_MAG_DECL", "deg", told, value, value - half, value + half, total, error.n,
             ),
         ),
         "",
         {"world_model_deg": found.declination_deg},
     )  # fmt: skip
-
-
-def airborne_span(observed: ObservedFlight) -> Interval | None:
-    """From the first to the last time in the air, µs."""
-    return (observed.airborne[0][0], observed.airborne[-1][1]) if observed.airborne else None

@@ -88,14 +88,14 @@ def fit_range(observed: ObservedFlight) -> RangeFit | str:
     time, distance = time[used], distance[used]
     if time.size < _FEWEST:
         return "too few distances in the air"
-    down = motion.at(time, motion.rotation[:, 2])
+    down = motion.rotation_at(time)[:, 2]
     upright = down[:, 2] > _STEEPEST
     time, distance, down = time[upright], distance[upright], down[upright]
     if time.size < _FEWEST:
         return "too few distances in the air"
-    height = motion.at(time, motion.height[:, None])[:, 0]
+    height = -motion.way_at(time)[:, 2]
     measured = distance * down[:, 2]
-    vertical = motion.at(time, motion.velocity[:, 2:])[:, 0]
+    vertical = motion.velocity_at(time)[:, 2]
     # a sensor that is later than told shows where the vehicle was
     far = height - height[0] + measured[0]
     design = np.column_stack([-down, vertical, far, far[:, None] * down[:, :2]])
@@ -230,13 +230,13 @@ def _gate(observed: ObservedFlight, fitted: RangeFit, white: float, share: float
     assert motion is not None
     states = observed.replayed.states()
     time, distance = fitted.time, fitted.distance
-    cosine = motion.at(time, motion.rotation[:, 2])[:, 2]
+    cosine = motion.rotation_at(time)[:, 2, 2]
     height = distance * cosine
     step_s = np.diff(time) * 1e-6
     kept = (step_s >= DT_MIN_S) & (step_s <= DT_MAX_S)
     if np.count_nonzero(kept) < _FEWEST:
         return None
-    rate = -np.diff(height)[kept] / step_s[kept] - motion.at(time, motion.velocity[:, 2:])[1:][kept, 0]
+    rate = -np.diff(height)[kept] / step_s[kept] - motion.velocity_at(time)[1:][kept, 2]
     vertical = np.interp(time[1:][kept], states.time, states.velocity_variance[:, 2])
     variance = 2.0 * (white + share * np.square(distance[1:][kept])) / np.square(step_s[kept]) + vertical
     ratio = np.sign(rate) * np.square(rate) / np.maximum(variance, 1e-9)

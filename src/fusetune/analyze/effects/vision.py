@@ -57,12 +57,9 @@ def estimate_vision_arm(observed: ObservedFlight) -> Effect:
 
 
 def _fit(motion: BodyMotion, time: Times, measured: Array) -> WalkingFit | None:
-    step_s = np.diff(motion.time)[:, None] * 1e-6
-    travelled = np.cumsum(0.5 * (motion.velocity[1:] + motion.velocity[:-1]) * step_s, axis=0)
-    way = motion.at(time, np.vstack([np.zeros(3), travelled]))
-    way[:, 2] = -motion.at(time, motion.height[:, None])[:, 0]
+    way = motion.way_at(time)
     way = way - way.mean(axis=0)
-    rotation, velocity = motion.at(time, motion.rotation), motion.at(time, motion.velocity)
+    rotation, velocity = motion.rotation_at(time), motion.velocity_at(time)
     heading, time_s = _first_heading(way, measured), np.asarray(time * 1e-6, np.float64)
     fit: WalkingFit | None = None
     walking = np.kron(np.eye(3), np.ones((time.size, 1)))

@@ -41,6 +41,8 @@ class BodyMotion:
     body_rate : (K, 3) FRD, rad/s, less the mean of the gyro bias
     height : (K,) above the first row, m; drifts
     by_gnss : whether GNSS vertical velocities bound the drift; otherwise it is the replay's velocity
+    fast_time, fast_rotation, fast_velocity, fast_way, fast_rate : (M, …) time, attitude, velocity, the way north, east,
+        down, and body rate at every update of the filter: a sensor's lever arm shows in what is faster than the grid
     """
 
     time: Times
@@ -50,6 +52,11 @@ class BodyMotion:
     body_rate: Array
     height: Array
     by_gnss: bool
+    fast_time: Times
+    fast_rotation: Array
+    fast_velocity: Array
+    fast_way: Array
+    fast_rate: Array
 
     @property
     def time_s(self) -> Array:
@@ -62,9 +69,23 @@ class BodyMotion:
 
     def at(self, time: Times, values: Array) -> Array:
         """Values (K, …) of the motion at other times (N,), µs → (N, …); the ends hold outside."""
-        flat = values.reshape(values.shape[0], -1)
-        found = np.column_stack([np.interp(time, self.time, column) for column in flat.T])
-        return found.reshape(time.size, *values.shape[1:])
+        return _interpolated(time, self.time, values)
+
+    def rotation_at(self, time: Times) -> Array:
+        """(N, 3, 3) body → NED at times (N,), µs."""
+        return _interpolated(time, self.fast_time, self.fast_rotation)
+
+    def velocity_at(self, time: Times) -> Array:
+        """(N, 3) NED, m/s, at times (N,), µs."""
+        return _interpolated(time, self.fast_time, self.fast_velocity)
+
+    def way_at(self, time: Times) -> Array:
+        """(N, 3) travelled north, east and down from the first row, m, at times (N,), µs; drifts."""
+        return _interpolated(time, self.fast_time, self.fast_way)
+
+    def rate_at(self, time: Times) -> Array:
+        """(N, 3) body rate, rad/s, at times (N,), µs."""
+        return _interpolated(time, self.fast_time, self.fast_rate)
 
     def covers(self, time: Times) -> npt.NDArray[np.bool_]:
         """Times (N,), µs, at which it is known."""
@@ -99,18 +120,29 @@ def body_motion(
     half_us = 0.5 * float(np.median(np.diff(steps.time)))
     time = np.rint(mean(steps.time[:, None] - float(steps.time[0]))[:, 0] + steps.time[0] - half_us).astype(np.int64)
     vertical, by_gnss = _vertical_velocity(motion, flight, parameters)
-    climbed = np.concatenate([[0.0], np.cumsum(-0.5 * (vertical[1:] + vertical[:-1]) * np.diff(motion.time) * 1e-6)])
-    velocity = np.column_stack([np.interp(time, motion.time, one) for one in motion.bounded_velocity.T])
-    velocity[:, 2] = np.interp(time, motion.time, vertical)
+    fast = np.column_stack([motion.bounded_velocity[:, :2], vertical])
+    moved = 0.5 * (fast[1:] + fast[:-1]) * np.diff(motion.time)[:, None] * 1e-6
+    way = np.vstack([np.zeros(3), np.cumsum(moved, axis=0)])
     return BodyMotion(
         time=time,
         rotation=mean(motion.rotation),
-        velocity=velocity,
+        velocity=_interpolated(time, motion.time, fast),
         specific_force=of_imu(steps.delta_velocity, steps.delta_velocity_dt, steps.accel_bias),
         body_rate=of_imu(steps.delta_angle, steps.delta_angle_dt, steps.gyro_bias),
-        height=np.interp(time, motion.time, climbed),
+        height=-np.interp(time, motion.time, way[:, 2]),
         by_gnss=by_gnss,
+        fast_time=motion.time,
+        fast_rotation=motion.rotation,
+        fast_velocity=fast,
+        fast_way=way,
+        fast_rate=motion.body_rate - steps.gyro_bias.mean(axis=0),
     )
+
+
+def _interpolated(time: Times, known: Times, values: Array) -> Array:
+    flat = values.reshape(values.shape[0], -1)
+    found = np.column_stack([np.interp(time, known, column) for column in flat.T])
+    return found.reshape(time.size, *values.shape[1:])
 
 
 def _vertical_velocity(
