@@ -1,9 +1,8 @@
 """Which delays that PX4 is told are wrong, from all flights together.
 
-Flights are joined as in a random-effects analysis: their delays vary by more than their own intervals say (DerSimonian
-and Laird, 1986), and the interval of the mean is that of Student's t over the flights (Hartung and Knapp, 2001), never
-narrower than what the flights' own errors give. A delay is wrong where the whole interval lies further from the told
-value than what matters: EKF2 acts on delays in steps of an update, 10 ms.
+Flights are joined as in a random-effects analysis (`analyze/metrics/random_effects`): their delays vary by more than
+their own intervals say, and the interval of the mean is that of Student's t over the flights. A delay is wrong where
+the whole interval lies further from the told value than what matters: EKF2 acts on delays in steps of an update, 10 ms.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.delays.sensor_delays import CONFIDENCE, SensorDelay, read_delays
 from fusetune.analyze.delays.settings import DelaySettings
+from fusetune.analyze.metrics.random_effects import random_effects
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.storage.documents import read_as, read_document, write_document
@@ -101,20 +101,11 @@ def _mended(now: SensorDelay, value: float, off_ms: float, settings: DelaySettin
 
 def joined(values: Sequence[float], errors: Sequence[float]) -> tuple[float, float, float]:
     """Mean of flights with their own standard errors, and its interval; infinite of a single flight."""
-    value, own = np.array(values), np.hypot(errors, LEAST_ERROR_MS)
-    weight = own**-2
-    mean = float(np.sum(weight * value) / weight.sum())
-    freedom = value.size - 1
-    if not freedom:
-        return mean, -np.inf, np.inf
-    excess = float(np.sum(weight * (value - mean) ** 2)) - freedom
-    between = max(excess / float(weight.sum() - np.sum(weight**2) / weight.sum()), 0.0)
-    weight = 1.0 / (own**2 + between)
-    mean = float(np.sum(weight * value) / weight.sum())
-    promised = 1.0 / float(weight.sum())
-    scatter = float(np.sum(weight * (value - mean) ** 2)) / freedom * promised
-    half = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * max(scatter, promised) ** 0.5
-    return mean, mean - half, mean + half
+    found = random_effects(values, np.hypot(errors, LEAST_ERROR_MS))
+    if not found.freedom:
+        return found.mean, -np.inf, np.inf
+    half = float(stdtrit(found.freedom, 0.5 + 0.5 * CONFIDENCE)) * found.standard_error
+    return found.mean, found.mean - half, found.mean + half
 
 
 def mended_values(delays: Iterable[JoinedDelay]) -> dict[str, float]:

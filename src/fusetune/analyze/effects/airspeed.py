@@ -32,7 +32,7 @@ LEAST_AIRSPEED_M_S = 2.0
 EXPECTED = np.array([np.inf, 15.0, 15.0])
 FASTEST_HZ = 10.0
 _FEWEST = 50
-_ROUNDS = 6
+_ROUNDS, _REFINED = 5, 2
 _KNOTS_S = 1.0
 _WHAT_TO_FLY = "fly two full circles, or the same leg there and back, at cruise speed and constant height"
 
@@ -85,7 +85,8 @@ def _measured(observed: ObservedFlight) -> tuple[Times, Array, bool] | None:
 
 
 def _gauss_newton(time_s: Array, speed: Array, velocity: Array) -> WalkingFit | None:
-    values, gusts, fit = np.array([1.0, *_first_wind(speed, velocity)]), np.zeros((time_s.size, 2)), None
+    values, gusts = np.array([1.0, *_first_wind(speed, velocity)]), np.zeros((time_s.size, 2))
+    fit: WalkingFit | None = None
     for number in range(_ROUNDS):
         through = velocity.copy()
         through[:, :2] -= values[1:] + gusts
@@ -94,8 +95,7 @@ def _gauss_newton(time_s: Array, speed: Array, velocity: Array) -> WalkingFit | 
         design = np.column_stack([length, by_wind])
         target = speed - values[0] * length + design @ values + np.sum(by_wind * gusts, axis=1)
         rows = WalkingRows(time_s, target, design, by_wind, EXPECTED, _KNOTS_S, WIND_MEMORIES_S)
-        searched = fit is None or number == 2
-        fit = fit_walking(rows) if searched or fit is None else fit_walking(rows, fit.ratio, fit.memory_s)
+        fit = fit_walking(rows, fit, refined=number == _REFINED)
         if fit is None:
             return None
         values = fit.constants.copy()

@@ -48,7 +48,9 @@ def true_heading_error(
     steps = steps_of()
     turn = np.interp(steps.time, time, error)
     rotation = heading.rotation_at(steps.time)
-    felt = np.einsum("kij,kj->ki", rotation, steps.delta_velocity - steps.accel_bias.mean(axis=0) * steps.delta_velocity_dt[:, None])
+    felt = np.einsum(
+        "kij,kj->ki", rotation, steps.delta_velocity - steps.accel_bias.mean(axis=0) * steps.delta_velocity_dt[:, None]
+    )
     felt[:, 2] += ONE_G * steps.delta_velocity_dt
     cosine, sine = np.cos(turn), np.sin(turn)
     gained = np.column_stack([cosine * felt[:, 0] - sine * felt[:, 1], sine * felt[:, 0] + cosine * felt[:, 1]])
@@ -69,4 +71,5 @@ def true_heading_error(
     fit = fit_walking(rows)
     if fit is None:
         return None
-    return HeadingError(*(math.degrees(one) for one in (fit.constants[0], fit.half_width(0), fit.standard_error[0])), stamp.size)
+    value, half, error_deg = (math.degrees(one) for one in (fit.constants[0], fit.half_width(0), fit.standard_error[0]))
+    return HeadingError(value, half, error_deg, stamp.size)

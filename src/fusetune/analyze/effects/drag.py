@@ -38,7 +38,8 @@ LARGEST_RELATIVE_ERROR = 0.25
 """A coefficient whose standard error is a larger share of it is not told."""
 WIND_MEMORIES_S = (2.0, 5.0, 15.0, 60.0)
 _ROUNDS = 6
-_SEARCHED = (1, 3)
+_SEARCHED_FROM_NEW, _REFINED = 1, 3
+"""The first rounds are too far from the truth for the gusts' memory to be kept."""
 _STANDS = 1e-4
 _KNOTS_S = 1.0
 _WHAT_TO_FLY = (
@@ -83,7 +84,8 @@ def fit_drag(observed: ObservedFlight) -> DragFit | str:
         return f"too short a time in the air away from the ground; {_WHAT_TO_FLY}"
     excited = float(np.linalg.norm(np.std(motion.velocity[used, :2], axis=0)))
     if excited < LEAST_SPEED_M_S:
-        return f"horizontal velocity changes by {excited:.1f} m/s only, so wind and drag cannot be told apart; {_WHAT_TO_FLY}"
+        why = f"horizontal velocity changes by {excited:.1f} m/s only, so wind and drag cannot be told apart"
+        return f"{why}; {_WHAT_TO_FLY}"
     fitted = _gauss_newton(motion, used)
     return fitted if isinstance(fitted, str) else DragFit(*fitted, air_density(observed), used)
 
@@ -106,7 +108,8 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
     time_s, force = motion.time_s[used], motion.specific_force[used][:, :2].ravel(order="F")
     both = np.concatenate([time_s, time_s])
     gusts: Array = np.zeros((time_s.size, 2))
-    values, fit = _FIRST.copy(), None
+    values: Array = _FIRST.copy()
+    fit: WalkingFit | None = None
     for number in range(_ROUNDS):
         predicted = predicted_force(values, rotation, velocity, gusts)
         design = np.column_stack([_slope(values, one, rotation, velocity, gusts, predicted) for one in range(8)])
@@ -114,8 +117,7 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
         target = force - predicted + design @ values + walking[:, 0] * np.tile(gusts[:, 0], 2)
         target += walking[:, 1] * np.tile(gusts[:, 1], 2)
         rows = WalkingRows(both, target, design, walking, EXPECTED, _KNOTS_S, WIND_MEMORIES_S)
-        keeps = fit is not None and number not in _SEARCHED
-        fit = fit_walking(rows, fit.ratio, fit.memory_s) if keeps and fit is not None else fit_walking(rows)
+        fit = fit_walking(rows, fit if number > _SEARCHED_FROM_NEW else None, refined=number == _REFINED)
         if fit is None:
             return f"too short a time in the air; {_WHAT_TO_FLY}"
         change = fit.constants - values
@@ -123,7 +125,7 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
         # a negative drag has no place in the model: it is where the ellipse has its edge
         values[[KAPPA_X, KAPPA_Y]] = np.clip(values[[KAPPA_X, KAPPA_Y]], 1e-4, 0.5)
         gusts = np.column_stack([np.interp(time_s, fit.knot_s, one) for one in fit.course.T])
-        if number > max(_SEARCHED) and np.all(np.abs(change) < _STANDS + 0.02 * fit.standard_error):
+        if number > _REFINED and np.all(np.abs(change) < _STANDS + 0.02 * fit.standard_error):
             break
     assert fit is not None
     return fit, values
@@ -169,19 +171,25 @@ def estimate_drag(observed: ObservedFlight, fitted: DragFit | str | None = None)
         "residual_m_s2": float(np.std(fitted.fit.residual)),
         "velocity_m_s": float(np.linalg.norm(np.std(motion.velocity[fitted.rows, :2], axis=0))),
     }
-    found, missing = [], []
+    found: list[Estimate] = []
+    missing: list[str] = []
     for index, axis in ((KAPPA_X, "X"), (KAPPA_Y, "Y")):
         name = f"EKF2_BCOEF_{axis}"
         one = _reciprocal(fitted.fit, index, name, 0.5 * fitted.rho, told.get(name))
-        (missing if one is None else found).append(one or name)
+        if one is None:
+            missing.append(name)
+        else:
+            found.append(one)
     m = _share(fitted.fit, M, "EKF2_MCOEF", "1/s", 1.0 / momentum, told.get("EKF2_MCOEF"))
-    (missing if m is None else found).append(m or "EKF2_MCOEF")
-    estimates = [one for one in found if isinstance(one, Estimate)]
-    if estimates:
-        estimates.append(_noise(observed, fitted))
-    names = ", ".join(str(one) for one in missing)
+    if m is None:
+        missing.append("EKF2_MCOEF")
+    else:
+        found.append(m)
+    if found:
+        found.append(_noise(observed, fitted))
+    names = ", ".join(missing)
     refusal = f"{names} not told: too little change of speed along that axis; {_WHAT_TO_FLY}" if missing else ""
-    return Effect("drag", tuple(estimates), refusal, figures)
+    return Effect("drag", tuple(found), refusal, figures)
 
 
 def _share(fit: WalkingFit, index: int, name: str, unit: str, factor: float, told: float | None) -> Estimate | None:
@@ -206,7 +214,8 @@ def _reciprocal(fit: WalkingFit, index: int, name: str, factor: float, told: flo
 def _noise(observed: ObservedFlight, fitted: DragFit) -> Estimate:
     """Variance of what PX4 takes as a drag measurement, the mean of five IMU samples, about the drag that was found."""
     motion, record = observed.motion, observed.replayed
-    assert motion is not None and record.steps is not None
+    assert motion is not None
+    assert record.steps is not None
     steps = record.steps()
     inside = (steps.time >= motion.time[fitted.rows][0]) & (steps.time <= motion.time[fitted.rows][-1])
     time = steps.time[inside]
@@ -222,5 +231,6 @@ def _noise(observed: ObservedFlight, fitted: DragFit) -> Estimate:
     value = max(variance, MIN_OBSERVATION_VARIANCE)
     return Estimate(
         "EKF2_DRAG_NOISE", "(m/s^2)^2", observed.parameters.get("EKF2_DRAG_NOISE"), value,
-        max(variance - half, MIN_OBSERVATION_VARIANCE), max(variance + half, MIN_OBSERVATION_VARIANCE), error, slow.size,
+        max(variance - half, MIN_OBSERVATION_VARIANCE), max(variance + half, MIN_OBSERVATION_VARIANCE), error,
+        slow.size,
     )  # fmt: skip

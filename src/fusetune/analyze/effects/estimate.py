@@ -29,6 +29,11 @@ class Estimate:
     standard_error: float
     n: int
 
+    @property
+    def is_apart_from_told(self) -> bool:
+        """Whether the whole interval lies to one side of what the vehicle was told."""
+        return self.told is not None and not self.lower <= self.told <= self.upper
+
 
 @dataclass(frozen=True)
 class Effect:

@@ -26,7 +26,9 @@ LEAST_DISTANCE_M = 0.8
 EXPECTED = np.array([np.inf, 1.0, 1.0, 1.0, 0.05, 0.05, 0.02])
 """Standard deviations beforehand: scale; arm m; offsets rad/s; delay s."""
 _FEWEST = 200
-_WHAT_TO_FLY = "fly back and forth and sideways, two to five metres high above textured, even ground, and turn on the spot"
+_WHAT_TO_FLY = (
+    "fly back and forth and sideways, two to five metres high above textured, even ground, and turn on the spot"
+)
 
 
 def estimate_flow(observed: ObservedFlight) -> Effect:
@@ -68,9 +70,7 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
     for axis in range(2):
         whole = sight[:, axis] + gyro[:, axis]
         offset = [one, zero] if axis == 0 else [zero, one]
-        design.append(
-            np.column_stack([whole, arms[axis] / distance[:, None], *offset, -np.gradient(whole, time_s)])
-        )
+        design.append(np.column_stack([whole, arms[axis] / distance[:, None], *offset, -np.gradient(whole, time_s)]))
     rows = WalkingRows(
         np.tile(time_s, 2), flow.ravel(order="F"), np.vstack(design), np.zeros((2 * time.size, 0)), EXPECTED
     )

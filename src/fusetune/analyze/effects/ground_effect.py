@@ -3,8 +3,8 @@
     barometer − height = walk − A exp(−h / H)        in the air, h above the ground
 
 The height is that of IMU and GNSS vertical velocity; the ground is where the vehicle took off and where it landed.
-Before the motors turn there is no wash, so what the barometer falls by on take-off counts, too. The dead zone is A and a
-tenth (PX4's guide); the height is where a tenth of A is left.
+Before the motors turn there is no wash, so what the barometer falls by on take-off counts, too. The dead zone is A and
+a tenth (PX4's guide); the height is where a tenth of A is left.
 """
 
 from __future__ import annotations
@@ -28,12 +28,14 @@ LEFT_AT_HEIGHT = 0.1
 NEAR_M = 1.0
 """So low a vehicle must have been for a second and more."""
 LARGEST_ERROR_M = 0.5
+LARGEST_SHARE = 0.5
+"""Standard error of H over itself."""
 ON_GROUND_S = 12.0
 """So much of the time on the ground before and after counts."""
 UNSURE_BEFORE_S, UNSURE_AFTER_S = 1.5, 1.5
 """Around a change of the land detector it is not known how much the rotors push."""
 _HEIGHTS_M = (0.3, 0.6, 1.0, 1.6, 2.5)
-_HEIGHT_LIMITS_M = (0.15, 4.0)
+_HEIGHT_LIMITS_M = (0.15, 2.5)
 _ROUNDS = 4
 _KNOTS_S = 2.0
 _FEWEST_NEAR = 8
@@ -61,13 +63,19 @@ def estimate_ground_effect(observed: ObservedFlight) -> Effect:
     if found is None:
         return refused(name, f"too short a log; {_WHAT_TO_FLY}", **figures)
     fit, scale_m = found
-    figures |= {"dip_m": float(fit.constants[0]), "falls_over_m": scale_m, "noise_m": fit.noise, "walk_m_sqrt_s": fit.walk}
+    figures |= {
+        "dip_m": float(fit.constants[0]),
+        "falls_over_m": scale_m,
+        "noise_m": fit.noise,
+        "walk_m_sqrt_s": fit.walk,
+    }
     if fit.standard_error[0] > LARGEST_ERROR_M:
         why = f"the dip is not told from the wander of barometer and GNSS (± {fit.half_width(0):.1f} m)"
         return refused(name, f"{why}; {_WHAT_TO_FLY}", **figures)
     told = observed.parameters
     estimates = [estimate_of(fit, 0, "EKF2_GND_EFF_DZ", "m", told.get("EKF2_GND_EFF_DZ"), MARGIN)]
-    if fit.constants[0] > fit.half_width(0):
+    # of a dip that may be none, or whose height is not told, nothing is said of where it ends
+    if fit.constants[0] > fit.half_width(0) and fit.standard_error[1] < LARGEST_SHARE * scale_m:
         estimates.append(_height(fit, scale_m, told.get("EKF2_GND_MAX_HGT")))
     return Effect(name, tuple(estimates), "", figures)
 
@@ -118,17 +126,14 @@ def _fit(time_s: Array, target: Array, flies: npt.NDArray[np.bool_], above: Arra
     first = fit_walking(rows([wash(1.0)], [np.inf]))
     if first is None:
         return None
-    ratio, memory = first.ratio, first.memory_s
-    tried = [(fit_walking(rows([wash(one)], [np.inf]), ratio, memory), one) for one in _HEIGHTS_M]
+    tried = [(fit_walking(rows([wash(one)], [np.inf]), first), one) for one in _HEIGHTS_M]
     fit, scale = min(((one, height) for one, height in tried if one is not None), key=lambda pair: pair[0].noise)
     for number in range(_ROUNDS):
         shape = wash(scale)
         slope = fit.constants[0] * shape * np.where(flies, above, 0.0) / scale**2
-        again = fit_walking(rows([shape, slope], [np.inf, 1.0]), ratio, memory)
+        again = fit_walking(rows([shape, slope], [np.inf, 1.0]), fit, refined=number == 1)
         if again is None:
             return None
         change = float(np.clip(again.constants[1], -0.5 * scale, 0.5 * scale))
         scale, fit = float(np.clip(scale + change, *_HEIGHT_LIMITS_M)), again
-        if number == 1:
-            ratio = (fit_walking(rows([shape, slope], [np.inf, 1.0])) or fit).ratio
     return fit, scale

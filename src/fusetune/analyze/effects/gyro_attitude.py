@@ -1,9 +1,9 @@
 """Attitude that the gyros alone turn: a magnetometer must not be judged by an attitude that follows it.
 
-All that fusion did is taken out of the replay's attitude, of the heading all of it, of the tilt all but a straight line:
-the one that fits while the vehicle manoeuvred, when GNSS tells tilt and accelerometer bias apart. On the ground the
-replay's tilt is off by the bias of the accelerometer, and comes right after take-off, just when the motors begin to draw;
-here it does not. What is left is a heading that is off by what it began with, and drifts of the gyros.
+All that fusion did is taken out of the replay's attitude, of the heading all of it, of the tilt all but a straight
+line: the one that fits while the vehicle manoeuvred, when GNSS tells tilt and accelerometer bias apart. On the ground
+the replay's tilt is off by the bias of the accelerometer, and comes right after take-off, just when the motors begin to
+draw; here it does not. What is left is a heading that is off by what it began with, and drifts of the gyros.
 """
 
 from __future__ import annotations
@@ -70,6 +70,4 @@ def gyro_attitude(steps: ReplayedSteps, airborne: Sequence[Interval]) -> GyroAtt
     heading = from_rotation_vector(np.column_stack([np.zeros((since_s.size, 2)), -corrected[:, 2]]))
     level = from_rotation_vector(np.column_stack([tilt - corrected[:, :2], np.zeros(since_s.size)]))
     turned = np.einsum("kj,kj->k", rotation_matrix(q[:-1])[:, 2], rotation)
-    return GyroAttitude(
-        steps.time, multiply(heading, multiply(level, q)), np.concatenate([[0.0], np.cumsum(turned)])
-    )
+    return GyroAttitude(steps.time, multiply(heading, multiply(level, q)), np.concatenate([[0.0], np.cumsum(turned)]))

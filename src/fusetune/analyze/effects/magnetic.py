@@ -2,10 +2,10 @@
 
     m = (1 + S) R(t)ᵀ E + h + c u(t) + noise
 
-E is the earth's field, whose strength and dip the World Magnetic Model tells within some milligauss, R the attitude with
-a heading that the gyros alone turn (`gyro_attitude`) and whose error is a constant rate, a share of the way turned, and a
-walk; u is the power of the motors (`motor_power`). From before arming to the air u jumps while E does not: that is what
-tells c from h.
+E is the earth's field, whose strength and dip the World Magnetic Model tells within some milligauss, R the attitude
+that the gyros alone turn (`gyro_attitude`) and whose error is a constant rate, a share of the way turned, and a walk; u
+is the power of the motors (`motor_power`). From before arming to the air u jumps while E does not: that is what tells c
+from h.
 
 PX4 corrects what a sensor measures as rotation · scale · (data + power · COMP − OFF) (`Magnetometer::Correct`), so COMP
 falls by c and OFF rises by h, both over the scale.
@@ -108,7 +108,16 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
     fitted = _gauss_newton(time, field, rotation, attitude.turned_at(time), drawn, world)
     if fitted is None:
         return "too short a log for the magnetic field"
-    return MagneticFit(fitted[0], power, has_power, math.degrees(math.atan2(world[1], world[0])), math.hypot(*world[:2]), attitude, time, fitted[1])
+    return MagneticFit(
+        fitted[0],
+        power,
+        has_power,
+        math.degrees(math.atan2(world[1], world[0])),
+        math.hypot(*world[:2]),
+        attitude,
+        time,
+        fitted[1],
+    )
 
 
 def _world_field(observed: ObservedFlight) -> Array | None:
@@ -151,7 +160,8 @@ def _gauss_newton(
     since_s = time_s - time_s[0]
     level, scale = math.hypot(world[0], world[1]), np.zeros(3)
     error = np.full(time.size, _first_error(rotation, field, world))
-    earth, fit = world.copy(), None
+    earth = world.copy()
+    fit: WalkingFit | None = None
     stacked = np.tile(time_s, 3)
     for number in range(_ROUNDS):
         cosine, sine = np.cos(error), np.sin(error)
@@ -179,14 +189,16 @@ def _gauss_newton(
                 earth[2] * rotation[:, 1, axis] - seen[:, 1] * down[:, axis],
                 seen[:, 0] * down[:, axis] - earth[2] * rotation[:, 0, axis],
             ])  # fmt: skip
-            rows.append((one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error))
+            rows.append(
+                (one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error)
+            )
         design, walking = np.vstack([one for one, _, _ in rows]), np.vstack([one for _, one, _ in rows])
         offsets = earth_change(earth, world)
         target = np.concatenate([one for _, _, one in rows])
         # fields are told as changes of the world's, scales as they are
         target = target + design[:, :2] @ offsets + design[:, SCALE] @ scale
         given = WalkingRows(stacked, target, design, walking, EXPECTED, _KNOTS_S, starts=STARTS)
-        fit = fit_walking(given) if fit is None or number == 1 else fit_walking(given, fit.ratio, fit.memory_s)
+        fit = fit_walking(given, fit, refined=number == 1)
         if fit is None:
             return None
         scale = fit.constants[SCALE].copy()
@@ -214,7 +226,9 @@ def estimate_magnetic(observed: ObservedFlight) -> tuple[Effect, ...]:
     """Effects `motor_magnetic_field`, `hard_iron`, `magnetometer_scale` and `declination`."""
     found = fit_magnetic(observed)
     if isinstance(found, str):
-        return tuple(refused(name, found) for name in ("motor_magnetic_field", "hard_iron", "magnetometer_scale", "declination"))
+        return tuple(
+            refused(name, found) for name in ("motor_magnetic_field", "hard_iron", "magnetometer_scale", "declination")
+        )
     figures = {"noise_gauss": found.fit.noise, "heading_walk_deg_sqrt_s": math.degrees(found.fit.walk)}
     calibration = _Calibration.of(observed)
     return (
@@ -253,7 +267,9 @@ class _Calibration:
 def _motor(found: MagneticFit, calibration: _Calibration, figures: dict[str, float]) -> Effect:
     name = "motor_magnetic_field"
     if not found.has_power:
-        return refused(name, "the log tells neither what the motors draw nor when they stand still: log from boot", **figures)
+        return refused(
+            name, "the log tells neither what the motors draw nor when they stand still: log from boot", **figures
+        )
     span = float(np.ptp(np.percentile(found.power.power, [1.0, 99.0])))
     figures = figures | {"power_span": span, "CAL_MAG_COMP_TYP": float(found.power.kind)}
     errors = found.fit.standard_error[MOTOR]
@@ -276,9 +292,7 @@ def _motor(found: MagneticFit, calibration: _Calibration, figures: dict[str, flo
     return Effect(name, tuple(estimates), "", figures)
 
 
-def _shifted(
-    fit: WalkingFit, index: int, name: str, unit: str, told: float, factor: float, *, known: bool
-) -> Estimate:
+def _shifted(fit: WalkingFit, index: int, name: str, unit: str, told: float, factor: float, *, known: bool) -> Estimate:
     value, half = told + factor * float(fit.constants[index]), abs(factor) * fit.half_width(index)
     error = abs(factor) * float(fit.standard_error[index])
     count = int(fit.residual.size)
@@ -335,9 +349,14 @@ def _declination(observed: ObservedFlight, found: MagneticFit) -> Effect:
     total = math.inf if error is None else math.hypot(error.standard_error, math.degrees(float(level)))
     if error is None or total > LARGEST_DECLINATION_ERROR_DEG:
         figures = {} if error is None else {"standard_error_deg": total}
-        why = "GNSS velocities do not tell the heading; fly straight legs with hard starts and stops, on several headings"
+        why = (
+            "GNSS velocities do not tell the heading; fly straight legs with hard starts and stops, on several headings"
+        )
         return refused(name, why, **figures)
-    value, half = found.declination_deg + error.value, math.hypot(error.half_width, NORMAL_95 * math.degrees(float(level)))
+    value, half = (
+        found.declination_deg + error.value,
+        math.hypot(error.half_width, NORMAL_95 * math.degrees(float(level))),
+    )
     return Effect(
         name,
         (

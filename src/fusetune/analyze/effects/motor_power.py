@@ -64,7 +64,9 @@ def _thrust(observed: ObservedFlight, time: npt.NDArray[np.int64]) -> Array:
     motion, power = observed.motion, np.full(time.size, np.nan)
     if motion is None:
         return power
-    flies = inside(time, [(a + round(_THRUST_UNSURE_S * 5e5), b - round(_THRUST_UNSURE_S * 1e6)) for a, b in observed.airborne])
+    flies = inside(
+        time, [(a + round(_THRUST_UNSURE_S * 5e5), b - round(_THRUST_UNSURE_S * 1e6)) for a, b in observed.airborne]
+    )
     flies &= motion.covers(time)
     power[flies] = motion.at(time, -motion.specific_force[:, 2:])[flies, 0] / ONE_G
     status = observed.flight.topic("vehicle_status")

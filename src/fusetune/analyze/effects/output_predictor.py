@@ -32,7 +32,9 @@ def estimate_output_predictor(observed: ObservedFlight) -> Effect:
     name = "output_predictor"
     table = observed.flight.topic("estimator_status") or observed.logged.topic("estimator_status")
     if table is None or "output_tracking_error[2]" not in table:
-        return refused(name, "the log has no `estimator_status.output_tracking_error`: log it (SDLOG_PROFILE, any but 0)")
+        return refused(
+            name, "the log has no `estimator_status.output_tracking_error`: log it (SDLOG_PROFILE, any but 0)"
+        )
     time = table["timestamp"].astype(np.int64)
     rows = inside(time, observed.clear_of_ground)
     errors = np.column_stack([np.asarray(table[f"output_tracking_error[{one}]"], np.float64) for one in range(3)])

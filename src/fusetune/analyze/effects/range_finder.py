@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.told import NO_MOTION, refused
-from fusetune.analyze.effects.walking_regression import BLOCK_S, WalkingFit, WalkingRows, fit_walking
+from fusetune.analyze.effects.walking_regression import BLOCK_S, UNCERTAINTY, WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.feed.message_samples import range_refusals, range_samples, taken
@@ -101,7 +101,8 @@ def fit_range(observed: ObservedFlight) -> RangeFit | str:
     design = np.column_stack([-down, vertical, far, far[:, None] * down[:, :2]])
     expected = np.array([1.0, 1.0, 1.0, DELAY_S, SCALE, TILT_RAD, TILT_RAD])
     time_s = np.asarray(time * 1e-6, np.float64)
-    weight = np.ones(time.size)
+    weight: Array = np.ones(time.size)
+    noise: Array = np.zeros(time.size)
     fit: WalkingFit | None = None
     for _ in range(2):
         columns = (measured - height) * weight, design * weight[:, None], weight[:, None]
@@ -113,6 +114,7 @@ def fit_range(observed: ObservedFlight) -> RangeFit | str:
         white, share = _variances(np.square(noise), distance, grows=True)
         deviation = np.sqrt(white + share * np.square(distance))
         weight = float(np.median(deviation)) / np.maximum(deviation, 1e-4)
+    assert fit is not None
     return RangeFit(time, distance, noise, fit)
 
 
@@ -191,7 +193,7 @@ def _noises(
     parts = [block == one for one in np.unique(block)]
     whole = _variances(squares, distance, grows=grows)
     left_out = np.array([_variances(squares[~own], distance[~own], grows=grows) for own in parts])
-    spread = np.sqrt((len(parts) - 1) * np.var(left_out, axis=0))
+    spread = UNCERTAINTY * np.sqrt((len(parts) - 1) * np.var(left_out, axis=0))
     return float(whole[0]), float(whole[1]), (float(spread[0]), float(spread[1]), float(len(parts) - 1))
 
 
@@ -240,7 +242,7 @@ def _gate(observed: ObservedFlight, fitted: RangeFit, white: float, share: float
     vertical = np.interp(time[1:][kept], states.time, states.velocity_variance[:, 2])
     variance = 2.0 * (white + share * np.square(distance[1:][kept])) / np.square(step_s[kept]) + vertical
     ratio = np.sign(rate) * np.square(rate) / np.maximum(variance, 1e-9)
-    filtered, blocks = 0.0, {}
+    filtered, blocks = 0.0, dict[int, float]()
     place = np.floor((time[1:][kept] - time[0]) * 1e-6 / (2.0 * BLOCK_S)).astype(np.int64)
     for value, dt, block in zip(ratio.tolist(), step_s[kept].tolist(), place.tolist(), strict=True):
         filtered += dt / (dt + SIGNED_TEST_RATIO_TAU) * (value - filtered)

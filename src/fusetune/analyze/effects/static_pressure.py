@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 DIRECTIONS = ("XP", "XN", "YP", "YN", "Z")
 WASH_M_PER_G = 0.5
 """Standard deviation beforehand of what one g more of thrust does to the barometer, m."""
-LARGEST_ERROR = 0.06
+LARGEST_ERROR = 0.1
 """Standard error of a coefficient above which it is not told; PX4 takes −0.5 to 0.5."""
 LEAST_SPEED_M_S = 3.0
 _KNOTS_S = 2.0

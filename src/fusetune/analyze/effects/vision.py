@@ -30,7 +30,9 @@ EXPECTED = np.array([1.0, 1.0, 1.0, np.inf, 0.1, 0.02])
 _FEWEST = 200
 _KNOTS_S = 1.0
 _ROUNDS = 3
-_WHAT_TO_FLY = "fly with hard starts and stops in all directions, and turn on the spot, where the vision system sees well"
+_WHAT_TO_FLY = (
+    "fly with hard starts and stops in all directions, and turn on the spot, where the vision system sees well"
+)
 
 
 def estimate_vision_arm(observed: ObservedFlight) -> Effect:
@@ -62,7 +64,7 @@ def _fit(motion: BodyMotion, time: Times, measured: Array) -> WalkingFit | None:
     rotation, velocity = motion.rotation_at(time), motion.velocity_at(time)
     heading, time_s = _first_heading(way, measured), np.asarray(time * 1e-6, np.float64)
     fit: WalkingFit | None = None
-    walking = np.kron(np.eye(3), np.ones((time.size, 1)))
+    walking: Array = np.asarray(np.kron(np.eye(3), np.ones((time.size, 1))), np.float64)
     for _ in range(_ROUNDS):
         cosine, sine = np.cos(heading), np.sin(heading)
         back = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -73,7 +75,7 @@ def _fit(motion: BodyMotion, time: Times, measured: Array) -> WalkingFit | None:
             design.append(np.column_stack([rotation[:, axis], across, way[:, axis], -velocity[:, axis]]))
         target = (seen - seen.mean(axis=0) - way).ravel(order="F")
         rows = WalkingRows(np.tile(time_s, 3), target, np.vstack(design), walking, EXPECTED, _KNOTS_S)
-        fit = fit_walking(rows) if fit is None else fit_walking(rows, fit.ratio, fit.memory_s)
+        fit = fit_walking(rows, fit)
         if fit is None:
             return None
         heading += float(fit.constants[3])

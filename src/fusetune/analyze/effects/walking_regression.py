@@ -110,18 +110,24 @@ class WalkingFit:
         return float(one @ other / max(float(self.residual @ self.residual), 1e-30))
 
 
-def fit_walking(rows: WalkingRows, ratio: float | None = None, memory_s: float | None = None) -> WalkingFit | None:
+def fit_walking(rows: WalkingRows, like: WalkingFit | None = None, *, refined: bool = False) -> WalkingFit | None:
     """Solve; None with too few rows or blocks.
 
     Parameters
     ----------
-    ratio, memory_s : those of an earlier fit, so that they are not searched again
+    like : an earlier fit, whose ratio and memory are taken
+    refined : whether these are only where the search begins
     """
     equations = _Equations.of(rows)
     if equations is None:
         return None
-    if ratio is None or memory_s is None:
+    if like is None:
         ratio, memory_s = _likeliest(equations, rows)
+    else:
+        ratio, memory_s = like.ratio, like.memory_s
+        if refined and rows.walking.shape[1]:
+            score = equations.solved(ratio, memory_s).score
+            _, ratio = _finest(equations, score, math.log10(ratio), memory_s)
     for _ in range(_ROUNDS):
         equations = replace(equations, scale=equations.solved(ratio, memory_s).noise)
     return equations.solved(ratio, memory_s).fit()
@@ -134,15 +140,21 @@ def _likeliest(equations: _Equations, rows: WalkingRows) -> tuple[float, float]:
     for memory in rows.memories_s:
         scores = [equations.solved(one, memory).score for one in _RATIOS]
         place = int(np.argmin(scores))
-        low, exponent = scores[place], math.log10(_RATIOS[place])
-        for step in _FINER:
-            for side in (exponent - step, exponent + step):
-                score = equations.solved(10.0**side, memory).score
-                if score < low:
-                    low, exponent = score, side
-        if low < best:
-            best, found = low, (10.0**exponent, memory)
+        score, ratio = _finest(equations, scores[place], math.log10(_RATIOS[place]), memory)
+        if score < best:
+            best, found = score, (ratio, memory)
     return found
+
+
+def _finest(equations: _Equations, score: float, exponent: float, memory_s: float) -> tuple[float, float]:
+    """The best score and ratio around a power of ten."""
+    for step in _FINER:
+        centre = exponent
+        for side in (centre - step, centre + step):
+            tried = equations.solved(10.0**side, memory_s).score
+            if tried < score:
+                score, exponent = tried, side
+    return score, 10.0**exponent
 
 
 @dataclass(frozen=True)
@@ -171,7 +183,7 @@ class _Equations:
         pieces = max(1, math.ceil((end - begin) / rows.knots_s))
         place = np.minimum((rows.time_s - begin) / rows.knots_s, pieces - 1e-9)
         left = place.astype(np.int64)
-        share = place - left
+        share: Array = np.asarray(place - left, np.float64)
         sights = np.column_stack([rows.design, -rows.target])
         band, border = np.zeros((2 * states, (pieces + 1) * states)), np.zeros(((pieces + 1) * states, sights.shape[1]))
         weights = ((left, 1.0 - share), (left + 1, share))
@@ -189,7 +201,7 @@ class _Equations:
                 band[states + one - other, other::states] += np.bincount(left, product, pieces + 1)
         # of the difference of two; what the constants are expected to be is weighed by it until σ itself is known
         scale = max(float(np.median(np.abs(np.diff(rows.target)))) / (math.sqrt(2.0) * NORMAL_QUARTILE), 1e-9)
-        knots = begin + rows.knots_s * np.arange(pieces + 1)
+        knots: Array = np.asarray(begin + rows.knots_s * np.arange(pieces + 1), np.float64)
         return cls(rows, scale, left, share, knots, block, band, border, sights.T @ sights)
 
     def solved(self, ratio: float, memory_s: float) -> _Solved:

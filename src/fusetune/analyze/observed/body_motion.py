@@ -105,7 +105,7 @@ def body_motion(
     first, last = np.searchsorted(steps.time, (motion.time[0], motion.time[-1] + 1))
     steps = steps.rows(slice(int(first), int(last)))
     place = ((steps.time - steps.time[0]) // round(EVERY_S * 1e6)).astype(np.int64)
-    bins, begin = np.unique(place, return_index=True)
+    _, begin = np.unique(place, return_index=True)
     count = np.diff(np.append(begin, place.size))
 
     def mean(values: Array) -> Array:
@@ -118,7 +118,8 @@ def body_motion(
 
     # an interval of the IMU ends at its step: its middle is half a step earlier
     half_us = 0.5 * float(np.median(np.diff(steps.time)))
-    time = np.rint(mean(steps.time[:, None] - float(steps.time[0]))[:, 0] + steps.time[0] - half_us).astype(np.int64)
+    since: Array = np.asarray(steps.time[:, None] - steps.time[0], np.float64)
+    time = np.rint(mean(since)[:, 0] + steps.time[0] - half_us).astype(np.int64)
     vertical, by_gnss = _vertical_velocity(motion, flight, parameters)
     fast = np.column_stack([motion.bounded_velocity[:, :2], vertical])
     moved = 0.5 * (fast[1:] + fast[:-1]) * np.diff(motion.time)[:, None] * 1e-6
@@ -145,9 +146,7 @@ def _interpolated(time: Times, known: Times, values: Array) -> Array:
     return found.reshape(time.size, *values.shape[1:])
 
 
-def _vertical_velocity(
-    motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]
-) -> tuple[Array, bool]:
+def _vertical_velocity(motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]) -> tuple[Array, bool]:
     """(M,) down, m/s: fast part of the IMU, slow part of GNSS or, where there is too little of it, of the replay."""
     table = flight.topic("vehicle_gps_position")
     inertial = motion.velocity[:, 2]
