@@ -8,14 +8,17 @@ that is wrong by a share makes the scale wrong by nearly as much.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.range_finder import LARGEST_ARM_ERROR_M, measured_ranges
 from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
-from fusetune.analyze.effects.walking_regression import WalkingRows, fit_walking
+from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
+from fusetune.analyze.observed.body_motion import BodyMotion
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.feed.message_samples import flow_refusals, flow_samples, taken
 
@@ -23,12 +26,57 @@ Array = npt.NDArray[np.float64]
 
 LARGEST_SCALE_ERROR = 0.03
 LEAST_DISTANCE_M = 0.8
-EXPECTED = np.array([np.inf, 1.0, 1.0, 1.0, 0.05, 0.05, 0.02])
+LARGEST_DELAY_S = 0.3
+"""Further from what it is told no delay is looked for."""
+EXPECTED = np.array([np.inf, 1.0, 1.0, 1.0, 0.05, 0.05, 0.1])
 """Standard deviations beforehand: scale; arm m; offsets rad/s; delay s."""
 _FEWEST = 200
+_LEAST_SCALE = 0.1
+_ROUNDS = 4
 _WHAT_TO_FLY = (
     "fly back and forth and sideways, two to five metres high above textured, even ground, and turn on the spot"
 )
+
+
+class _Flow(NamedTuple):
+    """Times (N,), µs, of the motion that is seen; flow (N, 2) and turning as the sensor says (N, 2), rad/s."""
+
+    time: npt.NDArray[np.int64]
+    flow: Array
+    gyro: Array
+
+
+def _fitted(
+    observed: ObservedFlight, motion: BodyMotion, ranges: tuple[npt.NDArray[np.int64], Array] | None, seen: _Flow
+) -> WalkingFit | None:
+    """Scale, scale times arm, offsets, and by how much the flow is later than the times say."""
+    if ranges is not None:
+        distance = np.interp(seen.time, *ranges)
+    else:
+        begin = float(np.interp(observed.airborne[0][0], motion.time, motion.height))
+        upright = motion.rotation_at(seen.time)[:, 2, 2]
+        distance = (-motion.way_at(seen.time)[:, 2] - begin) / np.maximum(upright, 0.5)
+    near = (distance > LEAST_DISTANCE_M) & motion.covers(seen.time)
+    if np.count_nonzero(near) < _FEWEST:
+        return None
+    time, flow, gyro = seen.time[near], seen.flow[near], seen.gyro[near]
+    rate, distance = motion.rate_at(time), distance[near]
+    gyro = np.where(np.isfinite(gyro), gyro, -rate[:, :2])
+    body = np.einsum("nji,nj->ni", motion.rotation_at(time), motion.velocity_at(time))
+    sight = np.column_stack([body[:, 1], -body[:, 0]]) / distance[:, None]
+    time_s, zero, one = np.asarray(time * 1e-6, np.float64), np.zeros(time.size), np.ones(time.size)
+    arms = (
+        np.column_stack([rate[:, 2], zero, -rate[:, 0]]),  # (ω × p)_y
+        np.column_stack([zero, rate[:, 2], -rate[:, 1]]),  # −(ω × p)_x
+    )
+    design = []
+    for axis, offset in enumerate(([one, zero], [zero, one])):
+        # the sensor's own gyro is of the same time as its flow, whatever the delay
+        later = -np.gradient(sight[:, axis], time_s)
+        columns = [sight[:, axis] + gyro[:, axis], arms[axis] / distance[:, None], *offset, later]
+        design.append(np.column_stack(columns))
+    walking = np.zeros((2 * time.size, 0))
+    return fit_walking(WalkingRows(np.tile(time_s, 2), flow.ravel(order="F"), np.vstack(design), walking, EXPECTED))
 
 
 def estimate_flow(observed: ObservedFlight) -> Effect:
@@ -45,40 +93,18 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
     if np.count_nonzero(usable) < _FEWEST:
         return refused(name, f"too few measurements of the flow in the air; {_WHAT_TO_FLY}")
     time, flow = time[usable], np.asarray(samples["flow_rate"][usable], np.float64)
-    gyro = np.asarray(samples["gyro_rate"][usable], np.float64)
-    rate = motion.rate_at(time)
-    gyro = np.where(np.isfinite(gyro), gyro, -rate)
+    gyro = np.asarray(samples["gyro_rate"][usable], np.float64)[:, :2]
     ranges = measured_ranges(observed)
-    if ranges is not None:
-        distance = np.interp(time, *ranges)
-    else:
-        begin = float(np.interp(observed.airborne[0][0], motion.time, motion.height))
-        upright = motion.rotation_at(time)[:, 2, 2]
-        distance = (motion.at(time, motion.height[:, None])[:, 0] - begin) / np.maximum(upright, 0.5)
-    near = distance > LEAST_DISTANCE_M
-    if np.count_nonzero(near) < _FEWEST:
-        return refused(name, f"too few measurements of the flow {LEAST_DISTANCE_M} m above ground; {_WHAT_TO_FLY}")
-    time, flow, gyro, rate, distance = time[near], flow[near], gyro[near], rate[near], distance[near]
-    body = np.einsum("nji,nj->ni", motion.rotation_at(time), motion.velocity_at(time))
-    sight = np.column_stack([body[:, 1], -body[:, 0]]) / distance[:, None]
-    time_s, zero, one = np.asarray(time * 1e-6, np.float64), np.zeros(time.size), np.ones(time.size)
-    design = []
-    arms = (
-        np.column_stack([rate[:, 2], zero, -rate[:, 0]]),  # (ω × p)_y
-        np.column_stack([zero, rate[:, 2], -rate[:, 1]]),  # −(ω × p)_x
-    )
-    for axis in range(2):
-        whole = sight[:, axis] + gyro[:, axis]
-        offset = [one, zero] if axis == 0 else [zero, one]
-        design.append(np.column_stack([whole, arms[axis] / distance[:, None], *offset, -np.gradient(whole, time_s)]))
-    rows = WalkingRows(
-        np.tile(time_s, 2), flow.ravel(order="F"), np.vstack(design), np.zeros((2 * time.size, 0)), EXPECTED
-    )
-    fit = fit_walking(rows)
-    if fit is None or fit.constants[0] <= 0.1:
-        return refused(name, f"the flow does not follow the motion; {_WHAT_TO_FLY}")
+    later_s, fit = 0.0, None
+    for _ in range(_ROUNDS):
+        fit = _fitted(observed, motion, ranges, _Flow(time - round(later_s * 1e6), flow, gyro))
+        if fit is None or fit.constants[0] <= _LEAST_SCALE:
+            why = f"the flow does not follow the motion {LEAST_DISTANCE_M} m and more above ground"
+            return refused(name, f"{why}; {_WHAT_TO_FLY}")
+        later_s = float(np.clip(later_s + fit.constants[-1], -LARGEST_DELAY_S, LARGEST_DELAY_S))
+    assert fit is not None
     scale, half, error = float(fit.constants[0]), fit.half_width(0), float(fit.standard_error[0])
-    figures = {"residual_rad_s": fit.noise, "by_range": float(ranges is not None)}
+    figures = {"residual_rad_s": fit.noise, "by_range": float(ranges is not None), "later_s": later_s}
     estimates, missing = [], []
     if error > LARGEST_SCALE_ERROR:
         missing.append("SENS_FLOW_SCALE")

@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.told import NO_MOTION, refused
-from fusetune.analyze.effects.walking_regression import BLOCK_S, UNCERTAINTY, WalkingFit, WalkingRows, fit_walking
+from fusetune.analyze.effects.walking_regression import BLOCK_S, WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.feed.message_samples import range_refusals, range_samples, taken
@@ -38,6 +38,9 @@ LARGEST_WALK_M_SQRT_S = 0.25
 """Of ground and height reference; on rougher ground the noise of the sensor cannot be told from it."""
 LEAST_DISTANCE_RATIO = 2.0
 """From the smallest to the largest distance, for the share that grows with it."""
+NOISE_UNCERTAINTY = 1.6
+"""Factor on the standard errors of the noises, by which errors were larger on made flights (docs/effects.md): what of
+the noise the walk takes along is known on the average alone."""
 GATE_SIGMAS = 3.0
 DELAY_S, SCALE, TILT_RAD = 0.02, 0.02, 0.005
 """Standard deviations beforehand of errors of delay, scale and mounting; a sensor that looks aslant, or an attitude
@@ -193,7 +196,7 @@ def _noises(
     parts = [block == one for one in np.unique(block)]
     whole = _variances(squares, distance, grows=grows)
     left_out = np.array([_variances(squares[~own], distance[~own], grows=grows) for own in parts])
-    spread = UNCERTAINTY * np.sqrt((len(parts) - 1) * np.var(left_out, axis=0))
+    spread = NOISE_UNCERTAINTY * np.sqrt((len(parts) - 1) * np.var(left_out, axis=0))
     return float(whole[0]), float(whole[1]), (float(spread[0]), float(spread[1]), float(len(parts) - 1))
 
 

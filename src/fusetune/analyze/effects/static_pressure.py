@@ -75,6 +75,7 @@ def estimate_static_pressure(observed: ObservedFlight, fitted: DragFit | str | N
     if fit is None:
         return refused(name, f"too short a time in the air away from the ground; {_WHAT_TO_FLY}", **figures)
     figures |= {"noise_m": fit.noise, "walk_m_sqrt_s": fit.walk, "wash_m_per_g": float(fit.constants[-1])}
+    figures["wash_error_m_per_g"] = float(fit.standard_error[-1])
     names = [f"EKF2_PCOEF_{one}" for one in DIRECTIONS]
     known = [index for index in range(len(names)) if fit.standard_error[index] <= LARGEST_ERROR]
     estimates = tuple(estimate_of(fit, one, names[one], "", observed.parameters.get(names[one])) for one in known)

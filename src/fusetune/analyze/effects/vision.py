@@ -8,10 +8,13 @@ some percent. Positions are taken; of a system that tells velocities alone the a
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.effects.estimate import Effect
+from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.range_finder import lever_arm
 from fusetune.analyze.effects.told import NO_MOTION, refused
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
@@ -25,8 +28,12 @@ Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
 FASTEST_HZ = 15.0
-EXPECTED = np.array([1.0, 1.0, 1.0, np.inf, 0.1, 0.02])
+HEADING, SCALE, DELAY = 3, 4, 5
+"""Of the constants; the first three are the arm."""
+EXPECTED = np.array([1.0, 1.0, 1.0, np.inf, 0.3, 0.1])
 """Standard deviations beforehand: arm m, heading rad, scale, delay s."""
+LARGEST_DELAY_S = 0.3
+"""Further from what it is told no delay is looked for."""
 _FEWEST = 200
 _KNOTS_S = 1.0
 _ROUNDS = 3
@@ -49,23 +56,31 @@ def estimate_vision_arm(observed: ObservedFlight) -> Effect:
         return refused(name, f"too few positions of the vision system in the air; {_WHAT_TO_FLY}")
     time, measured = time[known], np.asarray(samples["pos"][known], np.float64)
     every = max(1, round(1.0 / (FASTEST_HZ * max(float(np.median(np.diff(time))) * 1e-6, 1e-3))))
-    fit = _fit(motion, time[::every], measured[::every])
-    if fit is None:
+    found = _fit(motion, time[::every], measured[::every])
+    if found is None:
         return refused(name, f"too short a time in the air; {_WHAT_TO_FLY}")
+    fit, heading, later_s = found
+    scale = 1.0 + float(fit.constants[SCALE])
     figures = {
-        "residual_m": float(np.std(fit.residual)), "walk_m_sqrt_s": fit.walk, "scale": 1.0 + float(fit.constants[4]),
+        "residual_m": float(np.std(fit.residual)), "walk_m_sqrt_s": fit.walk, "heading_deg": math.degrees(heading),
+        "heading_error_deg": math.degrees(float(fit.standard_error[HEADING])), "later_s": later_s,
     }  # fmt: skip
-    return lever_arm(observed, name, "EKF2_EV_POS", fit, figures, _WHAT_TO_FLY)
+    arm = lever_arm(observed, name, "EKF2_EV_POS", fit, figures, _WHAT_TO_FLY)
+    half, error = fit.half_width(SCALE), float(fit.standard_error[SCALE])
+    told = Estimate("vision_scale", "", None, scale, scale - half, scale + half, error, fit.residual.size)
+    return replace(arm, estimates=(*arm.estimates, told))
 
 
-def _fit(motion: BodyMotion, time: Times, measured: Array) -> WalkingFit | None:
-    way = motion.way_at(time)
-    way = way - way.mean(axis=0)
-    rotation, velocity = motion.rotation_at(time), motion.velocity_at(time)
-    heading, time_s = _first_heading(way, measured), np.asarray(time * 1e-6, np.float64)
+def _fit(motion: BodyMotion, time: Times, measured: Array) -> tuple[WalkingFit, float, float] | None:
+    """The fit, the heading of the vision system's frame, rad, and by how much it is later than told, s."""
+    heading, time_s = _first_heading(motion.way_at(time), measured), np.asarray(time * 1e-6, np.float64)
+    later_s = 0.0
     fit: WalkingFit | None = None
     walking: Array = np.asarray(np.kron(np.eye(3), np.ones((time.size, 1))), np.float64)
     for _ in range(_ROUNDS):
+        then = time - round(later_s * 1e6)
+        rotation, velocity, way = motion.rotation_at(then), motion.velocity_at(then), motion.way_at(then)
+        way = way - way.mean(axis=0)
         cosine, sine = np.cos(heading), np.sin(heading)
         back = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         seen = measured @ back.T
@@ -78,8 +93,10 @@ def _fit(motion: BodyMotion, time: Times, measured: Array) -> WalkingFit | None:
         fit = fit_walking(rows, fit)
         if fit is None:
             return None
-        heading += float(fit.constants[3])
-    return fit
+        heading += float(fit.constants[HEADING])
+        later_s = float(np.clip(later_s + fit.constants[DELAY], -LARGEST_DELAY_S, LARGEST_DELAY_S))
+    assert fit is not None
+    return fit, heading, later_s
 
 
 def _first_heading(way: Array, measured: Array) -> float:

@@ -1,8 +1,8 @@
 """How the vehicle moved and what its accelerometers felt, on an even grid: what the tuners of effects share.
 
-Attitude and slow velocity are the replay's, the fast velocity is the IMU's alone (`analyze/delays/inertial_motion`).
-The height is made of the IMU and of GNSS vertical velocities, without the barometer: an error of the barometer must
-not hide in what it is compared with.
+The attitude is the replay's, the fast velocity the IMU's alone (`analyze/delays/inertial_motion`), the slow one that of
+GNSS; the way and the height are their integral. No other source goes in: an error of the barometer, of the optical flow
+or of vision must not hide in what it is compared with. Without GNSS the slow velocity is the replay's.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from fusetune.analyze.delays.inertial_motion import InertialMotion, slow_part
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.replaying.replayed_set import ReplayedSteps
+from fusetune.analyze.smoothing.smoothed_velocity import NORMAL_QUARTILE, OUTLIER_SIGMAS
 from fusetune.ekf2.feed.message_samples import gnss_refusals, gnss_samples, taken
 from fusetune.px4.flight import Flight
 
@@ -23,8 +24,8 @@ Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
 EVERY_S = 0.1
-HEIGHT_KNOTS_S = 5.0
-"""Over so long the IMU alone knows the vertical velocity."""
+VELOCITY_KNOTS_S = 5.0
+"""Over so long the IMU alone knows the velocity."""
 _FEWEST_FIXES = 20
 
 
@@ -40,7 +41,7 @@ class BodyMotion:
     specific_force : (K, 3) body, m/s², less the mean of the accelerometer bias that the replay found
     body_rate : (K, 3) FRD, rad/s, less the mean of the gyro bias
     height : (K,) above the first row, m; drifts
-    by_gnss : whether GNSS vertical velocities bound the drift; otherwise it is the replay's velocity
+    by_gnss : whether GNSS velocities bound the drift; otherwise it is the replay's velocity
     fast_time, fast_rotation, fast_velocity, fast_way, fast_rate : (M, …) time, attitude, velocity, the way north, east,
         down, and body rate at every update of the filter: a sensor's lever arm shows in what is faster than the grid
     """
@@ -120,8 +121,7 @@ def body_motion(
     half_us = 0.5 * float(np.median(np.diff(steps.time)))
     since: Array = np.asarray(steps.time[:, None] - steps.time[0], np.float64)
     time = np.rint(mean(since)[:, 0] + steps.time[0] - half_us).astype(np.int64)
-    vertical, by_gnss = _vertical_velocity(motion, flight, parameters)
-    fast = np.column_stack([motion.bounded_velocity[:, :2], vertical])
+    fast, by_gnss = _bounded_velocity(motion, flight, parameters)
     moved = 0.5 * (fast[1:] + fast[:-1]) * np.diff(motion.time)[:, None] * 1e-6
     way = np.vstack([np.zeros(3), np.cumsum(moved, axis=0)])
     return BodyMotion(
@@ -146,20 +146,27 @@ def _interpolated(time: Times, known: Times, values: Array) -> Array:
     return found.reshape(time.size, *values.shape[1:])
 
 
-def _vertical_velocity(motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]) -> tuple[Array, bool]:
-    """(M,) down, m/s: fast part of the IMU, slow part of GNSS or, where there is too little of it, of the replay."""
+def _bounded_velocity(motion: InertialMotion, flight: Flight, parameters: Mapping[str, float]) -> tuple[Array, bool]:
+    """(M, 3) NED, m/s: fast part of the IMU, slow part of GNSS or, where there is too little of it, of the replay.
+
+    The replay follows every source that is fused, a wrong one, too; so nothing can be judged by it where GNSS is there.
+    """
     table = flight.topic("vehicle_gps_position")
-    inertial = motion.velocity[:, 2]
     if table is None:
-        return motion.bounded_velocity[:, 2], False
+        return motion.bounded_velocity, False
     samples = gnss_samples(table)
-    delay_us = round(1e3 * parameters.get("EKF2_GPS_DELAY", 0.0))
-    time, down = samples["time_us"] - delay_us, samples["vel"][:, 2]
-    usable = taken(table, gnss_refusals(table, flight.release)) & np.isfinite(down) & (samples["fix_type"] >= 3)
-    usable &= (time >= motion.time[0]) & (time <= motion.time[-1])
+    time = samples["time_us"] - round(1e3 * parameters.get("EKF2_GPS_DELAY", 0.0))
+    usable = taken(table, gnss_refusals(table, flight.release)) & (samples["fix_type"] >= 3)
+    usable &= np.isfinite(samples["vel"]).all(axis=1) & (time >= motion.time[0]) & (time <= motion.time[-1])
     if np.count_nonzero(usable) < _FEWEST_FIXES:
-        return motion.bounded_velocity[:, 2], False
+        return motion.bounded_velocity, False
     time = time[usable]
-    off = (np.interp(time, motion.time, inertial) - down[usable])[:, None]
-    drift = slow_part(time, off, HEIGHT_KNOTS_S)[:, 0]
-    return np.asarray(inertial - np.interp(motion.time, time, drift)), True
+    off = _interpolated(time, motion.time, motion.velocity) - samples["vel"][usable]
+    drift = slow_part(time, off, VELOCITY_KNOTS_S)
+    # once more without what lies far off: a glitch must not bend the reference
+    left = np.abs(off - drift)
+    near = (left <= OUTLIER_SIGMAS * np.median(left, axis=0) / NORMAL_QUARTILE).all(axis=1)
+    if _FEWEST_FIXES <= np.count_nonzero(near) < near.size:
+        time = time[near]
+        drift = slow_part(time, off[near], VELOCITY_KNOTS_S)
+    return motion.velocity - _interpolated(motion.time, time, drift), True
