@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scipy.special import stdtrit
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.told import NO_MOTION, refused
+from fusetune.analyze.effects.told import NO_MOTION, is_fixed_wing, refused
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.observed.body_motion import BodyMotion
 from fusetune.analyze.observed.observed_flight import ObservedFlight
@@ -76,8 +76,7 @@ def fit_drag(observed: ObservedFlight) -> DragFit | str:
     motion = observed.motion
     if motion is None:
         return NO_MOTION
-    status = observed.flight.topic("vehicle_status")
-    if status is not None and "vehicle_type" in status and np.any(status["vehicle_type"] == _FIXED_WING):
+    if is_fixed_wing(observed):
         return "not a multicopter"
     used = motion.within(observed.clear_of_ground)
     if np.count_nonzero(used) * 2 < _FEWEST_ROWS:
@@ -99,7 +98,6 @@ def air_density(observed: ObservedFlight) -> float:
     return rho if math.isfinite(rho) and rho > 0.1 else AIR_DENSITY_SEA_LEVEL
 
 
-_FIXED_WING = 2
 _FEWEST_ROWS = 400
 
 

@@ -10,15 +10,17 @@ a tenth (PX4's guide); the height is where a tenth of A is left.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.told import NO_MOTION, barometer_rows, estimate_of, refused
+from fusetune.analyze.effects.told import NO_MOTION, barometer_rows, estimate_of, is_fixed_wing, refused
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
@@ -48,6 +50,8 @@ def estimate_ground_effect(observed: ObservedFlight) -> Effect:
     rows = barometer_rows(observed)
     if motion is None or rows is None:
         return refused(name, NO_MOTION if motion is None else "the log has no barometer (`vehicle_air_data`)")
+    if is_fixed_wing(observed):
+        return refused(name, "EKF2 takes no ground effect of a fixed wing into account")
     if not observed.airborne:
         return refused(name, f"the vehicle did not fly; {_WHAT_TO_FLY}")
     time, altitude = rows
@@ -72,8 +76,11 @@ def estimate_ground_effect(observed: ObservedFlight) -> Effect:
     if fit.standard_error[0] > LARGEST_ERROR_M:
         why = f"the dip is not told from the wander of barometer and GNSS (± {fit.half_width(0):.1f} m)"
         return refused(name, f"{why}; {_WHAT_TO_FLY}", **figures)
-    told = observed.parameters
-    estimates = [estimate_of(fit, 0, "EKF2_GND_EFF_DZ", "m", told.get("EKF2_GND_EFF_DZ"), MARGIN)]
+    told, dip = observed.parameters, estimate_of(fit, 0, "EKF2_GND_EFF_DZ", "m", None, MARGIN)
+    if dip.upper < 0.0:
+        return refused(name, "the barometer rises near the ground, which no dead zone of EKF2 is for", **figures)
+    zone = replace(dip, value=max(dip.value, 0.0), lower=max(dip.lower, 0.0), told=told.get("EKF2_GND_EFF_DZ"))
+    estimates = [zone]
     # of a dip that may be none, or whose height is not told, nothing is said of where it ends
     if fit.constants[0] > fit.half_width(0) and fit.standard_error[1] < LARGEST_SHARE * scale_m:
         estimates.append(_height(fit, scale_m, told.get("EKF2_GND_MAX_HGT")))
@@ -81,12 +88,10 @@ def estimate_ground_effect(observed: ObservedFlight) -> Effect:
 
 
 def _height(fit: WalkingFit, scale_m: float, told: float | None) -> Estimate:
-    factor = -math.log(LEFT_AT_HEIGHT)
-    half, error = fit.half_width(1), float(fit.standard_error[1])
-    low, high = max(scale_m - half, 0.0), scale_m + half
-    return Estimate(
-        "EKF2_GND_MAX_HGT", "m", told, factor * scale_m, factor * low, factor * high, factor * error, fit.residual.size
-    )
+    factor, highest = -math.log(LEFT_AT_HEIGHT), PARAMETERS["EKF2_GND_MAX_HGT"].maximum or math.inf
+    half, error = fit.half_width(1), factor * float(fit.standard_error[1])
+    value, low, high = (min(factor * max(one, 0.0), highest) for one in (scale_m, scale_m - half, scale_m + half))
+    return Estimate("EKF2_GND_MAX_HGT", "m", told, value, low, high, error, fit.residual.size)
 
 
 def _step_s(time: Times) -> float:

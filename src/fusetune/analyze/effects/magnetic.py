@@ -39,7 +39,9 @@ Times = npt.NDArray[np.int64]
 
 LARGEST_FIELD_ERROR_GAUSS = 0.003
 """Standard error of a field above which it is not told: about 1° of heading."""
-LARGEST_SCALE_ERROR = 0.01
+LARGEST_NOISE_GAUSS = 0.05
+"""Residual above which the model does not hold; noisy magnetometers have a tenth of it."""
+LARGEST_SCALE_ERROR = 0.04
 LARGEST_DECLINATION_ERROR_DEG = 2.0
 NORMAL_95 = 1.96
 MODEL_ERROR_GAUSS = 0.005
@@ -108,6 +110,9 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
     fitted = _gauss_newton(time, field, rotation, attitude.turned_at(time), drawn, world)
     if fitted is None:
         return "too short a log for the magnetic field"
+    if fitted[0].noise > LARGEST_NOISE_GAUSS:
+        why = f"the magnetometer is {fitted[0].noise:.2f} G off the earth's field as the vehicle turns"
+        return f"{why}: see first whether it is mounted as PX4 is told, or disturbed from outside"
     return MagneticFit(
         fitted[0],
         power,

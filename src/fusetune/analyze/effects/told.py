@@ -47,3 +47,13 @@ def barometer_rows(observed: ObservedFlight) -> tuple[npt.NDArray[np.int64], Arr
     time = samples["time_us"] - round(1e3 * observed.parameters.get("EKF2_BARO_DELAY", 0.0))
     usable = np.isfinite(samples["hgt"]) & motion.covers(time)
     return (time[usable], np.asarray(samples["hgt"][usable], np.float64)) if usable.any() else None
+
+
+FIXED_WING = 2
+"""`vehicle_status.vehicle_type`."""
+
+
+def is_fixed_wing(observed: ObservedFlight) -> bool:
+    """Whether the vehicle ever flew on its wings."""
+    status = observed.flight.topic("vehicle_status")
+    return status is not None and "vehicle_type" in status and bool(np.any(status["vehicle_type"] == FIXED_WING))

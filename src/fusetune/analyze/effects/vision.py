@@ -32,6 +32,7 @@ HEADING, SCALE, DELAY = 3, 4, 5
 """Of the constants; the first three are the arm."""
 EXPECTED = np.array([1.0, 1.0, 1.0, np.inf, 0.3, 0.1])
 """Standard deviations beforehand: arm m, heading rad, scale, delay s."""
+LARGEST_SCALE_ERROR = 0.05
 LARGEST_DELAY_S = 0.3
 """Further from what it is told no delay is looked for."""
 _FEWEST = 200
@@ -68,13 +69,13 @@ def estimate_vision_arm(observed: ObservedFlight) -> Effect:
     arm = lever_arm(observed, name, "EKF2_EV_POS", fit, figures, _WHAT_TO_FLY)
     half, error = fit.half_width(SCALE), float(fit.standard_error[SCALE])
     told = Estimate("vision_scale", "", None, scale, scale - half, scale + half, error, fit.residual.size)
-    return replace(arm, estimates=(*arm.estimates, told))
+    return replace(arm, estimates=(*arm.estimates, told)) if error <= LARGEST_SCALE_ERROR else arm
 
 
 def _fit(motion: BodyMotion, time: Times, measured: Array) -> tuple[WalkingFit, float, float] | None:
     """The fit, the heading of the vision system's frame, rad, and by how much it is later than told, s."""
     heading, time_s = _first_heading(motion.way_at(time), measured), np.asarray(time * 1e-6, np.float64)
-    later_s = 0.0
+    later_s, scale = 0.0, 1.0
     fit: WalkingFit | None = None
     walking: Array = np.asarray(np.kron(np.eye(3), np.ones((time.size, 1))), np.float64)
     for _ in range(_ROUNDS):
@@ -87,13 +88,14 @@ def _fit(motion: BodyMotion, time: Times, measured: Array) -> tuple[WalkingFit, 
         design = []
         for axis in range(3):
             across = -way[:, 1] if axis == 0 else way[:, 0] if axis == 1 else np.zeros(time.size)
-            design.append(np.column_stack([rotation[:, axis], across, way[:, axis], -velocity[:, axis]]))
+            design.append(np.column_stack([scale * rotation[:, axis], across, way[:, axis], -velocity[:, axis]]))
         target = (seen - seen.mean(axis=0) - way).ravel(order="F")
         rows = WalkingRows(np.tile(time_s, 3), target, np.vstack(design), walking, EXPECTED, _KNOTS_S)
         fit = fit_walking(rows, fit)
         if fit is None:
             return None
         heading += float(fit.constants[HEADING])
+        scale = float(np.clip(1.0 + fit.constants[SCALE], 0.3, 3.0))
         later_s = float(np.clip(later_s + fit.constants[DELAY], -LARGEST_DELAY_S, LARGEST_DELAY_S))
     assert fit is not None
     return fit, heading, later_s
