@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.range_finder import LARGEST_ARM_ERROR_M, measured_ranges
+from fusetune.analyze.effects.range_finder import measured_ranges
 from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
@@ -25,6 +25,8 @@ from fusetune.ekf2.feed.message_samples import flow_refusals, flow_samples, take
 Array = npt.NDArray[np.float64]
 
 LARGEST_SCALE_ERROR = 0.03
+LARGEST_ARM_ERROR_M = 0.065
+"""Standard errors above which they are not told; high above ground an arm moves the flow by next to nothing."""
 LEAST_DISTANCE_M = 0.8
 LARGEST_DELAY_S = 0.3
 """Further from what it is told no delay is looked for."""

@@ -39,6 +39,9 @@ Times = npt.NDArray[np.int64]
 
 LARGEST_FIELD_ERROR_GAUSS = 0.003
 """Standard error of a field above which it is not told: about 1° of heading."""
+LARGEST_IRON_ERROR_GAUSS = 0.005
+LEAST_TURN_DEG = 150.0
+"""Of all headings; what is seen from one side is nearly one with the earth's field."""
 LARGEST_NOISE_GAUSS = 0.05
 """Residual above which the model does not hold; noisy magnetometers have a tenth of it."""
 LARGEST_SCALE_ERROR = 0.04
@@ -68,13 +71,23 @@ _AXES = "XYZ"
 
 @dataclass(frozen=True)
 class MagneticFit:
-    """What was found: `fit` with its constants in the order of `EXPECTED`, and the motors' power at the samples."""
+    """What was found.
+
+    Attributes
+    ----------
+    fit : constants in the order of `EXPECTED`
+    power : of the motors at the samples, where `has_power`
+    declination_deg, level_gauss : of the world's field, and its horizontal strength
+    turned : from the leftmost to the rightmost heading, rad
+    heading, heading_error : the attitude, and by how much its heading is off at `time`, (N,) rad
+    """
 
     fit: WalkingFit
     power: MotorPower
     has_power: bool
     declination_deg: float
     level_gauss: float
+    turned: float
     heading: GyroAttitude
     time: Times
     heading_error: Array
@@ -119,6 +132,7 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
         has_power,
         math.degrees(math.atan2(world[1], world[0])),
         math.hypot(*world[:2]),
+        float(np.ptp(attitude.turned_at(time))),
         attitude,
         time,
         fitted[1],
@@ -308,7 +322,8 @@ def _hard_iron(found: MagneticFit, calibration: _Calibration, figures: dict[str,
     estimates, missing = [], []
     for axis, letter in enumerate(_AXES):
         index = HARD.start + axis
-        if found.fit.standard_error[index] > LARGEST_FIELD_ERROR_GAUSS * 5.0 / 3.0:
+        one_sided = axis < 2 and math.degrees(found.turned) < LEAST_TURN_DEG
+        if one_sided or found.fit.standard_error[index] > LARGEST_IRON_ERROR_GAUSS:
             missing.append(letter)
         elif calibration.prefix:
             told, factor = calibration.told(f"{letter}OFF", 0.0), 1.0 / calibration.told(f"{letter}SCALE", 1.0)

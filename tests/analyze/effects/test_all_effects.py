@@ -1,0 +1,116 @@
+"""All tuners on a simulated flight, from the log to the values: what was simulated lies in the intervals."""
+
+from __future__ import annotations
+
+import math
+from datetime import date
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from fusetune.analyze.effects.all_effects import all_effects
+from fusetune.analyze.effects.drag import air_density
+from fusetune.analyze.effects.gyro_attitude import gyro_attitude
+from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL
+from fusetune.execute.world.earth import magnetic_field_ned
+from fusetune.px4.flight import stacked
+from fusetune.quaternions import rotation_matrix
+
+if TYPE_CHECKING:
+    from fusetune.analyze.effects.estimate import Effect, Estimate
+    from fusetune.px4.flight import Flight
+
+LINEAR_DRAG_1_S, CURRENT_GAUSS, GROUND_EFFECT_M = 0.25, 0.004, 0.8
+"""Of config/vehicles/quadrotor.yaml."""
+ABSENT = ("range_lever_arm", "range_noise", "optical_flow", "vision_lever_arm", "airspeed_scale")
+
+
+@pytest.fixture(scope="module")
+def observed(survey_flight: Flight) -> ObservedFlight:
+    return ObservedFlight(survey_flight)
+
+
+@pytest.fixture(scope="module")
+def effects(observed: ObservedFlight) -> dict[str, Effect]:
+    return {one.id: one for one in all_effects(observed)}
+
+
+def estimate(effects: dict[str, Effect], effect: str, name: str) -> Estimate:
+    return next(one for one in effects[effect].estimates if one.name == name)
+
+
+def test_momentum_drag(effects: dict[str, Effect], observed: ObservedFlight) -> None:
+    found = estimate(effects, "drag", "EKF2_MCOEF")
+    truth = LINEAR_DRAG_1_S / math.sqrt(air_density(observed) / AIR_DENSITY_SEA_LEVEL)
+    assert found.lower < truth < found.upper
+    assert found.told == pytest.approx(0.15)
+    assert found.is_apart_from_told
+
+
+def test_ground_effect_with_the_tenth_of_the_guide(effects: dict[str, Effect]) -> None:
+    found = estimate(effects, "ground_effect", "EKF2_GND_EFF_DZ")
+    assert found.lower < 1.1 * GROUND_EFFECT_M < found.upper < 4.0
+
+
+def test_the_field_of_the_motors_has_its_strength(effects: dict[str, Effect]) -> None:
+    """Over weight of thrust, as the log tells neither throttle nor current; its direction is of chance."""
+    found = effects["motor_magnetic_field"]
+    strength = np.linalg.norm([one.value for one in found.estimates])
+    error = max(one.upper - one.value for one in found.estimates)
+    assert strength == pytest.approx(CURRENT_GAUSS, abs=error)
+    assert error < 0.003
+    assert found.figures["CAL_MAG_COMP_TYP"] == 0.0
+
+
+def test_declination_by_gnss(effects: dict[str, Effect]) -> None:
+    field = magnetic_field_ned(47.397742, 8.545594, 535.0, date(2025, 6, 15))
+    found = estimate(effects, "declination", "EKF2_MAG_DECL")
+    assert found.lower < math.degrees(math.atan2(field[1], field[0])) < found.upper
+
+
+def test_no_static_pressure_error_is_found_where_there_is_none(effects: dict[str, Effect]) -> None:
+    for one in effects["static_pressure"].estimates:
+        assert one.lower < 0.0 < one.upper
+
+
+@pytest.mark.parametrize("effect", ABSENT)
+def test_sensors_that_are_not_there_are_refused_in_words(effects: dict[str, Effect], effect: str) -> None:
+    assert not effects[effect].estimates
+    assert "the log has no" in effects[effect].refusal
+
+
+def test_an_effect_is_told_or_refused(effects: dict[str, Effect]) -> None:
+    for one in effects.values():
+        assert one.estimates or one.refusal
+        assert all(value.lower <= value.value <= value.upper for value in one.estimates)
+
+
+def test_the_motion_is_the_true_one(observed: ObservedFlight, survey_flight: Flight) -> None:
+    """Velocity within the receiver's 0.1 m/s, height within what walks away in a flight."""
+    motion, truth = observed.motion, survey_flight.topics["vehicle_local_position_groundtruth", 0]
+    assert motion is not None
+    assert motion.by_gnss
+    used = motion.within(observed.clear_of_ground)
+    time = motion.time[used]
+    for axis, name in enumerate(("vx", "vy", "vz")):
+        true = np.interp(time, truth["timestamp"], truth[name])
+        assert np.sqrt(np.mean((motion.velocity[used, axis] - true) ** 2)) < 0.12
+    rise = motion.height[used] + np.interp(time, truth["timestamp"], truth["z"])
+    assert np.std(rise) < 0.5
+
+
+def test_the_gyros_attitude_drifts_evenly_and_keeps_the_true_tilt(
+    observed: ObservedFlight, survey_flight: Flight
+) -> None:
+    """From the ground on, where the replay's own tilt is off by the bias of the accelerometer."""
+    steps_of = observed.replayed.steps
+    assert steps_of is not None
+    attitude = gyro_attitude(steps_of(), observed.airborne)
+    table = survey_flight.topics["vehicle_attitude_groundtruth", 0]
+    time = table["timestamp"].astype(np.int64)
+    inside = (time > attitude.time[500]) & (time < attitude.time[-1])
+    down = rotation_matrix(stacked(table, "q")[inside])[:, 2]
+    tilt = np.degrees(np.arccos(np.clip(np.sum(down * attitude.rotation_at(time[inside])[:, 2], axis=1), -1.0, 1.0)))
+    assert np.max(tilt) < 0.7
