@@ -2,8 +2,8 @@
 
 python -m benchmarks.effect_estimates LOG.ulg … STUDY/*/*/fault.json
 
-Beside a `fault.json`, whose `truth` holds the true values by name, lies its log. Of these a table is printed at the end:
-how often each value was told, how often its interval holds the truth, median error and half-width, CPU a minute of flight.
+Beside a `fault.json`, whose `truth` holds the true values by name, lies its log. Of these a table is printed at the
+end: how often each value was told, how often its interval holds the truth, median error and half-width; and the CPU.
 """
 
 from __future__ import annotations
@@ -33,12 +33,14 @@ class Table:
 
     rows: dict[str, list[tuple[float, Estimate]]] = field(default_factory=dict)
     flights: int = 0
+    known: int = 0
     motion_s: float = 0.0
     effects_s: float = 0.0
     minutes: float = 0.0
 
     def add(self, effects: Sequence[Effect], truth: Mapping[str, float]) -> None:
         """Estimates of one flight whose truth is known."""
+        self.known += 1
         for effect in effects:
             for one in effect.estimates:
                 if one.name in truth:
@@ -51,7 +53,7 @@ class Table:
             error = np.median([abs(one.value - true) for true, one in pairs])
             half = np.median([0.5 * (one.upper - one.lower) for _, one in pairs])
             held = np.mean([one.lower <= true <= one.upper for true, one in pairs])
-            found.append(f"| {name} | {len(pairs)} of {self.flights} | {100 * held:.0f} % | {error:.4g} | {half:.4g} |")
+            found.append(f"| {name} | {len(pairs)} of {self.known} | {100 * held:.0f} % | {error:.4g} | {half:.4g} |")
         return found
 
 
@@ -109,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if table.minutes:
         motion, effects_s = (one / table.minutes for one in (table.motion_s, table.effects_s))
         print(
-            f"{table.flights} flights; per minute of flight {motion:.3f} s for the motion, {effects_s:.3f} s for all effects"
+            f"{table.flights} flights; a minute of flight costs {motion:.3f} s for motion, {effects_s:.3f} s for all effects"
         )
 
 
