@@ -111,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if table.minutes:
         motion, effects_s = (one / table.minutes for one in (table.motion_s, table.effects_s))
         print(
-            f"{table.flights} flights; a minute of flight costs {motion:.3f} s for motion, {effects_s:.3f} s for all effects"
+            f"{table.flights} flights; a minute costs {motion:.3f} s of CPU for motion, {effects_s:.3f} s for effects"
         )
 
 
