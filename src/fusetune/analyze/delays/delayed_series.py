@@ -72,7 +72,7 @@ def _heading(time: Times, measured: Array, motion_time: Times, motion: Array) ->
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _range(flight: Flight) -> tuple[Times, Array] | None:
+def measured_distances(flight: Flight) -> tuple[Times, Array] | None:
     """Times and distances of the range finder that looks down."""
     for instance in range(4):
         table = flight.topics.get(("distance_sensor", instance))
@@ -89,7 +89,7 @@ def _range(flight: Flight) -> tuple[Times, Array] | None:
 
 def range_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str, float]) -> LaggedSeries | None:
     """Height above ground."""
-    found = _range(flight)
+    found = measured_distances(flight)
     if found is None:
         return None
     time, distance = found
@@ -101,7 +101,7 @@ def range_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str
 
 def flow_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str, float]) -> LaggedSeries | None:
     """Rate of the line of sight without the vehicle's own turning, rad/s."""
-    table, ranged = flight.topic("vehicle_optical_flow"), _range(flight)
+    table, ranged = flight.topic("vehicle_optical_flow"), measured_distances(flight)
     if table is None or ranged is None:
         return None
     samples, _ = flow_samples(table)

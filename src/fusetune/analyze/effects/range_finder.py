@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import stdtrit
 
+from fusetune.analyze.delays.delayed_series import measured_distances
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.told import NO_MOTION, refused
 from fusetune.analyze.effects.walking_regression import BLOCK_S, WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.ekf2.feed.message_samples import range_refusals, range_samples, taken
 from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import (
     DT_MAX_S,
     DT_MIN_S,
@@ -65,18 +65,11 @@ class RangeFit:
 
 def measured_ranges(observed: ObservedFlight) -> tuple[Times, Array] | None:
     """Times of measurement, µs, and distances, m, of the range finder that looks down; None without one."""
-    for instance in range(4):
-        table = observed.flight.topics.get(("distance_sensor", instance))
-        if table is None:
-            continue
-        samples, limits = range_samples(table)
-        distance = np.asarray(samples["range"], np.float64)
-        usable = taken(table, range_refusals(table)) & np.isfinite(distance) & (samples["quality"] != 0)
-        usable &= ~(distance <= limits[:, 0]) & ~(distance >= limits[:, 1])
-        if np.count_nonzero(usable) > 2:
-            delay_us = round(1e3 * observed.parameters.get("EKF2_RNG_DELAY", 0.0))
-            return samples["time_us"][usable] - delay_us, distance[usable]
-    return None
+    found = measured_distances(observed.flight)
+    if found is None:
+        return None
+    time, distance = found
+    return time - round(1e3 * observed.parameters.get("EKF2_RNG_DELAY", 0.0)), np.asarray(distance, np.float64)
 
 
 def fit_range(observed: ObservedFlight) -> RangeFit | str:
