@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from datetime import date
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,11 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.effects.all_effects import all_effects
-from fusetune.analyze.effects.drag import air_density
+from fusetune.analyze.effects.drag import DragFit, air_density, estimate_drag, fit_drag
 from fusetune.analyze.effects.gyro_attitude import gyro_attitude
+from fusetune.analyze.effects.magnetic import estimate_magnetic
+from fusetune.analyze.effects.motor_power import motor_power
+from fusetune.analyze.effects.static_pressure import estimate_static_pressure, pressure_heights
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL
 from fusetune.execute.world.earth import magnetic_field_ned
@@ -114,3 +118,50 @@ def test_the_gyros_attitude_drifts_evenly_and_keeps_the_true_tilt(
     down = rotation_matrix(stacked(table, "q")[inside])[:, 2]
     tilt = np.degrees(np.arccos(np.clip(np.sum(down * attitude.rotation_at(time[inside])[:, 2], axis=1), -1.0, 1.0)))
     assert np.max(tilt) < 0.7
+
+
+def changed(observed: ObservedFlight, topic: str, columns: dict[str, np.ndarray]) -> ObservedFlight:
+    """The same flight, with the same replay, of which a sensor read something else."""
+    other = ObservedFlight(observed.logged)
+    flight = observed.flight
+    tables = dict(flight.topics) | {(topic, 0): flight.topics[topic, 0] | columns}
+    vars(other).update(vars(observed) | {"flight": flight.with_topics(tables)})
+    return other
+
+
+def test_gravity_that_leaks_into_the_accelerometer_does_not_end_in_the_drag(observed: ObservedFlight) -> None:
+    """0.2 m/s² along x is what a tilt of 1.2° leaves; the coefficients stay as they were."""
+    motion = observed.motion
+    assert motion is not None
+    leaning = ObservedFlight(observed.logged)
+    vars(leaning).update(vars(observed))
+    vars(leaning)["motion"] = replace(motion, specific_force=motion.specific_force + [0.2, -0.1, 0.0])
+    straight, slanting = estimate_drag(observed), estimate_drag(leaning)
+    assert slanting.figures["offset_x_m_s2"] - straight.figures["offset_x_m_s2"] == pytest.approx(0.2, abs=0.03)
+    one, other = ({one.name: one for one in effect.estimates}["EKF2_MCOEF"] for effect in (straight, slanting))
+    assert abs(one.value - other.value) < 0.5 * (one.upper - one.value)
+
+
+def test_a_static_pressure_error_is_found_where_there_is_one(observed: ObservedFlight) -> None:
+    """0.3 of the dynamic pressure from ahead, on top of what the flight has."""
+    table, motion, drag = observed.flight.topics["vehicle_air_data", 0], observed.motion, fit_drag(observed)
+    assert motion is not None
+    assert isinstance(drag, DragFit)
+    time = table["timestamp_sample"].astype(np.int64)
+    velocity = motion.at(time, motion.velocity)
+    velocity[:, :2] -= drag.wind(time * 1e-6)
+    air = np.einsum("nji,nj->ni", motion.at(time, motion.rotation), velocity)
+    error = 0.3 * pressure_heights(air, 400.0)[:, 0]
+    wrong = changed(observed, "vehicle_air_data", {"baro_alt_meter": table["baro_alt_meter"] + error})
+    before, after = (estimate_static_pressure(one, drag).values()["EKF2_PCOEF_XP"] for one in (observed, wrong))
+    assert after - before == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_motor_field_is_found_where_there_is_one(observed: ObservedFlight, effects: dict[str, Effect]) -> None:
+    """Up to 30 mG at hover, on top of what the flight has."""
+    table, field = observed.flight.topics["vehicle_magnetometer", 0], np.array([0.03, -0.02, 0.01])
+    power = np.nan_to_num(motor_power(observed, table["timestamp_sample"].astype(np.int64)).power)
+    columns = {f"magnetometer_ga[{axis}]": table[f"magnetometer_ga[{axis}]"] + field[axis] * power for axis in range(3)}
+    found = estimate_magnetic(changed(observed, "vehicle_magnetometer", columns))[0]
+    added = np.array(list(found.values().values())) - list(effects["motor_magnetic_field"].values().values())
+    np.testing.assert_allclose(added, field, atol=1e-3)

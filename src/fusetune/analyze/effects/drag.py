@@ -42,6 +42,7 @@ _SEARCHED_FROM_NEW, _REFINED = 1, 3
 """The first rounds are too far from the truth for the gusts' memory to be kept."""
 _STANDS = 1e-4
 _KNOTS_S = 1.0
+_FEWEST_ROWS = 200
 _WHAT_TO_FLY = (
     "fly forward, backward, left and right between rest and full speed, several times each, on two headings a quarter"
     " turn apart, in still air, for two minutes"
@@ -79,7 +80,7 @@ def fit_drag(observed: ObservedFlight) -> DragFit | str:
     if is_fixed_wing(observed):
         return "not a multicopter"
     used = motion.within(observed.clear_of_ground)
-    if np.count_nonzero(used) * 2 < _FEWEST_ROWS:
+    if np.count_nonzero(used) < _FEWEST_ROWS:
         return f"too short a time in the air away from the ground; {_WHAT_TO_FLY}"
     excited = float(np.linalg.norm(np.std(motion.velocity[used, :2], axis=0)))
     if excited < LEAST_SPEED_M_S:
@@ -96,9 +97,6 @@ def air_density(observed: ObservedFlight) -> float:
         return AIR_DENSITY_SEA_LEVEL
     rho = float(np.median(table["rho"]))
     return rho if math.isfinite(rho) and rho > 0.1 else AIR_DENSITY_SEA_LEVEL
-
-
-_FEWEST_ROWS = 400
 
 
 def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[WalkingFit, Array] | str:

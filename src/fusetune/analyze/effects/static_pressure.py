@@ -30,6 +30,7 @@ LARGEST_ERROR = 0.1
 """Standard error of a coefficient above which it is not told; PX4 takes −0.5 to 0.5."""
 LEAST_SPEED_M_S = 3.0
 _KNOTS_S = 2.0
+_FEWEST = 300
 _WHAT_TO_FLY = (
     "fly forward, backward, left and right between rest and full speed at constant height, several times each, in"
     " still air, with good GNSS"
@@ -82,9 +83,6 @@ def estimate_static_pressure(observed: ObservedFlight, fitted: DragFit | str | N
     missing = ", ".join(names[one] for one in range(len(names)) if one not in known)
     refusal = f"{missing} not told: too little air from there; {_WHAT_TO_FLY}" if missing else ""
     return Effect(name, estimates, refusal, figures)
-
-
-_FEWEST = 300
 
 
 def pressure_heights(air: Array, limit: float) -> Array:
