@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.range_finder import measured_ranges
-from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
+from fusetune.analyze.effects.told import NO_MOTION, refused, stands_still, told_value
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.body_motion import BodyMotion
@@ -96,6 +96,8 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
         return refused(name, f"too few measurements of the flow in the air; {_WHAT_TO_FLY}")
     time, flow = time[usable], np.asarray(samples["flow_rate"][usable], np.float64)
     gyro = np.asarray(samples["gyro_rate"][usable], np.float64)[:, :2]
+    if stands_still(flow):
+        return refused(name, "the optical flow repeats one value")
     ranges = measured_ranges(observed)
     later_s, fit = 0.0, None
     for _ in range(_ROUNDS):

@@ -28,7 +28,7 @@ from fusetune.analyze.effects.declination import true_heading_error
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.gyro_attitude import GyroAttitude, gyro_attitude
 from fusetune.analyze.effects.motor_power import OFF, MotorPower, motor_power
-from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
+from fusetune.analyze.effects.told import NO_MOTION, refused, stands_still, told_value
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.feed.message_samples import gnss_samples, mag_samples
@@ -44,6 +44,8 @@ LEAST_TURN_DEG = 150.0
 """Of all headings; what is seen from one side is nearly one with the earth's field."""
 LARGEST_NOISE_GAUSS = 0.05
 """Residual above which the model does not hold; noisy magnetometers have a tenth of it."""
+LARGEST_WALK_DEG_SQRT_S = 0.6
+"""Of heading and tilt by the gyros against the field; those of autopilots have a tenth of it."""
 LARGEST_SCALE_ERROR = 0.04
 LARGEST_DECLINATION_ERROR_DEG = 2.0
 NORMAL_95 = 1.96
@@ -109,6 +111,8 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
     time, field = samples["time_us"] - delay_us, np.asarray(samples["mag"], np.float64)
     inside = (time > max(int(steps.time[0]), _aligned_from(observed))) & (time < steps.time[-1])
     inside &= np.isfinite(field).all(axis=1) & (np.diff(time, prepend=time[0] - 1) > 0)
+    if stands_still(field[inside]):
+        return "the magnetometer repeats one value"
     attitude = gyro_attitude(steps, observed.airborne)
     time, field, rotation = _thinned(time[inside], field[inside], attitude)
     if time.size < _FEWEST:
@@ -126,6 +130,9 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
     if fitted[0].noise > LARGEST_NOISE_GAUSS:
         why = f"the magnetometer is {fitted[0].noise:.2f} G off the earth's field as the vehicle turns"
         return f"{why}: see first whether it is mounted as PX4 is told, or disturbed from outside"
+    if math.degrees(fitted[0].walk) > LARGEST_WALK_DEG_SQRT_S:
+        why = "the headings by gyros and by magnetometer part"
+        return f"{why}: it is disturbed from outside, or mounted otherwise than PX4 is told"
     return MagneticFit(
         fitted[0],
         power,

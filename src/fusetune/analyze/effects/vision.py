@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.range_finder import lever_arm
-from fusetune.analyze.effects.told import NO_MOTION, refused
+from fusetune.analyze.effects.told import NO_MOTION, refused, stands_still
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.body_motion import BodyMotion
@@ -56,6 +56,8 @@ def estimate_vision_arm(observed: ObservedFlight) -> Effect:
     if np.count_nonzero(known) < _FEWEST:
         return refused(name, f"too few positions of the vision system in the air; {_WHAT_TO_FLY}")
     time, measured = time[known], np.asarray(samples["pos"][known], np.float64)
+    if stands_still(measured):
+        return refused(name, "the vision system repeats one position")
     every = max(1, round(1.0 / (FASTEST_HZ * max(float(np.median(np.diff(time))) * 1e-6, 1e-3))))
     found = _fit(motion, time[::every], measured[::every])
     if found is None:
