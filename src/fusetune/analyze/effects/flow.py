@@ -1,9 +1,9 @@
 """Optical flow: its scale (`SENS_FLOW_SCALE`) and where it sits (`EKF2_OF_POS_*`).
 
-    flow = s (sight(v + ω × p) + turning) + offset + e        sight = (v_y, −v_x) / distance
+    flow = s (sight(v + ω × p) + turning) + offset + walk + e        sight = (v_y, −v_x) / distance
 
-The velocity is the replay's, the distance the range finder's or, without one, the height above take-off. A distance
-that is wrong by a share makes the scale wrong by nearly as much.
+The velocity is that of IMU and GNSS, whose own error is the walk; the distance is the range finder's or, without one,
+the height above take-off. A distance that is wrong by a share makes the scale wrong by nearly as much.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ Array = npt.NDArray[np.float64]
 LARGEST_SCALE_ERROR = 0.03
 LARGEST_ARM_ERROR_M = 0.065
 """Standard errors above which they are not told; high above ground an arm moves the flow by next to nothing."""
+VELOCITY_MEMORIES_S = (2.0, 10.0)
 LEAST_DISTANCE_M = 0.8
 LARGEST_DELAY_S = 0.3
 """Further from what it is told no delay is looked for."""
@@ -34,6 +35,7 @@ EXPECTED = np.array([np.inf, 1.0, 1.0, 1.0, 0.05, 0.05, 0.1])
 """Standard deviations beforehand: scale; arm m; offsets rad/s; delay s."""
 _FEWEST = 200
 _LEAST_SCALE = 0.1
+_KNOTS_S = 1.0
 _ROUNDS = 4
 _WHAT_TO_FLY = (
     "fly back and forth and sideways, two to five metres high above textured, even ground, and turn on the spot"
@@ -49,7 +51,11 @@ class _Flow(NamedTuple):
 
 
 def _fitted(
-    observed: ObservedFlight, motion: BodyMotion, ranges: tuple[npt.NDArray[np.int64], Array] | None, seen: _Flow
+    observed: ObservedFlight,
+    motion: BodyMotion,
+    ranges: tuple[npt.NDArray[np.int64], Array] | None,
+    seen: _Flow,
+    like: WalkingFit | None,
 ) -> WalkingFit | None:
     """Scale, scale times arm, offsets, and by how much the flow is later than the times say."""
     if ranges is not None:
@@ -77,8 +83,17 @@ def _fitted(
         later = -np.gradient(sight[:, axis], time_s)
         columns = [sight[:, axis] + gyro[:, axis], arms[axis] / distance[:, None], *offset, later]
         design.append(np.column_stack(columns))
-    walking = np.zeros((2 * time.size, 0))
-    return fit_walking(WalkingRows(np.tile(time_s, 2), flow.ravel(order="F"), np.vstack(design), walking, EXPECTED))
+    # the reference's own error of the velocity, along the body, wanders; far above ground it shows less
+    rows = WalkingRows(
+        time_s=np.tile(time_s, 2),
+        target=flow.ravel(order="F"),
+        design=np.vstack(design),
+        walking=np.asarray(np.kron(np.eye(2), (1.0 / distance)[:, None]), np.float64),
+        expected=EXPECTED,
+        knots_s=_KNOTS_S,
+        memories_s=VELOCITY_MEMORIES_S,
+    )
+    return fit_walking(rows, like)
 
 
 def estimate_flow(observed: ObservedFlight) -> Effect:
@@ -99,9 +114,10 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
     if stands_still(flow):
         return refused(name, "the optical flow repeats one value")
     ranges = measured_ranges(observed)
-    later_s, fit = 0.0, None
+    later_s = 0.0
+    fit: WalkingFit | None = None
     for _ in range(_ROUNDS):
-        fit = _fitted(observed, motion, ranges, _Flow(time - round(later_s * 1e6), flow, gyro))
+        fit = _fitted(observed, motion, ranges, _Flow(time - round(later_s * 1e6), flow, gyro), fit)
         if fit is None or fit.constants[0] <= _LEAST_SCALE:
             why = f"the flow does not follow the motion {LEAST_DISTANCE_M} m and more above ground"
             return refused(name, f"{why}; {_WHAT_TO_FLY}")
