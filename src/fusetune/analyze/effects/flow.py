@@ -123,28 +123,30 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
             return refused(name, f"{why}; {_WHAT_TO_FLY}")
         later_s = float(np.clip(later_s + fit.constants[-1], -LARGEST_DELAY_S, LARGEST_DELAY_S))
     assert fit is not None
-    scale, half, error = float(fit.constants[0]), fit.half_width(0), float(fit.standard_error[0])
     figures = {"residual_rad_s": fit.noise, "by_range": float(ranges is not None), "later_s": later_s}
+    estimates, missing = _told(observed, fit, time.size)
+    refusal = f"{', '.join(missing)} not told: {_WHAT_TO_FLY}" if missing else ""
+    return Effect(name, tuple(estimates), refusal, figures)
+
+
+def _told(observed: ObservedFlight, fit: WalkingFit, n: int) -> tuple[list[Estimate], list[str]]:
+    """Scale and arms that the fit tells, and the names of those that it does not."""
     estimates, missing = [], []
+    scale, half, error = float(fit.constants[0]), fit.half_width(0), float(fit.standard_error[0])
     if error > LARGEST_SCALE_ERROR:
         missing.append("SENS_FLOW_SCALE")
     else:
         told = told_value(observed.logged.parameters.initial, "SENS_FLOW_SCALE")
         unit = 1.0 if told is None else told
-        estimates.append(
-            Estimate(
-                "SENS_FLOW_SCALE", "", told, unit / scale, unit / (scale + half), unit / (scale - half),
-                unit * error / scale**2, time.size,
-            )
-        )  # fmt: skip
-    for index, letter in enumerate("XYZ"):
-        arm = f"EKF2_OF_POS_{letter}"
-        spread, width = float(fit.standard_error[1 + index]) / scale, fit.half_width(1 + index) / scale
+        lower, upper = unit / (scale + half), unit / (scale - half)
+        estimates.append(Estimate("SENS_FLOW_SCALE", "", told, unit / scale, lower, upper, unit * error / scale**2, n))
+    for index, letter in enumerate("XYZ", start=1):
+        name = f"EKF2_OF_POS_{letter}"
+        spread, width = float(fit.standard_error[index]) / scale, fit.half_width(index) / scale
         if spread > LARGEST_ARM_ERROR_M:
-            missing.append(arm)
+            missing.append(name)
             continue
-        value = float(fit.constants[1 + index]) / scale + observed.parameters.get(f"EKF2_IMU_POS_{letter}", 0.0)
-        told_arm = observed.parameters.get(arm)
-        estimates.append(Estimate(arm, "m", told_arm, value, value - width, value + width, spread, time.size))
-    refusal = f"{', '.join(missing)} not told: {_WHAT_TO_FLY}" if missing else ""
-    return Effect(name, tuple(estimates), refusal, figures)
+        value = float(fit.constants[index]) / scale + observed.parameters.get(f"EKF2_IMU_POS_{letter}", 0.0)
+        told = observed.parameters.get(name)
+        estimates.append(Estimate(name, "m", told, value, value - width, value + width, spread, n))
+    return estimates, missing

@@ -124,7 +124,8 @@ def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
         time, field, rotation = time[known], field[known], rotation[known]
         power = MotorPower(power.kind, power.unit, power.power[known])
     drawn = power.power if has_power else np.zeros(time.size)
-    fitted = _gauss_newton(time, field, rotation, attitude.turned_at(time), drawn, world)
+    time_s = np.asarray(time * 1e-6, np.float64)
+    fitted = _gauss_newton(_Samples(time_s, field, rotation, attitude.turned_at(time), drawn), world)
     if fitted is None:
         return "too short a log for the magnetic field"
     if fitted[0].noise > LARGEST_NOISE_GAUSS:
@@ -178,62 +179,79 @@ def _thinned(time: Times, field: Array, attitude: GyroAttitude) -> tuple[Times, 
     return np.rint(time[:rows].reshape(-1, every).mean(axis=1)).astype(np.int64), *means
 
 
-def _gauss_newton(
-    time: Times, field: Array, rotation: Array, turned: Array, power: Array, world: Array
-) -> tuple[WalkingFit, Array] | None:
+@dataclass(frozen=True)
+class _Samples:
+    """Fields (N, 3) at times (N,), s; attitude (N, 3, 3), how far it turned (N,), rad, and the motors' power (N,)."""
+
+    time_s: Array
+    field: Array
+    rotation: Array
+    turned: Array
+    power: Array
+
+    @property
+    def since_s(self) -> Array:
+        return np.asarray(self.time_s - self.time_s[0])
+
+
+def _gauss_newton(samples: _Samples, world: Array) -> tuple[WalkingFit, Array] | None:
     """The fit and the heading's error at the samples."""
-    time_s = np.asarray(time * 1e-6, np.float64)
-    since_s = time_s - time_s[0]
-    level, scale = math.hypot(world[0], world[1]), np.zeros(3)
-    error = np.full(time.size, _first_error(rotation, field, world))
-    earth = world.copy()
+    level, scale, earth = math.hypot(world[0], world[1]), np.zeros(3), world.copy()
+    error = np.full(samples.time_s.size, _first_error(samples.rotation, samples.field, world))
     fit: WalkingFit | None = None
-    stacked = np.tile(time_s, 3)
     for number in range(_ROUNDS):
-        cosine, sine = np.cos(error), np.sin(error)
-        # the earth's field as the attitude with the wrong heading sees it, and its change with that heading
-        seen = np.column_stack([cosine * earth[0] + sine * earth[1], cosine * earth[1] - sine * earth[0]])
-        unit = seen / max(float(np.hypot(earth[0], earth[1])), 1e-6)
-        down = rotation[:, 2]
-        body = rotation[:, 0] * seen[:, :1] + rotation[:, 1] * seen[:, 1:] + down * earth[2]
-        across = rotation[:, 0] * seen[:, 1:] - rotation[:, 1] * seen[:, :1]
-        strong = rotation[:, 0] * unit[:, :1] + rotation[:, 1] * unit[:, 1:]
-        gain = 1.0 + scale
-        rows = []
-        for axis in range(3):
-            one = np.zeros((time.size, EXPECTED.size))
-            one[:, FIELD_H], one[:, FIELD_V] = gain[axis] * strong[:, axis], gain[axis] * down[:, axis]
-            one[:, HARD.start + axis], one[:, MOTOR.start + axis] = 1.0, power
-            one[:, SCALE.start + axis] = body[:, axis]
-            crossed = slice(CROSSED.start + 2 * axis, CROSSED.start + 2 * axis + 2)
-            one[:, crossed] = body[:, _OTHERS[axis]]
-            turns = gain[axis] * across[:, axis]
-            one[:, DELAY] = -gain[axis] * np.gradient(body[:, axis], time_s)
-            one[:, DRIFT], one[:, GYRO_SCALE] = turns * since_s, turns * turned
-            # R'ᵀ (E' × e) of rotations e about north and east, which the tilt may be off by
-            tilts = gain[axis] * np.column_stack([
-                earth[2] * rotation[:, 1, axis] - seen[:, 1] * down[:, axis],
-                seen[:, 0] * down[:, axis] - earth[2] * rotation[:, 0, axis],
-            ])  # fmt: skip
-            rows.append(
-                (one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error)
-            )
-        design, walking = np.vstack([one for one, _, _ in rows]), np.vstack([one for _, one, _ in rows])
-        offsets = earth_change(earth, world)
-        target = np.concatenate([one for _, _, one in rows])
+        target, design, walking = _linearised(samples, earth, scale, error)
         # fields are told as changes of the world's, scales as they are
-        target = target + design[:, :2] @ offsets + design[:, SCALE] @ scale
-        given = WalkingRows(stacked, target, design, walking, EXPECTED, _KNOTS_S, starts=STARTS)
-        fit = fit_walking(given, fit, refined=number == 1)
+        target = target + design[:, :2] @ earth_change(earth, world) + design[:, SCALE] @ scale
+        stacked = np.tile(samples.time_s, 3)
+        fit = fit_walking(
+            WalkingRows(stacked, target, design, walking, EXPECTED, _KNOTS_S, starts=STARTS), fit, refined=number == 1
+        )
         if fit is None:
             return None
         scale = fit.constants[SCALE].copy()
         factor = (level + fit.constants[FIELD_H]) / level
         earth = np.array([world[0] * factor, world[1] * factor, world[2] + fit.constants[FIELD_V]])
-        error = np.interp(time_s, fit.knot_s, fit.course[:, 0])
-        error = error + fit.constants[DRIFT] * since_s + fit.constants[GYRO_SCALE] * turned
+        error = np.interp(samples.time_s, fit.knot_s, fit.course[:, 0])
+        error = error + fit.constants[DRIFT] * samples.since_s + fit.constants[GYRO_SCALE] * samples.turned
     assert fit is not None
     return fit, error
+
+
+def _linearised(samples: _Samples, earth: Array, scale: Array, error: Array) -> tuple[Array, Array, Array]:
+    """What is left of the fields (3 N,), and how it changes with the constants (3 N, P) and with the wander (3 N, 3).
+
+    Parameters
+    ----------
+    earth, scale : (3,) field, and error of the scale, around which the model is taken as linear
+    error : (N,) of the heading, rad
+    """
+    rotation, cosine, sine = samples.rotation, np.cos(error), np.sin(error)
+    # the earth's field as the attitude with the wrong heading sees it, and its change with that heading
+    seen = np.column_stack([cosine * earth[0] + sine * earth[1], cosine * earth[1] - sine * earth[0]])
+    unit = seen / max(float(np.hypot(earth[0], earth[1])), 1e-6)
+    down = rotation[:, 2]
+    body = rotation[:, 0] * seen[:, :1] + rotation[:, 1] * seen[:, 1:] + down * earth[2]
+    across = rotation[:, 0] * seen[:, 1:] - rotation[:, 1] * seen[:, :1]
+    strong = rotation[:, 0] * unit[:, :1] + rotation[:, 1] * unit[:, 1:]
+    left, designs, wanders = [], [], []
+    for axis in range(3):
+        gain = 1.0 + scale[axis]
+        turns = gain * across[:, axis]
+        design = np.zeros((samples.time_s.size, EXPECTED.size))
+        design[:, FIELD_H], design[:, FIELD_V] = gain * strong[:, axis], gain * down[:, axis]
+        design[:, HARD.start + axis], design[:, MOTOR.start + axis] = 1.0, samples.power
+        design[:, SCALE.start + axis] = body[:, axis]
+        design[:, CROSSED.start + 2 * axis : CROSSED.start + 2 * axis + 2] = body[:, _OTHERS[axis]]
+        design[:, DELAY] = -gain * np.gradient(body[:, axis], samples.time_s)
+        design[:, DRIFT], design[:, GYRO_SCALE] = turns * samples.since_s, turns * samples.turned
+        # R'ᵀ (E' × e) of rotations e about north and east, which the tilt may be off by
+        north = gain * (earth[2] * rotation[:, 1, axis] - seen[:, 1] * down[:, axis])
+        east = gain * (seen[:, 0] * down[:, axis] - earth[2] * rotation[:, 0, axis])
+        left.append(samples.field[:, axis] - gain * body[:, axis] + turns * error)
+        designs.append(design)
+        wanders.append(np.column_stack([turns, north, east]))
+    return np.concatenate(left), np.vstack(designs), np.vstack(wanders)
 
 
 def earth_change(earth: Array, world: Array) -> Array:
