@@ -27,7 +27,8 @@ from fusetune.ekf2.feed.message_samples import (
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
-LARGEST_ERROR = 0.05
+LARGEST_ERROR = 0.1
+"""Standard error over the scale above which it is not told."""
 LEAST_AIRSPEED_M_S = 2.0
 EXPECTED = np.array([np.inf, 15.0, 15.0])
 FASTEST_HZ = 10.0
