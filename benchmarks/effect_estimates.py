@@ -64,6 +64,8 @@ def true_values(document: Mapping[str, float]) -> dict[str, float]:
         found[f"hard_iron_{axis}"] = document.get(f"hard_iron_{axis}_gauss", np.nan)
         per_a = document.get(f"motor_field_{axis}_gauss_per_a", np.nan)
         found[f"motor_field_{axis}"] = GAUSS_PER_A_IN_GAUSS_PER_KA * per_a
+    for name, parameter in (("flow_scale", "SENS_FLOW_SCALE"), ("airspeed_scale", "ASPD_SCALE_1")):
+        found[parameter] = 1.0 / document.get(name, np.nan)
     return {name: value for name, value in found.items() if np.isfinite(value)}
 
 

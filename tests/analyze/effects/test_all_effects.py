@@ -165,3 +165,28 @@ def test_a_motor_field_is_found_where_there_is_one(observed: ObservedFlight, eff
     found = estimate_magnetic(changed(observed, "vehicle_magnetometer", columns))[0]
     added = np.array(list(found.values().values())) - list(effects["motor_magnetic_field"].values().values())
     np.testing.assert_allclose(added, field, atol=1e-3)
+
+
+def test_parameters_of_px4_take_the_other_sign_and_what_they_have_already(
+    observed: ObservedFlight, effects: dict[str, Effect]
+) -> None:
+    """data + power · COMP − OFF: with throttle at 0.42 of weight COMP is −c/0.42, and OFF what it was and h."""
+    flight = observed.flight
+    device = int(flight.topics["vehicle_magnetometer", 0]["device_id"][0])
+    told = {"CAL_MAG0_ID": device, "CAL_MAG0_ROT": 0, "CAL_MAG0_XOFF": 0.05, "CAL_MAG0_YCOMP": 0.02}
+    parameters = replace(observed.logged.parameters, initial=observed.logged.parameters.initial | told)
+    time = flight.topics["vehicle_magnetometer", 0]["timestamp_sample"].astype(np.int64)
+    power = motor_power(observed, time).power
+    known = np.isfinite(power)
+    throttle = {"timestamp": time[known], "xyz[2]": -0.42 * power[known]}
+    other = ObservedFlight(replace(observed.logged, parameters=parameters))
+    kept = {name: value for name, value in vars(observed).items() if name != "logged"}
+    topics = flight.topics | {("vehicle_thrust_setpoint", 0): throttle}
+    vars(other).update(kept | {"flight": flight.with_topics(topics)})
+    motor, iron, *_ = estimate_magnetic(other)
+    assert motor.figures["CAL_MAG_COMP_TYP"] == 1.0
+    before = effects["motor_magnetic_field"].values()
+    assert motor.values()["CAL_MAG0_XCOMP"] == pytest.approx(-before["motor_field_x"] / 0.42, abs=2e-3)
+    assert motor.values()["CAL_MAG0_YCOMP"] == pytest.approx(0.02 - before["motor_field_y"] / 0.42, abs=2e-3)
+    iron_before = effects["hard_iron"].values()["hard_iron_x"]
+    assert iron.values()["CAL_MAG0_XOFF"] == pytest.approx(0.05 + iron_before, abs=2e-3)

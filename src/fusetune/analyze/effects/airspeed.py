@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.effects.drag import WIND_MEMORIES_S
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
+from fusetune.analyze.effects.told import NO_MOTION, refused, stands_still, told_value
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
@@ -27,7 +27,8 @@ from fusetune.ekf2.feed.message_samples import (
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
-LARGEST_ERROR = 0.05
+LARGEST_ERROR = 0.1
+"""Standard error over the scale above which it is not told."""
 LEAST_AIRSPEED_M_S = 2.0
 EXPECTED = np.array([np.inf, 15.0, 15.0])
 FASTEST_HZ = 10.0
@@ -48,6 +49,8 @@ def estimate_airspeed_scale(observed: ObservedFlight) -> Effect:
     time, speed = time[used], speed[used]
     if time.size < _FEWEST:
         return refused(name, f"too few airspeeds in the air; {_WHAT_TO_FLY}")
+    if stands_still(speed):
+        return refused(name, "the airspeed sensor repeats one value")
     every = max(1, round(1.0 / (FASTEST_HZ * max(float(np.median(np.diff(time))) * 1e-6, 1e-3))))
     time, speed = time[::every], speed[::every]
     fit = _gauss_newton(np.asarray(time * 1e-6, np.float64), speed, motion.at(time, motion.velocity))

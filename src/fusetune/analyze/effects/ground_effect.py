@@ -49,7 +49,9 @@ def estimate_ground_effect(observed: ObservedFlight) -> Effect:
     motion, name = observed.motion, "ground_effect"
     rows = barometer_rows(observed)
     if motion is None or rows is None:
-        return refused(name, NO_MOTION if motion is None else "the log has no barometer (`vehicle_air_data`)")
+        return refused(
+            name, NO_MOTION if motion is None else "the log has no barometer that measures (`vehicle_air_data`)"
+        )
     if is_fixed_wing(observed):
         return refused(name, "EKF2 takes no ground effect of a fixed wing into account")
     if not observed.airborne:

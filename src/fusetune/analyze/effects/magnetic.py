@@ -1,11 +1,6 @@
-"""The field that turns with the vehicle: motors, hard iron, scale; and the declination.
+"""Motor field, hard iron, scale and declination out of the fit of the magnetometer (`magnetic_fit`).
 
-    m = (1 + S) R(t)ᵀ E + h + c u(t) + noise
-
-E is the earth's field, whose strength and dip the World Magnetic Model tells within some milligauss, R the attitude
-that the gyros alone turn (`gyro_attitude`) and whose error is a constant rate, a share of the way turned, and a walk; u
-is the power of the motors (`motor_power`). From before arming to the air u jumps while E does not: that is what tells c
-from h.
+Its terms: c of the motors, h of the body, S of the scale.
 
 PX4 corrects what a sensor measures as rotation · scale · (data + power · COMP − OFF) (`Magnetometer::Correct`), so COMP
 falls by c and OFF rises by h, both over the scale.
@@ -22,223 +17,24 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fusetune.analyze.effects.declination import true_heading_error
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.gyro_attitude import GyroAttitude, gyro_attitude
-from fusetune.analyze.effects.motor_power import OFF, MotorPower, motor_power
-from fusetune.analyze.effects.told import NO_MOTION, refused, told_value
-from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
+from fusetune.analyze.effects.magnetic_fit import HARD, MOTOR, SCALE, MagneticFit, fit_magnetic
+from fusetune.analyze.effects.motor_power import OFF
+from fusetune.analyze.effects.told import refused, told_value
+from fusetune.analyze.effects.walking_regression import WalkingFit
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.ekf2.feed.message_samples import gnss_samples, mag_samples
-from fusetune.ekf2.numerics.world_magnetic_model import field_at
-
-Array = npt.NDArray[np.float64]
-Times = npt.NDArray[np.int64]
 
 LARGEST_FIELD_ERROR_GAUSS = 0.003
 """Standard error of a field above which it is not told: about 1° of heading."""
 LARGEST_IRON_ERROR_GAUSS = 0.005
 LEAST_TURN_DEG = 150.0
 """Of all headings; what is seen from one side is nearly one with the earth's field."""
-LARGEST_NOISE_GAUSS = 0.05
-"""Residual above which the model does not hold; noisy magnetometers have a tenth of it."""
 LARGEST_SCALE_ERROR = 0.04
 LARGEST_DECLINATION_ERROR_DEG = 2.0
 NORMAL_95 = 1.96
-MODEL_ERROR_GAUSS = 0.005
-"""Standard deviation of the field at a place from the model of the world's."""
-EXPECTED = np.array([
-    MODEL_ERROR_GAUSS, MODEL_ERROR_GAUSS, *[0.3] * 3, *[10.0] * 3, *[0.05] * 3, 0.002, 0.003, *[0.02] * 6, 0.01,
-])  # fmt: skip
-"""Standard deviations beforehand: horizontal and vertical field, hard iron, motors, scale, drift rad/s, gyro scale,
-what one axis shows of another, delay s."""
-STARTS = np.array([np.inf, 0.01, 0.01])
-"""The same, of heading and tilt at the beginning, rad."""
-FIELD_H, FIELD_V = 0, 1
-HARD, MOTOR, SCALE = slice(2, 5), slice(5, 8), slice(8, 11)
-DRIFT, GYRO_SCALE = 11, 12
-CROSSED = slice(13, 19)
-DELAY = 19
-_OTHERS = ((1, 2), (0, 2), (0, 1))
-FASTEST_HZ = 12.5
-_ROUNDS = 3
-_FEWEST = 100
-_KNOTS_S = 2.0
 _AXES = "XYZ"
-
-
-@dataclass(frozen=True)
-class MagneticFit:
-    """What was found.
-
-    Attributes
-    ----------
-    fit : constants in the order of `EXPECTED`
-    power : of the motors at the samples, where `has_power`
-    declination_deg, level_gauss : of the world's field, and its horizontal strength
-    turned : from the leftmost to the rightmost heading, rad
-    heading, heading_error : the attitude, and by how much its heading is off at `time`, (N,) rad
-    """
-
-    fit: WalkingFit
-    power: MotorPower
-    has_power: bool
-    declination_deg: float
-    level_gauss: float
-    turned: float
-    heading: GyroAttitude
-    time: Times
-    heading_error: Array
-
-
-def fit_magnetic(observed: ObservedFlight) -> MagneticFit | str:
-    """Fit all of it; a refusal in words where the log does not hold what it takes."""
-    table = observed.flight.topic("vehicle_magnetometer")
-    if table is None or table["timestamp"].size < 100:
-        return "the log has too few messages of the magnetometer (`vehicle_magnetometer`)"
-    if observed.replayed.steps is None:
-        return NO_MOTION
-    world = _world_field(observed)
-    if world is None:
-        return "the log has no position from which the earth's field would follow"
-    steps = observed.replayed.steps()
-    samples = mag_samples(table)
-    delay_us = round(1e3 * observed.parameters.get("EKF2_MAG_DELAY", 0.0))
-    time, field = samples["time_us"] - delay_us, np.asarray(samples["mag"], np.float64)
-    inside = (time > max(int(steps.time[0]), _aligned_from(observed))) & (time < steps.time[-1])
-    inside &= np.isfinite(field).all(axis=1) & (np.diff(time, prepend=time[0] - 1) > 0)
-    attitude = gyro_attitude(steps, observed.airborne)
-    time, field, rotation = _thinned(time[inside], field[inside], attitude)
-    if time.size < _FEWEST:
-        return "magnetometer and attitude hardly overlap"
-    power = motor_power(observed, time)
-    known = np.isfinite(power.power)
-    has_power = bool(np.count_nonzero(known) > 50 and np.ptp(power.power[known]) > 0.0)
-    if has_power:
-        time, field, rotation = time[known], field[known], rotation[known]
-        power = MotorPower(power.kind, power.unit, power.power[known])
-    drawn = power.power if has_power else np.zeros(time.size)
-    fitted = _gauss_newton(time, field, rotation, attitude.turned_at(time), drawn, world)
-    if fitted is None:
-        return "too short a log for the magnetic field"
-    if fitted[0].noise > LARGEST_NOISE_GAUSS:
-        why = f"the magnetometer is {fitted[0].noise:.2f} G off the earth's field as the vehicle turns"
-        return f"{why}: see first whether it is mounted as PX4 is told, or disturbed from outside"
-    return MagneticFit(
-        fitted[0],
-        power,
-        has_power,
-        math.degrees(math.atan2(world[1], world[0])),
-        math.hypot(*world[:2]),
-        float(np.ptp(attitude.turned_at(time))),
-        attitude,
-        time,
-        fitted[1],
-    )
-
-
-def _world_field(observed: ObservedFlight) -> Array | None:
-    table = observed.flight.topic("vehicle_gps_position")
-    if table is None:
-        return None
-    samples = gnss_samples(table)
-    good = (samples["fix_type"] >= 3) & np.isfinite(samples["lat_deg"]) & np.isfinite(samples["lon_deg"])
-    if not good.any():
-        return None
-    place = int(np.argmax(good))
-    declination, inclination, strength = field_at(float(samples["lat_deg"][place]), float(samples["lon_deg"][place]))
-    level = strength * math.cos(inclination)
-    return np.array([level * math.cos(declination), level * math.sin(declination), strength * math.sin(inclination)])
-
-
-def _aligned_from(observed: ObservedFlight) -> int:
-    """When the replay's tilt was known, µs."""
-    flags = observed.replayed.flags
-    if "cs_tilt_align" not in flags or not np.any(flags["cs_tilt_align"]):
-        return 0
-    return int(flags["timestamp"][int(np.argmax(np.asarray(flags["cs_tilt_align"], bool)))])
-
-
-def _thinned(time: Times, field: Array, attitude: GyroAttitude) -> tuple[Times, Array, Array]:
-    """Means of so many neighbours that no more than `FASTEST_HZ` are left: times, fields and rotations."""
-    step_s = float(np.median(np.diff(time))) * 1e-6 if time.size > 1 else 1.0
-    every = max(1, round(1.0 / (FASTEST_HZ * max(step_s, 1e-3))))
-    rows = time.size // every * every
-    rotation = attitude.rotation_at(time[:rows]) if rows else np.zeros((0, 3, 3))
-    means = (field[:rows].reshape(-1, every, 3).mean(axis=1), rotation.reshape(-1, every, 3, 3).mean(axis=1))
-    return np.rint(time[:rows].reshape(-1, every).mean(axis=1)).astype(np.int64), *means
-
-
-def _gauss_newton(
-    time: Times, field: Array, rotation: Array, turned: Array, power: Array, world: Array
-) -> tuple[WalkingFit, Array] | None:
-    """The fit and the heading's error at the samples."""
-    time_s = np.asarray(time * 1e-6, np.float64)
-    since_s = time_s - time_s[0]
-    level, scale = math.hypot(world[0], world[1]), np.zeros(3)
-    error = np.full(time.size, _first_error(rotation, field, world))
-    earth = world.copy()
-    fit: WalkingFit | None = None
-    stacked = np.tile(time_s, 3)
-    for number in range(_ROUNDS):
-        cosine, sine = np.cos(error), np.sin(error)
-        # the earth's field as the attitude with the wrong heading sees it, and its change with that heading
-        seen = np.column_stack([cosine * earth[0] + sine * earth[1], cosine * earth[1] - sine * earth[0]])
-        unit = seen / max(float(np.hypot(earth[0], earth[1])), 1e-6)
-        down = rotation[:, 2]
-        body = rotation[:, 0] * seen[:, :1] + rotation[:, 1] * seen[:, 1:] + down * earth[2]
-        across = rotation[:, 0] * seen[:, 1:] - rotation[:, 1] * seen[:, :1]
-        strong = rotation[:, 0] * unit[:, :1] + rotation[:, 1] * unit[:, 1:]
-        gain = 1.0 + scale
-        rows = []
-        for axis in range(3):
-            one = np.zeros((time.size, EXPECTED.size))
-            one[:, FIELD_H], one[:, FIELD_V] = gain[axis] * strong[:, axis], gain[axis] * down[:, axis]
-            one[:, HARD.start + axis], one[:, MOTOR.start + axis] = 1.0, power
-            one[:, SCALE.start + axis] = body[:, axis]
-            crossed = slice(CROSSED.start + 2 * axis, CROSSED.start + 2 * axis + 2)
-            one[:, crossed] = body[:, _OTHERS[axis]]
-            turns = gain[axis] * across[:, axis]
-            one[:, DELAY] = -gain[axis] * np.gradient(body[:, axis], time_s)
-            one[:, DRIFT], one[:, GYRO_SCALE] = turns * since_s, turns * turned
-            # R'ᵀ (E' × e) of rotations e about north and east, which the tilt may be off by
-            tilts = gain[axis] * np.column_stack([
-                earth[2] * rotation[:, 1, axis] - seen[:, 1] * down[:, axis],
-                seen[:, 0] * down[:, axis] - earth[2] * rotation[:, 0, axis],
-            ])  # fmt: skip
-            rows.append(
-                (one, np.column_stack([turns, tilts]), field[:, axis] - gain[axis] * body[:, axis] + turns * error)
-            )
-        design, walking = np.vstack([one for one, _, _ in rows]), np.vstack([one for _, one, _ in rows])
-        offsets = earth_change(earth, world)
-        target = np.concatenate([one for _, _, one in rows])
-        # fields are told as changes of the world's, scales as they are
-        target = target + design[:, :2] @ offsets + design[:, SCALE] @ scale
-        given = WalkingRows(stacked, target, design, walking, EXPECTED, _KNOTS_S, starts=STARTS)
-        fit = fit_walking(given, fit, refined=number == 1)
-        if fit is None:
-            return None
-        scale = fit.constants[SCALE].copy()
-        factor = (level + fit.constants[FIELD_H]) / level
-        earth = np.array([world[0] * factor, world[1] * factor, world[2] + fit.constants[FIELD_V]])
-        error = np.interp(time_s, fit.knot_s, fit.course[:, 0])
-        error = error + fit.constants[DRIFT] * since_s + fit.constants[GYRO_SCALE] * turned
-    assert fit is not None
-    return fit, error
-
-
-def earth_change(earth: Array, world: Array) -> Array:
-    """By how much a field is stronger than another in the horizontal and in the vertical, (2,)."""
-    return np.array([math.hypot(*earth[:2]) - math.hypot(*world[:2]), earth[2] - world[2]])
-
-
-def _first_error(rotation: Array, field: Array, world: Array) -> float:
-    """Error of the heading by the first samples."""
-    first = np.einsum("nij,nj->ni", rotation[:20], field[:20]).mean(axis=0)
-    # true = Rz(error) · attitude
-    return float(math.atan2(world[1], world[0]) - math.atan2(first[1], first[0]))
 
 
 def estimate_magnetic(observed: ObservedFlight) -> tuple[Effect, ...]:

@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.delays.delayed_series import measured_distances
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.told import NO_MOTION, refused
+from fusetune.analyze.effects.told import NO_MOTION, refused, stands_still
 from fusetune.analyze.effects.walking_regression import BLOCK_S, WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
@@ -84,6 +84,8 @@ def fit_range(observed: ObservedFlight) -> RangeFit | str:
     time, distance = time[used], distance[used]
     if time.size < _FEWEST:
         return "too few distances in the air"
+    if stands_still(distance):
+        return "the range finder repeats one value"
     down = motion.rotation_at(time)[:, 2]
     upright = down[:, 2] > _STEEPEST
     time, distance, down = time[upright], distance[upright], down[upright]

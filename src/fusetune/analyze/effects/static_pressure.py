@@ -47,7 +47,9 @@ def estimate_static_pressure(observed: ObservedFlight, fitted: DragFit | str | N
     motion, name = observed.motion, "static_pressure"
     rows = barometer_rows(observed)
     if motion is None or rows is None:
-        return refused(name, NO_MOTION if motion is None else "the log has no barometer (`vehicle_air_data`)")
+        return refused(
+            name, NO_MOTION if motion is None else "the log has no barometer that measures (`vehicle_air_data`)"
+        )
     time, altitude = rows
     used = inside(time, observed.clear_of_ground)
     if np.count_nonzero(used) < _FEWEST:

@@ -38,6 +38,19 @@ def refused(effect: str, why: str, **figures: float) -> Effect:
     return Effect(effect, (), why, figures)
 
 
+LARGEST_REPEATED_SHARE = 0.95
+"""Of messages; noise moves every sample of a sensor that measures."""
+
+
+def stands_still(values: Array) -> bool:
+    """Whether a sensor, (N,) or (N, D), repeats one value, or tells hardly any."""
+    if values.shape[0] < 2:
+        return True
+    repeated = np.diff(values, axis=0) == 0.0
+    repeated = repeated if repeated.ndim == 1 else repeated.all(axis=1)
+    return bool(np.mean(repeated) > LARGEST_REPEATED_SHARE)
+
+
 def barometer_rows(observed: ObservedFlight) -> tuple[npt.NDArray[np.int64], Array] | None:
     """Times of measurement (N,), µs, and altitudes (N,), m, where the motion is known; None without any."""
     table, motion = observed.flight.topic("vehicle_air_data"), observed.motion
@@ -46,7 +59,8 @@ def barometer_rows(observed: ObservedFlight) -> tuple[npt.NDArray[np.int64], Arr
     samples, _ = baro_samples(table)
     time = samples["time_us"] - round(1e3 * observed.parameters.get("EKF2_BARO_DELAY", 0.0))
     usable = np.isfinite(samples["hgt"]) & motion.covers(time)
-    return (time[usable], np.asarray(samples["hgt"][usable], np.float64)) if usable.any() else None
+    time, altitude = time[usable], np.asarray(samples["hgt"][usable], np.float64)
+    return None if stands_still(altitude) else (time, altitude)
 
 
 FIXED_WING = 2

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.range_finder import lever_arm
-from fusetune.analyze.effects.told import NO_MOTION, refused
+from fusetune.analyze.effects.told import NO_MOTION, refused, stands_still
 from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
 from fusetune.analyze.flight.intervals import inside
 from fusetune.analyze.observed.body_motion import BodyMotion
@@ -32,6 +32,8 @@ HEADING, SCALE, DELAY = 3, 4, 5
 """Of the constants; the first three are the arm."""
 EXPECTED = np.array([1.0, 1.0, 1.0, np.inf, 0.3, 0.1])
 """Standard deviations beforehand: arm m, heading rad, scale, delay s."""
+POSITION_UNCERTAINTY = 1.3
+"""Factor on the standard errors: the way drifts with GNSS, of which no walk is the whole (docs/effects.md)."""
 LARGEST_SCALE_ERROR = 0.05
 LARGEST_DELAY_S = 0.3
 """Further from what it is told no delay is looked for."""
@@ -56,11 +58,14 @@ def estimate_vision_arm(observed: ObservedFlight) -> Effect:
     if np.count_nonzero(known) < _FEWEST:
         return refused(name, f"too few positions of the vision system in the air; {_WHAT_TO_FLY}")
     time, measured = time[known], np.asarray(samples["pos"][known], np.float64)
+    if stands_still(measured):
+        return refused(name, "the vision system repeats one position")
     every = max(1, round(1.0 / (FASTEST_HZ * max(float(np.median(np.diff(time))) * 1e-6, 1e-3))))
     found = _fit(motion, time[::every], measured[::every])
     if found is None:
         return refused(name, f"too short a time in the air; {_WHAT_TO_FLY}")
     fit, heading, later_s = found
+    fit = replace(fit, standard_error=POSITION_UNCERTAINTY * fit.standard_error)
     scale = 1.0 + float(fit.constants[SCALE])
     figures = {
         "residual_m": float(np.std(fit.residual)), "walk_m_sqrt_s": fit.walk, "heading_deg": math.degrees(heading),
