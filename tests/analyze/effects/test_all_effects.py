@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from fusetune.analyze.effects.estimate import Effect, Estimate
     from fusetune.px4.flight import Flight
 
-LINEAR_DRAG_1_S, CURRENT_GAUSS, GROUND_EFFECT_M = 0.25, 0.004, 0.8
+LINEAR_DRAG_1_S, CURRENT_GAUSS, GROUND_EFFECT_M, HOVER_THROTTLE = 0.25, 0.004, 0.8, 0.42
 """Of config/vehicles/quadrotor.yaml."""
 ABSENT = ("range_lever_arm", "range_noise", "optical_flow", "vision_lever_arm", "airspeed_scale")
 
@@ -59,13 +59,13 @@ def test_ground_effect_with_the_tenth_of_the_guide(effects: dict[str, Effect]) -
 
 
 def test_the_field_of_the_motors_has_its_strength(effects: dict[str, Effect]) -> None:
-    """Over weight of thrust, as the log tells neither throttle nor current; its direction is of chance."""
+    """Over throttle, which the log tells, and 0.42 of which hovers; its direction is of chance."""
     found = effects["motor_magnetic_field"]
     strength = np.linalg.norm([one.value for one in found.estimates])
     error = max(one.upper - one.value for one in found.estimates)
-    assert strength == pytest.approx(CURRENT_GAUSS, abs=error)
-    assert error < 0.003
-    assert found.figures["CAL_MAG_COMP_TYP"] == 0.0
+    assert strength == pytest.approx(CURRENT_GAUSS / HOVER_THROTTLE, abs=error)
+    assert error < 0.003 / HOVER_THROTTLE
+    assert found.figures["CAL_MAG_COMP_TYP"] == 1.0
 
 
 def test_declination_by_gnss(effects: dict[str, Effect]) -> None:
