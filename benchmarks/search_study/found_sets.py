@@ -105,7 +105,7 @@ class WorldSearch:
 
     def _true_place(self) -> VelocityPlace | None:
         """What the truth knows of the receiver where the vehicle is told it wrong."""
-        told, right = self.space.present, self.world.right
+        told, right = self.space.present, self.world.right_place
         if not right:
             return None
         arm = [right.get(name, told.get(name, 0.0)) for name in ARM_PARAMETERS["gnss"]]

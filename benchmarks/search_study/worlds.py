@@ -10,6 +10,7 @@ from typing import Any
 from benchmarks.decision_study.collect import StudyFiles, replay_settings, saved_flight
 
 from fusetune.analyze.replaying.settings import ReplaySettings
+from fusetune.apply.search.measured_place import ARM, DELAY
 
 HERE = Path(__file__).parent
 DECISION, TOLD_WRONG = StudyFiles(), StudyFiles(worlds=HERE / "worlds.yaml")
@@ -35,6 +36,13 @@ class SearchWorld:
     @property
     def right(self) -> dict[str, float]:
         return dict(self.described.get("right", {}))
+
+    @property
+    def right_place(self) -> dict[str, float]:
+        """Delay and place of the GNSS antenna, as far as the world names them."""
+        gnss = self.described.get("second", {}).get("gnss", {})
+        delay = {DELAY: float(gnss["delay_ms"])} if "delay_ms" in gnss else {}
+        return delay | dict(zip(ARM, map(float, gnss.get("antenna_m", ())), strict=False))
 
     @property
     def wrong(self) -> tuple[str, ...]:
