@@ -21,6 +21,7 @@ from fusetune.analyze.diagnosis.motion import Motion, motion_of
 from fusetune.analyze.diagnosis.vision_signs import VisionSigns, vision_signs
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.px4.layouts.estimator_instances import instance_switches
@@ -138,16 +139,10 @@ class Signs:
         return magnetometer_signs(self.observed.flight, self.motion, self.airborne, heading)
 
     @cached_property
-    def mounting(self) -> float:
-        """Share of the field's scatter that the best other mounting would leave; 1 where none is better or it is not known."""
+    def mounting(self) -> Finding | None:
+        """What the verdict says of the magnetometer's mounting, by tilt alone; None where it says nothing."""
         found = magnetometer_mounting.findings(JudgedFlight(self.observed.flight, VerdictThresholds()))[0]
-        return found.figure if found.figure is not None and found.severity != "does-not-apply" else 1.0
-
-    @cached_property
-    def mounting_words(self) -> str:
-        """What the verdict says of the mounting; empty where it says nothing."""
-        found = magnetometer_mounting.findings(JudgedFlight(self.observed.flight, VerdictThresholds()))[0]
-        return found.found if found.severity == "warning" else ""
+        return found if found.severity == "warning" else None
 
     @cached_property
     def barometer(self) -> BarometerSigns | None:

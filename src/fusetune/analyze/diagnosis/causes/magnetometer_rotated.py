@@ -11,8 +11,8 @@ from fusetune.save.checks.magnetometer_mounting import described
 
 FITS_BELOW = 0.3
 """The right mounting leaves this share of what is wrong at most; no other cause is mended so by turning axes."""
-OFF_FROM = 0.2
-"""Of the field: the smallest turn that is looked for moves twice as much."""
+OFF_FROM = 0.12
+"""RMS of an axis over the field: the smallest turn that is looked for, 45° where the field is steep, makes 0.16."""
 REMEDY = (
     "Set CAL_MAGn_ROT (or SENS_BOARD_ROT) to how the sensor sits, then calibrate the compass again; in a simulation, ask "
     "its sensor model"
@@ -33,9 +33,9 @@ def diagnose(signs: Signs) -> Diagnosis | None:
                 found = [Sign(words, as_told / magnetometer.field_gauss, OFF_FROM, "1", "replay")]
                 return _diagnosis(signs, found, confidence(FITS_BELOW / max(share, 1e-3), 1.0), _turn(turned.turn))
         return None
-    if signs.mounting_words:
-        left = 1.0 / max(signs.mounting, 1e-3)
-        found = [Sign(signs.mounting_words, left, 1.0 / FITS_BELOW, "1")]
+    if signs.mounting is not None:
+        left = 1.0 / max(signs.mounting.figure or 1.0, 1e-3)
+        found = [Sign(signs.mounting.found, left, 1.0 / FITS_BELOW, "1")]
         return _diagnosis(signs, found, confidence(left, 1.5, 0.9), "a quarter turn or two")
     return None
 
