@@ -17,7 +17,8 @@ HEADING_OFF = 0.4
 def made_motion(climbs: bool = True, fast: float = 6.0) -> Motion:
     """On the ground for five seconds, then in the air for a minute, and five seconds on the ground.
 
-    The heading of the gyros' frame is `HEADING_OFF` less than true; the thrust is that of a hover and follows the climb.
+    The heading of the gyros' frame is `HEADING_OFF` less than true; the thrust is that of a hover and follows the
+    climb.
     """
     count = int(SECONDS * 1e6 / STEP_US)
     time = START_US + STEP_US * np.arange(count, dtype=np.int64)
@@ -31,7 +32,10 @@ def made_motion(climbs: bool = True, fast: float = 6.0) -> Motion:
     velocity = np.column_stack([north, east, down])
     acceleration = np.gradient(velocity, time * 1e-6, axis=0)
     yaw = envelope * 2.5 * np.sin(2.0 * np.pi * phase / 17.0)
-    roll, pitch = 0.25 * envelope * np.sin(2.0 * np.pi * phase / 3.0), 0.2 * envelope * np.sin(2.0 * np.pi * phase / 4.3)
+    roll, pitch = (
+        0.25 * envelope * np.sin(2.0 * np.pi * phase / 3.0),
+        0.2 * envelope * np.sin(2.0 * np.pi * phase / 4.3),
+    )
     q = np.array([1.0, 0.0, 0.0, 0.0])
     for axis, angle in ((2, yaw), (1, pitch), (0, roll)):
         vector = np.zeros((count, 3))

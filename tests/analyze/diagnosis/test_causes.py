@@ -57,7 +57,9 @@ WRONG: dict[str, dict[str, Any]] = {
     "gyro_bias": {"gyro_bias": replace(BIAS, change=np.radians([0.1, 4.0, 0.2]))},
     "imu_gaps": {"imu": replace(IMU, gaps=(AIR[0],), lost_s=0.9, lost_share=0.02)},
     "yaw_alignment": magnetometer(BODY, compass_off=np.radians(40.0)),
-    "magnetic_disturbance": magnetometer(fits(0.09), disturbed=(20_000_000, 31_000_000), disturbance=0.2, undisturbed=0.004),
+    "magnetic_disturbance": magnetometer(
+        fits(0.09), disturbed=(20_000_000, 31_000_000), disturbance=0.2, undisturbed=0.004
+    ),
     "motor_magnetic_field": magnetometer(BODY, motors_off=np.zeros(3), in_air=np.array([0.15, 0.05, 0.01])),
     "magnetometer_rotated": magnetometer(fits(0.2, mounting=0.005)),
     "magnetometer_scale": magnetometer(SCALED),
@@ -94,9 +96,14 @@ def test_a_sound_flight_shows_no_cause(id: str) -> None:
 @pytest.mark.parametrize("id", sorted(WRONG))
 def test_its_signs_show_the_cause_with_evidence_and_remedy(id: str) -> None:
     found = CAUSES[id](signs(**WRONG[id]))
-    assert isinstance(found, Diagnosis) and found.id == id
-    assert found.severity in ("warning", "fail") and 0.5 <= found.confidence <= 0.97
-    assert found.signs and found.remedy and found.source and found.stop_us > found.start_us
+    assert isinstance(found, Diagnosis)
+    assert found.id == id
+    assert found.severity in ("warning", "fail")
+    assert 0.5 <= found.confidence <= 0.97
+    assert found.signs
+    assert found.remedy
+    assert found.source
+    assert found.stop_us > found.start_us
     first = found.signs[0]
     assert first.figure > first.usual
 
@@ -113,7 +120,8 @@ def test_a_delay_is_claimed_only_where_the_smoothed_velocity_agrees(monkeypatch:
     agrees = replace_lag(0.19, 0.006)
     monkeypatch.setattr(gnss_delay, "velocity_delay", lambda *_: agrees)
     found = gnss_delay.diagnose(flight)
-    assert found is not None and found.values == {"EKF2_GPS_DELAY": 200.0}
+    assert found is not None
+    assert found.values == {"EKF2_GPS_DELAY": 200.0}
     monkeypatch.setattr(gnss_delay, "velocity_delay", lambda *_: replace_lag(0.115, 0.006))
     assert gnss_delay.diagnose(flight) is None
 
@@ -131,7 +139,8 @@ def test_a_turned_frame_of_vision_matters_where_vision_says_that_it_knows_north(
     assert vision_yaw.diagnose(flight) is None
     flight.observed.flight.topics["vehicle_visual_odometry", 0] = frame
     found = vision_yaw.diagnose(flight)
-    assert found is not None and found.values["vision_turn_deg"] == pytest.approx(30.0)
+    assert found is not None
+    assert found.values["vision_turn_deg"] == pytest.approx(30.0)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +165,8 @@ def test_what_looks_alike_is_told_apart(id: str, not_these: tuple[str, ...], cha
 def test_an_offset_that_is_there_at_rest_is_no_vibration() -> None:
     off = replace(GNSS_MOTION, bias_down=0.9)
     shaken = CAUSES["vibration"](signs(gnss_motion=off))
-    assert shaken is not None and shaken.signs[0].figure == pytest.approx(0.9, abs=0.01)
+    assert shaken is not None
+    assert shaken.signs[0].figure == pytest.approx(0.9, abs=0.01)
     # at rest the sensor's bias of 0.9 m/s² down takes as much from what it feels of gravity
     assert CAUSES["vibration"](signs(gnss_motion=off, imu=replace(IMU, resting_force=9.80665 - 0.9))) is None
 

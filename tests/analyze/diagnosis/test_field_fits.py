@@ -13,7 +13,9 @@ NOISE = 0.002
 
 
 def fits(change: object = None, heading: float | None = HEADING_OFF) -> dict[str, FieldFit]:
-    clean = FieldReadings(MOTION.time[ROWS] * 1e-6, np.zeros((ROWS.size, 3)), MOTION.rotation[ROWS], MOTION.thrust[ROWS])
+    clean = FieldReadings(
+        MOTION.time[ROWS] * 1e-6, np.zeros((ROWS.size, 3)), MOTION.rotation[ROWS], MOTION.thrust[ROWS]
+    )
     field = clean.expected(EARTH, HEADING_OFF)
     measured = field if change is None else change(field, clean.thrust)  # type: ignore[operator]
     measured = measured + NOISE * np.random.default_rng(2).normal(size=field.shape)
@@ -38,7 +40,9 @@ def test_a_field_of_the_body_is_found() -> None:
 def test_a_field_in_step_with_the_thrust_is_told_from_a_constant_one() -> None:
     coefficient = np.array([0.3, 0.2, -0.1])
     found = fits(lambda field, thrust: field + thrust[:, None] * coefficient)
-    assert [found["motor_field"].values[f"motor_field_{axis}"] for axis in "xyz"] == pytest.approx(coefficient, abs=0.01)
+    assert [found["motor_field"].values[f"motor_field_{axis}"] for axis in "xyz"] == pytest.approx(
+        coefficient, abs=0.01
+    )
     assert found["motor_field"].left < 0.6 * found["body_field"].left
 
 
@@ -61,5 +65,6 @@ def test_a_turn_about_the_vertical_is_found_by_the_heading_of_gnss(degrees: int)
 def test_without_a_heading_a_turn_about_the_vertical_is_none() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     found = fits(lambda field, _: field @ turn.T, None)
-    assert found["mounting"].turn is not None and abs(found["mounting"].turn[2, 2]) < 0.5
+    assert found["mounting"].turn is not None
+    assert abs(found["mounting"].turn[2, 2]) < 0.5
     assert found["as_told"].heading != pytest.approx(HEADING_OFF, abs=0.5)

@@ -30,7 +30,8 @@ class FlowSigns:
     fit : delay and its like
     scale, scale_error : flow over what the motion makes
     turn, turn_error : of the flow against the body about the down axis, rad
-    rotation, rotation_error : (2,) share of the body's own turning that is left in the flow after its gyro's is taken out
+    rotation, rotation_error : (2,) share of the body's own turning that is left in the flow after its gyro's is taken
+        out
     """
 
     fit: LaggedFit
@@ -72,7 +73,9 @@ def flow_signs(
         across = np.column_stack([-sight[:, 1], sight[:, 0]])
         own = np.zeros((at.size, 2, 2))
         own[:, range(2), range(2)] = rate
-        return np.zeros_like(sight), np.concatenate([later[:, :, None], sight[:, :, None], across[:, :, None], own], axis=2)
+        return np.zeros_like(sight), np.concatenate(
+            [later[:, :, None], sight[:, :, None], across[:, :, None], own], axis=2
+        )
 
     fit = lagged_fit(time, measured, course, told_s, 1)
     if fit is None:

@@ -23,10 +23,10 @@ from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable
-from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.px4.layouts.estimator_instances import instance_switches
-from fusetune.save.checks.magnetometer_mounting import magnetometer_mounting
+from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.save.checks.judged_flight import JudgedFlight
+from fusetune.save.checks.magnetometer_mounting import magnetometer_mounting
 from fusetune.save.checks.standstill import Standstill, flying_steps, standstill
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.save.verdict import Verdict, judge
@@ -110,7 +110,9 @@ class Signs:
     @cached_property
     def gnss_sound(self) -> tuple[Interval, ...]:
         """In the air without the times that the receiver says were poor, lost or jammed, nor its jumps, µs."""
-        bad = [] if self.gnss is None else [*self.gnss.lost, *(one for one in (self.gnss.poor, self.gnss.jammed) if one)]
+        bad = (
+            [] if self.gnss is None else [*self.gnss.lost, *(one for one in (self.gnss.poor, self.gnss.jammed) if one)]
+        )
         jumps = [one.time for one in self.gnss.jumps] if self.gnss is not None else []
         if jumps:
             bad.append((min(jumps) - 500_000, max(jumps) + 500_000))
@@ -178,11 +180,6 @@ class Signs:
         return None if self.motion is None else airspeed_signs(self.observed.flight, self.motion, self.airborne)
 
     @property
-    def fused(self) -> set[str]:
-        """Sensors that the log holds and the filter may use beside GNSS."""
-        return {"ev"} if self.table("vehicle_visual_odometry") is not None else set()
-
-    @property
     def vision_knows_north(self) -> bool:
         """Whether vision says that its frame is north, east, down."""
         table = self.table("vehicle_visual_odometry")
@@ -202,7 +199,10 @@ class Signs:
         if self.gnss_motion is not None:
             measured["gnss_vel"] = self.gnss_motion.fit.noise
         if self.gnss is not None:
-            reported = {"gnss_vel": self.gnss.usual.get("s_variance_m_s", 0.0), "gnss_pos": self.gnss.usual.get("eph", 0.0)}
+            reported = {
+                "gnss_vel": self.gnss.usual.get("s_variance_m_s", 0.0),
+                "gnss_pos": self.gnss.usual.get("eph", 0.0),
+            }
             measured["gnss_pos"] = self.gnss.position_noise
         if self.barometer is not None:
             measured["baro_hgt"] = self.barometer.noise

@@ -7,7 +7,7 @@ from fusetune.analyze.diagnosis.causes.flow_rotation import not_turned
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-MATTERS_MS, SIGMAS = 25.0, 2.5
+MATTERS_MS, SIGMAS = 20.0, 2.5
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:
@@ -23,7 +23,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     mended = max(0.0, round(value, -1))
     words = f"flow lags behind the motion by {value:.0f} ms (±{2.0 * error:.0f}), PX4 is told {told:.0f}"
     return diagnosed(
-        signs, "flow_delay", f"Optical flow is {value:.0f} ms late, and PX4 is told {told:.0f}", "warning",
-        confidence(off, level, 0.93), [Sign(words, off, level, "ms", "replay")], touches=("optical_flow",),
-        remedy=f"Set EKF2_OF_DELAY to {mended:.0f} ms", values={"EKF2_OF_DELAY": mended},
-    )  # fmt: skip
+        signs,
+        "flow_delay",
+        f"Optical flow is {value:.0f} ms late, and PX4 is told {told:.0f}",
+        "warning",
+        confidence(off, level, 0.93),
+        [Sign(words, off, level, "ms", "replay")],
+        touches=("optical_flow",),
+        remedy=f"Set EKF2_OF_DELAY to {mended:.0f} ms",
+        values={"EKF2_OF_DELAY": mended},
+    )

@@ -7,7 +7,7 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.diagnosis.vision_signs import LEAST_SPEED_M_S
 
-MATTERS_MS, SIGMAS = 25.0, 3.0
+MATTERS_MS, SIGMAS = 20.0, 2.5
 SCALE_OFF = 0.2
 
 
@@ -24,8 +24,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     mended = max(0.0, round(value, -1))
     words = f"vision lags behind the motion by {value:.0f} ms (±{2.0 * error:.0f}), PX4 is told {told:.0f}"
     return diagnosed(
-        signs, "vision_delay", f"Vision is {value:.0f} ms late, and PX4 is told {told:.0f}", "warning",
-        confidence(off, level, 0.95), [Sign(words, off, level, "ms", "replay")], touches=("ev",),
+        signs,
+        "vision_delay",
+        f"Vision is {value:.0f} ms late, and PX4 is told {told:.0f}",
+        "warning",
+        confidence(off, level, 0.95),
+        [Sign(words, off, level, "ms", "replay")],
+        touches=("ev",),
         remedy=f"Synchronise the clocks of camera and autopilot, or set EKF2_EV_DELAY to {mended:.0f} ms",
         values={"EKF2_EV_DELAY": mended},
-    )  # fmt: skip
+    )
