@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
-from fusetune.analyze.diagnosis.causes.magnetometer_scale import scaled, scaled_down
+from fusetune.analyze.diagnosis.causes.magnetometer_scale import as_sure_of_a_field, scaled, scaled_down
 from fusetune.analyze.diagnosis.causes.motor_magnetic_field import in_step
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
@@ -46,7 +46,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
             "The compass feels a constant field of the body",
             [Sign(words, size, BODY_FROM, "1", "replay")],
             None,
-            0.5 if scaled_down(one) is not None else 1.0,
+            as_sure_of_a_field(one) if scaled_down(one) is not None else 1.0,
         )
     found = []
     if abs(one.strength - 1.0) > STRENGTH_FROM:

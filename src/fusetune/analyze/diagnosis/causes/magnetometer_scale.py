@@ -35,7 +35,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         "magnetometer_scale",
         "The magnetometer is scaled wrongly",
         "fail" if off > 0.6 else "warning",
-        confidence(off, OFF_FROM) if is_sure else 0.5,
+        confidence(off, OFF_FROM) if is_sure else 1.0 - as_sure_of_a_field(one),
         [Sign(words, off, OFF_FROM, "1", "replay")],
         touches=("mag",),
         remedy=REMEDY,
@@ -78,3 +78,8 @@ def scaled_down(one: MagnetometerSigns) -> np.ndarray | None:
 
 
 UPRIGHT = 0.4
+
+
+def as_sure_of_a_field(one: MagnetometerSigns) -> float:
+    """How sure a field down the body is where a scale of that axis may be as well: a little, by what each leaves."""
+    return 0.6 if one.fits["body_field"].left < one.fits["scale"].left else 0.4
