@@ -102,7 +102,7 @@ def test_a_wrong_delay_is_found_on_a_simulated_flight_and_borne_out_by_a_replay(
 
 
 def test_an_experiment_that_contradicts_lets_a_claim_fall(told_wrong: Flight, survey_flight: Flight) -> None:
-    worse = claim("gnss_delay", sure=0.55, values={"EKF2_GPS_DELAY": 300.0})
+    worse = claim("gnss_lever_arm", sure=0.55, values={"EKF2_GPS_POS_X": 2.0})
     assert tried(worse, Signs(ObservedFlight(survey_flight, AS_FLOWN))) is None
     right = claim("gnss_delay", sure=0.55, values={"EKF2_GPS_DELAY": 110.0})
     borne_out = tried(right, Signs(ObservedFlight(told_wrong, AS_FLOWN)))

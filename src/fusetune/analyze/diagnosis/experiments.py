@@ -26,7 +26,7 @@ AT_MOST = 2
 """By default: with them a minute of flight is diagnosed in half a second."""
 FALLS, GROWS = 0.9, 1.25
 """Mean test ratios are alike between these: what a replay changes by chance."""
-FALLS_BY, GROWS_BY = 0.001, 0.002
+FALLS_BY, GROWS_BY = 0.0002, 0.002
 """Smaller differences of mean ratios say nothing."""
 SURER, LESS_SURE = 0.5, 0.6
 """A claim that the experiment bears out loses half of its doubt, one that it contradicts keeps this of its

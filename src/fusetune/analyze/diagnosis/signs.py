@@ -149,7 +149,11 @@ class Signs:
     @cached_property
     def barometer(self) -> BarometerSigns | None:
         """Readings against the vehicle's motion."""
-        return None if self.motion is None else barometer_signs(self.observed.flight, self.motion, self.airborne)
+        if self.motion is None:
+            return None
+        stuck = self.stuck.get("baro")
+        out = (stuck.start_us, stuck.stop_us) if stuck is not None else None
+        return barometer_signs(self.observed.flight, self.motion, self.airborne, out)
 
     @cached_property
     def range(self) -> RangeSigns | None:

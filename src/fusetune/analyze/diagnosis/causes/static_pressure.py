@@ -6,7 +6,7 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-COEFFICIENT_FROM, TOGETHER = 0.2, 11.0
+COEFFICIENT_FROM, TOGETHER = 0.17, 11.0
 """Share of the dynamic pressure: 0.2 moves the height by 1 m at 10 m/s. χ² of three
 directions is above 11 by chance once in a hundred flights, hardly ever with a coefficient that large."""
 RANGE_FROM_M, LEAST_RANGE_M = 0.4, 0.15
@@ -29,7 +29,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     found, values = [], {}
     for direction, effect in errors.speed.items():
         size = abs(effect.value)
-        if size < COEFFICIENT_FROM + effect.error or effect.range_m < LEAST_RANGE_M:
+        if size < COEFFICIENT_FROM + 0.5 * effect.error or effect.range_m < LEAST_RANGE_M:
             continue
         sign = "more" if effect.value > 0.0 else "less"
         words = (
