@@ -155,6 +155,8 @@ def _readings(
 DISTURBED_FROM, SIGMAS = 0.12, 6.0
 """A passing field matters from this share of the earth's on, and is more than this times the readings' noise."""
 MOST_OF_FLIGHT = 0.7
+FEWEST_DISTURBED = 5
+"""Means of half a second: what passes within three is a turn that the gyros tell badly."""
 
 
 def _disturbed(readings: FieldReadings, left: Array, noise: float) -> tuple[Interval | None, float, float]:
@@ -174,7 +176,7 @@ def _disturbed(readings: FieldReadings, left: Array, noise: float) -> tuple[Inte
     # what lies seconds apart is one disturbance
     longest = int(np.argmax(ends - begins))
     first, last = int(begins[longest]), int(ends[longest]) - 1
-    if last - first < 2:
+    if last - first < FEWEST_DISTURBED:
         return None, 0.0, float(np.sqrt(np.mean(np.square(left))))
     margin = np.zeros(on.size, bool)
     margin[max(first - 3, 0) : last + 4] = True

@@ -9,7 +9,7 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns
 from fusetune.analyze.diagnosis.signs import Signs
 
-OFF_FROM = 0.1
+OFF_FROM, WARNS_FROM, FAILS_FROM = 0.1, 0.15, 0.6
 """Calibrations are better where the flight shows them; where a field of the body explains as much, that is taken."""
 REMEDY = (
     "Calibrate the compass where there is no iron; check that the driver's scale is that of the sensor "
@@ -34,7 +34,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         signs,
         "magnetometer_scale",
         "The magnetometer is scaled wrongly",
-        "fail" if off > 0.6 else "warning",
+        "fail" if off > FAILS_FROM else "warning" if off > WARNS_FROM else "note",
         confidence(off, OFF_FROM) if is_sure else 1.0 - as_sure_of_a_field(one),
         [Sign(words, off, OFF_FROM, "1", "replay")],
         touches=("mag",),

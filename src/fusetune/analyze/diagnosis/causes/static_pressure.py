@@ -9,7 +9,7 @@ from fusetune.analyze.diagnosis.signs import Signs
 COEFFICIENT_FROM, TOGETHER = 0.17, 11.0
 """Share of the dynamic pressure: 0.2 moves the height by 1 m at 10 m/s. χ² of three
 directions is above 11 by chance once in a hundred flights, hardly ever with a coefficient that large."""
-RANGE_FROM_M, LEAST_RANGE_M = 0.4, 0.15
+RANGE_FROM_M, LEAST_RANGE_M = 0.3, 0.15
 """Less than that no flight suffers from, whatever the coefficient."""
 PARAMETERS = {"forward": "EKF2_PCOEF_XP", "backward": "EKF2_PCOEF_XN", "sideways": "EKF2_PCOEF_YP"}
 LARGEST = 0.5
