@@ -7,7 +7,7 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.lagged_regression import LaggedFit
 from fusetune.analyze.diagnosis.signs import Signs
 
-MATTERS_MS, SIGMAS = 20.0, 2.5
+MATTERS_MS, SIGMAS = 20.0, 3.0
 """EKF2 acts on delays in steps of 10 ms."""
 STEP_MS = 10.0
 
