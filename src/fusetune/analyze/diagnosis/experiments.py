@@ -20,7 +20,7 @@ from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.px4.aid_sources import SENSORS
-from fusetune.px4.flight import Flight, TopicTable, select_rows
+from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows
 
 AT_MOST = 2
 """By default: with them a minute of flight is diagnosed in half a second."""
@@ -201,7 +201,10 @@ def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
 
 def _replayed(prepared: PreparedFlight, experiment: Experiment) -> ReplayedSet:
     if experiment.edit is not None:
-        stream = dataclasses.replace(prepared.reconstructed, flight=experiment.edit(prepared.reconstructed.flight))
+        edited, logged = experiment.edit(prepared.reconstructed.flight), prepared.reconstructed.measured
+        # of a topic with fewer rows it is no longer known which of them the log holds
+        known = {name: rows for name, rows in logged.items() if rows.size == row_count(edited.topics[name, 0])}
+        stream = dataclasses.replace(prepared.reconstructed, flight=edited, measured=known)
         prepared = prepared.with_stream(stream)
     return replay_set(prepared, "experiment", experiment.overrides)
 
