@@ -27,7 +27,7 @@ MAKES: Mapping[str, tuple[str, ...]] = {
         "parameter_at_limit",
     ),
     "gyro_bias": ("magnetic_disturbance", "yaw_alignment", "motor_magnetic_field", "gnss_lever_arm", "gnss_delay"),
-    "imu_gaps": ("gnss_delay", "gnss_lever_arm", "vision_delay", "flow_delay", "magnetic_disturbance", "noise_claim"),
+    "imu_gaps": ("gnss_delay", "gnss_lever_arm", "vision_delay", "flow_delay", "noise_claim"),
     "gnss_interference": (
         "gnss_loss",
         "gnss_accuracy",
@@ -48,7 +48,6 @@ MAKES: Mapping[str, tuple[str, ...]] = {
         "gnss_loss",
         "range_obstruction",
         "range_step",
-        "noise_claim",
         "gnss_delay",
         "gnss_lever_arm",
         "yaw_alignment",

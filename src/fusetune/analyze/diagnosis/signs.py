@@ -109,10 +109,12 @@ class Signs:
 
     @cached_property
     def gnss_sound(self) -> tuple[Interval, ...]:
-        """In the air without the times that the receiver says were poor, lost or jammed, nor its jumps, µs."""
+        """In the air without the times that the receiver was poor, lost, jammed or stuck, nor its jumps, µs."""
         bad = (
             [] if self.gnss is None else [*self.gnss.lost, *(one for one in (self.gnss.poor, self.gnss.jammed) if one)]
         )
+        if "gnss" in self.stuck:
+            bad.append((self.stuck["gnss"].start_us, self.stuck["gnss"].stop_us))
         jumps = [one.time for one in self.gnss.jumps] if self.gnss is not None else []
         if jumps:
             bad.append((min(jumps) - 500_000, max(jumps) + 500_000))
