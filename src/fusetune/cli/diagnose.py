@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 HELP = "tell what is wrong with a vehicle from its logs, since when, how sure, and what to do"
 WARNS = 1
-"""Exit status where there is no worse than a warning; of a log that cannot be read it is `USER_ERROR`, between the two."""
+"""Exit status where there is no worse than a warning; of a log that cannot be read it is `USER_ERROR`, between the
+two."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="replay a flight at most N times with a claimed cause taken away (2)",
     )
     parser.epilog = (
-        "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot be read; "
+        "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot "
+        "be read; "
         "3 a failure."
     )
 

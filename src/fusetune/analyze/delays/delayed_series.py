@@ -114,8 +114,8 @@ def flow_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str,
     return LaggedSeries(samples["time_us"][usable], measured, motion.time, sight)
 
 
-def airspeed_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str, float]) -> LaggedSeries | None:
-    """True airspeed, against the speed through the wind that fits best."""
+def measured_airspeed(flight: Flight) -> tuple[Times, Array] | None:
+    """Times, µs, and true airspeeds, m/s, that the estimator is given, without a scale of its own; None without any."""
     table = flight.topic("airspeed_validated")
     if table is not None:
         samples = validated_airspeed_samples(table)
@@ -125,7 +125,15 @@ def airspeed_series(flight: Flight, motion: InertialMotion, parameters: Mapping[
         if table is None:
             return None
         samples, usable = airspeed_samples(table, 1.0), taken(table, airspeed_refusals(table))
-    time, speed = samples["time_us"][usable], samples["true_airspeed"][usable]
+    return samples["time_us"][usable], samples["true_airspeed"][usable]
+
+
+def airspeed_series(flight: Flight, motion: InertialMotion, parameters: Mapping[str, float]) -> LaggedSeries | None:
+    """True airspeed, against the speed through the wind that fits best."""
+    measured = measured_airspeed(flight)
+    if measured is None:
+        return None
+    time, speed = measured
     inside = (time > motion.time[0]) & (time < motion.time[-1]) & (speed > 0.0)
     time, speed = time[inside], speed[inside]
     if time.size < 10:

@@ -7,15 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.delays.delayed_series import measured_airspeed
 from fusetune.analyze.diagnosis.motion import Motion
 from fusetune.analyze.flight.intervals import Interval, inside
-from fusetune.ekf2.feed.message_samples import (
-    airspeed_refusals,
-    airspeed_samples,
-    taken,
-    validated_airspeed_refusals,
-    validated_airspeed_samples,
-)
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
@@ -43,17 +37,12 @@ def airspeed_signs(flight: Flight, motion: Motion, airborne: tuple[Interval, ...
     A pitot tube along the forward axis feels what of the air comes along it: f·(v − w) = s/k, f the forward axis, v the
     velocity, w the wind, s the reading and k its scale; linear in 1/k and w.
     """
-    validated = flight.topic("airspeed_validated")
-    if validated is not None:
-        samples = validated_airspeed_samples(validated)
-        usable = taken(validated, validated_airspeed_refusals(validated, flight.release))
-    else:
-        table = flight.topic("airspeed")
-        if table is None:
-            return None
-        samples, usable = airspeed_samples(table, 1.0), taken(table, airspeed_refusals(table))
-    time, speed = samples["time_us"].astype(np.int64), samples["true_airspeed"]
-    usable &= inside(time, airborne) & (time > motion.time[0]) & (time < motion.time[-1]) & (np.abs(speed) > LEAST_M_S)
+    measured = measured_airspeed(flight)
+    if measured is None:
+        return None
+    time, speed = measured
+    usable = inside(time, airborne) & (time > motion.time[0]) & (time < motion.time[-1])
+    usable &= np.abs(speed) > LEAST_M_S
     time, speed = time[usable], speed[usable]
     if time.size < FEWEST:
         return None

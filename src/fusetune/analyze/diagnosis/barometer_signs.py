@@ -43,13 +43,18 @@ class BarometerSigns:
     drifted: Interval | None
 
 
-def barometer_signs(flight: Flight, motion: Motion, airborne: tuple[Interval, ...]) -> BarometerSigns | None:
-    """Look at the barometer; None without one."""
+def barometer_signs(
+    flight: Flight, motion: Motion, airborne: tuple[Interval, ...], stuck: Interval | None = None
+) -> BarometerSigns | None:
+    """Look at the barometer, but for the time in which it was stuck, µs; None without one."""
     table = flight.topic("vehicle_air_data")
     if table is None:
         return None
     samples, _ = baro_samples(table)
     time, height = samples["time_us"].astype(np.int64), samples["hgt"]
+    if stuck is not None:
+        works = (time < stuck[0]) | (time > stuck[1])
+        time, height = time[works], height[works]
     around = ((airborne[0][0] - BEFORE_US, airborne[-1][1] + AFTER_US),)
     climbed = climbed_by(motion.time, motion.velocity)
     errors = height_errors(time, height, motion, around, climbed)

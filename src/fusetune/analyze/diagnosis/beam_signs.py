@@ -86,6 +86,7 @@ def range_signs(flight: Flight, motion: Motion, airborne: tuple[Interval, ...]) 
     )
 
 
+SURROUNDINGS = 15
 MEDIAN_ERROR = float(np.sqrt(2.0 * np.pi / 2.0 / AROUND))
 """Standard error of the difference of two medians, for noise of 1."""
 
@@ -99,6 +100,10 @@ def _steps(off: Array, near: npt.NDArray[np.bool_], limit: float) -> tuple[npt.N
     change[AROUND : off.size - AROUND + 1] = middle[AROUND:] - middle[:-AROUND]
     whole = np.convolve(near, np.ones(2 * AROUND - 1), mode="same")[: off.size - 1] >= 2 * AROUND - 1
     change[1:] = np.where(whole, change[1:], 0.0)
+    # a climb that is known badly makes every place alike; a step is a place of its own
+    wide = 2 * SURROUNDINGS + 1
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(change, SURROUNDINGS, mode="edge"), wide)
+    change = change - np.median(around, axis=1)
     size = np.abs(change)
     largest = np.lib.stride_tricks.sliding_window_view(np.pad(size, AROUND), 2 * AROUND + 1).max(axis=1)
     return np.flatnonzero((size > limit) & (size == largest)), change

@@ -10,8 +10,8 @@ import numpy as np
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterMetadata, as_float32
 
 FAR, NEAR, REJECTED_FROM = 3.7, 3.3, 0.1
-"""A claimed noise is far off from this factor on, as near to four as its estimate is sure: within it PX4's defaults serve sensors of many kinds.
-One that is too small shows earlier, where the filter refuses measurements for it."""
+"""A claimed noise is far off from this factor on, as near to four as its estimate is sure: within it PX4's defaults
+serve sensors of many kinds. One that is too small shows earlier, where the filter refuses measurements for it."""
 NOISES: Mapping[str, str] = {
     "gnss_vel": "EKF2_GPS_V_NOISE",
     "gnss_pos": "EKF2_GPS_P_NOISE",
@@ -94,7 +94,8 @@ class AtLimit:
 
 
 def at_limits(parameters: Mapping[str, float], release: tuple[int, int] | None) -> tuple[AtLimit, ...]:
-    """Parameters that people tune and that stand at a bound which is no default, of the release that flew or another."""
+    """Parameters that people tune and that stand at a bound which is no default, of the release that flew or
+    another."""
     found = []
     for name, value in parameters.items():
         known = PARAMETERS.get(name)

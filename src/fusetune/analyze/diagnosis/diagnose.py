@@ -47,7 +47,13 @@ def _unknown(signs: Signs) -> Diagnosis | None:
     if not bad:
         return None
     found = tuple(
-        Sign(f"{one.above_gate:.0%} of the test ratios of {name} are above 1", one.above_gate, UNKNOWN_FROM, "1", one.origin)
+        Sign(
+            f"{one.above_gate:.0%} of the test ratios of {name} are above 1",
+            one.above_gate,
+            UNKNOWN_FROM,
+            "1",
+            one.origin,
+        )
         for name, one in sorted(bad.items(), key=lambda item: -item[1].excess)
     )
     times = [one.off for one in bad.values() if one.off is not None]

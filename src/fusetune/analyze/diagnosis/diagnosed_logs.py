@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
 from fusetune.errors import UserError
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.discovery import discover_logs, printable
+from fusetune.save.verdict import judge
 from fusetune.storage.files import AnyPath
 
 AS_FLOWN = ReplaySettings(None, ReconstructionSettings(), StartSettings())
@@ -33,6 +35,7 @@ class DiagnosedLog:
     log : as it can be printed
     found : what is wrong, what explains most first
     start_us, stop_us : of the log, µs since boot
+    not_replayed : why there is no replay, in words, and the rules that ask for one said nothing; empty where there is
     error : why it could not be read, else None
     """
 
@@ -40,14 +43,27 @@ class DiagnosedLog:
     found: tuple[Diagnosis, ...] = ()
     start_us: int = 0
     stop_us: int = 0
+    not_replayed: tuple[str, ...] = ()
     error: UserError | None = None
 
     def document(self) -> dict[str, Any]:
         """As JSON holds it."""
         document: dict[str, Any] = {"log": self.log, "duration_s": round((self.stop_us - self.start_us) * 1e-6, 3)}
         document["error"] = None if self.error is None else {"reason": self.error.reason, "remedy": self.error.remedy}
-        document["findings"] = [one.document(self.start_us) for one in self.found]
+        document["not_replayed"] = list(self.not_replayed)
+        document["findings"] = [_as_json(one.document(self.start_us)) for one in self.found]
         return document
+
+
+def _as_json(value: Any) -> Any:
+    """Plain numbers; null for those that JSON does not have."""
+    if isinstance(value, dict):
+        return {name: _as_json(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [_as_json(one) for one in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
 
 
 def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iterator[DiagnosedLog]:
@@ -81,7 +97,8 @@ def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iter
 def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
     try:
         flight = read_ulog(path)
-        found = diagnose(ObservedFlight(flight, AS_FLOWN), experiments)
+        observed = ObservedFlight(flight, AS_FLOWN)
+        found, why_not = diagnose(observed, experiments), judge(observed.flight).reasons
     except UserError as error:
         return DiagnosedLog(shown, error=error)
     except OSError as error:
@@ -90,4 +107,4 @@ def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
     except _DAMAGED as error:
         reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
         return DiagnosedLog(shown, error=UserError(shown, reason, "Copy the log from the vehicle again"))
-    return DiagnosedLog(shown, found, flight.start_timestamp, flight.last_timestamp)
+    return DiagnosedLog(shown, found, flight.start_timestamp, flight.last_timestamp, why_not)

@@ -1,8 +1,8 @@
 """The replay as an experiment: the flight once more with a claimed cause taken away.
 
-A wrong value is put right, a sensor that misleads is withheld where it does, a part that shakes is told to. If the cause is
-what it is said to be, the test ratios of the sources that it spoils fall; if they stay or grow, the claim was wrong. The
-sources that are compared are those that both replays have, over the same time.
+A wrong value is put right, a sensor that misleads is withheld where it does, a part that shakes is told to. If the
+cause is what it is said to be, the test ratios of the sources that it spoils fall; if they stay or grow, the claim was
+wrong. The sources that are compared are those that both replays have, over the same time.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.px4.aid_sources import SENSORS
-from fusetune.px4.flight import Flight, TopicTable, select_rows
+from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows
 
 AT_MOST = 2
 """By default: with them a minute of flight is diagnosed in half a second."""
 FALLS, GROWS = 0.9, 1.25
 """Mean test ratios are alike between these: what a replay changes by chance."""
-FALLS_BY, GROWS_BY = 0.001, 0.005
+FALLS_BY, GROWS_BY = 0.0002, 0.002
 """Smaller differences of mean ratios say nothing."""
 SURER, LESS_SURE = 0.5, 0.6
-"""A claim that the experiment bears out loses half of its doubt, one that it contradicts keeps this of its confidence."""
+"""A claim that the experiment bears out loses half of its doubt, one that it contradicts keeps this of its
+confidence."""
 LEAST_CONFIDENCE = 0.4
 """A claim below falls."""
 
@@ -66,36 +67,50 @@ def experiment_for(diagnosis: Diagnosis, signs: Signs) -> Experiment | None:
         return Experiment(f"with {told}", judged, overrides)
     if diagnosis.id in ("vibration", "accelerometer_clipping"):
         noise = max(0.8, 2.0 * signs.parameters.get("EKF2_ACC_NOISE", 0.35))
-        return Experiment(f"with EKF2_ACC_NOISE {min(noise, 1.0):g}", ("gnss", "baro"), {"EKF2_ACC_NOISE": min(noise, 1.0)})
+        return Experiment(
+            f"with EKF2_ACC_NOISE {min(noise, 1.0):g}", ("gnss", "baro"), {"EKF2_ACC_NOISE": min(noise, 1.0)}
+        )
     if diagnosis.id in WITHHELD or diagnosis.id == "sensor_stuck":
         stuck = max(STUCK, key=lambda name: values.get(f"{name}_stuck_s", 0.0))
         sensor, judged = WITHHELD.get(diagnosis.id, (stuck, STUCK[stuck]))
-        words = f"without {SENSORS[sensor].label} from {_at(signs, diagnosis.start_us)} to {_at(signs, diagnosis.stop_us)}"
-        return Experiment(words, judged, edit=lambda flight: _without(flight, sensor, diagnosis.start_us, diagnosis.stop_us))
+        words = (
+            f"without {SENSORS[sensor].label} from {_at(signs, diagnosis.start_us)} to {_at(signs, diagnosis.stop_us)}"
+        )
+        return Experiment(
+            words, judged, edit=lambda flight: _without(flight, sensor, diagnosis.start_us, diagnosis.stop_us)
+        )
     if diagnosis.id == "motor_magnetic_field" and signs.motion is not None:
         coefficient = np.array([values[f"motor_field_{axis}_gauss"] for axis in "xyz"])
         motion = signs.motion
         return Experiment(
-            "with the field of the motors taken out", ("mag",),
-            edit=lambda flight: _magnetometer(flight, lambda time, field: field - motion.at(time, motion.thrust)[:, None] * coefficient),
-        )  # fmt: skip
+            "with the field of the motors taken out",
+            ("mag",),
+            edit=lambda flight: _magnetometer(
+                flight, lambda time, field: field - motion.at(time, motion.thrust)[:, None] * coefficient
+            ),
+        )
     if diagnosis.id == "yaw_alignment":
         body = np.array([values[f"body_field_{axis}_gauss"] for axis in "xyz"])
         return Experiment(
-            "with the field of the body taken out", ("mag",), edit=lambda flight: _magnetometer(flight, lambda _, field: field - body)
+            "with the field of the body taken out",
+            ("mag",),
+            edit=lambda flight: _magnetometer(flight, lambda _, field: field - body),
         )
     if diagnosis.id == "magnetometer_scale":
         scale = np.array([values[f"mag_scale_{axis}"] for axis in "xyz"])
         return Experiment(
-            "with the magnetometer's scale put right", ("mag",), edit=lambda flight: _magnetometer(flight, lambda _, field: field / scale)
+            "with the magnetometer's scale put right",
+            ("mag",),
+            edit=lambda flight: _magnetometer(flight, lambda _, field: field / scale),
         )
     if diagnosis.id == "magnetometer_rotated" and signs.magnetometer is not None:
         turn = signs.magnetometer.fits["mounting"].turn
         if turn is not None:
             return Experiment(
-                "with the magnetometer turned back", ("mag", "gnss_vel"),
+                "with the magnetometer turned back",
+                ("mag", "gnss_vel"),
                 edit=lambda flight: _magnetometer(flight, lambda _, field: field @ turn),
-            )  # fmt: skip
+            )
     return None
 
 
@@ -169,7 +184,10 @@ def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
     if compared is None:
         return diagnosis
     was, now = compared
-    words = f"{experiment.words} the mean test ratio of {_named(before, after, experiment.judged)} goes from {was:.3f} to {now:.3f}"
+    words = (
+        f"{experiment.words} the mean test ratio of {_named(before, after, experiment.judged)} goes from "
+        f"{was:.3f} to {now:.3f}"
+    )
     signed = (*diagnosis.signs, Sign(words, now, was, "1", "replay"))
     sure = diagnosis.confidence
     if was - now > FALLS_BY and now < FALLS * was:
@@ -183,12 +201,17 @@ def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
 
 def _replayed(prepared: PreparedFlight, experiment: Experiment) -> ReplayedSet:
     if experiment.edit is not None:
-        stream = dataclasses.replace(prepared.reconstructed, flight=experiment.edit(prepared.reconstructed.flight))
+        edited, logged = experiment.edit(prepared.reconstructed.flight), prepared.reconstructed.measured
+        # of a topic with fewer rows it is no longer known which of them the log holds
+        known = {name: rows for name, rows in logged.items() if rows.size == row_count(edited.topics[name, 0])}
+        stream = dataclasses.replace(prepared.reconstructed, flight=edited, measured=known)
         prepared = prepared.with_stream(stream)
     return replay_set(prepared, "experiment", experiment.overrides)
 
 
-def _shared(before: Mapping[str, SourceRatios], after: Mapping[str, SourceRatios], judged: tuple[str, ...]) -> list[str]:
+def _shared(
+    before: Mapping[str, SourceRatios], after: Mapping[str, SourceRatios], judged: tuple[str, ...]
+) -> list[str]:
     return [name for name in before if name in after and name.startswith(judged)]
 
 

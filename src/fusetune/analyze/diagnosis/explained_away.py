@@ -16,21 +16,50 @@ GRACE_US = 3_000_000
 MAKES: Mapping[str, tuple[str, ...]] = {
     "accelerometer_clipping": ("vibration", "baro_drift", "noise_claim", "gnss_delay", "gnss_lever_arm"),
     "vibration": (
-        "noise_claim", "baro_drift", "static_pressure", "gnss_delay", "gnss_lever_arm", "vision_scale", "vision_delay", "range_step",
+        "noise_claim",
+        "baro_drift",
+        "static_pressure",
+        "gnss_delay",
+        "gnss_lever_arm",
+        "vision_scale",
+        "vision_delay",
+        "range_step",
         "parameter_at_limit",
     ),
     "gyro_bias": ("magnetic_disturbance", "yaw_alignment", "motor_magnetic_field", "gnss_lever_arm", "gnss_delay"),
-    "imu_gaps": ("gnss_delay", "gnss_lever_arm", "vision_delay", "flow_delay", "magnetic_disturbance", "noise_claim"),
-    "gnss_interference": ("gnss_loss", "gnss_accuracy", "gnss_glitch", "noise_claim", "sensor_stuck", "gnss_delay", "baro_drift"),
+    "imu_gaps": ("gnss_delay", "gnss_lever_arm", "vision_delay", "flow_delay", "noise_claim"),
+    "gnss_interference": (
+        "gnss_loss",
+        "gnss_accuracy",
+        "gnss_glitch",
+        "noise_claim",
+        "sensor_stuck",
+        "gnss_delay",
+        "baro_drift",
+    ),
     "gnss_accuracy": ("noise_claim", "gnss_glitch", "gnss_delay", "gnss_lever_arm", "baro_drift"),
     "gnss_glitch": ("baro_drift", "noise_claim", "gnss_delay", "gnss_lever_arm", "vision_yaw", "vision_scale"),
     "gnss_loss": ("baro_drift",),
     "sensor_stuck": (
-        "magnetic_disturbance", "magnetometer_scale", "baro_drift", "baro_ground_effect", "propeller_wash", "static_pressure",
-        "gnss_glitch", "gnss_loss", "range_obstruction", "range_step", "noise_claim", "gnss_delay", "gnss_lever_arm", "yaw_alignment",
+        "magnetic_disturbance",
+        "magnetometer_scale",
+        "baro_drift",
+        "gnss_glitch",
+        "gnss_loss",
+        "range_obstruction",
+        "range_step",
+        "gnss_delay",
+        "gnss_lever_arm",
+        "yaw_alignment",
         "motor_magnetic_field",
     ),
-    "magnetometer_rotated": ("yaw_alignment", "magnetic_disturbance", "magnetometer_scale", "motor_magnetic_field", "vision_yaw"),
+    "magnetometer_rotated": (
+        "yaw_alignment",
+        "magnetic_disturbance",
+        "magnetometer_scale",
+        "motor_magnetic_field",
+        "vision_yaw",
+    ),
     "motor_magnetic_field": ("yaw_alignment", "magnetometer_scale"),
     "magnetometer_scale": ("yaw_alignment",),
     "yaw_alignment": ("magnetometer_scale", "magnetic_disturbance"),
@@ -45,9 +74,8 @@ MAKES: Mapping[str, tuple[str, ...]] = {
     "flow_scale": ("flow_delay",),
     "vision_scale": ("vision_delay",),
     "vision_delay": ("vision_scale",),
-}  # fmt: skip
+}
 """Cause → what it makes look like a cause of its own."""
-
 
 
 def explained_away(found: Iterable[Diagnosis]) -> list[Diagnosis]:

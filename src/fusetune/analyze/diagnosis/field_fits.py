@@ -1,9 +1,9 @@
 """What could be wrong with a magnetometer, each held against its readings: which of them leaves least.
 
 The earth's field at the place is known (world magnetic model), the attitude from gyros and level, the heading from GNSS
-or, without it, from the fit itself. What the readings differ by is explained in turn by a field of the body, one in step
-with the thrust, wrong scales, another mounting, or a field of the place that comes and goes; causes that look alike in
-the size of the innovations differ in what they leave.
+or, without it, from the fit itself. What the readings differ by is explained in turn by a field of the body, one in
+step with the thrust, wrong scales, another mounting, or a field of the place that comes and goes; causes that look
+alike in the size of the innovations differ in what they leave.
 """
 
 from __future__ import annotations
@@ -99,20 +99,23 @@ def _best_heading(readings: FieldReadings, earth: Array, left: Array, start: flo
     return float(np.arctan2(earth[1], earth[0]) - np.arctan2(in_frame[1], in_frame[0]))
 
 
-def _linear(
-    readings: FieldReadings, earth: Array, heading: float | None, terms: list[tuple[str, Array]]
-) -> FieldFit:
+def _linear(readings: FieldReadings, earth: Array, heading: float | None, terms: list[tuple[str, Array]]) -> FieldFit:
     """Fields of the body that are each a vector times a course."""
     course = np.column_stack([one for _, one in terms]) if terms else np.zeros((readings.time_s.size, 0))
     at = _best_heading(readings, earth, readings.measured, 0.0) if heading is None else heading
-    factors = np.zeros((course.shape[1], 3))
+    factors: Array = np.zeros((course.shape[1], 3))
     for _ in range(_ROUNDS if heading is None else 1):
         expected = readings.expected(earth, at)
-        factors = np.linalg.lstsq(course, readings.measured - expected, rcond=None)[0] if terms else factors
+        if terms:
+            factors = np.asarray(np.linalg.lstsq(course, readings.measured - expected, rcond=None)[0])
         if heading is None:
             at = _best_heading(readings, earth, readings.measured - course @ factors, at)
     left = readings.measured - readings.expected(earth, at) - course @ factors
-    values = {f"{name}_{axis}": float(one) for (name, _), row in zip(terms, factors, strict=True) for axis, one in zip("xyz", row, strict=True)}
+    values = {
+        f"{name}_{axis}": float(one)
+        for (name, _), row in zip(terms, factors, strict=True)
+        for axis, one in zip("xyz", row, strict=True)
+    }
     return FieldFit(_rms(left), values, None, at)
 
 

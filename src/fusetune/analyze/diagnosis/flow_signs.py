@@ -30,7 +30,8 @@ class FlowSigns:
     fit : delay and its like
     scale, scale_error : flow over what the motion makes
     turn, turn_error : of the flow against the body about the down axis, rad
-    rotation, rotation_error : (2,) share of the body's own turning that is left in the flow after its gyro's is taken out
+    rotation, rotation_error : (2,) share of the body's own turning that is left in the flow after its gyro's is taken
+        out
     """
 
     fit: LaggedFit
@@ -70,21 +71,27 @@ def flow_signs(
         sight, rate = looked_up(at, series.motion), looked_up(at, rates)
         later = (looked_up(at - 40_000, series.motion) - looked_up(at + 40_000, series.motion)) / 0.08
         across = np.column_stack([-sight[:, 1], sight[:, 0]])
-        own = np.zeros((at.size, 2, 2))
+        own = np.zeros((at.size, 2, 3))
         own[:, range(2), range(2)] = rate
-        return np.zeros_like(sight), np.concatenate([later[:, :, None], sight[:, :, None], across[:, :, None], own], axis=2)
+        # flow that is turned shows the turning about one axis as one about the other
+        own[:, 0, 2], own[:, 1, 2] = rate[:, 1], -rate[:, 0]
+        return np.zeros_like(sight), np.concatenate(
+            [later[:, :, None], sight[:, :, None], across[:, :, None], own], axis=2
+        )
 
     fit = lagged_fit(time, measured, course, told_s, 1)
     if fit is None:
         return None
     along, across = fit.values[:2]
     scale = float(np.hypot(along, across))
-    return FlowSigns(
-        fit,
-        scale,
-        float(np.hypot(fit.errors[0], 0.0)),
-        float(np.arctan2(across, along)),
-        float(fit.errors[1] / max(scale, 0.1)),
-        fit.values[2:4],
-        fit.errors[2:4],
-    )
+    by_way = float(np.arctan2(across, along)), float(fit.errors[1] / max(scale, 0.1))
+    own, own_error = fit.values[2:4], fit.errors[2:4]
+    turned = 1.0 - float(np.average(own, weights=own_error**-2.0))
+    size = max(float(np.hypot(fit.values[4], turned)), 0.1)
+    by_turning = float(np.arctan2(fit.values[4], turned)), float(fit.errors[4] / size)
+    turn, turn_error = min((by_way, by_turning), key=lambda one: one[1]) if turned > LEAST_TURNED else by_way
+    return FlowSigns(fit, scale, float(fit.errors[0]), turn, turn_error, own, own_error)
+
+
+LEAST_TURNED = 0.3
+"""With less of the turning in the flow, as of a gyro that does not tell it, its direction says nothing."""

@@ -1,8 +1,8 @@
 """GNSS velocity against what the IMU integrates: delay, lever arm and heading, found together.
 
-A measured velocity differs from the inertial one by what the receiver's delay, the antenna's place, a wrong heading, the
-tilt and the accelerometer's bias make of it. All are linear in what is unknown, up to the delay and the heading, which
-are looked for in rounds; what is left wanders, and the regression knows that (`whitened_regression`).
+A measured velocity differs from the inertial one by what the receiver's delay, the antenna's place, a wrong heading,
+the tilt and the accelerometer's bias make of it. All are linear in what is unknown, up to the delay and the heading,
+which are looked for in rounds; what is left wanders, and the regression knows that (`whitened_regression`).
 """
 
 from __future__ import annotations
@@ -106,7 +106,8 @@ def gnss_motion(
 
 
 def _bias_down(at: Times, measured: Array, motion: Motion) -> tuple[float, float]:
-    """Growth of the inertial vertical velocity against the measured one, and how unlike it is in pieces of the flight."""
+    """Growth of the inertial vertical velocity against the measured one, and how unlike it is in pieces of the
+    flight."""
     gained = motion.at(at, motion.free_velocity)[:, 2] - measured[:, 2]
     since_s = (at - at[0]) * 1e-6
     whole = float(np.polyfit(since_s, gained, 1)[0])

@@ -106,7 +106,9 @@ def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> Gnss
     for name, values in smooth.items():
         if name in names:
             beyond |= is_poor(values, usual[name], limit[name])
-    satellites = _smoothed(table["satellites_used"][good].astype(np.float64)) if "satellites_used" in table else np.zeros(0)
+    satellites = (
+        _smoothed(table["satellites_used"][good].astype(np.float64)) if "satellites_used" in table else np.zeros(0)
+    )
     jamming, noise = (_indicator(table, name, in_air) for name in ("jamming_indicator", "noise_per_ms"))
     up = np.zeros(np.count_nonzero(in_air), bool)
     for values, least in ((jamming, JAMMED_FROM), (noise, NOISY_FROM)):
@@ -115,7 +117,9 @@ def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> Gnss
             up |= (values > least) & (values > 1.3 * best + 10.0)
     warned = np.zeros(up.size, bool)
     if "jamming_state" in table:
-        warned = (table["jamming_state"][in_air] >= JAMMING_WARNING) & (table["jamming_state"][in_air] <= JAMMING_CRITICAL)
+        warned = (table["jamming_state"][in_air] >= JAMMING_WARNING) & (
+            table["jamming_state"][in_air] <= JAMMING_CRITICAL
+        )
     jumps, position_noise = _jumps(table, time, good, told)
     return GnssSigns(
         samples=int(np.count_nonzero(in_air)),
@@ -181,7 +185,9 @@ def _lost(time: Times, fixed: npt.NDArray[np.bool_], airborne: tuple[Interval, .
     return tuple(found)
 
 
-def _jumps(table: TopicTable, time: Times, good: npt.NDArray[np.bool_], told: Mapping[str, Array]) -> tuple[tuple[Jump, ...], float]:
+def _jumps(
+    table: TopicTable, time: Times, good: npt.NDArray[np.bool_], told: Mapping[str, Array]
+) -> tuple[tuple[Jump, ...], float]:
     rows = np.flatnonzero(good)
     if rows.size < 20 or "latitude_deg" not in table:
         return (), float("nan")
@@ -205,7 +211,9 @@ def _jumps(table: TopicTable, time: Times, good: npt.NDArray[np.bool_], told: Ma
         limit = max(least, JUMP_SIGMAS * float(np.median(size)) / 1.1774)
         if of_velocity:
             limit = max(limit, 2.0 * float(np.percentile(size, 98)), MOST_ACCELERATION * float(np.median(step_s)))
-        found += [Jump(int(at[i + 1]), float(size[i]), of_velocity) for i in np.flatnonzero((size > limit) & usual & steady)]
+        found += [
+            Jump(int(at[i + 1]), float(size[i]), of_velocity) for i in np.flatnonzero((size > limit) & usual & steady)
+        ]
     noise = float(np.median(np.abs(moved - np.median(moved, axis=0)))) / _NORMAL / np.sqrt(2.0)
     return tuple(sorted(found, key=lambda one: one.time)), noise
 

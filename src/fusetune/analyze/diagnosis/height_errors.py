@@ -1,8 +1,8 @@
 """What a barometer's height has that the vehicle's motion has not: wash, speed, nearness of the ground, time.
 
-All four move the barometer by metres, and innovations of the height look alike. They are told apart by what they follow:
-the thrust, the dynamic pressure along the axes of the body, the height above ground, or nothing but time. One regression
-holds all of them against the height at once; its residuals wander, as barometers do, and its errors know it.
+All four move the barometer by metres, and innovations of the height look alike. They are told apart by what they
+follow: the thrust, the dynamic pressure along the axes of the body, the height above ground, or nothing but time. One
+regression holds all of them against the height at once; its residuals wander, as barometers do, and its errors know it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class HeightErrors:
     Attributes
     ----------
     thrust : m for a thrust of once the weight
-    speed : m for each metre of v²/2g, by direction (`AXES`); 1 is a hole that feels the whole dynamic pressure as suction
+    speed : m for each metre of v²/2g, by direction (`AXES`); 1 is a hole that feels the whole dynamic pressure as
+        suction
     ground : m at the ground, with the thrust of a hover, against far above
     drift : m/s
     samples, blocks : measurements, and independent parts of the flight behind the errors
@@ -103,7 +104,11 @@ def height_errors(
     columns = np.column_stack([_followed(time, motion), (time - time[0]) * 1e-6])
     left = height - motion.at(time, climbed)
     rows = [
-        Rows(np.diff(left[part])[:, None], np.diff(columns[part], axis=0)[:, None, :], time[part][1:] * 1e-6)
+        Rows(
+            np.diff(left[part])[:, None],
+            np.diff(columns[part], axis=0)[:, None, :],
+            np.asarray(time[part][1:] * 1e-6, np.float64),
+        )
         for part in runs(time)
         if part.stop - part.start > 2 * order + 2
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +70,11 @@ def imu_signs(flight: Flight, airborne: tuple[Interval, ...]) -> ImuSigns | None
     shaking = float(np.sqrt(np.mean(np.sum(np.diff(force, axis=0)[near] ** 2, axis=1)) / 2.0))
     gyro = float(np.sqrt(np.mean(np.sum(np.diff(rate, axis=0)[near] ** 2, axis=1)) / 2.0))
     clipped = _clipped(table, flight, airborne)
-    gaps = tuple((int(time[i]), int(time[i + 1])) for i in np.flatnonzero(step > LONG_GAP_S * 1e6) if _in_one(time[i], time[i + 1], airborne))
+    gaps = tuple(
+        (int(time[i]), int(time[i + 1]))
+        for i in np.flatnonzero(step > LONG_GAP_S * 1e6)
+        if _in_one(time[i], time[i + 1], airborne)
+    )
     return ImuSigns(
         rate_hz=1e6 / max(float(np.median(step)), 1.0),
         shaking=shaking,
@@ -108,9 +113,17 @@ def _lost_share(time: Times, table: TopicTable, rows: npt.NDArray[np.bool_], air
     """Of the steps from sample to sample what is longer than the samples say that they were integrated."""
     step = np.diff(time).astype(np.float64)
     usual = float(np.median(step))
-    told = table["gyro_integral_dt"][rows][1:].astype(np.float64) if "gyro_integral_dt" in table else np.full(step.size, usual)
+    told = (
+        table["gyro_integral_dt"][rows][1:].astype(np.float64)
+        if "gyro_integral_dt" in table
+        else np.full(step.size, usual)
+    )
     told = np.where((told > 0.3 * usual) & (told < 50.0 * usual), told, usual)
-    same = np.array([_in_one(a, b, airborne) for a, b in zip(time[:-1], time[1:], strict=True)]) if len(airborne) > 1 else np.ones(step.size, bool)
+    same = (
+        np.array([_in_one(a, b, airborne) for a, b in itertools.pairwise(time)])
+        if len(airborne) > 1
+        else np.ones(step.size, bool)
+    )
     missing = np.where((step > 1.5 * usual) & same, np.maximum(step - told, 0.0), 0.0)
     return float(missing.sum() / max(step[same].sum(), 1.0))
 
@@ -208,7 +221,9 @@ def _estimated(steps: ReplayedSteps | None, airborne: tuple[Interval, ...]) -> t
     time, bias = steps.time[rows] * 1e-6, steps.gyro_bias[rows]
     block = ((time - time[0]) / BIAS_OVER_S).astype(np.int64)
     ones = np.unique(block)
-    return np.array([time[block == one].mean() for one in ones]), np.array([np.median(bias[block == one], axis=0) for one in ones])
+    return np.array([time[block == one].mean() for one in ones]), np.array(
+        [np.median(bias[block == one], axis=0) for one in ones]
+    )
 
 
 REST_MARGIN_US, SETTLED_US = 1_500_000, 10_000_000

@@ -69,7 +69,11 @@ def flown_ratios(flight: Flight, intervals: tuple[Interval, ...]) -> dict[str, S
         table = flight.topic(source.topic)
         if table is None or source.every_update:
             continue
-        columns = [c for c in ([f"test_ratio[{axis}]" for axis in range(source.axes)] if source.axes > 1 else ["test_ratio"]) if c in table]
+        columns = [
+            c
+            for c in ([f"test_ratio[{axis}]" for axis in range(source.axes)] if source.axes > 1 else ["test_ratio"])
+            if c in table
+        ]
         if not columns:
             continue
         ratio = np.max([table[column].astype(np.float64) for column in columns], axis=0)
@@ -81,7 +85,11 @@ def flown_ratios(flight: Flight, intervals: tuple[Interval, ...]) -> dict[str, S
 
 
 def ratios_of(
-    time: np.ndarray, ratio: np.ndarray, intervals: tuple[Interval, ...], first: int, origin: Literal["vehicle", "replay"]
+    time: np.ndarray,
+    ratio: np.ndarray,
+    intervals: tuple[Interval, ...],
+    first: int,
+    origin: Literal["vehicle", "replay"],
 ) -> SourceRatios | None:
     """Figures of some samples; None with too few of them."""
     rows = inside(time, intervals) & np.isfinite(ratio) & (time >= first)

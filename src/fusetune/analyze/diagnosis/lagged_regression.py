@@ -1,4 +1,4 @@
-"""A measured series against a course of the motion, with the delay as one more unknown: linear but for that, in rounds."""
+"""A measured series against a course of the motion, with the delay as one more unknown."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def lagged_fit(time: Times, measured: Array, course: Course, told_s: float, diff
         for part in parts:
             if part.stop - part.start > 2 * order + 2 + differences:
                 left, columns = (np.diff(one[part], differences, axis=0) for one in (measured - expected, design))
-                rows.append(Rows(left, columns, at[part][differences:] * 1e-6))
+                rows.append(Rows(left, columns, np.asarray(at[part][differences:] * 1e-6, np.float64)))
         if not rows:
             return None
         fit = generalised(rows, order)

@@ -66,7 +66,9 @@ def earth_field(flight: Flight) -> Array | None:
     if table is None or "latitude_deg" not in table or not np.any(table["fix_type"] >= FIX_3D):
         return None
     first = int(np.argmax(table["fix_type"] >= FIX_3D))
-    declination, inclination, strength = field_at(float(table["latitude_deg"][first]), float(table["longitude_deg"][first]))
+    declination, inclination, strength = field_at(
+        float(table["latitude_deg"][first]), float(table["longitude_deg"][first])
+    )
     level = strength * np.cos(inclination)
     return np.array([level * np.cos(declination), level * np.sin(declination), strength * np.sin(inclination)])
 
@@ -127,7 +129,9 @@ def _compass_off(readings: FieldReadings, earth: Array, heading: float) -> float
     return float(np.percentile(np.abs(np.angle(np.exp(1j * off))), 90.0))
 
 
-def _readings(table: TopicTable, motion: Motion, intervals: tuple[Interval, ...]) -> tuple[FieldReadings, float, float] | None:
+def _readings(
+    table: TopicTable, motion: Motion, intervals: tuple[Interval, ...]
+) -> tuple[FieldReadings, float, float] | None:
     """Means over half a second, the noise of a reading per axis, and how many readings are in a mean."""
     samples = mag_samples(table)
     time, field = samples["time_us"].astype(np.int64), samples["mag"]
@@ -151,6 +155,8 @@ def _readings(table: TopicTable, motion: Motion, intervals: tuple[Interval, ...]
 DISTURBED_FROM, SIGMAS = 0.12, 6.0
 """A passing field matters from this share of the earth's on, and is more than this times the readings' noise."""
 MOST_OF_FLIGHT = 0.7
+FEWEST_DISTURBED = 5
+"""Means of half a second: what passes within three is a turn that the gyros tell badly."""
 
 
 def _disturbed(readings: FieldReadings, left: Array, noise: float) -> tuple[Interval | None, float, float]:
@@ -159,7 +165,9 @@ def _disturbed(readings: FieldReadings, left: Array, noise: float) -> tuple[Inte
     size = np.linalg.norm(in_place - np.median(in_place, axis=0), axis=1)
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(size, 1, mode="edge"), 3), axis=1)
     calm_size = float(np.percentile(smooth, 30.0))
-    least = max(3.0 * calm_size, SIGMAS * noise, DISTURBED_FROM * float(np.median(np.linalg.norm(readings.measured, axis=1))))
+    least = max(
+        3.0 * calm_size, SIGMAS * noise, DISTURBED_FROM * float(np.median(np.linalg.norm(readings.measured, axis=1)))
+    )
     on = smooth > least
     if not 3 <= np.count_nonzero(on) <= MOST_OF_FLIGHT * on.size:
         return None, 0.0, float(np.sqrt(np.mean(np.square(left))))
@@ -168,10 +176,14 @@ def _disturbed(readings: FieldReadings, left: Array, noise: float) -> tuple[Inte
     # what lies seconds apart is one disturbance
     longest = int(np.argmax(ends - begins))
     first, last = int(begins[longest]), int(ends[longest]) - 1
-    if last - first < 2:
+    if last - first < FEWEST_DISTURBED:
         return None, 0.0, float(np.sqrt(np.mean(np.square(left))))
     margin = np.zeros(on.size, bool)
     margin[max(first - 3, 0) : last + 4] = True
     calm = left[~margin]
     span = (int(readings.time_s[first] * 1e6), int(readings.time_s[last] * 1e6) + MEAN_OVER_US)
-    return span, float(np.median(size[first : last + 1])), float(np.sqrt(np.mean(np.square(calm - np.median(calm, axis=0))))) if calm.size else 0.0
+    return (
+        span,
+        float(np.median(size[first : last + 1])),
+        float(np.sqrt(np.mean(np.square(calm - np.median(calm, axis=0))))) if calm.size else 0.0,
+    )

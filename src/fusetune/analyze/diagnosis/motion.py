@@ -99,8 +99,17 @@ def motion_of(record: ReplayedSet, flight: Flight, airborne: tuple[Interval, ...
     height = _height(steps, airborne)
     thrust, source = _thrust(flight, steps.time, force, airborne)
     return Motion(
-        steps.time, rotation, off, steps.velocity, np.cumsum(gained * step_s, axis=0), rate, force, height, thrust, source
-    )  # fmt: skip
+        steps.time,
+        rotation,
+        off,
+        steps.velocity,
+        np.cumsum(gained * step_s, axis=0),
+        rate,
+        force,
+        height,
+        thrust,
+        source,
+    )
 
 
 def _gyro_bias(steps: ReplayedSteps, airborne: tuple[Interval, ...]) -> Array:

@@ -21,6 +21,7 @@ from fusetune.analyze.diagnosis.motion import Motion, motion_of
 from fusetune.analyze.diagnosis.vision_signs import VisionSigns, vision_signs
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.layouts.estimator_instances import instance_switches
 from fusetune.px4.parameters.ekf2_parameters import complete
@@ -108,8 +109,12 @@ class Signs:
 
     @cached_property
     def gnss_sound(self) -> tuple[Interval, ...]:
-        """In the air without the times that the receiver says were poor, lost or jammed, nor its jumps, µs."""
-        bad = [] if self.gnss is None else [*self.gnss.lost, *(one for one in (self.gnss.poor, self.gnss.jammed) if one)]
+        """In the air without the times that the receiver was poor, lost, jammed or stuck, nor its jumps, µs."""
+        bad = (
+            [] if self.gnss is None else [*self.gnss.lost, *(one for one in (self.gnss.poor, self.gnss.jammed) if one)]
+        )
+        if "gnss" in self.stuck:
+            bad.append((self.stuck["gnss"].start_us, self.stuck["gnss"].stop_us))
         jumps = [one.time for one in self.gnss.jumps] if self.gnss is not None else []
         if jumps:
             bad.append((min(jumps) - 500_000, max(jumps) + 500_000))
@@ -138,21 +143,19 @@ class Signs:
         return magnetometer_signs(self.observed.flight, self.motion, self.airborne, heading)
 
     @cached_property
-    def mounting(self) -> float:
-        """Share of the field's scatter that the best other mounting would leave; 1 where none is better or it is not known."""
+    def mounting(self) -> Finding | None:
+        """What the verdict says of the magnetometer's mounting, by tilt alone; None where it says nothing."""
         found = magnetometer_mounting.findings(JudgedFlight(self.observed.flight, VerdictThresholds()))[0]
-        return found.figure if found.figure is not None and found.severity != "does-not-apply" else 1.0
-
-    @cached_property
-    def mounting_words(self) -> str:
-        """What the verdict says of the mounting; empty where it says nothing."""
-        found = magnetometer_mounting.findings(JudgedFlight(self.observed.flight, VerdictThresholds()))[0]
-        return found.found if found.severity == "warning" else ""
+        return found if found.severity == "warning" else None
 
     @cached_property
     def barometer(self) -> BarometerSigns | None:
         """Readings against the vehicle's motion."""
-        return None if self.motion is None else barometer_signs(self.observed.flight, self.motion, self.airborne)
+        if self.motion is None:
+            return None
+        stuck = self.stuck.get("baro")
+        out = (stuck.start_us, stuck.stop_us) if stuck is not None else None
+        return barometer_signs(self.observed.flight, self.motion, self.airborne, out)
 
     @cached_property
     def range(self) -> RangeSigns | None:
@@ -183,11 +186,6 @@ class Signs:
         return None if self.motion is None else airspeed_signs(self.observed.flight, self.motion, self.airborne)
 
     @property
-    def fused(self) -> set[str]:
-        """Sensors that the log holds and the filter may use beside GNSS."""
-        return {"ev"} if self.table("vehicle_visual_odometry") is not None else set()
-
-    @property
     def vision_knows_north(self) -> bool:
         """Whether vision says that its frame is north, east, down."""
         table = self.table("vehicle_visual_odometry")
@@ -207,7 +205,10 @@ class Signs:
         if self.gnss_motion is not None:
             measured["gnss_vel"] = self.gnss_motion.fit.noise
         if self.gnss is not None:
-            reported = {"gnss_vel": self.gnss.usual.get("s_variance_m_s", 0.0), "gnss_pos": self.gnss.usual.get("eph", 0.0)}
+            reported = {
+                "gnss_vel": self.gnss.usual.get("s_variance_m_s", 0.0),
+                "gnss_pos": self.gnss.usual.get("eph", 0.0),
+            }
             measured["gnss_pos"] = self.gnss.position_noise
         if self.barometer is not None:
             measured["baro_hgt"] = self.barometer.noise

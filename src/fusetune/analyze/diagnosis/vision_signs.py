@@ -82,7 +82,9 @@ def vision_signs(
     differences = 2 if of_position else 1
     apart = max(1, round(FASTEST_HZ))
     first = 0.0
-    slow = np.column_stack([np.interp(at_time, motion.time, column) for column in _in_gyro_frame(motion, of_position).T])
+    slow = np.column_stack(
+        [np.interp(at_time, motion.time, column) for column in _in_gyro_frame(motion, of_position).T]
+    )
     first = turned_by(slow, measured, apart)
     turn = about_down(first)
 

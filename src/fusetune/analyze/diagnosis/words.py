@@ -16,10 +16,9 @@ def log_lines(one: DiagnosedLog) -> Iterator[str]:
     if one.error is not None:
         yield f"{one.log}: {one.error.reason}. {one.error.remedy}."
         return
-    if not one.found:
-        yield f"{one.log}: nothing found"
-        return
-    yield f"{one.log}:"
+    yield f"{one.log}: nothing found" if not one.found else f"{one.log}:"
+    if one.not_replayed:
+        yield f"  not replayed, so less can be told: {'; '.join(one.not_replayed)}"
     for found in one.found:
         yield from _lines(found, one)
 

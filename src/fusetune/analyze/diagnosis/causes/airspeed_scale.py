@@ -21,8 +21,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     told = signs.parameters.get("ASPD_SCALE_1", 1.0)
     words = f"airspeed is {one.scale:.2f} (±{2.0 * one.error:.2f}) times what velocity and wind make"
     return diagnosed(
-        signs, "airspeed_scale", "Airspeed is scaled wrongly", "fail" if off > 0.4 else "warning", confidence(off, level, 0.95),
-        [Sign(words, off, OFF_FROM, "1", "replay")], touches=("airspeed",),
+        signs,
+        "airspeed_scale",
+        "Airspeed is scaled wrongly",
+        "fail" if off > 0.4 else "warning",
+        confidence(off, level, 0.95),
+        [Sign(words, off, OFF_FROM, "1", "replay")],
+        touches=("airspeed",),
         remedy=f"Set ASPD_SCALE_1 to {told / one.scale:.2f}; check the tube's place and hoses first",
         values={"ASPD_SCALE_1": round(told / one.scale, 3)},
-    )  # fmt: skip
+    )

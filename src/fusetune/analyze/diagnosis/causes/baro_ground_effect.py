@@ -23,8 +23,14 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     zone = round(MARGIN * dip, 1)
     words = f"near the ground the barometer reads {dip:.1f} m (±{2.0 * error:.1f}) less"
     return diagnosed(
-        signs, "baro_ground_effect", "The barometer dips near the ground", "fail" if dip > FAILS_FROM_M else "warning",
-        confidence(dip, DIP_FROM_M + SIGMAS * error), [Sign(words, dip, DIP_FROM_M, "m", "replay")], touches=("baro", "rng"),
+        signs,
+        "baro_ground_effect",
+        "The barometer dips near the ground",
+        "fail" if dip > FAILS_FROM_M else "warning",
+        confidence(dip, DIP_FROM_M + SIGMAS * error),
+        [Sign(words, dip, DIP_FROM_M, "m", "replay")],
+        touches=("baro", "rng"),
         remedy=f"Set EKF2_GND_EFF_DZ to {min(zone, 10.0):.1f} m, and EKF2_GND_MAX_HGT where a range finder is fitted; "
-        "better, cover the barometer with open-cell foam or move it", values={"EKF2_GND_EFF_DZ": min(zone, 10.0)},
-    )  # fmt: skip
+        "better, cover the barometer with open-cell foam or move it",
+        values={"EKF2_GND_EFF_DZ": min(zone, 10.0)},
+    )

@@ -43,5 +43,15 @@ def diagnosed(
     explained = excess(signs.ratios, *touches) if touches else 0.0
     ordered = dict(values or {})
     return Diagnosis(
-        id, cause, severity, round(sure, 3), round(explained + strength, 4), start, stop, tuple(found), remedy, source, ordered
-    )  # fmt: skip
+        id,
+        cause,
+        severity,
+        round(sure, 3),
+        round(explained + strength, 4),
+        start,
+        stop,
+        tuple(found),
+        remedy,
+        source,
+        ordered,
+    )

@@ -11,7 +11,8 @@ from fusetune.analyze.diagnosis.signs import Signs
 
 TURN_FROM_DEG, LEFT_FROM, SIGMAS = 9.0, 0.3, 2.5
 REMEDY = (
-    "Compare SENS_FLOW_ROT with how the sensor sits, and see that the driver publishes the angular rate over the same time "
+    "Compare SENS_FLOW_ROT with how the sensor sits, and see that the driver publishes the angular rate over the "
+    "same time "
     "as the flow (`delta_angle`); without a gyro of its own let PX4 use the autopilot's"
 )
 
@@ -39,7 +40,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if not found:
         return None
     return diagnosed(
-        signs, "flow_rotation", "Optical flow is turned, or its turning is not taken out", "fail",
-        max(confidence(sign.figure, sign.usual, 0.95) for sign in found), found, touches=("optical_flow",), remedy=REMEDY,
+        signs,
+        "flow_rotation",
+        "Optical flow is turned, or its turning is not taken out",
+        "fail",
+        max(confidence(sign.figure, sign.usual, 0.95) for sign in found),
+        found,
+        touches=("optical_flow",),
+        remedy=REMEDY,
         values={"flow_turn_deg": round(turn, 1), "turning_left": round(left, 3)},
-    )  # fmt: skip
+    )

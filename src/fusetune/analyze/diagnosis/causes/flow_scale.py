@@ -29,7 +29,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         Sign(f"and {by_turning:.2f} times what turning makes", other, OFF_FROM, "1", "replay"),
     ]
     return diagnosed(
-        signs, "flow_scale", "Optical flow is scaled wrongly", "fail" if off > 0.5 else "warning", confidence(off, OFF_FROM, 0.95),
-        found, touches=("optical_flow",), values={"flow_scale": round(by_turning, 3)},
-        remedy=f"Correct the sensor's scale by {1.0 / max(by_turning, 0.1):.2f} (SENS_FLOW_SCALE, or its lens and focal length)",
-    )  # fmt: skip
+        signs,
+        "flow_scale",
+        "Optical flow is scaled wrongly",
+        "fail" if off > 0.5 else "warning",
+        confidence(off, OFF_FROM, 0.95),
+        found,
+        touches=("optical_flow",),
+        values={"flow_scale": round(by_turning, 3)},
+        remedy=f"Correct the sensor's scale by {1.0 / max(by_turning, 0.1):.2f} (SENS_FLOW_SCALE, or its lens)",
+    )

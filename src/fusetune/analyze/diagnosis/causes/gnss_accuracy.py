@@ -15,7 +15,8 @@ LABELS = {
 FAILS_FROM = 4.0
 """Times the limit."""
 REMEDY = (
-    "Give the antenna a free sky and a ground plane, away from other electronics, and wait before take-off until accuracy "
+    "Give the antenna a free sky and a ground plane, away from other electronics, and wait before take-off until "
+    "accuracy "
     "has settled (typical: 0.8 m, 1.5 m and 0.3 m/s). Do not raise EKF2_REQ_* to fly with less"
 )
 
@@ -36,7 +37,14 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     found.sort(key=lambda one: one.usual / one.figure)
     factor = found[0].figure / found[0].usual
     return diagnosed(
-        signs, "gnss_accuracy", "GNSS is poor, and the receiver says so", "fail" if factor > FAILS_FROM else "warning",
-        confidence(factor, 0.8), found, touches=("gnss",), remedy=REMEDY, when=gnss.poor,
+        signs,
+        "gnss_accuracy",
+        "GNSS is poor, and the receiver says so",
+        "fail" if factor > FAILS_FROM else "warning",
+        confidence(factor, 0.8),
+        found,
+        touches=("gnss",),
+        remedy=REMEDY,
+        when=gnss.poor,
         values={f"worst_{name}": round(value, 3) for name, value in gnss.worst.items()},
-    )  # fmt: skip
+    )

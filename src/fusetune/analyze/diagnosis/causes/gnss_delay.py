@@ -24,7 +24,9 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     off = value - told
     if abs(off) < MATTERS_MS + SIGMAS * error:
         return None
-    words = f"velocity lags behind the motion by {value:.0f} ms (±{2.0 * SIGMAS / 2.0 * error:.0f}), PX4 is told {told:.0f}"
+    words = (
+        f"velocity lags behind the motion by {value:.0f} ms (±{2.0 * SIGMAS / 2.0 * error:.0f}), PX4 is told {told:.0f}"
+    )
     found = [Sign(words, abs(off), MATTERS_MS + SIGMAS * error, "ms", "replay")]
     place = velocity_place(signs.observed.replayed, "gnss_vel", signs.gnss_sound, told * 1e-3)
     smooth = None if place is None else place.lag
@@ -32,13 +34,26 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         again, spread = 1e3 * smooth.delay_s, 1e3 * smooth.standard_error_s
         if (again - told) * off <= 0.0 or abs(again - told) < 0.5 * MATTERS_MS + CONFIRMED_SIGMAS * spread:
             return None
-        found.append(Sign(f"the smoothed velocity says {again:.0f} ms (±{2.0 * spread:.0f})", abs(again - told), MATTERS_MS, "ms", "replay"))
+        found.append(
+            Sign(
+                f"the smoothed velocity says {again:.0f} ms (±{2.0 * spread:.0f})",
+                abs(again - told),
+                MATTERS_MS,
+                "ms",
+                "replay",
+            )
+        )
         value = (value / error**2 + again / spread**2) / (error**-2 + spread**-2)
     limit = PARAMETERS["EKF2_GPS_DELAY"]
     mended = min(max(10.0 * round(value / 10.0), limit.minimum or 0.0), limit.maximum or 300.0)
     return diagnosed(
-        signs, "gnss_delay", f"GNSS is {value:.0f} ms late, and PX4 is told {told:.0f}", "fail" if abs(off) > FAILS_FROM_MS else "warning",
-        confidence(abs(off), MATTERS_MS + SIGMAS * error, 0.95 if smooth is not None else 0.8), found,
-        touches=("gnss_vel", "gnss_pos"), values={"EKF2_GPS_DELAY": mended},
+        signs,
+        "gnss_delay",
+        f"GNSS is {value:.0f} ms late, and PX4 is told {told:.0f}",
+        "fail" if abs(off) > FAILS_FROM_MS else "warning",
+        confidence(abs(off), MATTERS_MS + SIGMAS * error, 0.95 if smooth is not None else 0.8),
+        found,
+        touches=("gnss_vel", "gnss_pos"),
+        values={"EKF2_GPS_DELAY": mended},
         remedy=f"Set EKF2_GPS_DELAY to {mended:.0f} ms, after other flights that accelerate and stop agree",
-    )  # fmt: skip
+    )

@@ -9,7 +9,8 @@ from fusetune.analyze.diagnosis.signs import Signs
 
 FAILS_FROM_M = 25.0
 REMEDY = (
-    "Keep away from walls and masts that reflect; a better antenna and a receiver with more bands help. Leave the gates "
+    "Keep away from walls and masts that reflect; a better antenna and a receiver with more bands help. Leave "
+    "the gates "
     "(EKF2_GPS_P_GATE, EKF2_GPS_V_GATE) as they are, they refuse such jumps. Jumps in open sky: think of spoofing"
 )
 
@@ -32,7 +33,14 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         found.append(Sign(words, largest.size, LEAST_JUMP_M_S, "m/s"))
     largest_m = max((one.size for one in places), default=0.0)
     return diagnosed(
-        signs, "gnss_glitch", "GNSS jumps while it reports good accuracy", "fail" if largest_m > FAILS_FROM_M else "warning",
-        max(confidence(one.figure, one.usual) for one in found), found, touches=("gnss",), remedy=REMEDY,
-        when=(gnss.jumps[0].time, gnss.jumps[-1].time + 1_000_000), values={"largest_jump_m": round(largest_m, 2)},
-    )  # fmt: skip
+        signs,
+        "gnss_glitch",
+        "GNSS jumps while it reports good accuracy",
+        "fail" if largest_m > FAILS_FROM_M else "warning",
+        max(confidence(one.figure, one.usual) for one in found),
+        found,
+        touches=("gnss",),
+        remedy=REMEDY,
+        when=(gnss.jumps[0].time, gnss.jumps[-1].time + 1_000_000),
+        values={"largest_jump_m": round(largest_m, 2)},
+    )

@@ -18,7 +18,9 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     motion = signs.gnss_motion
     if motion is None:
         return None
-    told = np.array([signs.parameters[f"EKF2_GPS_POS_{axis}"] - signs.parameters[f"EKF2_IMU_POS_{axis}"] for axis in "XYZ"])
+    told = np.array(
+        [signs.parameters[f"EKF2_GPS_POS_{axis}"] - signs.parameters[f"EKF2_IMU_POS_{axis}"] for axis in "XYZ"]
+    )
     off, error = motion.arm - told, motion.arm_error
     # along the axis about which a vehicle hardly turns the arm does not show
     known = error < np.maximum(0.5 * MATTERS_M, 0.2 * np.abs(off))
@@ -29,13 +31,23 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     level = MATTERS_M + SIGMAS * spread
     if size < level:
         return None
-    there = ", ".join(f"{name} {value:+.2f}" for name, value, sure in zip("XYZ", motion.arm, known, strict=True) if sure)
-    words = f"velocity moves with the rate of turn as at {there} m, PX4 is told X {told[0]:+.2f}, Y {told[1]:+.2f}, Z {told[2]:+.2f}"
+    there = ", ".join(
+        f"{name} {value:+.2f}" for name, value, sure in zip("XYZ", motion.arm, known, strict=True) if sure
+    )
+    words = (
+        f"velocity moves with the rate of turn as at {there} m, PX4 is told X {told[0]:+.2f}, Y {told[1]:+.2f}, Z "
+        f"{told[2]:+.2f}"
+    )
     imu = np.array([signs.parameters[f"EKF2_IMU_POS_{name}"] for name in "XYZ"])
     values = {f"EKF2_GPS_POS_{'XYZ'[i]}": round(float(motion.arm[i] + imu[i]), 3) for i in range(3) if known[i]}
     return diagnosed(
-        signs, "gnss_lever_arm", f"The GNSS antenna is {size:.2f} m from where PX4 is told",
-        "warning" if size > WARNS_FROM_M else "note", confidence(size, level, 0.95),
-        [Sign(words, size, level, "m", "replay")], touches=("gnss_vel",), values=values,
+        signs,
+        "gnss_lever_arm",
+        f"The GNSS antenna is {size:.2f} m from where PX4 is told",
+        "warning" if size > WARNS_FROM_M else "note",
+        confidence(size, level, 0.95),
+        [Sign(words, size, level, "m", "replay")],
+        touches=("gnss_vel",),
+        values=values,
         remedy="Measure from the IMU to the antenna, forward, right, down, and set EKF2_GPS_POS_X, _Y, _Z to it",
-    )  # fmt: skip
+    )

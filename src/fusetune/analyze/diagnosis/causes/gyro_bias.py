@@ -13,7 +13,8 @@ REST_DEG_S, CHANGE_DEG_S = 3.0, 1.5
 flight has not warmed up. Calibrated gyros rest within 1.2 °/s and move 0.6 on real and simulated healthy flights."""
 FAILS_DEG_S = 8.0
 REMEDY = (
-    "Calibrate the gyros, warm. If the bias comes back with temperature: thermal calibration, insulation, or another IMU. "
+    "Calibrate the gyros, warm. If the bias comes back with temperature: thermal calibration, insulation, or "
+    "another IMU. "
     "Give the filter a minute at rest after switch-on"
 )
 
@@ -23,7 +24,10 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     bias = signs.gyro_bias
     if bias is None or signs.imu is None or signs.imu.rate_hz < 50.0:
         return None
-    rest, change = (float(np.degrees(np.nanmax(np.abs(one)))) if np.isfinite(one).any() else 0.0 for one in (bias.at_rest, bias.change))
+    rest, change = (
+        float(np.degrees(np.nanmax(np.abs(one)))) if np.isfinite(one).any() else 0.0
+        for one in (bias.at_rest, bias.change)
+    )
     found = []
     if rest > REST_DEG_S:
         found.append(Sign(f"a gyro reads {rest:.1f} °/s at rest", rest, REST_DEG_S, "°/s"))
@@ -34,7 +38,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     sure = max(confidence(one.figure, one.usual) for one in found)
     worst = max(rest, change)
     return diagnosed(
-        signs, "gyro_bias", "A gyro has a large bias" if rest > REST_DEG_S else "The bias of a gyro changes in flight",
-        "fail" if worst > FAILS_DEG_S else "warning", sure, found, touches=("mag", "gnss_vel", "gnss_yaw"), remedy=REMEDY,
+        signs,
+        "gyro_bias",
+        "A gyro has a large bias" if rest > REST_DEG_S else "The bias of a gyro changes in flight",
+        "fail" if worst > FAILS_DEG_S else "warning",
+        sure,
+        found,
+        touches=("mag", "gnss_vel", "gnss_yaw"),
+        remedy=REMEDY,
         values={"bias_at_rest_deg_s": round(rest, 3), "bias_change_deg_s": round(change, 3)},
-    )  # fmt: skip
+    )

@@ -11,7 +11,8 @@ LOST_FROM_S, SHARE_FROM, RATE_FROM_HZ = 0.25, 0.1, 100.0
 SHARE_WHOLE = 0.004
 """Where the log holds what the estimator took of every run (`ekf2_timestamps`), the estimator missed them as well."""
 REMEDY = (
-    "A faster card, fewer logged topics (SDLOG_PROFILE), a look at the load (`top`): what the logger lost the filter had. If "
+    "A faster card, fewer logged topics (SDLOG_PROFILE), a look at the load (`top`): what the logger lost the "
+    "filter had. If "
     "the messages of the IMU themselves stop, look for a driver that restarts, wiring and power"
 )
 
@@ -36,6 +37,14 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if not found:
         return None
     return diagnosed(
-        signs, "imu_gaps", "IMU samples are missing", "warning", max(confidence(one.figure, one.usual) for one in found), found,
-        touches=("gnss_vel", "mag"), remedy=REMEDY, when=when, values={"imu_lost_s": round(imu.lost_s, 3)},
-    )  # fmt: skip
+        signs,
+        "imu_gaps",
+        "IMU samples are missing",
+        "warning",
+        max(confidence(one.figure, one.usual) for one in found),
+        found,
+        touches=("gnss_vel", "mag"),
+        remedy=REMEDY,
+        when=when,
+        values={"imu_lost_s": round(imu.lost_s, 3)},
+    )

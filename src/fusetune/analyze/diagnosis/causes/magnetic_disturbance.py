@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
-from fusetune.analyze.diagnosis.causes.magnetometer_scale import scaled, scaled_down
+from fusetune.analyze.diagnosis.causes.magnetometer_scale import as_sure_of_a_field, scaled, scaled_down
 from fusetune.analyze.diagnosis.causes.motor_magnetic_field import in_step
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
 PASSING_FROM, BODY_FROM, SCATTER_FROM, STRENGTH_FROM = 0.14, 0.14, 0.25, 0.25
-"""Of the earth's field: calibrated compasses of healthy flights, real and simulated, are off by a tenth, and in strength
-by as much."""
+"""Of the earth's field: calibrated compasses of healthy flights, real and simulated, are off by a tenth, and in
+strength by as much."""
 FAILS_FROM = 0.7
 REMEDY = (
-    "Fly away from steel, power lines and reinforced ground, and calibrate the compass there; if it stays, look for what "
+    "Fly away from steel, power lines and reinforced ground, and calibrate the compass there; if it stays, look "
+    "for what "
     "is magnetic near the sensor. EKF2_MAG_CHECK lets the filter refuse such a field"
 )
 
@@ -40,14 +41,22 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     size = float(np.linalg.norm(body)) / earth
     if one.by_gnss and size > BODY_FROM and fits["body_field"].left < 0.4 * fits["as_told"].left:
         words = f"a constant field of the body of {size:.0%} of the earth's was not calibrated"
-        return _diagnosis(signs, "The compass feels a constant field of the body", [Sign(words, size, BODY_FROM, "1", "replay")], None, 0.5 if scaled_down(one) is not None else 1.0)
+        return _diagnosis(
+            signs,
+            "The compass feels a constant field of the body",
+            [Sign(words, size, BODY_FROM, "1", "replay")],
+            None,
+            as_sure_of_a_field(one) if scaled_down(one) is not None else 1.0,
+        )
     found = []
     if abs(one.strength - 1.0) > STRENGTH_FROM:
         words = f"the field is {one.strength:.2f} times as strong as the earth's there"
         found.append(Sign(words, abs(one.strength - 1.0), STRENGTH_FROM, "1"))
     scatter = fits["body_field"].left / earth
     if scatter > SCATTER_FROM:
-        found.append(Sign(f"readings scatter by {scatter:.0%} of the earth's field", scatter, SCATTER_FROM, "1", "replay"))
+        found.append(
+            Sign(f"readings scatter by {scatter:.0%} of the earth's field", scatter, SCATTER_FROM, "1", "replay")
+        )
     return _diagnosis(signs, "The magnetometer is disturbed", found, None) if found else None
 
 
@@ -59,6 +68,14 @@ def _diagnosis(
     sure = signs.magnetometer is not None and signs.magnetometer.by_gnss
     is_strong = any(one.figure > FAILS_FROM and (sure or one.origin == "vehicle") for one in found)
     return diagnosed(
-        signs, "magnetic_disturbance", cause, "fail" if is_strong else "warning", min(confidence(worst.figure, worst.usual), most),
-        found, touches=("mag",), remedy=REMEDY, when=when, values={"field_share": round(found[0].figure, 3)},
-    )  # fmt: skip
+        signs,
+        "magnetic_disturbance",
+        cause,
+        "fail" if is_strong else "warning",
+        min(confidence(worst.figure, worst.usual), most),
+        found,
+        touches=("mag",),
+        remedy=REMEDY,
+        when=when,
+        values={"field_share": round(found[0].figure, 3)},
+    )

@@ -11,10 +11,11 @@ from fusetune.save.checks.magnetometer_mounting import described
 
 FITS_BELOW = 0.3
 """The right mounting leaves this share of what is wrong at most; no other cause is mended so by turning axes."""
-OFF_FROM = 0.2
-"""Of the field: the smallest turn that is looked for moves twice as much."""
+OFF_FROM = 0.12
+"""RMS of an axis over the field: the smallest turn that is looked for, 45° where the field is steep, makes 0.16."""
 REMEDY = (
-    "Set CAL_MAGn_ROT (or SENS_BOARD_ROT) to how the sensor sits, then calibrate the compass again; in a simulation, ask "
+    "Set CAL_MAGn_ROT (or SENS_BOARD_ROT) to how the sensor sits, then calibrate the compass again; in a "
+    "simulation, ask "
     "its sensor model"
 )
 
@@ -29,13 +30,16 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         if as_told > OFF_FROM * magnetometer.field_gauss and turned.turn is not None:
             share = turned.left / as_told
             if share < FITS_BELOW and turned.left < 0.6 * others:
-                words = f"turned by {_turn(turned.turn)} the readings miss the field by {turned.left:.3f} G instead of {as_told:.3f}"
+                words = (
+                    f"turned by {_turn(turned.turn)} the readings miss the field by {turned.left:.3f} G instead "
+                    f"of {as_told:.3f}"
+                )
                 found = [Sign(words, as_told / magnetometer.field_gauss, OFF_FROM, "1", "replay")]
                 return _diagnosis(signs, found, confidence(FITS_BELOW / max(share, 1e-3), 1.0), _turn(turned.turn))
         return None
-    if signs.mounting_words:
-        left = 1.0 / max(signs.mounting, 1e-3)
-        found = [Sign(signs.mounting_words, left, 1.0 / FITS_BELOW, "1")]
+    if signs.mounting is not None:
+        left = 1.0 / max(signs.mounting.figure or 1.0, 1e-3)
+        found = [Sign(signs.mounting.found, left, 1.0 / FITS_BELOW, "1")]
         return _diagnosis(signs, found, confidence(left, 1.5, 0.9), "a quarter turn or two")
     return None
 
@@ -48,6 +52,12 @@ def _turn(turn: np.ndarray) -> str:
 
 def _diagnosis(signs: Signs, found: list[Sign], sure: float, turn: str) -> Diagnosis:
     return diagnosed(
-        signs, "magnetometer_rotated", f"The magnetometer sits otherwise than PX4 is told, by {turn}", "fail", sure, found,
-        touches=("mag", "gnss_vel", "gnss_pos"), remedy=REMEDY,
-    )  # fmt: skip
+        signs,
+        "magnetometer_rotated",
+        f"The magnetometer sits otherwise than PX4 is told, by {turn}",
+        "fail",
+        sure,
+        found,
+        touches=("mag", "gnss_vel", "gnss_pos"),
+        remedy=REMEDY,
+    )

@@ -9,9 +9,12 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns
 from fusetune.analyze.diagnosis.signs import Signs
 
-OFF_FROM = 0.1
+OFF_FROM, WARNS_FROM, FAILS_FROM = 0.1, 0.15, 0.6
 """Calibrations are better where the flight shows them; where a field of the body explains as much, that is taken."""
-REMEDY = "Calibrate the compass where there is no iron; check that the driver's scale is that of the sensor (CAL_MAGn_?SCALE)"
+REMEDY = (
+    "Calibrate the compass where there is no iron; check that the driver's scale is that of the sensor "
+    "(CAL_MAGn_?SCALE)"
+)
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:
@@ -28,10 +31,16 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     told = ", ".join(f"{axis} {value:.2f}" for axis, value in zip("xyz", scale, strict=True))
     words = f"readings are the field times {told}"
     return diagnosed(
-        signs, "magnetometer_scale", "The magnetometer is scaled wrongly", "fail" if off > 0.6 else "warning",
-        confidence(off, OFF_FROM) if is_sure else 0.5, [Sign(words, off, OFF_FROM, "1", "replay")], touches=("mag",), remedy=REMEDY,
+        signs,
+        "magnetometer_scale",
+        "The magnetometer is scaled wrongly",
+        "fail" if off > FAILS_FROM else "warning" if off > WARNS_FROM else "note",
+        confidence(off, OFF_FROM) if is_sure else 1.0 - as_sure_of_a_field(one),
+        [Sign(words, off, OFF_FROM, "1", "replay")],
+        touches=("mag",),
+        remedy=REMEDY,
         values={f"mag_scale_{axis}": round(float(value), 3) for axis, value in zip("xyz", scale, strict=True)},
-    )  # fmt: skip
+    )
 
 
 def scaled(one: MagnetometerSigns) -> np.ndarray | None:
@@ -69,3 +78,8 @@ def scaled_down(one: MagnetometerSigns) -> np.ndarray | None:
 
 
 UPRIGHT = 0.4
+
+
+def as_sure_of_a_field(one: MagnetometerSigns) -> float:
+    """How sure a field down the body is where a scale of that axis may be as well: a little, by what each leaves."""
+    return 0.6 if one.fits["body_field"].left < one.fits["scale"].left else 0.4

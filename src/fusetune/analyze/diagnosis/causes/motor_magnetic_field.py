@@ -17,7 +17,8 @@ FITS_BELOW = 0.4
 """What a field of the body leaves of the readings, at most; wrong scales look like one that turns with the heading."""
 REMEDY = (
     "Move the magnetometer away from motors and power leads, twist the leads; then compensate what is left "
-    "(CAL_MAG_COMP_TYP and CAL_MAGn_XCOMP, _YCOMP, _ZCOMP), or fly without it (EKF2_MAG_TYPE 5) where GNSS gives heading"
+    "(CAL_MAG_COMP_TYP and CAL_MAGn_XCOMP, _YCOMP, _ZCOMP), or fly without it (EKF2_MAG_TYPE 5) where GNSS gives "
+    "heading"
 )
 
 
@@ -32,10 +33,16 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     size = float(np.linalg.norm(field)) / one.field_gauss
     words = f"a field of {np.linalg.norm(field):.2f} G comes with the motors ({size:.0%} of the earth's)"
     return diagnosed(
-        signs, "motor_magnetic_field", "The motors' current disturbs the magnetometer", "fail" if size > FAILS_FROM and one.by_gnss else "warning",
-        confidence(size, FIELD_FROM), [Sign(words, size, FIELD_FROM, "1", "replay")], touches=("mag",), remedy=REMEDY,
+        signs,
+        "motor_magnetic_field",
+        "The motors' current disturbs the magnetometer",
+        "fail" if size > FAILS_FROM and one.by_gnss else "warning",
+        confidence(size, FIELD_FROM),
+        [Sign(words, size, FIELD_FROM, "1", "replay")],
+        touches=("mag",),
+        remedy=REMEDY,
         values={f"motor_field_{axis}_gauss": round(float(value), 4) for axis, value in zip("xyz", field, strict=True)},
-    )  # fmt: skip
+    )
 
 
 def in_step(one: MagnetometerSigns) -> np.ndarray | None:

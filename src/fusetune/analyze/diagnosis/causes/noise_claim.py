@@ -7,7 +7,12 @@ from fusetune.analyze.diagnosis.claims import FAR
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-LABELS = {"gnss_vel": "GNSS velocity", "gnss_pos": "GNSS position", "baro_hgt": "the barometer", "mag": "the magnetometer"}
+LABELS = {
+    "gnss_vel": "GNSS velocity",
+    "gnss_pos": "GNSS position",
+    "baro_hgt": "the barometer",
+    "mag": "the magnetometer",
+}
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:
@@ -31,6 +36,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     found.sort(key=lambda one: -one.figure)
     told = ", ".join(f"{name} {value:g}" for name, value in values.items())
     return diagnosed(
-        signs, "noise_claim", "PX4 is told a noise far from what the sensor does", "warning", confidence(found[0].figure, 0.8 * FAR, 0.93),
-        found, touches=touched, remedy=f"Begin with {told}, then let several flights choose (docs/search.md)", values=values,
-    )  # fmt: skip
+        signs,
+        "noise_claim",
+        "PX4 is told a noise far from what the sensor does",
+        "warning",
+        confidence(found[0].figure, 0.8 * FAR, 0.93),
+        found,
+        touches=touched,
+        remedy=f"Begin with {told}, then let several flights choose (docs/search.md)",
+        values=values,
+    )

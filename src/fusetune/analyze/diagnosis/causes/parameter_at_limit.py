@@ -15,22 +15,41 @@ AT_LIMIT, SHARE_FROM = 0.98, 0.1
 def diagnose(signs: Signs) -> Diagnosis | None:
     """By what is set, and by how long the accelerometer's bias stood at EKF2_ABL_LIM."""
     found = [
-        Sign(f"{one.parameter} is {one.value:g}, the {'least' if one.is_low else 'most'} that PX4 takes (default {one.default:g})", 2.0, 1.0, "")
+        Sign(
+            f"{one.parameter} is {one.value:g}, the {'least' if one.is_low else 'most'} that PX4 takes (default "
+            f"{one.default:g})",
+            2.0,
+            1.0,
+            "",
+        )
         for one in signs.at_limits
     ]
     values = {one.parameter: one.default for one in signs.at_limits}
     share = _bias_at_limit(signs)
     if share > SHARE_FROM:
-        found.append(Sign(f"the accelerometer's bias stands at EKF2_ABL_LIM for {share:.0%} of the flight", share, SHARE_FROM, "1", "replay"))
+        found.append(
+            Sign(
+                f"the accelerometer's bias stands at EKF2_ABL_LIM for {share:.0%} of the flight",
+                share,
+                SHARE_FROM,
+                "1",
+                "replay",
+            )
+        )
     if not found:
         return None
     return diagnosed(
-        signs, "parameter_at_limit", "A parameter stands at a bound of its range" if values else "A state stands at its limit", "warning",
-        0.9 if values else 0.7, found, values=values,
+        signs,
+        "parameter_at_limit",
+        "A parameter stands at a bound of its range" if values else "A state stands at its limit",
+        "warning",
+        0.9 if values else 0.7,
+        found,
+        values=values,
         remedy="Find out why it was set there: what it was to hide is seldom cured by it. Start again from the default"
         if values
         else "Calibrate the accelerometer; if it comes back, look for vibration. Do not raise EKF2_ABL_LIM",
-    )  # fmt: skip
+    )
 
 
 def _bias_at_limit(signs: Signs) -> float:

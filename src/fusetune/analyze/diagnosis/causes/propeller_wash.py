@@ -24,9 +24,18 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     size = abs(wash)
     if size < WASH_FROM_M + SIGMAS * error or -errors.ground.value > size:
         return None
-    words = f"the barometer reads {wash:+.1f} m (±{2.0 * error:.1f}) with the thrust of a hover ({signs.motion.thrust_source})"
+    words = (
+        f"the barometer reads {wash:+.1f} m (±{2.0 * error:.1f}) with the thrust of a hover "
+        f"({signs.motion.thrust_source})"
+    )
     return diagnosed(
-        signs, "propeller_wash", "The barometer follows the throttle", "fail" if size > FAILS_FROM_M else "warning",
-        confidence(size, WASH_FROM_M + SIGMAS * error), [Sign(words, size, WASH_FROM_M, "m", "replay")],
-        touches=("baro", "rng"), remedy=REMEDY, values={"wash_m": round(wash, 2)},
-    )  # fmt: skip
+        signs,
+        "propeller_wash",
+        "The barometer follows the throttle",
+        "fail" if size > FAILS_FROM_M else "warning",
+        confidence(size, WASH_FROM_M + SIGMAS * error),
+        [Sign(words, size, WASH_FROM_M, "m", "replay")],
+        touches=("baro", "rng"),
+        remedy=REMEDY,
+        values={"wash_m": round(wash, 2)},
+    )

@@ -8,7 +8,8 @@ from fusetune.analyze.diagnosis.signs import Signs
 
 SHORT_FROM, CONSTANT_FROM = 0.03, 0.6
 REMEDY = (
-    "Clear the beam: legs, cables, a payload that swings, a dirty window. In fog or dust the sensor reads its own range; "
+    "Clear the beam: legs, cables, a payload that swings, a dirty window. In fog or dust the sensor reads its "
+    "own range; "
     "EKF2_RNG_FOG tells the filter from how near on"
 )
 
@@ -20,7 +21,14 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return None
     words = f"{one.short_share:.0%} of the readings in the air are {one.short_m:.2f} m, whatever the height"
     return diagnosed(
-        signs, "range_obstruction", "Something is in the beam of the range finder", "fail" if one.short_share > 0.5 else "warning",
-        confidence(one.short_share, SHORT_FROM), [Sign(words, one.short_share, SHORT_FROM, "1", "replay")],
-        touches=("rng", "optical_flow"), remedy=REMEDY, when=one.short, values={"obstruction_m": round(one.short_m, 3)},
-    )  # fmt: skip
+        signs,
+        "range_obstruction",
+        "Something is in the beam of the range finder",
+        "fail" if one.short_share > 0.5 else "warning",
+        confidence(one.short_share, SHORT_FROM),
+        [Sign(words, one.short_share, SHORT_FROM, "1", "replay")],
+        touches=("rng", "optical_flow"),
+        remedy=REMEDY,
+        when=one.short,
+        values={"obstruction_m": round(one.short_m, 3)},
+    )

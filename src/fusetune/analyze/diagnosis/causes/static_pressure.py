@@ -6,10 +6,10 @@ from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
 
-COEFFICIENT_FROM, TOGETHER = 0.2, 16.0
+COEFFICIENT_FROM, TOGETHER = 0.17, 11.0
 """Share of the dynamic pressure: 0.2 moves the height by 1 m at 10 m/s. χ² of three
-directions is above 16 by chance once in a thousand flights."""
-RANGE_FROM_M, LEAST_RANGE_M = 0.4, 0.15
+directions is above 11 by chance once in a hundred flights, hardly ever with a coefficient that large."""
+RANGE_FROM_M, LEAST_RANGE_M = 0.3, 0.15
 """Less than that no flight suffers from, whatever the coefficient."""
 PARAMETERS = {"forward": "EKF2_PCOEF_XP", "backward": "EKF2_PCOEF_XN", "sideways": "EKF2_PCOEF_YP"}
 LARGEST = 0.5
@@ -32,7 +32,10 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         if size < COEFFICIENT_FROM + 0.5 * effect.error or effect.range_m < LEAST_RANGE_M:
             continue
         sign = "more" if effect.value > 0.0 else "less"
-        words = f"flying {direction} the barometer reads up to {effect.range_m:.1f} m {sign} (coefficient {effect.value:+.2f} ± {2.0 * effect.error:.2f})"
+        words = (
+            f"flying {direction} the barometer reads up to {effect.range_m:.1f} m {sign} (coefficient "
+            f"{effect.value:+.2f} ± {2.0 * effect.error:.2f})"
+        )
         found.append(Sign(words, size, COEFFICIENT_FROM, "1", "replay"))
         # EKF2 adds what a positive coefficient says the barometer reads low
         values[PARAMETERS[direction]] = round(max(-LARGEST, min(LARGEST, -effect.value)), 3)
@@ -45,8 +48,15 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if range_m < RANGE_FROM_M:
         return None
     return diagnosed(
-        signs, "static_pressure", "The barometer follows the airspeed", "fail" if range_m > FAILS_FROM_M else "warning",
-        confidence(found[0].figure, COEFFICIENT_FROM, 0.9), found, touches=("baro", "gnss_hgt", "rng"), values=values,
-        remedy="Shield the barometer from the airflow (foam, a closed bay). Else fly forward, backward, left and right at "
-        "speed in still air and set EKF2_PCOEF_*; they act only where wind is estimated (airspeed, sideslip or drag fusion)",
-    )  # fmt: skip
+        signs,
+        "static_pressure",
+        "The barometer follows the airspeed",
+        "fail" if range_m > FAILS_FROM_M else "warning",
+        confidence(found[0].figure, COEFFICIENT_FROM, 0.9),
+        found,
+        touches=("baro", "gnss_hgt", "rng"),
+        values=values,
+        remedy="Shield the barometer from the airflow (foam, a closed bay). Else fly forward, back, left and right at "
+        "speed in still air and set EKF2_PCOEF_*; they act only where wind is estimated (airspeed, sideslip or "
+        "drag fusion)",
+    )

@@ -45,6 +45,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return None
     worst = max(one.figure / one.usual for one in found)
     return diagnosed(
-        signs, "vibration", "The IMU shakes more than it can stand", "fail" if worst > 2.0 else "warning", sure, found,
-        touches=("baro", "gnss", "rng", "ev"), remedy=REMEDY, values={"imu_shaking_m_s2": round(imu.shaking, 3)},
-    )  # fmt: skip
+        signs,
+        "vibration",
+        "The IMU shakes more than it can stand",
+        "fail" if worst > 2.0 else "warning",
+        sure,
+        found,
+        touches=("baro", "gnss", "rng", "ev"),
+        remedy=REMEDY,
+        values={"imu_shaking_m_s2": round(imu.shaking, 3)},
+    )

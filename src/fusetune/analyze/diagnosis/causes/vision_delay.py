@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
-from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.causes.told_delay import told_wrong
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.diagnosis.vision_signs import LEAST_SPEED_M_S
 
-MATTERS_MS, SIGMAS = 25.0, 3.0
 SCALE_OFF = 0.2
+EARLIEST_MS = -200.0
+"""Clocks that are not synchronised may make vision early, but not by more."""
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:
@@ -16,16 +17,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     one = signs.vision
     if one is None or one.speed < LEAST_SPEED_M_S or abs(one.scale - 1.0) > SCALE_OFF:
         return None
-    told = signs.parameters["EKF2_EV_DELAY"]
-    value, error = 1e3 * one.fit.delay_s, 1e3 * one.fit.delay_error_s
-    off, level = abs(value - told), MATTERS_MS + SIGMAS * error
-    if off < level:
-        return None
-    mended = max(0.0, round(value, -1))
-    words = f"vision lags behind the motion by {value:.0f} ms (±{2.0 * error:.0f}), PX4 is told {told:.0f}"
-    return diagnosed(
-        signs, "vision_delay", f"Vision is {value:.0f} ms late, and PX4 is told {told:.0f}", "warning",
-        confidence(off, level, 0.95), [Sign(words, off, level, "ms", "replay")], touches=("ev",),
-        remedy=f"Synchronise the clocks of camera and autopilot, or set EKF2_EV_DELAY to {mended:.0f} ms",
-        values={"EKF2_EV_DELAY": mended},
-    )  # fmt: skip
+    return told_wrong(
+        signs,
+        "vision_delay",
+        "Vision",
+        "EKF2_EV_DELAY",
+        one.fit,
+        "ev",
+        earliest_ms=EARLIEST_MS,
+        first="Synchronise the clocks of camera and autopilot; else ",
+    )

@@ -20,7 +20,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return None
     words = f"vision's way is {one.scale:.2f} (±{2.0 * one.scale_error:.2f}) times the vehicle's"
     return diagnosed(
-        signs, "vision_scale", "Vision is scaled wrongly", "fail" if off > 0.4 else "warning", confidence(off, level, 0.95),
-        [Sign(words, off, OFF_FROM, "1", "replay")], touches=("ev",), values={"vision_scale": round(one.scale, 3)},
+        signs,
+        "vision_scale",
+        "Vision is scaled wrongly",
+        "fail" if off > 0.4 else "warning",
+        confidence(off, level, 0.95),
+        [Sign(words, off, OFF_FROM, "1", "replay")],
+        touches=("ev",),
+        values={"vision_scale": round(one.scale, 3)},
         remedy=f"Give vision its scale (stereo, IMU or a known length), or divide by {one.scale:.2f} before it is sent",
-    )  # fmt: skip
+    )

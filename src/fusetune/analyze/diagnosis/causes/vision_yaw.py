@@ -27,7 +27,13 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return None
     words = f"vision's north points {np.degrees(one.turn):+.0f}° (±{2.0 * error:.0f}) off that of GNSS"
     return diagnosed(
-        signs, "vision_yaw", "The frame of vision is turned against north", "fail" if turn > FAILS_FROM_DEG else "warning",
-        confidence(turn, TURN_FROM_DEG + SIGMAS * error), [Sign(words, turn, TURN_FROM_DEG, "°", "replay")],
-        touches=("ev", "gnss_vel", "gnss_pos"), remedy=REMEDY, values={"vision_turn_deg": round(float(np.degrees(one.turn)), 1)},
-    )  # fmt: skip
+        signs,
+        "vision_yaw",
+        "The frame of vision is turned against north",
+        "fail" if turn > FAILS_FROM_DEG else "warning",
+        confidence(turn, TURN_FROM_DEG + SIGMAS * error),
+        [Sign(words, turn, TURN_FROM_DEG, "°", "replay")],
+        touches=("ev", "gnss_vel", "gnss_pos"),
+        remedy=REMEDY,
+        values={"vision_turn_deg": round(float(np.degrees(one.turn)), 1)},
+    )

@@ -16,7 +16,8 @@ OFF_DEG = 13.0
 LEVEL_SHARE = 0.4
 """Of a field that is more upright than that the heading feels little; it is a disturbance like others."""
 REMEDY = (
-    "Calibrate the compass away from iron, look for what became magnetic or was moved near it (screws, batteries, power "
+    "Calibrate the compass away from iron, look for what became magnetic or was moved near it (screws, "
+    "batteries, power "
     "leads); check the heading on the ground before the next take-off"
 )
 
@@ -26,7 +27,11 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     one, motion, gnss = signs.magnetometer, signs.motion, signs.gnss_motion
     if one is None or motion is None or gnss is None or not one.by_gnss:
         return None
-    if one.fits["mounting"].left < 0.4 * one.fits["as_told"].left or scaled(one) is not None or in_step(one) is not None:
+    if (
+        one.fits["mounting"].left < 0.4 * one.fits["as_told"].left
+        or scaled(one) is not None
+        or in_step(one) is not None
+    ):
         return None
     body = one.fits["body_field"]
     if not body.left < 0.4 * one.fits["as_told"].left:
@@ -45,8 +50,14 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if happened > OFF_DEG:
         found.append(Sign(f"the heading was {happened:.0f}° off at take-off", happened, OFF_DEG, "°", "replay"))
     return diagnosed(
-        signs, "yaw_alignment", "The heading is far off from the start: the compass feels a field of the body", "fail" if happened > 30.0 else "warning",
-        confidence(shown, OFF_DEG), found, touches=("mag", "gnss_vel", "gnss_pos"), remedy=REMEDY,
+        signs,
+        "yaw_alignment",
+        "The heading is far off from the start: the compass feels a field of the body",
+        "fail" if happened > 30.0 else "warning",
+        confidence(shown, OFF_DEG),
+        found,
+        touches=("mag", "gnss_vel", "gnss_pos"),
+        remedy=REMEDY,
         values={f"body_field_{axis}_gauss": round(body.values[f"body_field_{axis}"], 4) for axis in "xyz"}
         | {"heading_off_deg": round(happened, 1)},
-    )  # fmt: skip
+    )

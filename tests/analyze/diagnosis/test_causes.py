@@ -1,0 +1,184 @@
+"""Each cause: silent on a sound flight, and named by its own signs, with the severity and the values that follow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.analyze.diagnosis.made_signs import (
+    AIR,
+    AIRSPEED,
+    BAROMETER,
+    BIAS,
+    ERRORS,
+    FIT,
+    FLOW,
+    GNSS,
+    GNSS_MOTION,
+    IMU,
+    MAGNETOMETER,
+    RANGE,
+    VISION,
+    fits,
+    signs,
+    with_values,
+)
+
+from fusetune.analyze.diagnosis.causes import gnss_delay, vision_yaw
+from fusetune.analyze.diagnosis.causes.registry import CAUSES
+from fusetune.analyze.diagnosis.claims import AtLimit, NoiseClaim
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis
+from fusetune.analyze.diagnosis.gnss_signs import Jump
+from fusetune.analyze.diagnosis.height_errors import Effect
+from fusetune.save.checks.standstill import Standstill
+
+
+def effect(value: float, error: float = 0.1) -> Effect:
+    return Effect(value, error, abs(value))
+
+
+def barometer(**errors: Any) -> dict[str, Any]:
+    return {"barometer": replace(BAROMETER, errors=replace(ERRORS, **errors))}
+
+
+def magnetometer(found: dict[str, Any], **others: Any) -> dict[str, Any]:
+    return {"magnetometer": replace(MAGNETOMETER, fits=found, **others)}
+
+
+BODY = with_values(fits(0.1, body_field=0.004, motor_field=0.004), "body_field", body_field_x=0.15, body_field_y=0.05)
+UPRIGHT = with_values(fits(0.1, body_field=0.004, motor_field=0.004), "body_field", body_field_x=0.01, body_field_z=0.2)
+SCALED = with_values(fits(0.1, scale=0.004, body_field=0.06), "scale", scale_x=1.3, scale_y=0.8)
+
+WRONG: dict[str, dict[str, Any]] = {
+    "vibration": {"imu": replace(IMU, shaking=14.0)},
+    "accelerometer_clipping": {"imu": replace(IMU, clipped=200, clipped_share=0.014, clipping=AIR[0])},
+    "gyro_bias": {"gyro_bias": replace(BIAS, change=np.radians([0.1, 4.0, 0.2]))},
+    "imu_gaps": {"imu": replace(IMU, gaps=(AIR[0],), lost_s=0.9, lost_share=0.02)},
+    "yaw_alignment": magnetometer(BODY, compass_off=np.radians(40.0)),
+    "magnetic_disturbance": magnetometer(
+        fits(0.09), disturbed=(20_000_000, 31_000_000), disturbance=0.2, undisturbed=0.004
+    ),
+    "motor_magnetic_field": magnetometer(BODY, motors_off=np.zeros(3), in_air=np.array([0.15, 0.05, 0.01])),
+    "magnetometer_rotated": magnetometer(fits(0.2, mounting=0.005)),
+    "magnetometer_scale": magnetometer(SCALED),
+    "gnss_accuracy": {"gnss": replace(GNSS, worst={"eph": 6.0, "s_variance_m_s": 1.3}, poor=AIR[0])},
+    "gnss_glitch": {"gnss": replace(GNSS, jumps=(Jump(30_000_000, 12.0, False), Jump(35_000_000, 12.1, False)))},
+    "gnss_loss": {"gnss": replace(GNSS, lost=((30_000_000, 38_000_000),))},
+    "gnss_interference": {"gnss": replace(GNSS, jamming=170.0, jammed=AIR[0], satellites=7.0)},
+    "gnss_lever_arm": {"gnss_motion": replace(GNSS_MOTION, arm=np.array([0.3, 0.1, 0.0]))},
+    "baro_ground_effect": barometer(ground=effect(-3.0)),
+    "static_pressure": barometer(speed={"forward": effect(0.6), "backward": effect(0.1), "sideways": effect(0.3)}),
+    "propeller_wash": barometer(thrust=effect(-4.0)),
+    "baro_drift": {"barometer": replace(BAROMETER, drift=6.0, inertial_drift=5.5)},
+    "range_obstruction": {"range": replace(RANGE, short_share=0.3, constant_share=1.0, short=AIR[0], short_m=0.4)},
+    "range_step": {"range": replace(RANGE, steps=((20_000_000, -0.9), (23_000_000, 0.9)))},
+    "flow_scale": {"flow": replace(FLOW, scale=0.7, rotation=np.array([0.3, 0.3]))},
+    "flow_delay": {"flow": replace(FLOW, fit=replace(FIT, delay_s=0.1))},
+    "flow_rotation": {"flow": replace(FLOW, turn=np.radians(90.0))},
+    "vision_scale": {"vision": replace(VISION, scale=0.7)},
+    "vision_delay": {"vision": replace(VISION, fit=replace(FIT, delay_s=0.12))},
+    "vision_covariance": {"vision": replace(VISION, velocity_noise=0.5, position_noise=0.3)},
+    "airspeed_scale": {"airspeed": replace(AIRSPEED, scale=0.7)},
+    "noise_claim": {"claims": {"baro_hgt": NoiseClaim("EKF2_BARO_NOISE", 0.05, 3.5, 0.3, 0.05)}},
+    "parameter_at_limit": {"at_limits": (AtLimit("EKF2_ACC_NOISE", 1.0, False, 0.35),)},
+    "instance_whipsaw": {"switches": np.arange(20, 32, 2) * 1_000_000},
+    "sensor_stuck": {"stuck": {"mag": Standstill(8.0, 0.1, 0.2, 20_000_000, 28_000_000)}},
+}
+
+
+@pytest.mark.parametrize("id", sorted(CAUSES))
+def test_a_sound_flight_shows_no_cause(id: str) -> None:
+    assert CAUSES[id](signs()) is None
+
+
+@pytest.mark.parametrize("id", sorted(WRONG))
+def test_its_signs_show_the_cause_with_evidence_and_remedy(id: str) -> None:
+    found = CAUSES[id](signs(**WRONG[id]))
+    assert isinstance(found, Diagnosis)
+    assert found.id == id
+    assert found.severity in ("warning", "fail")
+    assert 0.5 <= found.confidence <= 0.97
+    assert found.signs
+    assert found.remedy
+    assert found.source
+    assert found.stop_us > found.start_us
+    first = found.signs[0]
+    assert first.figure > first.usual
+
+
+def test_every_cause_is_tried() -> None:
+    # these two need a replay or a message of vision, and are tried below
+    assert set(CAUSES) - set(WRONG) == {"gnss_delay", "vision_yaw"}
+
+
+def test_a_delay_is_claimed_only_where_the_smoothed_velocity_agrees(monkeypatch: pytest.MonkeyPatch) -> None:
+    off = replace(GNSS_MOTION, fit=replace(FIT, delay_s=0.2))
+    flight = signs(gnss_motion=off)
+    flight.observed.__dict__["replayed"] = None
+    agrees = replace_lag(0.19, 0.006)
+    monkeypatch.setattr(gnss_delay, "velocity_delay", lambda *_: agrees)
+    found = gnss_delay.diagnose(flight)
+    assert found is not None
+    assert found.values == {"EKF2_GPS_DELAY": 200.0}
+    monkeypatch.setattr(gnss_delay, "velocity_delay", lambda *_: replace_lag(0.115, 0.006))
+    assert gnss_delay.diagnose(flight) is None
+
+
+def replace_lag(delay_s: float, error_s: float) -> Any:
+    from fusetune.analyze.delays.lag import Lag
+
+    return Lag(delay_s, error_s, 1000, 300)
+
+
+def test_a_turned_frame_of_vision_matters_where_vision_says_that_it_knows_north() -> None:
+    turned = replace(VISION, turn=np.radians(30.0))
+    frame = {"timestamp": np.arange(3), "pose_frame": np.array([1, 1, 1])}
+    flight = signs(vision=turned)
+    assert vision_yaw.diagnose(flight) is None
+    flight.observed.flight.topics["vehicle_visual_odometry", 0] = frame
+    found = vision_yaw.diagnose(flight)
+    assert found is not None
+    assert found.values["vision_turn_deg"] == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize(
+    ("id", "not_these", "changed"),
+    [
+        ("motor_magnetic_field", ("yaw_alignment",), WRONG["motor_magnetic_field"]),
+        ("magnetometer_scale", ("motor_magnetic_field", "yaw_alignment"), WRONG["magnetometer_scale"]),
+        ("magnetometer_rotated", ("magnetic_disturbance", "yaw_alignment"), WRONG["magnetometer_rotated"]),
+        ("magnetic_disturbance", ("yaw_alignment", "motor_magnetic_field"), magnetometer(UPRIGHT, compass_off=0.02)),
+        ("propeller_wash", ("baro_ground_effect",), barometer(thrust=effect(5.0), ground=effect(-2.5))),
+        ("baro_ground_effect", ("propeller_wash",), barometer(thrust=effect(-2.0), ground=effect(-4.0))),
+        ("flow_scale", ("flow_rotation",), WRONG["flow_scale"]),
+        ("gnss_interference", ("gnss_glitch", "gnss_loss"), WRONG["gnss_interference"]),
+    ],
+)
+def test_what_looks_alike_is_told_apart(id: str, not_these: tuple[str, ...], changed: dict[str, Any]) -> None:
+    flight = signs(**changed)
+    assert CAUSES[id](flight) is not None
+    assert [other for other in not_these if CAUSES[other](flight) is not None] == []
+
+
+def test_an_offset_that_is_there_at_rest_is_no_vibration() -> None:
+    off = replace(GNSS_MOTION, bias_down=0.9)
+    shaken = CAUSES["vibration"](signs(gnss_motion=off))
+    assert shaken is not None
+    assert shaken.signs[0].figure == pytest.approx(0.9, abs=0.01)
+    # at rest the sensor's bias of 0.9 m/s² down takes as much from what it feels of gravity
+    assert CAUSES["vibration"](signs(gnss_motion=off, imu=replace(IMU, resting_force=9.80665 - 0.9))) is None
+
+
+@pytest.mark.parametrize("share", [0.0004, 0.0006])
+def test_a_landing_that_clips_a_sample_is_no_clipping(share: float) -> None:
+    imu = replace(IMU, clipped=6, clipped_share=share, clipping=AIR[0])
+    assert (CAUSES["accelerometer_clipping"](signs(imu=imu)) is not None) == (share > 0.0005)
+
+
+def test_a_position_without_a_fix_is_lost_and_not_stuck() -> None:
+    lost = replace(GNSS, lost=((20_000_000, 28_000_000),))
+    stuck = {"gnss": Standstill(8.0, 0.1, 47.0, 20_000_000, 28_000_000)}
+    assert CAUSES["sensor_stuck"](signs(gnss=lost, stuck=stuck)) is None
+    assert CAUSES["gnss_loss"](signs(gnss=lost, stuck=stuck)) is not None
