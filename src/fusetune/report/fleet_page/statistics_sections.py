@@ -100,7 +100,7 @@ def outliers_section(results: FleetResults) -> str:
             )
             for one in found
         ]
-        words = listed([figure_words(one["id"]) for one in found], 2)
+        words = listed([figure_words(one["id"]) for one in found], 2, "; ")
         parts.append(details(f"{flight}: {words}", table(head, rows)))
     return section("Flights that stand out", *parts)
 
@@ -120,7 +120,11 @@ def verdicts_section(results: FleetResults) -> str:
             driven[flight].append(figure_words(one["id"]))
     order = sorted(driven.items(), key=lambda item: (-len(item[1]), item[0]))
     rows = [
-        (Cell(flight, "short", results.links.get(flight, "")), number(len(words)), listed(words, _MOST_NAMED_FIGURES))
+        (
+            Cell(flight, "short", results.links.get(flight, "")),
+            number(len(words)),
+            listed(words, _MOST_NAMED_FIGURES, "; "),
+        )
         for flight, words in order
     ]
     parts = [paragraph(text, "note"), table(("flight", "figures", "which"), rows)] if rows else []

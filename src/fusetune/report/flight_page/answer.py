@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
@@ -12,6 +13,7 @@ from fusetune.report.markup import bullets, number, paragraph, section, severity
 from fusetune.report.severity_words import SEVERITY_WORDS, FlightTimes, confidence_words, worst_of
 
 _NAMED_ROWS = 3
+_ROUNDED = 0.02
 
 
 def answer_section(results: FlightResults) -> str:
@@ -100,10 +102,16 @@ def _sign(sign: Mapping[str, Any]) -> str:
     """What was seen, with the level up to which it is usual."""
     usual = sign["usual"]
     words = str(sign["words"]).rstrip(".")
-    if not isinstance(usual, int | float) or not math.isfinite(usual):
+    if not isinstance(usual, int | float) or not math.isfinite(usual) or _is_named(usual, words):
         return words
     unit = "" if sign["unit"] == "1" else f" {sign['unit']}"
     return f"{words} (usual: up to {number(usual).text}{unit.rstrip()})"
+
+
+def _is_named(value: float, words: str) -> bool:
+    """Whether words tell a value already, as those of an experiment do."""
+    told = [float(one) for one in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", words)]
+    return any(math.isclose(one, value, rel_tol=_ROUNDED) for one in told)
 
 
 def _values(values: Mapping[str, float]) -> Iterator[str]:

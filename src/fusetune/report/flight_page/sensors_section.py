@@ -32,8 +32,11 @@ def sensors_section(noise: Document, figure_folder: Path) -> str:
         text = f"Vibration, not the sensor, makes the noise in flight of: {', '.join(limited)}."
         parts.append(paragraph(text + " Less vibration tells more than another parameter."))
     if noise["starting"]:
-        head = ("parameter", "unit", "flies now", "at rest", "in flight", "start with", "why")
+        head = ("parameter", "unit", "flies now", "at rest", "in flight", "start with")
+        parts.append(paragraph("Noise parameters to start a study with, from what the sensors do:"))
         parts.append(table(head, [_starting_row(one) for one in noise["starting"]]))
+        reasons = [(Cell(str(one["parameter"]), "mono"), str(one["words"])) for one in noise["starting"]]
+        parts.append(details("Why these", table(("parameter", "why"), reasons)))
     for name, (title, caption) in _PICTURES.items():
         if (figure_folder / name).exists():
             parts.append(details(title, figure(figure_folder / name, caption)))
@@ -54,5 +57,4 @@ def _starting_row(one: Document) -> tuple[Cell | str, ...]:
         number(one["at_rest"]),
         number(one["in_flight"]),
         Cell(start.text, "number is-warning" if changed else "number"),
-        str(one["words"]),
     )
