@@ -139,7 +139,7 @@ _SUBJECTS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "flow": ("optical flow", _OF_SENSORS),
     "vision": ("external vision", _OF_SENSORS),
 }
-_MAGNETOMETER_AND_AIRSPEED = _OF_RATIOS | _OF_SENSORS
+_MAGNETOMETER_AND_AIRSPEED: Mapping[str, str] = {**_OF_RATIOS, **_OF_SENSORS}
 """Aid source and sensor have one name."""
 
 

@@ -6,9 +6,10 @@ from collections import Counter
 from collections.abc import Iterator
 from html import escape
 
+from fusetune.report.counted import count_words, listed
 from fusetune.report.figure_words import figure_words
 from fusetune.report.fleet_page.change_points import change_points
-from fusetune.report.fleet_page.fleet_results import FleetResults, count_words, listed
+from fusetune.report.fleet_page.fleet_results import FleetResults
 from fusetune.report.markup import bullets, number
 from fusetune.report.severity_words import SEVERITY_WORDS, cause_words, worst_of
 
