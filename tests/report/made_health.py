@@ -36,7 +36,7 @@ SHAKEN = Diagnosis(
     stop_us=at(32.5),
     signs=(
         Sign("mean high-frequency acceleration 18.9 m/s²", 18.9, 4.9, "m/s²"),
-        Sign("with less weight on the IMU the mean test ratio goes from 2.1 to 0.3", 0.3, 2.1, "1", "replay"),
+        Sign("with less weight on the IMU the mean test ratio goes from 0.003 to 0.3", 0.3, 0.00277, "1", "replay"),
     ),
     remedy="Isolate the autopilot",
     source="PX4's tuning guide",

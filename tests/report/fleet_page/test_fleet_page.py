@@ -84,7 +84,7 @@ def test_flights_stand_against_causes_with_links_to_their_pages(page: str) -> No
     # causes by severity: vibration, then the delay
     assert re.findall(r"spot (is-\w+)", rows[0]) == ["is-fail", "is-note"]
     assert re.findall(r"spot (is-\w+)", rows[1]) == ["is-warning"]
-    assert "It is vibration – do not fly like this, likely (90 %)" in rows[0]
+    assert "It is vibration – do not fly like this, sure (90 %)" in rows[0]
     assert "21 flights without any trouble" in matrix
 
 

@@ -13,7 +13,6 @@ from fusetune.report.markup import bullets, number, paragraph, section, severity
 from fusetune.report.severity_words import SEVERITY_WORDS, FlightTimes, confidence_words, worst_of
 
 _NAMED_ROWS = 3
-_ROUNDED = 0.02
 
 
 def answer_section(results: FlightResults) -> str:
@@ -109,9 +108,9 @@ def _sign(sign: Mapping[str, Any]) -> str:
 
 
 def _is_named(value: float, words: str) -> bool:
-    """Whether words tell a value already, as those of an experiment do."""
-    told = [float(one) for one in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", words)]
-    return any(math.isclose(one, value, rel_tol=_ROUNDED) for one in told)
+    """Whether words tell a value already, as rounded as it may be; those of an experiment do."""
+    told = [one for one in re.findall(r"-?\d+(?:\.\d+)?", words) if float(one)]
+    return any(round(value, len(one.partition(".")[2])) == float(one) for one in told)
 
 
 def _values(values: Mapping[str, float]) -> Iterator[str]:
