@@ -108,21 +108,21 @@ def _of_vehicle(
     drift_chance = family_chances(values, rank_correlations)
     stepped = np.flatnonzero(step_chance <= level)
     steps: list[Change] = []
-    told: set[int] = set()
+    drifts: list[Drift] = []
     for column in np.flatnonzero((step_chance <= level) | (drift_chance <= level)).tolist():
         known = np.flatnonzero(np.isfinite(values[:, column]))
         series = values[known, column]
         edges = [(0, 1.0)]
         if column in stepped:
             edges = [(0, 1.0), *_edges(series, float(step_chance[column]), 0.5 * level / stepped.size)]
-        is_drift = drift_chance[column] <= level and _misfit_of_line(series) < _misfit_of_steps(
-            series, [start for start, _ in edges[1:]]
-        )
-        if is_drift:
-            told.add(column)
+        misfit = _misfit_of_steps(series, [start for start, _ in edges[1:]])
+        if drift_chance[column] > level or _misfit_of_line(series) >= misfit:
+            steps += _told_steps(flights, figures[column], known, series, edges)
             continue
-        steps += _told_steps(flights, figures[column], known, series, edges)
-    drifts = [_drift(flights, figures[one], values[:, one], float(drift_chance[one])) for one in sorted(told)]
+        drift = _drift(flights, figures[column], series, float(drift_chance[column]))
+        usual = float(np.median(series))
+        if figures[column].matters(usual + drift.per_ten_flights * series.size / _PER_FLIGHTS, usual):
+            drifts.append(drift)
     return steps, drifts
 
 
@@ -241,8 +241,7 @@ def _told_steps(
     return found
 
 
-def _drift(flights: list[FleetFlight], figure: FigureName, column: Array, chance: float) -> Drift:
-    series = column[np.isfinite(column)]
+def _drift(flights: list[FleetFlight], figure: FigureName, series: Array, chance: float) -> Drift:
     found = theilslopes(series)
     slope, lower, upper = (float(_PER_FLIGHTS * one) for one in (found.slope, found.low_slope, found.high_slope))
     return Drift(flights[0].vehicle, figure.id, figure.unit, series.size, slope, lower, upper, chance)

@@ -33,9 +33,7 @@ def changes_section(results: FleetResults, trends: AnyPath) -> str:
         head = ("figure", "per ten flights", "interval", "unit", "flights", "vehicle", "chance")
         parts.append(table(head, [_drift_row(one) for one in results.drifts], "Drifts"))
     if not parts:
-        few = (
-            f"A change shows in {FEWEST_A_SIDE} flights before and after at least, in practice in a dozen of a vehicle."
-        )
+        few = f"A change takes {FEWEST_A_SIDE} flights before and after to show; to be sure of it, a dozen and more."
         parts.append(paragraph(f"No figure changed over time beyond what the order of flights does by chance. {few}"))
     else:
         text = (
