@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from fusetune.px4.aid_sources import AID_SOURCES
 
 _OF_RATIOS: Mapping[str, str] = {
-    "raised_share": "test ratios above 0.5, share",
-    "amber_share": "test ratios in (0.5, 1], share",
-    "red_share": "test ratios above 1, share",
+    "raised_share": "share of test ratios above 0.5",
+    "amber_share": "share of test ratios in (0.5, 1]",
+    "red_share": "share of test ratios above 1",
     "mean_ratio": "mean test ratio",
     "max_ratio": "largest test ratio",
     "worst_ratio": "mean test ratio of the worst 30 s",
-    "rejected_share": "rejected samples, share",
+    "rejected_share": "share of rejected samples",
     "longest_unfused_s": "longest time without fusion",
 }
 _OF_SENSORS: Mapping[str, str] = {
@@ -60,7 +60,7 @@ _SUBJECTS: Mapping[str, tuple[str, Mapping[str, str]]] = {
         "estimator instances",
         {
             "count": "in the log",
-            "primary_share": "time as the primary one, share",
+            "primary_share": "share of the time as the primary one",
             "switches": "changes of the primary one in flight",
             "whipsaw": "most changes within 10 s",
         },
@@ -75,7 +75,7 @@ _SUBJECTS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "status_position": ("position as the filter sums it up", _OF_RATIOS),
     "status_airspeed": ("airspeed as the filter sums it up", _OF_RATIOS),
     "status_hagl": ("height above ground as the filter sums it up", _OF_RATIOS),
-    "rejections": ("rejected, share of the flight", {f"{name}_share": words for name, words in _REJECTED.items()}),
+    "rejections": ("share of the flight rejected", {f"{name}_share": words for name, words in _REJECTED.items()}),
     "filter": ("filter", {"faults": "fault flags", "time_slip_s": "IMU time lost in flight"}),
     "alignment": ("alignment", {"tilt_s": "tilt known after", "yaw_s": "heading known after"}),
     "resets": ("resets, clear of the ground", _OF_STATES),
@@ -85,10 +85,10 @@ _SUBJECTS: Mapping[str, tuple[str, Mapping[str, str]]] = {
         {
             "gyro": "gyro",
             "gyro_change": "change of the gyro's in flight",
-            "gyro_at_limit_share": "gyro's at its limit, share",
+            "gyro_at_limit_share": "share of the time with the gyro's at its limit",
             "accel": "accelerometer",
             "accel_change": "change of the accelerometer's in flight",
-            "accel_at_limit_share": "accelerometer's at its limit, share",
+            "accel_at_limit_share": "share of the time with the accelerometer's at its limit",
         },
     ),
     "output_predictor": (
@@ -114,7 +114,7 @@ _SUBJECTS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "gnss": (
         "GNSS",
         {
-            "checks_failed_share": "EKF2's checks failed, share",
+            "checks_failed_share": "share of the time in which EKF2's checks failed",
             "drift_horizontal": "horizontal drift at rest",
             "drift_vertical": "vertical drift at rest",
             "eph": "horizontal accuracy",
@@ -139,7 +139,7 @@ _SUBJECTS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "flow": ("optical flow", _OF_SENSORS),
     "vision": ("external vision", _OF_SENSORS),
 }
-_MAGNETOMETER_AND_AIRSPEED = _OF_RATIOS | _OF_SENSORS
+_MAGNETOMETER_AND_AIRSPEED: Mapping[str, str] = {**_OF_RATIOS, **_OF_SENSORS}
 """Aid source and sensor have one name."""
 
 

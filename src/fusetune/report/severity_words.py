@@ -26,6 +26,7 @@ SEVERITY_COLOURS: Mapping[str, str] = {
 }
 """In pictures; page.css has the same for the text."""
 
+_SURE = ((0.9, "sure"), (0.7, "likely"), (0.0, "possible"))
 _EDGE_S = 2.0
 """A cause that begins or ends so near to take-off or landing holds from or to there."""
 
@@ -60,11 +61,9 @@ def worst_of(findings: list[Mapping[str, Any]]) -> str:
 
 
 def confidence_words(confidence: float) -> str:
-    """How sure: the figure with a word for it."""
-    for least, words in ((0.95, "almost certain"), (0.8, "likely"), (0.5, "more likely than not")):
-        if confidence >= least:
-            return f"{words} ({100.0 * confidence:.0f} %)"
-    return f"possible ({100.0 * confidence:.0f} %)"
+    """How sure: a word for it, the same as in the terminal, with the figure."""
+    word = next(word for least, word in _SURE if confidence >= least)
+    return f"{word} ({100.0 * confidence:.0f} %)"
 
 
 def cause_words(cause: str) -> str:

@@ -8,7 +8,7 @@ figures at the level, however they depend on each other (Westfall and Young, Res
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +81,7 @@ def changes(table: FleetTable) -> tuple[tuple[Change, ...], tuple[Drift, ...]]:
     drifts: list[Drift] = []
     for rows in tried:
         flights = [table.flights[row] for row in rows]
-        found = _of_vehicle(flights, [table.figures[one] for one in columns], table.values[np.ix_(rows, columns)],
+        found = _of_vehicle(flights, [table.figures[one] for one in columns], table.values[rows][:, columns],
                             LEVEL / len(tried))  # fmt: skip
         steps += found[0]
         drifts += found[1]
@@ -108,19 +108,21 @@ def _of_vehicle(
     drift_chance = family_chances(values, rank_correlations)
     stepped = np.flatnonzero(step_chance <= level)
     steps: list[Change] = []
-    told: set[int] = set()
+    drifts: list[Drift] = []
     for column in np.flatnonzero((step_chance <= level) | (drift_chance <= level)).tolist():
         known = np.flatnonzero(np.isfinite(values[:, column]))
         series = values[known, column]
         edges = [(0, 1.0)]
         if column in stepped:
             edges = [(0, 1.0), *_edges(series, float(step_chance[column]), 0.5 * level / stepped.size)]
-        is_drift = drift_chance[column] <= level and _misfit_of_line(series) < _misfit_of_steps(series, edges)
-        if is_drift:
-            told.add(column)
+        misfit = _misfit_of_steps(series, [start for start, _ in edges[1:]])
+        if drift_chance[column] > level or _misfit_of_line(series) >= misfit:
+            steps += _told_steps(flights, figures[column], known, series, edges)
             continue
-        steps += _told_steps(flights, figures[column], known, series, edges)
-    drifts = [_drift(flights, figures[one], values[:, one], float(drift_chance[one])) for one in sorted(told)]
+        drift = _drift(flights, figures[column], series, float(drift_chance[column]))
+        usual = float(np.median(series))
+        if figures[column].matters(usual + drift.per_ten_flights * series.size / _PER_FLIGHTS, usual):
+            drifts.append(drift)
     return steps, drifts
 
 
@@ -176,9 +178,7 @@ def rank_correlations(centred: Array, squares: Array, known: npt.NDArray[np.bool
 def _edges(series: Array, chance: float, level: float) -> list[tuple[int, float]]:
     """Where the parts of a series begin that has a step, with the chance of each; halves are searched for further
     ones at half the level, each by itself."""
-    centred = rankdata(series)[:, None] - 0.5 * (series.size + 1)
-    known = np.ones(centred.shape, dtype=bool)
-    place = int(np.argmax(_step_sizes(centred, (centred**2).sum(axis=0), known)[:, 0])) + 1
+    place = _best_place(series)
     found = [(place, chance)]
     for offset, part in ((0, series[:place]), (place, series[place:])):
         if part.size >= 2 * FEWEST_A_SIDE and np.unique(part).size > 1:
@@ -188,13 +188,25 @@ def _edges(series: Array, chance: float, level: float) -> list[tuple[int, float]
     return sorted(found)
 
 
+def _best_place(series: Array) -> int:
+    """The first row after the step: where two medians leave the least; of equal ones where the ranks differ most.
+
+    That they differ says that there is a step. Where it is they tell less well: as long as both sides are apart, the
+    larger statistic is that of the more even division.
+    """
+    centred = rankdata(series)[:, None] - 0.5 * (series.size + 1)
+    sizes = _step_sizes(centred, (centred**2).sum(axis=0), np.ones(centred.shape, dtype=bool))[:, 0]
+    places = range(FEWEST_A_SIDE, series.size - FEWEST_A_SIDE + 1)
+    return min(places, key=lambda place: (_misfit_of_steps(series, [place]), -sizes[place - 1]))
+
+
 def _misfit_of_line(series: Array) -> float:
     slope, intercept, _, _ = theilslopes(series)
     return float(np.abs(series - intercept - slope * np.arange(series.size)).sum())
 
 
-def _misfit_of_steps(series: Array, edges: list[tuple[int, float]]) -> float:
-    parts = np.split(series, [start for start, _ in edges[1:]])
+def _misfit_of_steps(series: Array, places: Sequence[int]) -> float:
+    parts = np.split(series, places)
     return float(sum(np.abs(part - np.median(part)).sum() for part in parts))
 
 
@@ -229,8 +241,7 @@ def _told_steps(
     return found
 
 
-def _drift(flights: list[FleetFlight], figure: FigureName, column: Array, chance: float) -> Drift:
-    series = column[np.isfinite(column)]
-    slope, _, lower, upper = theilslopes(series)
-    told = [float(_PER_FLIGHTS * one) for one in (slope, lower, upper)]
-    return Drift(flights[0].vehicle, figure.id, figure.unit, series.size, *told, chance)
+def _drift(flights: list[FleetFlight], figure: FigureName, series: Array, chance: float) -> Drift:
+    found = theilslopes(series)
+    slope, lower, upper = (float(_PER_FLIGHTS * one) for one in (found.slope, found.low_slope, found.high_slope))
+    return Drift(flights[0].vehicle, figure.id, figure.unit, series.size, slope, lower, upper, chance)

@@ -50,9 +50,9 @@ def distribution(values: Array) -> Distribution | None:
     known = values[np.isfinite(values)]
     if not known.size:
         return None
-    low, *quantiles, high = np.quantile(known, (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)).tolist()
+    low, p05, p25, median, p75, p95, high = np.quantile(known, (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)).tolist()
     spread = float(known.std(ddof=1)) if known.size > 1 else None
-    return Distribution(known.size, float(known.mean()), spread, low, *quantiles, high)
+    return Distribution(known.size, float(known.mean()), spread, low, p05, p25, median, p75, p95, high)
 
 
 def histogram(values: Array) -> Histogram | None:

@@ -69,7 +69,7 @@ def fleet_verdict(names: list[str], values: Array, severities: npt.NDArray[np.in
             mean, median = (float(np.mean(rest)), float(np.median(rest))) if rest.size else (None, None)
             found.append(Driver(names[row], *without, mean, median))
     counts = {name: int(np.count_nonzero(severities == place)) for place, name in enumerate(SEVERITIES) if place}
-    told = {name: count for name, count in counts.items() if count}
+    told: dict[str, int] = {name: count for name, count in counts.items() if count}
     return FleetVerdict(worst, typical, judged.size, told, tuple(found))
 
 

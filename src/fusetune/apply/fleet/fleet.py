@@ -82,12 +82,12 @@ def _flight(table: FleetTable, row: int, diagnoses: Mapping[str, Sequence[Mappin
 
 
 def _causes(table: FleetTable, diagnoses: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
-    """Causes by the number of flights that show them."""
+    """Causes by how severe they are on the worst flight, then by the number of flights that show them."""
     shown: dict[str, dict[str, Mapping[str, Any]]] = defaultdict(dict)
     for flight in table.flights:
         for one in diagnoses.get(flight.name, ()):
             shown[one["id"]].setdefault(flight.name, one)
-    return [
+    causes = [
         {
             "id": cause,
             "severity": max((one["severity"] for one in flights.values()), key=SEVERITIES.index),
@@ -95,8 +95,9 @@ def _causes(table: FleetTable, diagnoses: Mapping[str, Sequence[Mapping[str, Any
             "vehicles": _distinct(one.vehicle for one in table.flights if one.name in flights),
             "hangs_on": _hangs_on(flights),
         }
-        for cause, flights in sorted(shown.items(), key=lambda item: (-len(item[1]), item[0]))
+        for cause, flights in shown.items()
     ]
+    return sorted(causes, key=lambda one: (-SEVERITIES.index(one["severity"]), -len(one["flights"]), one["id"]))
 
 
 def _distinct(names: Iterable[str]) -> list[str]:

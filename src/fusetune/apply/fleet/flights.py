@@ -139,8 +139,9 @@ def _flights(rows: pd.DataFrame) -> Iterator[FleetFlight]:
 
 
 def _figure_names(rows: pd.DataFrame) -> tuple[FigureName, ...]:
-    limits = rows.dropna(subset=["threshold"]).drop_duplicates(["id", "unit"])
-    limit = {(one.id, one.unit): float(one.threshold) for one in limits.itertuples()}
+    limited = rows.dropna(subset=["threshold"]).drop_duplicates(["id", "unit"])
+    keys = zip(limited["id"], limited["unit"], strict=True)
+    limit = dict(zip(keys, limited["threshold"].astype(float).tolist(), strict=True))
     return tuple(
         FigureName(str(one.id), str(one.group), str(one.unit), limit.get((one.id, one.unit)))
         for one in rows.drop_duplicates(["id", "unit"]).itertuples()

@@ -22,6 +22,8 @@ FALSE_SHARE = 0.05
 """Of what is named, at most so much is chance."""
 
 MOST_ALIKE = 0.2
+"""Of a vehicle's flights, as many may be unlike the others in a figure; more are a kind of their own."""
+
 _ROUNDING = 1e-9
 _EFFICIENCY_OF_QN = 0.82
 _VARIANCE_OF_MEDIAN = 0.5 * math.pi

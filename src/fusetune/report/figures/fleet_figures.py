@@ -27,6 +27,7 @@ _COLUMNS = 3
 _PANEL_INCH = (3.35, 1.75)
 _TITLE_WIDTH = 52
 _MARKED = ("fail", "warning")
+_DECADES = 50.0
 _WITHIN_REACH = 4.0
 """A limit that is so many times farther than the largest value would flatten all, and is left out."""
 
@@ -57,15 +58,25 @@ def draw_trends(table: FleetTable, columns: Sequence[int], changes: Sequence[Map
         _limit(axes.axhline, name.limit, values)
         axes.set_xlim(-0.6, rows.size - 0.4)
         axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-        axes.yaxis.set_major_locator(MaxNLocator(4))
+        if _spans_decades(values):
+            axes.set_yscale("log")
+            axes.minorticks_off()
+        else:
+            axes.yaxis.set_major_locator(MaxNLocator(4))
         axes.set_xlabel("flight, by date")
     _legend(figure, colours)
     return figure
 
 
+def _spans_decades(values: Array) -> bool:
+    """Whether a few flights would press all others onto the axis."""
+    known = values[np.isfinite(values)]
+    return known.size > 0 and bool(known.min() > 0.0) and bool(known.max() > _DECADES * np.median(known))
+
+
 def _legend(figure: Figure, colours: Mapping[str, str]) -> None:
     """Vehicles in a line at the bottom; those that share a colour as one."""
-    named = {colour: vehicle for vehicle, colour in reversed(colours.items())}
+    named = {colour: vehicle for vehicle, colour in reversed(list(colours.items()))}
     labels = {colour: vehicle if colour != _OTHERS_COLOUR else "others" for colour, vehicle in named.items()}
     points = [Line2D([], [], marker="o", linestyle="", color=colour, markersize=4) for colour in reversed(labels)]
     words = list(reversed(labels.values()))

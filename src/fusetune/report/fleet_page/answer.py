@@ -6,11 +6,12 @@ from collections import Counter
 from collections.abc import Iterator
 from html import escape
 
+from fusetune.report.counted import count_words, listed
 from fusetune.report.figure_words import figure_words
 from fusetune.report.fleet_page.change_points import change_points
-from fusetune.report.fleet_page.fleet_results import FleetResults, count_words, listed
+from fusetune.report.fleet_page.fleet_results import FleetResults
 from fusetune.report.markup import bullets, number
-from fusetune.report.severity_words import cause_words, worst_of
+from fusetune.report.severity_words import SEVERITY_WORDS, cause_words, worst_of
 
 _NAMED_CAUSES = 4
 _NAMED_CHANGES = 3
@@ -37,7 +38,9 @@ def _causes(results: FleetResults) -> Iterator[str]:
         words = cause_words(cause["id"])
         where = f" of {count_words(len(cause['vehicles']), 'vehicle')}" if len(cause["vehicles"]) > 1 else ""
         flights = cause["flights"]
-        yield f"{words[0].upper()}{words[1:]} on {count_words(len(flights), 'flight')}{where}: {listed(flights)}."
+        severity = SEVERITY_WORDS[cause["severity"]]
+        found = f"{words[0].upper()}{words[1:]} ({severity}) on {count_words(len(flights), 'flight')}{where}"
+        yield f"{found}: {listed(flights)}."
     more = len(results.causes) - _NAMED_CAUSES
     if more > 0:
         yield f"{count_words(more, 'more cause')}, in the table below."

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass
 
-from fusetune.report.fleet_page.fleet_results import Document, FleetResults, count_words
+from fusetune.report.counted import count_words
+from fusetune.report.fleet_page.fleet_results import Document, FleetResults
 
 
 @dataclass(frozen=True)

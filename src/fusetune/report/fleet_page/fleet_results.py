@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,14 +59,3 @@ def read_fleet_results(fleet_file: AnyPath, health_table: AnyPath, links: Mappin
         )
 
     return read_as(fleet_file, built, "all flights together")
-
-
-def count_words(count: int, noun: str) -> str:
-    """As `1 flight`, `3 flights`."""
-    return f"{count} {noun}{'s' if count != 1 else ''}"
-
-
-def listed(names: Sequence[str], most: int = 3) -> str:
-    """The first few names, and how many more there are."""
-    more = len(names) - most
-    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
-from fusetune.report.fleet_page.fleet_results import Document, FleetResults, count_words
+from fusetune.report.counted import count_words
+from fusetune.report.fleet_page.fleet_results import Document, FleetResults
 from fusetune.report.markup import details, link, paragraph, section
 from fusetune.report.severity_words import SEVERITY_WORDS, cause_words, confidence_words, worst_of
 

@@ -9,16 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from fusetune.apply.fleet.flights import OF_FLIGHT
+from fusetune.report.counted import count_words
 from fusetune.report.figures.drawing import figure_style, save_png
 from fusetune.report.figures.fleet_figures import draw_histograms, draw_trends
 from fusetune.report.fleet_page.answer import fleet_answer
-from fusetune.report.fleet_page.fleet_results import Document, FleetResults, count_words, read_fleet_results
+from fusetune.report.fleet_page.fleet_results import Document, FleetResults, read_fleet_results
 from fusetune.report.fleet_page.matrix import matrix_section
 from fusetune.report.fleet_page.statistics_sections import (
     changes_section,
     figures_section,
     histograms_section,
     outliers_section,
+    pooled_sensors_section,
     verdicts_section,
 )
 from fusetune.report.html_page import PageHead, page_links, write_page
@@ -45,7 +47,8 @@ def build_fleet_page(
     ----------
     fleet_file : `results/apply/fleet.json`
     health_table : `results/analyze/health.parquet`, which it was made from
-    figure_folder : `results/report/fleet`, is made where it does not exist
+    figure_folder : `results/report/fleet`, is made where it does not exist; shown is also what `plot_pooled_sensors`
+        drew there
     output : `results/fleet.html`
     flight_pages : `results/report/flights/<flight>.html` of the flights that have one
     pages : words → other pages that it leads to
@@ -69,6 +72,7 @@ def build_fleet_page(
         outliers_section(results),
         verdicts_section(results),
         histograms_section(histograms),
+        pooled_sensors_section(sorted(figures.glob("pooled_*.svg"))),
         figures_section(results),
     )
     vehicles = count_words(len(results.table.vehicles), "vehicle")
@@ -77,8 +81,9 @@ def build_fleet_page(
     write_page(output, PageHead("All flights", "All flights: what is wrong, and what changed", origin), sections)
 
 
-def plot_fleet(results: FleetResults, folder: Path) -> tuple[Path, list[Path]]:
+def plot_fleet(results: FleetResults, figure_folder: AnyPath) -> tuple[Path, list[Path]]:
     """Draw the trends and the histograms; returns their files, of which there is none where nothing can be drawn."""
+    folder = Path(figure_folder)
     trends = folder / TRENDS_FILE
     for old in (trends, *folder.glob("histograms_*.png")):
         old.unlink(missing_ok=True)

@@ -8,15 +8,17 @@ from pathlib import Path
 
 from fusetune.apply.fleet.changes import FEWEST_A_SIDE, LEVEL
 from fusetune.apply.fleet.outliers import FALSE_SHARE, FEWEST_FLIGHTS
+from fusetune.report.counted import count_words, listed
 from fusetune.report.figure_words import figure_words
 from fusetune.report.fleet_page.change_points import change_points
-from fusetune.report.fleet_page.fleet_results import Document, FleetResults, count_words, listed
+from fusetune.report.fleet_page.fleet_results import Document, FleetResults
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
+from fusetune.storage.files import AnyPath
 
 _MOST_NAMED_FIGURES = 6
 
 
-def changes_section(results: FleetResults, trends: Path) -> str:
+def changes_section(results: FleetResults, trends: AnyPath) -> str:
     """Steps and drifts in tables, and the picture of the trends."""
     parts = []
     for point in change_points(results):
@@ -31,9 +33,7 @@ def changes_section(results: FleetResults, trends: Path) -> str:
         head = ("figure", "per ten flights", "interval", "unit", "flights", "vehicle", "chance")
         parts.append(table(head, [_drift_row(one) for one in results.drifts], "Drifts"))
     if not parts:
-        few = (
-            f"A change shows in {FEWEST_A_SIDE} flights before and after at least, in practice in a dozen of a vehicle."
-        )
+        few = f"A change takes {FEWEST_A_SIDE} flights before and after to show; to be sure of it, a dozen and more."
         parts.append(paragraph(f"No figure changed over time beyond what the order of flights does by chance. {few}"))
     else:
         text = (
@@ -41,7 +41,7 @@ def changes_section(results: FleetResults, trends: Path) -> str:
             "the chances are corrected for the number of figures."
         )
         parts.append(paragraph(text, "note"))
-    if trends.exists():
+    if Path(trends).exists():
         caption = (
             "A dot per flight in the order of time, a colour per vehicle; ringed: beyond the limit, which is dashed "
             "where it is near. Lines: medians between changes."
@@ -100,7 +100,7 @@ def outliers_section(results: FleetResults) -> str:
             )
             for one in found
         ]
-        words = listed([figure_words(one["id"]) for one in found], 2)
+        words = listed([figure_words(one["id"]) for one in found], 2, "; ")
         parts.append(details(f"{flight}: {words}", table(head, rows)))
     return section("Flights that stand out", *parts)
 
@@ -120,7 +120,11 @@ def verdicts_section(results: FleetResults) -> str:
             driven[flight].append(figure_words(one["id"]))
     order = sorted(driven.items(), key=lambda item: (-len(item[1]), item[0]))
     rows = [
-        (Cell(flight, "short", results.links.get(flight, "")), number(len(words)), listed(words, _MOST_NAMED_FIGURES))
+        (
+            Cell(flight, "short", results.links.get(flight, "")),
+            number(len(words)),
+            listed(words, _MOST_NAMED_FIGURES, "; "),
+        )
         for flight, words in order
     ]
     parts = [paragraph(text, "note"), table(("flight", "figures", "which"), rows)] if rows else []
@@ -156,7 +160,7 @@ def _judged_otherwise(verdict: Document) -> list[str]:
     return [driver["flight"] for driver in verdict["drivers"] if (driver["worst"], driver["typical"]) != told]
 
 
-def histograms_section(pictures: Sequence[Path]) -> str:
+def histograms_section(pictures: Sequence[AnyPath]) -> str:
     """Histograms: those of figures beyond their limits on some flight, the rest behind a click."""
     if not pictures:
         return ""
@@ -167,6 +171,15 @@ def histograms_section(pictures: Sequence[Path]) -> str:
     first, *others = (figure(one, caption) for one in pictures)
     more = details("All other figures", *others) if others else ""
     return section("How the figures are spread", first, more)
+
+
+def pooled_sensors_section(pictures: Sequence[AnyPath]) -> str:
+    """Sensors over all flights of a vehicle, each behind a click; empty where none was drawn."""
+    caption = "A box for each flight, the histogram of all together; Allan deviation of all times of standing still."
+    parts = [
+        details(Path(one).stem.removeprefix("pooled_").replace("_", " "), figure(one, caption)) for one in pictures
+    ]
+    return section("The sensors over all flights", *parts) if parts else ""
 
 
 def figures_section(results: FleetResults) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
@@ -100,10 +101,16 @@ def _sign(sign: Mapping[str, Any]) -> str:
     """What was seen, with the level up to which it is usual."""
     usual = sign["usual"]
     words = str(sign["words"]).rstrip(".")
-    if not isinstance(usual, int | float) or not math.isfinite(usual):
+    if not isinstance(usual, int | float) or not math.isfinite(usual) or _is_named(usual, words):
         return words
     unit = "" if sign["unit"] == "1" else f" {sign['unit']}"
     return f"{words} (usual: up to {number(usual).text}{unit.rstrip()})"
+
+
+def _is_named(value: float, words: str) -> bool:
+    """Whether words tell a value already, as rounded as it may be; those of an experiment do."""
+    told = [one for one in re.findall(r"-?\d+(?:\.\d+)?", words) if float(one)]
+    return any(round(value, len(one.partition(".")[2])) == float(one) for one in told)
 
 
 def _values(values: Mapping[str, float]) -> Iterator[str]:

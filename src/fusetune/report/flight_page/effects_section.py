@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from fusetune.report.counted import count_words
 from fusetune.report.flight_page.flight_results import Document, FlightResults
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
 
@@ -47,7 +48,7 @@ def effects_section(results: FlightResults) -> str:
         return ""
     if refused:
         rows = [(_words(one["id"]), str(one["refusal"])) for one in refused]
-        count = f"{len(rows)} effect{'s' if len(rows) != 1 else ''} that this flight does not tell, and what to fly"
+        count = f"{count_words(len(rows), 'effect')} that this flight does not tell, and what to fly"
         parts.append(details(count, table(("effect", "why not, and what to fly"), rows)))
     return section("What could be set from this flight", *parts)
 

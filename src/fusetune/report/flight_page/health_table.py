@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+from fusetune.report.counted import count_words
 from fusetune.report.figure_words import figure_words
 from fusetune.report.flight_page.flight_results import Document, FlightResults
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
@@ -35,7 +36,9 @@ def health_table_section(results: FlightResults) -> str:
         parts.append(_group(group, rows))
     if lacking:
         told = [(str(row["found"]),) for row in lacking]
-        parts.append(details(f"{len(lacking)} figures that this log does not tell", table(("why",), told)))
+        parts.append(
+            details(f"{count_words(len(lacking), 'figure')} that this log does not tell", table(("why",), told))
+        )
     return section("Health of sensors and filter", *parts)
 
 
@@ -61,7 +64,9 @@ def _span(start: float, stop: float) -> str:
 def _group(group: str, rows: list[Document]) -> str:
     worst = min((row["severity"] for row in rows), key=rank)
     beyond = sum(row["severity"] in ("warning", "fail") for row in rows)
-    summary = f"{group[0].upper()}{group[1:]}: {len(rows)} figures" + (f", {beyond} beyond the limit" if beyond else "")
+    summary = f"{group[0].upper()}{group[1:]}: {count_words(len(rows), 'figure')}" + (
+        f", {beyond} beyond the limit" if beyond else ""
+    )
     several = len({row["instance"] for row in rows}) > 1
     head = ("figure", *(("instance",) if several else ()), "value", "unit", "limit", "told by")
     told = [

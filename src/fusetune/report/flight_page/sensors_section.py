@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fusetune.report.flight_page.flight_results import Document
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
+from fusetune.storage.files import AnyPath
 
 _PICTURES = {
     "allan.svg": (
@@ -18,7 +19,7 @@ _PICTURES = {
 _OF_SENSOR = "Samples with outliers marked, boxes per axis, histogram, and quantiles against a normal distribution."
 
 
-def sensors_section(noise: Document, figure_folder: Path) -> str:
+def sensors_section(noise: Document, figure_folder: AnyPath) -> str:
     """What `sensor_noise.json` says and what was drawn of it; empty where neither says anything.
 
     Parameters
@@ -26,19 +27,23 @@ def sensors_section(noise: Document, figure_folder: Path) -> str:
     noise : that document
     figure_folder : with what `plot_sensor_noise` drew; what is missing there is left out
     """
+    figures = Path(figure_folder)
     parts = []
     limited = noise["vibration_limited"]
     if limited:
         text = f"Vibration, not the sensor, makes the noise in flight of: {', '.join(limited)}."
         parts.append(paragraph(text + " Less vibration tells more than another parameter."))
     if noise["starting"]:
-        head = ("parameter", "unit", "flies now", "at rest", "in flight", "start with", "why")
+        head = ("parameter", "unit", "flies now", "at rest", "in flight", "start with")
+        parts.append(paragraph("Noise parameters to start a study with, from what the sensors do:"))
         parts.append(table(head, [_starting_row(one) for one in noise["starting"]]))
+        reasons = [(Cell(str(one["parameter"]), "mono"), str(one["words"])) for one in noise["starting"]]
+        parts.append(details("Why these", table(("parameter", "why"), reasons)))
     for name, (title, caption) in _PICTURES.items():
-        if (figure_folder / name).exists():
-            parts.append(details(title, figure(figure_folder / name, caption)))
+        if (figures / name).exists():
+            parts.append(details(title, figure(figures / name, caption)))
     for name, sensor in noise["sensors"].items():
-        picture = figure_folder / f"sensor_{name}.png"
+        picture = figures / f"sensor_{name}.png"
         if picture.exists():
             parts.append(details(f"{sensor['sensor']}: {sensor['topic']}", figure(picture, _OF_SENSOR)))
     return section("The sensors themselves", *parts) if parts else ""
@@ -54,5 +59,4 @@ def _starting_row(one: Document) -> tuple[Cell | str, ...]:
         number(one["at_rest"]),
         number(one["in_flight"]),
         Cell(start.text, "number is-warning" if changed else "number"),
-        str(one["words"]),
     )

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fusetune.report.counted import count_words
 from fusetune.report.markup import Cell, paragraph, section, table
 from fusetune.report.severity_words import SEVERITY_WORDS, confidence_words, rank, worst_of
 from fusetune.storage.files import AnyPath
@@ -26,7 +27,7 @@ def health_section(diagnoses: Sequence[Mapping[str, Any]], flight_pages: Mapping
     found = [one for one in diagnoses if one["diagnoses"]]
     found.sort(key=lambda one: (rank(worst_of(one["diagnoses"])), -len(one["diagnoses"]), one["flight"]))
     clean = len(diagnoses) - len(found)
-    none = f"On {clean} of {len(diagnoses)} flight{'s' if len(diagnoses) != 1 else ''} nothing wrong was found."
+    none = f"On {clean} of {count_words(len(diagnoses), 'flight')} nothing wrong was found."
     if not found:
         return section("What is wrong with the flights", paragraph(none))
     folder = Path(page).parent

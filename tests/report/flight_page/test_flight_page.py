@@ -1,0 +1,141 @@
+"""The page of a flight: the answer first, then why, all of it in one file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from tests.report.made_health import LATE, SHAKEN, SILENT, health_rows, rejected, write_documents, write_log
+
+from fusetune.errors import UserError
+from fusetune.report.flight_page.page import TIMELINE_FILE, build_flight_page, plot_flight_timeline
+from fusetune.storage.documents import write_document
+
+
+def page_of(folder: Path, figures: Path | None = None) -> str:
+    output = folder.parent.parent / "report" / "flights" / f"{folder.name}.html"
+    build_flight_page(
+        folder, figures or folder / "no_figures", output, {"All flights": folder.parent.parent / "fleet.html"}
+    )
+    return output.read_text(encoding="utf-8")
+
+
+def told(page: str) -> str:
+    """What a reader sees, without pictures and style."""
+    body = re.sub(r'src="data:[^"]*"', "", page[page.index("<body>") :])
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", body).replace("&nbsp;", " "))
+
+
+@pytest.fixture(scope="module")
+def shaken(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A flight with two causes and two figures beyond their limits, with its timeline."""
+    root = tmp_path_factory.mktemp("results")
+    problems = (rejected("gnss_vel_vertical", 0.2, 22.0, 30.0), rejected("baro_hgt", 0.02, 24.0, 25.0, "warning"))
+    folder = write_documents(root / "analyze" / "shaken", (SHAKEN, LATE), health_rows(*problems))
+    plot_flight_timeline(write_log(root / "save" / "shaken"), folder, root / "figures" / TIMELINE_FILE)
+    return page_of(folder, root / "figures")
+
+
+def test_the_answer_stands_first(shaken: str) -> None:
+    words = told(shaken)
+    order = [
+        "The &lt;frame&gt; shakes the IMU do not fly like this",
+        "since 20.0 s (10 s after take-off) until 32.5 s",
+        "sure (97 %)",
+        "Isolate the autopilot.",
+        "Also: GNSS is later than PX4 is told worth knowing",
+        "What the log shows",
+        "What the replay shows",
+        "EKF2_ACC_NOISE = 0.5",
+        "What could be set from this flight",
+        "Health of sensors and filter",
+    ]
+    places = [words.index(one) for one in order]
+    assert places == sorted(places)
+
+
+def test_a_sign_tells_what_is_usual_unless_its_words_do(shaken: str) -> None:
+    words = told(shaken)
+    assert "18.9 m/s² (usual: up to 4.9 m/s²)" in words
+    assert "goes from 0.003 to 0.3" in words
+    assert "goes from 0.003 to 0.3 (usual" not in words
+
+
+def test_a_cause_of_the_whole_flight_says_so(shaken: str) -> None:
+    second = told(shaken).split("GNSS is later than PX4 is told")[-1]
+    assert "when all of the flight how sure possible (60 %)" in second
+
+
+def test_the_page_needs_no_network(shaken: str) -> None:
+    assert re.findall(r'href="([^"]*)"', shaken) == ["../../fleet.html"]
+    sources = re.findall(r'src="([^"]{0,22})', shaken)
+    assert sources == ["data:image/png;base64,"]
+    assert "http" not in re.sub(r'src="data:[^"]*"', "", shaken)
+    assert "<frame>" not in shaken
+
+
+def test_problems_stand_before_passes_and_these_behind_a_click(shaken: str) -> None:
+    health = shaken[shaken.index("Health of sensors and filter") :]
+    assert health.index("gnss_vel_vertical: samples rejected: 20 %") < health.index("baro_hgt: samples rejected: 2 %")
+    assert health.index("baro_hgt: samples rejected") < health.index("<details>")
+    assert "22.0 to 30.0 s" in health
+    assert health.index("<details>") < health.index("horizontal accuracy")
+    assert "range finder: not in the log" in health[health.index("1 figure that this log does not tell") :]
+
+
+def test_effects_say_what_to_make_of_them(shaken: str) -> None:
+    """EKF2_BCOEF_X flies 100 and is told to lie between 50 and 70; EKF2_MCOEF flies within its interval."""
+    effects = shaken[shaken.index("What could be set") : shaken.index("Health of sensors")]
+    rows = {row.split("<td")[2].split(">")[1].split("<")[0]: row for row in effects.split("<tr>")[2:] if "mono" in row}
+    assert "try 60" in rows["EKF2_BCOEF_X"]
+    assert "agrees with what flies" in rows["EKF2_MCOEF"]
+    assert "measured; no parameter says it" in rows["wind_north"]
+    assert "it never came near the ground; hover half a metre high" in effects
+
+
+def test_a_sound_flight_is_said_to_be_sound(tmp_path: Path) -> None:
+    words = told(page_of(write_documents(tmp_path / "analyze" / "sound", effects=(SILENT,))))
+    assert "Nothing wrong was found on this flight" in words
+    assert "No figure lies beyond its limit." in words
+    assert "This flight tells none of them" in words
+    assert "Why" not in words.split("What could be set")[0]
+
+
+def test_figures_that_no_cause_explains_are_told_as_such(tmp_path: Path) -> None:
+    problems = (rejected("baro_hgt", 0.02, 24.0, 25.0, "warning"), rejected("gnss_pos", 0.3, 22.0, 30.0))
+    folder = write_documents(tmp_path / "analyze" / "odd", rows=health_rows(*problems))
+    words = told(page_of(folder))
+    assert "Something is off, and no known cause explains it" in words
+    assert words.index("gnss_pos: samples rejected: 30 %") < words.index("baro_hgt: samples rejected: 2 %")
+
+
+def test_the_same_figure_of_several_instances_is_one_line(tmp_path: Path) -> None:
+    problems = (rejected("mag", 0.3, 22.0, 30.0), rejected("mag", 0.2, 22.0, 30.0, "warning"))
+    page = page_of(write_documents(tmp_path / "analyze" / "twice", rows=health_rows(*problems)))
+    table = page[page.index("Health of sensors") : page.index("<details>", page.index("Health of sensors"))]
+    assert table.count("samples rejected") == 1
+    assert "beyond it on instance 1, too" in table
+
+
+def test_pages_and_pictures_are_the_same_bytes_twice(tmp_path: Path) -> None:
+    folder = write_documents(tmp_path / "analyze" / "flight", (SHAKEN,))
+    log = write_log(tmp_path / "save" / "flight")
+    pictures = [tmp_path / name / TIMELINE_FILE for name in ("one", "two")]
+    for picture in pictures:
+        plot_flight_timeline(log, folder, picture)
+    assert pictures[0].read_bytes() == pictures[1].read_bytes()
+    with Image.open(pictures[0]) as image:
+        assert image.width == 1000
+    assert page_of(folder, pictures[0].parent) == page_of(folder, pictures[1].parent)
+
+
+def test_a_document_that_is_lost_or_of_something_else_is_named(tmp_path: Path) -> None:
+    folder = write_documents(tmp_path / "analyze" / "flight")
+    write_document(folder / "effects.json", {"flight": "flight"})
+    with pytest.raises(UserError, match=r"effects\.json.*effects"):
+        page_of(folder)
+    (folder / "diagnosis.json").unlink()
+    with pytest.raises(UserError, match=r"diagnosis\.json"):
+        page_of(folder)
