@@ -24,16 +24,18 @@ def test_a_cause_is_told_once_with_its_flights_the_worst_first() -> None:
         FlightDiagnoses("one", (diagnosis("mag"), diagnosis("imu", "fail", 0.7))),
         FlightDiagnoses("two", (diagnosis("imu"),)),
         FlightDiagnoses("three", (diagnosis("mag", "note"), diagnosis("baro", confidence=0.3))),
+        # told by the decision itself, from all flights
+        FlightDiagnoses("four", (diagnosis("gnss_delay"), diagnosis("noise_claim"))),
     ]
     imu, mag = problem_findings(flights)
     assert (imu.id, imu.severity, imu.figure, imu.found) == (
-        "diagnosis.imu", "fail", 2.0, "The imu is off (on 2 of 3 flights)"
+        "diagnosis.imu", "fail", 2.0, "The imu is off (on 2 of 4 flights)"
     )  # fmt: skip
     assert imu.evidence["flights"] == "one, two"
     assert (mag.severity, mag.figure) == ("warning", 1.0)
     assert problem_sentence([imu, mag]) == (
-        "Mend this first, and tune on flights after it, for it may change the choice: the imu is off (on 2 of 3 "
-        "flights); the mag is off (on 1 of 3 flights)."
+        "Mend this first, and tune on flights after it, for it may change the choice: the imu is off (on 2 of 4 "
+        "flights); the mag is off (on 1 of 4 flights)."
     )
 
 

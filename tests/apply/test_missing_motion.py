@@ -8,6 +8,8 @@ import pytest
 from tests.apply.statistics.test_leave_one_out import flight as evidence_of
 
 from fusetune.analyze.delays.wrong_delays import JoinedDelay
+from fusetune.analyze.effects.estimate import Effect, Estimate
+from fusetune.analyze.effects.joined_effects import join_effects
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.missing_motion import DELAYS, LEVER_ARMS, MINUTES, NOISES, THINNED, missing_motion
 
@@ -51,6 +53,14 @@ def test_hovering_tells_no_delay_and_only_its_own_noises() -> None:
     assert first.cannot == "Hover only: delays cannot be told, and noises found here are those of hovering"
     assert first.fly == "three hard accelerate–stop legs of 5 s each way"
     assert [one.kind for one in rest] == [LEVER_ARMS]
+
+
+@pytest.mark.parametrize(("half_m", "missing"), [(0.03, []), (0.2, [LEVER_ARMS])])
+def test_an_antenna_that_is_known_needs_no_turns(half_m: float, missing: list[str]) -> None:
+    axes = tuple(Estimate(f"EKF2_GPS_POS_{axis}", "m", 0.0, 0.0, -half_m, half_m, half_m, 9) for axis in "XYZ")
+    told = join_effects({"a": [Effect("gnss_antenna", axes)]})
+    gentle = BRISK | {"roll_pitch_rate_deg_s": 5.0, "yaw_rate_deg_s": 5.0}
+    assert [one.kind for one in missing_motion([analyzed(gentle)] * 3, "present", (), told)] == missing
 
 
 def test_one_brisk_flight_is_not_enough_to_tell_a_delay_two_are() -> None:

@@ -125,13 +125,14 @@ def decide(
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
+    told = read_joined_effects(effects) if effects is not None else None
     problems = problem_findings([one for one in map(read_diagnoses, diagnoses) if vehicle.without(one.flight) is None])
-    measured = effect_findings(read_joined_effects(effects), choice, sets) if effects is not None else ()
+    measured = effect_findings(told, choice, sets) if told is not None else ()
     late = confirmed(delay_findings(read_joined(delays) if delays is not None else ()), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
     power = _power(ranked, present, flights, settings)
-    missing = missing_motion(flights, present, read_joined(delays) if delays is not None else ())
+    missing = missing_motion(flights, present, read_joined(delays) if delays is not None else (), told)
     steps = next_steps(
         Situation(
             choice,

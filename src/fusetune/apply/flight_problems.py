@@ -16,6 +16,9 @@ from fusetune.storage.files import AnyPath
 SURE = 0.6
 """Diagnoses that are less sure are on the flight's page, and not told here."""
 
+OF_ALL_FLIGHTS = ("gnss_delay", "gnss_lever_arm", "noise_claim")
+"""What a single flight says of these is weaker than what the decision makes of all flights, and could contradict it."""
+
 _WORSE: Mapping[str, int] = {"warning": 1, "fail": 2}
 _OF_EKF2 = "EKF2_"
 
@@ -38,7 +41,7 @@ def problem_findings(flights: Sequence[FlightDiagnoses]) -> tuple[Finding, ...]:
     by_cause: dict[str, list[tuple[str, Mapping[str, Any]]]] = {}
     for one in flights:
         for found in one.diagnoses:
-            if found["severity"] in _WORSE and found["confidence"] >= SURE:
+            if found["severity"] in _WORSE and found["confidence"] >= SURE and found["id"] not in OF_ALL_FLIGHTS:
                 by_cause.setdefault(found["id"], []).append((one.flight, found))
     findings = [_finding(cause, found, len(flights)) for cause, found in by_cause.items()]
     return tuple(sorted(findings, key=lambda one: (-_WORSE[one.severity], -(one.figure or 0.0), one.id)))

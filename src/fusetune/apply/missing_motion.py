@@ -11,7 +11,9 @@ from statistics import median
 from typing import Any
 
 from fusetune.analyze.delays.wrong_delays import FEWEST_FLIGHTS, JoinedDelay
+from fusetune.analyze.effects.joined_effects import JoinedEffects
 from fusetune.apply.evidence import AnalyzedFlight
+from fusetune.set_names import EFFECT_SETS
 
 BRISK_M_S2 = 1.0
 """RMS of the change of horizontal velocity over a second from which a flight of a minute tells the delay of GNSS: below
@@ -35,6 +37,10 @@ known to 1/√(2N), 7 % after three minutes."""
 GNSS_HZ = 4.0
 """Receivers give 5 to 10 positions a second; where fewer are scored, the log was thinned."""
 
+SURE_ARM_M = 0.05
+"""A lever arm whose interval reaches no further needs no other flight."""
+_AXES = "XYZ"
+
 DELAYS, NOISES, LEVER_ARMS, MINUTES, THINNED = "delays", "noises", "lever_arms", "minutes", "thinned_gnss"
 
 
@@ -55,7 +61,10 @@ class MissingMotion:
 
 
 def missing_motion(
-    flights: Sequence[AnalyzedFlight], present: str, delays: Sequence[JoinedDelay] = ()
+    flights: Sequence[AnalyzedFlight],
+    present: str,
+    delays: Sequence[JoinedDelay] = (),
+    effects: JoinedEffects | None = None,
 ) -> tuple[MissingMotion, ...]:
     """What is missing, the most useful first; nothing where the flights do not say how they moved.
 
@@ -63,7 +72,7 @@ def missing_motion(
     ----------
     flights : those that decide
     present : the set that flies now
-    delays : as estimated over all flights: one that is sure needs no other flight
+    delays, effects : as estimated over all flights: what is sure needs no other flight
     """
     summaries = [one.summary for one in flights if one.evidence is not None and one.summary.get("excitation")]
     if not summaries:
@@ -78,7 +87,7 @@ def missing_motion(
     elif hovering:
         found.append(MissingMotion(NOISES, "All flights hover: noises found here are those of hovering", _LEGS))
     turning = sum(max(one["roll_pitch_rate_deg_s"], one["yaw_rate_deg_s"]) >= TURNING_DEG_S for one in moved)
-    if turning < FEWEST_FLIGHTS:
+    if turning < FEWEST_FLIGHTS and not _knows_antenna(effects):
         few = "no flight turns" if not turning else "only one flight turns"
         cannot = f"Lever arms (EKF2_IMU_POS_*, EKF2_GPS_POS_*) cannot be told: {few} fast enough"
         found.append(MissingMotion(LEVER_ARMS, cannot, "fast turns in yaw, and in pitch and roll, both ways"))
@@ -95,6 +104,12 @@ def missing_motion(
 
 LOG_PROFILE = "log with the bit “estimator replay” of SDLOG_PROFILE set, from boot (SDLOG_MODE 1)"
 _LEGS = "three hard accelerate–stop legs of 5 s each way"
+
+
+def _knows_antenna(effects: JoinedEffects | None) -> bool:
+    """Whether the flights tell each axis of the GNSS antenna's place."""
+    told = effects.effects.get(EFFECT_SETS["antenna_mended"], {}) if effects is not None else {}
+    return len(told) == len(_AXES) and all(one.upper - one.lower <= 2.0 * SURE_ARM_M for one in told.values())
 
 
 def _delays(hovering: bool, brisk: int, flights: int) -> MissingMotion:

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from fusetune.apply.flight_problems import OF_ALL_FLIGHTS
 from fusetune.report.html_page import PageHead, page_links, write_page
 from fusetune.report.results import read_results
 from fusetune.report.sections.decision_sections import decision_section, sets_section
@@ -62,7 +64,7 @@ def build_report(
     sections = (
         page_links({"All flights": fleet_page} if fleet_page is not None else {}, output),
         decision_section(results),
-        health_section([*map(read_document, diagnoses)], {Path(one).stem: one for one in flight_pages}, output),
+        health_section(_of_single_flights(diagnoses), {Path(one).stem: one for one in flight_pages}, output),
         next_steps_section(results, figures),
         findings_section(results),
         evidence_section(results, figures),
@@ -85,3 +87,11 @@ def build_report(
     flights = "no flight" if not count else f"{count} flight{'s' if count > 1 else ''}"
     head = PageHead("EKF2 parameters: the decision", "Which EKF2 parameters to fly", f"{product}, from {flights}")
     write_page(output, head, sections)
+
+
+def _of_single_flights(diagnoses: Sequence[AnyPath]) -> list[dict[str, Any]]:
+    """What is wrong on each flight, without what the decision tells of all of them together."""
+    found = [read_document(file) for file in diagnoses]
+    return [
+        one | {"diagnoses": [cause for cause in one["diagnoses"] if cause["id"] not in OF_ALL_FLIGHTS]} for one in found
+    ]
