@@ -34,6 +34,8 @@ MADE_BY = {
     "decide": ("apply", "score", "replay", "save"),
     "join_fleet": ("apply", "diagnose", "save"),
     "flight_page": ("report", "apply", "diagnose", "save"),
+    "all_sensors_page": ("report", "apply", "diagnose", "save"),
+    "sensor_page": ("report", "apply", "diagnose", "save"),
     "fleet_page": ("report", "apply", "diagnose", "save"),
     "plot_flight": ("report", "apply", "score", "replay", "save"),
     "plot_summary": ("report", "apply", "score", "replay", "save"),

@@ -69,6 +69,54 @@ rule flight_page:
         "../scripts/flight_page.py"
 
 
+# Drawn when asked for, `snakemake sensors`: the pictures of a flight's sensors take longer than its analysis.
+rule sensor_page:
+    input:
+        flight="results/save/{flight}",
+        noise="results/analyze/{flight}/sensor_noise.json",
+    output:
+        "results/report/sensors/{flight}.html",
+    log:
+        "results/logs/sensor_page/{flight}.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB, 3.0),
+        runtime=of_its_logs(5, 0.05),
+    params:
+        code=DIGEST["report"],
+    message:
+        "Report: draw the sensors of {wildcards.flight}"
+    script:
+        "../scripts/sensor_page.py"
+
+
+rule all_sensors_page:
+    input:
+        expand("results/analyze/{flight}/sensor_noise.json", flight=LOGS),
+    output:
+        "results/report/all_sensors.html",
+    log:
+        "results/logs/all_sensors_page.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
+        runtime=of_its_logs(10, 0.01),
+    params:
+        code=DIGEST["report"],
+    message:
+        "Report: draw the sensors over all flights"
+    script:
+        "../scripts/all_sensors_page.py"
+
+
+rule sensors:
+    input:
+        expand("results/report/sensors/{flight}.html", flight=LOGS),
+        "results/report/all_sensors.html",
+
+
 rule fleet_page:
     input:
         fleet="results/apply/fleet.json",

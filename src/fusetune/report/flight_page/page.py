@@ -6,10 +6,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from fusetune.analyze.flight_files import SENSOR_NOISE_FILE
-from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise_of
 from fusetune.report.figure_words import figure_words
 from fusetune.report.figures.drawing import figure_style, save_png
-from fusetune.report.figures.noise_figures import plot_sensor_noise
 from fusetune.report.figures.timeline_figure import TIMELINE_TOPICS, Bar, draw_timeline
 from fusetune.report.flight_page.answer import answer_section, causes_section
 from fusetune.report.flight_page.effects_section import effects_section
@@ -73,7 +71,7 @@ def build_drawn_flight_page(
     output: AnyPath,
     pages: Mapping[str, AnyPath] | None = None,
 ) -> None:
-    """Draw the figures of a saved flight, where anything of it could be read, and write its page.
+    """Draw when what was found on a saved flight, where anything of it could be read, and write its page.
 
     Parameters
     ----------
@@ -83,8 +81,6 @@ def build_drawn_flight_page(
     """
     if "topics" in read_flight_document(Path(flight_folder) / METADATA_FILE):
         plot_flight_timeline(flight_folder, analyze_folder, Path(figure_folder) / TIMELINE_FILE)
-        if read_document(Path(analyze_folder) / SENSOR_NOISE_FILE)["sensors"]:
-            plot_sensor_noise(sensor_noise_of(flight_folder), figure_folder)
     build_flight_page(analyze_folder, figure_folder, output, pages)
 
 

@@ -16,6 +16,10 @@ _PICTURES = {
     ),
     "spectra.svg": ("Spectra", "At rest and in flight; peaks in step with the motors are named."),
 }
+_HOW_TO_DRAW = (
+    "Pictures of each sensor (samples, boxes, histograms, Allan deviation, spectra): snakemake --cores 2 sensors draws "
+    "them into results/report/sensors/."
+)
 _OF_SENSOR = "Samples with outliers marked, boxes per axis, histogram, and quantiles against a normal distribution."
 
 
@@ -46,6 +50,8 @@ def sensors_section(noise: Document, figure_folder: AnyPath) -> str:
         picture = figures / f"sensor_{name}.png"
         if picture.exists():
             parts.append(details(f"{sensor['sensor']}: {sensor['topic']}", figure(picture, _OF_SENSOR)))
+    if parts and not any((figures / name).exists() for name in _PICTURES):
+        parts.append(paragraph(_HOW_TO_DRAW, "note"))
     return section("The sensors themselves", *parts) if parts else ""
 
 

@@ -1,0 +1,44 @@
+"""Pages of sensors: of a flight, and of all flights."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fusetune.analyze.sensor_noise.sensor_noise import write_sensor_noise
+from fusetune.px4.flight import Flight
+from fusetune.px4.ulog.writer import write_ulog
+from fusetune.report.flight_page.sensor_page import build_pooled_sensor_page, build_sensor_page
+from fusetune.save.log_folder import save_log
+
+
+@pytest.fixture(scope="module")
+def flight(survey_flight: Flight, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sensors")
+    log = folder / "survey.ulg"
+    write_ulog(log, survey_flight)
+    save_log(log, folder / "save" / "survey")
+    write_sensor_noise(folder / "save" / "survey", folder / "analyze")
+    return folder
+
+
+def test_the_page_of_a_flight_has_a_picture_of_each_sensor(flight: Path, tmp_path: Path) -> None:
+    build_sensor_page(flight / "save" / "survey", flight / "analyze", tmp_path / "figures", tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    # gyro, accelerometer, magnetometer, barometer, GNSS velocity and position; Allan deviation and spectra
+    assert page.count("<figure") == 8
+    assert "snakemake --cores 2 sensors" not in page
+
+
+def test_the_page_of_all_flights_has_a_picture_of_each_device(flight: Path, tmp_path: Path) -> None:
+    files = [flight / "analyze" / "sensor_noise.json"] * 2
+    build_pooled_sensor_page(files, tmp_path / "figures", tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count("<figure") == 7
+    assert "2 flights" in page
+
+
+def test_without_any_sensor_the_pages_say_so(tmp_path: Path) -> None:
+    build_pooled_sensor_page([], tmp_path / "figures", tmp_path / "page.html")
+    assert "No log" in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -1,0 +1,15 @@
+"""Draw each sensor over all flights, and write their page."""
+
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from fusetune.report.flight_page.sensor_page import build_pooled_sensor_page
+
+from job import keep_out, logged_job
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+keep_out("pandas")
+with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
+    build_pooled_sensor_page(list(snakemake.input), figures, snakemake.output[0], {"All flights": "results/fleet.html"})

@@ -1,0 +1,22 @@
+"""Draw the sensors of a flight, and write their page."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from fusetune.report.flight_page.sensor_page import build_sensor_page
+
+from job import keep_out, logged_job
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+keep_out("pandas")
+with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
+    build_sensor_page(
+        snakemake.input.flight,
+        Path(snakemake.input.noise).parent,
+        figures,
+        snakemake.output[0],
+        {"The flight": f"results/report/flights/{snakemake.wildcards.flight}.html"},
+    )
