@@ -15,7 +15,10 @@ from tests.workflow.conftest import STUDY, Workspace
 
 from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
-SUMMARIES = {"list_flights": 1, "join_delays": 1, "decide": 1, "plot_summary": 1, "build_report": 1, "all": 1}
+SUMMARIES = dict.fromkeys(
+    ("list_flights", "join_delays", "join_health", "join_fleet", "decide", "plot_summary", "fleet_page", "build_report",
+     "all"), 1
+)  # fmt: skip
 DECISION = "results/apply/decision.json"
 PATIENCE_S = 300.0
 
@@ -33,7 +36,8 @@ def read_flights(workspace: Workspace) -> dict[str, dict[str, str]]:
 def test_an_empty_folder_plans_one_simulated_flight_per_set(workspace: Workspace) -> None:
     planned = workspace.planned_jobs()
     planned.pop("compile_kernels", None)
-    assert planned == {"design": 1, "simulate_flight": 2, "save_flight": 2, **SUMMARIES}
+    of_flights = dict.fromkeys(("simulate_flight", "save_flight", "diagnose_flight", "flight_page"), 2)
+    assert planned == {"design": 1, **of_flights, **SUMMARIES}
 
 
 def test_the_demonstration_ends_with_parameters_decision_and_report(demonstration: Workspace) -> None:
