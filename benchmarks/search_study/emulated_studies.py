@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.apply.search.found_sets import SHARED
 from fusetune.apply.search.requests import values_of
 from fusetune.apply.search.rounds import Searched, run_searches, searches
 from fusetune.apply.search.space import Space
@@ -63,7 +64,8 @@ class Outcome:
         if not self.error > 0.0:
             return False
         times = 0.5 * (self.upper - self.lower) / self.error
-        half = times * math.sqrt((1.0 + self.flights / of_flights) * self.error**2 + self.spread**2)
+        error = SHARED * self.error
+        half = times * math.sqrt((1.0 + self.flights / of_flights) * error**2 + self.spread**2)
         return abs(gain - self.expected) <= half
 
 

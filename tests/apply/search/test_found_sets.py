@@ -26,7 +26,7 @@ def expected(tmp_path: Path, row: dict[str, Any], spread: float) -> dict[str, fl
 def test_the_interval_of_the_gain_is_that_of_as_many_flights_again_and_of_what_searches_find(tmp_path: Path) -> None:
     # half of the interval is 2.5 errors of 0.02; on as many flights again √2 of these, and the spread on top
     told = expected(tmp_path, ROW, 0.03)
-    half = 2.5 * math.sqrt(2 * 0.02**2 + 0.03**2)
+    half = 2.5 * math.sqrt(2 * (1.1 * 0.02) ** 2 + 0.03**2)
     assert told["percent"] == pytest.approx(100 * (1 - math.exp(-0.1)))
     assert told["lower_percent"] == pytest.approx(100 * (1 - math.exp(-0.1 + half)))
     assert told["upper_percent"] == pytest.approx(100 * (1 - math.exp(-0.1 - half)))
