@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+SURE = ((0.9, "sure"), (0.7, "likely"), (0.0, "possible"))
+"""From which confidence on what is said of a cause, in the terminal and on pages."""
+
 
 @dataclass(frozen=True)
 class Sign:
@@ -69,3 +72,8 @@ class Diagnosis:
             "values": dict(self.values),
             "source": self.source,
         }
+
+
+def how_sure(confidence: float) -> str:
+    """A word for a confidence."""
+    return next(word for least, word in SURE if confidence >= least)

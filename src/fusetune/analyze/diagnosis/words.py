@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fusetune.analyze.diagnosis.diagnosed_logs import DiagnosedLog
-from fusetune.analyze.diagnosis.diagnosis import Diagnosis
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, how_sure
 
 LABELS = {"fail": "FAIL", "warning": "warning", "note": "note"}
-SURE = ((0.9, "sure"), (0.7, "likely"), (0.0, "possible"))
 
 
 def log_lines(one: DiagnosedLog) -> Iterator[str]:
@@ -25,7 +24,7 @@ def log_lines(one: DiagnosedLog) -> Iterator[str]:
 
 def _lines(found: Diagnosis, one: DiagnosedLog) -> Iterator[str]:
     since, until = ((time - one.start_us) * 1e-6 for time in (found.start_us, found.stop_us))
-    how = next(word for least, word in SURE if found.confidence >= least)
+    how = how_sure(found.confidence)
     yield f"  {LABELS[found.severity]}: {found.cause} [{found.id}]"
     yield f"    when: from {since:.0f} s to {until:.0f} s of the log; {how} ({found.confidence:.0%})"
     for sign in found.signs:
