@@ -69,7 +69,7 @@ def test_the_answer_names_the_worst_the_change_and_the_odd_flight(page: str) -> 
     assert f"From flight_{CHANGED} ({date(CHANGED)[:10]}, with another firmware) on" in answer
     assert "GNSS: horizontal accuracy was" in answer
     assert "&lt;odd&gt; stands out most from the flights of its vehicle, in 1 figure." in answer
-    assert "21 logs of which nothing can be told" in answer
+    assert "21 logs without a diagnosis, unreadable or too damaged" in answer
 
 
 def test_flights_stand_against_causes_with_links_to_their_pages(page: str) -> None:
@@ -125,6 +125,6 @@ def test_refused_logs_are_told_and_make_no_green_answer(tmp_path: Path) -> None:
     }
     page = told(made_page(tmp_path, rows, diagnoses))
     assert "No cause of trouble shows on 0 of 2 flights; the others cannot be replayed" in page
-    assert "1 log of which nothing can be told: x." in page
+    assert "1 log without a diagnosis, unreadable or too damaged: x." in page
     assert "1 log that cannot be replayed, so less can be told: slow." in page
     assert page.count("(refused)") == 2

@@ -79,7 +79,7 @@ def test_the_page_needs_no_network(shaken: str) -> None:
 
 
 def test_problems_stand_before_passes_and_these_behind_a_click(shaken: str) -> None:
-    health = shaken[shaken.index("Health of sensors and filter") :]
+    health = shaken[shaken.index("Health of sensors and filter") :].replace("&nbsp;", " ")
     assert health.index("gnss_vel_vertical: samples rejected: 20 %") < health.index("baro_hgt: samples rejected: 2 %")
     assert health.index("baro_hgt: samples rejected") < health.index("<details>")
     assert "22.0 to 30.0 s" in health

@@ -15,7 +15,12 @@ def log_lines(one: DiagnosedLog) -> Iterator[str]:
     if one.error is not None:
         yield f"{one.log}: {one.error.reason}. {one.error.remedy}."
         return
-    yield f"{one.log}: nothing found" if not one.found else f"{one.log}:"
+    if one.found:
+        yield f"{one.log}:"
+    else:
+        yield f"{one.log}: nothing found" + (
+            ", and too little known to say that nothing is wrong" if one.not_replayed else ""
+        )
     if one.not_replayed:
         yield f"  not replayed, so less can be told: {'; '.join(one.not_replayed)}"
     for found in one.found:

@@ -58,7 +58,7 @@ def _unexplained(results: FleetResults) -> Iterator[str]:
               f"explains: {listed(unknown)}."  # fmt: skip
     silent = [one["name"] for one in results.flights if not one["is_diagnosed"]]
     if silent:
-        yield f"{count_words(len(silent), 'log')} of which nothing can be told: {listed(silent)}."
+        yield f"{count_words(len(silent), 'log')} without a diagnosis, unreadable or too damaged: {listed(silent)}."
     less = [one["name"] for one in results.flights if one["is_diagnosed"] and one["refused"]]
     if less:
         yield f"{count_words(len(less), 'log')} that cannot be replayed, so less can be told: {listed(less)}."

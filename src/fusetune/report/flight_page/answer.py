@@ -58,7 +58,7 @@ def _less_told(results: FlightResults) -> str:
     """Why a log that could be read is not replayed; empty of one that is."""
     if not results.refusals:
         return ""
-    untold = f" ({', '.join(results.untold)} not at all)" if results.untold else ""
+    untold = f", and nothing of its {' and '.join(results.untold)}" if results.untold else ""
     return _refusals(results, f"This log cannot be replayed, so less can be told of the flight{untold}:")
 
 
@@ -71,7 +71,9 @@ def _refusals(results: FlightResults, text: str) -> str:
 def _unexplained(results: FlightResults) -> str:
     rows = results.problems
     count = len(rows)
-    title = escape("Something is off, and no known cause explains it")
+    title = "Something is off, and no known cause explains it"
+    if "diagnosis" in results.untold:
+        title = "Something is off, and what causes it this log does not tell"
     text = f"{count} figure{'s lie' if count != 1 else ' lies'} beyond the limit. The first of them:"
     named = [
         _sentence(row["found"]) + (f" {row['remedy']}." if row["remedy"] else "")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from fusetune.report.counted import count_words
 from fusetune.report.flight_page.flight_results import Document, FlightResults
-from fusetune.report.markup import Cell, details, number, paragraph, section, table
+from fusetune.report.markup import Cell, details, number, paragraph, section, table, unit_cell
 from fusetune.report.severity_words import worst_of
 
 EFFECT_WORDS: Mapping[str, str] = {
@@ -69,7 +69,7 @@ def _estimate_row(_: Document, estimate: Document, effect: str) -> tuple[Cell | 
         number(told),
         number(estimate["value"]),
         Cell(f"{number(lower).text} to {number(upper).text}", "short"),
-        Cell(str(estimate["unit"]), "quiet"),
+        unit_cell(str(estimate["unit"])),
         _advice(told, lower, upper, estimate["value"]),
     )
 

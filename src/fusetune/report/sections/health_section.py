@@ -68,5 +68,5 @@ def _row(flight: str, diagnoses: Sequence[Mapping[str, Any]], links: Mapping[str
         Cell(str(first["cause"]).rstrip(".") + more, "said"),
         Cell(SEVERITY_WORDS[worst], f"short is-{worst}"),
         Cell(confidence_words(first["confidence"]), "short"),
-        Cell(str(first["remedy"]), "said"),
+        Cell(str(first["remedy"]), "advice"),
     )
