@@ -97,8 +97,9 @@ def read_flight_results(folder: AnyPath) -> FlightResults:
 
     def with_health(document: Document) -> FlightResults:
         names = ("flight", "vehicle", "firmware", "date", "mission")
+        named: dict[str, Any] = {name: str(document[name] or "") for name in names}
         return FlightResults(
-            **{name: str(document[name] or "") for name in names},
+            **named,
             **told,
             start_us=int(document["start_us"]),
             health=tuple(document["rows"]),
