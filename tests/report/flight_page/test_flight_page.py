@@ -146,11 +146,20 @@ def test_what_is_usual_has_the_form_of_the_words(tmp_path: Path) -> None:
 
 
 def test_measured_values_have_words_and_units(tmp_path: Path) -> None:
-    values = {"EKF2_ACC_NOISE": 0.5, "imu_shaking_m_s2": 12.966, "clipped_share": 0.0048, "vision_turn_deg": 90.0}
+    values = {
+        "worst_pdop": float("nan"),
+        "EKF2_ACC_NOISE": 0.5,
+        "imu_shaking_m_s2": 12.966,
+        "clipped_share": 0.0048,
+        "vision_turn_deg": 90.0,
+    }
     words = told(page_of(write_documents(tmp_path / "analyze" / "values", (replace(SHAKEN, values=values),))))
     assert "Values to set EKF2_ACC_NOISE = 0.5 Measured IMU shaking: 12.97 m/s²" in words
     assert "clipped share: 0.48 %" in words
     assert "vision turn: 90°" in words
+    # what is not known is null in the document, which any JSON reader takes, and not told
+    assert "NaN" not in (tmp_path / "analyze" / "values" / "diagnosis.json").read_text(encoding="utf-8")
+    assert "worst" not in words
 
 
 def test_figures_that_no_cause_explains_are_told_as_such(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,19 +51,8 @@ class DiagnosedLog:
         document: dict[str, Any] = {"log": self.log, "duration_s": round((self.stop_us - self.start_us) * 1e-6, 3)}
         document["error"] = None if self.error is None else {"reason": self.error.reason, "remedy": self.error.remedy}
         document["not_replayed"] = list(self.not_replayed)
-        document["findings"] = [_as_json(one.document(self.start_us)) for one in self.found]
+        document["findings"] = [one.document(self.start_us) for one in self.found]
         return document
-
-
-def _as_json(value: Any) -> Any:
-    """Plain numbers; null for those that JSON does not have."""
-    if isinstance(value, dict):
-        return {name: _as_json(one) for name, one in value.items()}
-    if isinstance(value, list):
-        return [_as_json(one) for one in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value
 
 
 def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iterator[DiagnosedLog]:

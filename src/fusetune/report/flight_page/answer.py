@@ -164,7 +164,7 @@ def _values_to_set(values: Mapping[str, float]) -> Iterator[str]:
 
 def _measured(values: Mapping[str, float]) -> Iterator[str]:
     for name, value in values.items():
-        if not name.isupper():
+        if not name.isupper() and value is not None:
             yield figure_in_words(name, value)
 
 
