@@ -28,7 +28,7 @@ def health_section(diagnoses: Sequence[Mapping[str, Any]], flight_pages: Mapping
     silent = [one for one in diagnoses if one["refused"] and not one["diagnoses"]]
     found.sort(key=lambda one: (rank(worst_of(one["diagnoses"])), -len(one["diagnoses"]), one["flight"]))
     clean = len(diagnoses) - len(found) - len(silent)
-    none = f"On {clean} of {count_words(len(diagnoses), 'flight')} nothing wrong was found."
+    none = f"On {clean} of {count_words(len(diagnoses), 'flight')} no cause of trouble was found."
     folder = Path(page).parent
     links = {name: os.path.relpath(target, folder) for name, target in flight_pages.items()}
     untold = _untold(silent, links)
