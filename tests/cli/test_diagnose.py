@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.diagnosis import diagnosed_logs as logs
-from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign, how_sure
 from fusetune.cli import main
 from fusetune.cli.command import DONE, FOUND_FAILURE, USER_ERROR
 from fusetune.px4.flight import Flight
@@ -70,6 +70,12 @@ def test_a_log_that_cannot_be_read_ends_with_2_unless_there_is_a_failure(folder:
     assert "rubbish.ulg: " in told
     assert "It shakes" in told
     assert main(["diagnose", str(rubbish), str(folder / "day" / "broken.ulg")]) == FOUND_FAILURE
+
+
+def test_the_same_percentage_has_the_same_word() -> None:
+    """Both are printed as 90 %."""
+    assert how_sure(0.896) == how_sure(0.904) == "sure"
+    assert how_sure(0.894) == "likely"
 
 
 def test_where_nothing_is_found_on_a_log_without_replay_it_is_not_said_to_be_sound(

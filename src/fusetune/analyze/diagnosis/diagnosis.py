@@ -77,8 +77,8 @@ class Diagnosis:
 
 
 def how_sure(confidence: float) -> str:
-    """A word for a confidence."""
-    return next(word for least, word in SURE if confidence >= least)
+    """A word for a confidence as it is told, in whole percent, so that 90 % is never two words."""
+    return next(word for least, word in SURE if round(confidence, 2) >= least)
 
 
 def _as_json(value: Any) -> Any:
