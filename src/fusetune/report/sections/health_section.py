@@ -48,7 +48,7 @@ def _untold(silent: Sequence[Mapping[str, Any]], links: Mapping[str, str]) -> st
         return ""
     rows = [
         (
-            Cell(one["flight"], "name", links.get(one["flight"], "")),
+            Cell(one["flight"], "flight", links.get(one["flight"], "")),
             "; ".join(reason["found"] for reason in one["refused"]),
             "; ".join(dict.fromkeys(reason["remedy"] for reason in one["refused"] if reason["remedy"])),
         )
@@ -64,7 +64,7 @@ def _row(flight: str, diagnoses: Sequence[Mapping[str, Any]], links: Mapping[str
     worst = worst_of(list(diagnoses))
     more = f" (and {len(diagnoses) - 1} more)" if len(diagnoses) > 1 else ""
     return (
-        Cell(flight, "name", links.get(flight, "")),
+        Cell(flight, "flight", links.get(flight, "")),
         Cell(str(first["cause"]).rstrip(".") + more, "said"),
         Cell(SEVERITY_WORDS[worst], f"short is-{worst}"),
         Cell(confidence_words(first["confidence"]), "short"),
