@@ -17,7 +17,7 @@ MADE = (
 )  # fmt: skip
 """What runs and people make."""
 
-OF_PX4 = ("EKF", "src/modules")
+OF_PX4 = ("EKF", "src/modules", "Tools")
 """Where PX4 has its files."""
 
 SUFFIXES = {".py", ".smk", ".md", ".yaml", ".yml", ".csv", ".toml", ".lock", ".cff", ".css", ".rst"}

@@ -11,6 +11,7 @@ from fusetune.analyze.diagnose_flight import diagnose_flight
 from fusetune.analyze.flight_files import DIAGNOSED_FILES
 from fusetune.px4.flight import Flight
 from fusetune.px4.ulog.writer import write_ulog
+from fusetune.report.flight_page.effects_section import EFFECT_WORDS
 from fusetune.save.log_folder import save_log
 from fusetune.storage.documents import read_document
 
@@ -33,6 +34,7 @@ def test_a_healthy_flight_has_figures_effects_and_sensors_and_nothing_is_wrong(
     assert {row["id"] for row in found["health"]["rows"]} >= {"gnss_vel_horizontal.raised_share", "filter.faults"}
     assert not [row for row in found["health"]["rows"] if row["severity"] == "fail"]
     effects = {one["id"]: one for one in found["effects"]["effects"]}
+    assert effects.keys() == EFFECT_WORDS.keys()
     # config/vehicles/quadrotor.yaml has the antenna 0.04 m behind and 0.09 m above the IMU
     true = {"EKF2_GPS_POS_X": -0.04, "EKF2_GPS_POS_Y": 0.0, "EKF2_GPS_POS_Z": -0.09}
     for one in effects["gnss_antenna"]["estimates"]:
@@ -46,6 +48,9 @@ def test_of_a_log_that_cannot_be_read_nothing_is_told_and_nothing_fails(content:
     log.write_bytes(content)
     found = told(log, tmp_path)
     assert not found["diagnosis"]["replayable"]
+    assert not found["diagnosis"]["readable"]
+    assert all(one["found"] and one["remedy"] for one in found["diagnosis"]["refused"])
+    assert len(found["diagnosis"]["refused"]) == 1
     assert found["effects"]["effects"] == []
     assert found["sensor_noise"]["sensors"] == {}
 

@@ -9,7 +9,7 @@ from fusetune.apply.choice import Choice, choose, choose_after_mending, paramete
 from fusetune.apply.ranking import RankedSet, proved_sets
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.mean_difference import MeanDifference
-from fusetune.apply.wording import _for_the_pick
+from fusetune.apply.wording import _comparison, _for_the_pick
 
 
 def one(name: str, difference: float, upper: float, p_family: float = 0.01, **changes) -> RankedSet:
@@ -128,3 +128,13 @@ def test_distance_is_the_size_of_the_logarithms_of_the_ratios() -> None:
         pytest.approx(5.0)
     )
     assert parameter_distance({"EKF2_GPS_CTRL": 7.0, "EKF2_ACC_NOISE": 0.35}, present) == pytest.approx(1.0)
+
+
+def test_what_one_flight_cannot_show_is_not_called_too_small_a_gain() -> None:
+    """Its blocks give an interval of −6 to −4.5 %, and no bound for a change, for which they are too few."""
+    best = one("b", -0.053, -0.045, p_family=None, bound=None, flights=1, flights_better=1)
+    choice = choose([PRESENT, best], "a", FLIGHTS[:1], {}, DecisionSettings())
+    text = _comparison(choice, [PRESENT, best], DecisionSettings())
+    assert choice.chosen == "a"
+    assert "gain that matters" not in text
+    assert "one flight cannot show whether the best of several candidates is only favoured by chance" in text

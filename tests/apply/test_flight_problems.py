@@ -41,9 +41,15 @@ def test_a_cause_is_told_once_with_its_flights_the_worst_first() -> None:
 
 def test_what_a_parameter_of_ekf2_mends_is_no_reason_to_wait() -> None:
     (found,) = problem_findings([FlightDiagnoses("one", (diagnosis("delay", EKF2_GPS_DELAY=40.0),))])
-    assert found.found == "The delay is off (on the flight)"
+    assert found.found == "The delay is off (on one)"
     assert problem_sentence([found]) == ""
     assert problem_sentence([]) == ""
+
+
+def test_names_keep_their_capitals_within_the_sentence() -> None:
+    lost = diagnosis("gnss", "fail") | {"cause": "GNSS is lost in flight"}
+    sentence = problem_sentence(problem_findings([FlightDiagnoses("one", (lost,))]))
+    assert sentence.endswith(": GNSS is lost in flight (on one).")
 
 
 def test_diagnoses_are_read_as_they_were_written(tmp_path: Path) -> None:

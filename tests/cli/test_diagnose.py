@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.diagnosis import diagnosed_logs as logs
-from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign, how_sure
 from fusetune.cli import main
 from fusetune.cli.command import DONE, FOUND_FAILURE, USER_ERROR
 from fusetune.px4.flight import Flight
@@ -70,6 +70,35 @@ def test_a_log_that_cannot_be_read_ends_with_2_unless_there_is_a_failure(folder:
     assert "rubbish.ulg: " in told
     assert "It shakes" in told
     assert main(["diagnose", str(rubbish), str(folder / "day" / "broken.ulg")]) == FOUND_FAILURE
+
+
+def test_the_same_percentage_has_the_same_word() -> None:
+    """Both are printed as 90 %."""
+    assert how_sure(0.896) == how_sure(0.904) == "sure"
+    assert how_sure(0.894) == "likely"
+
+
+def test_where_nothing_is_found_on_a_log_without_replay_it_is_not_said_to_be_sound(
+    folder: Path, capsys: Captured
+) -> None:
+    main(["diagnose", str(folder / "sound.ulg")])
+    told = capsys.readouterr().out
+    assert "nothing found, and too little known to say that nothing is wrong" in told
+    assert "not replayed, so less can be told" in told
+
+
+def test_a_log_that_breaks_the_rules_is_refused_for_the_reason_of_its_verdict(
+    folder: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ValueError("negative elements")
+
+    monkeypatch.setattr(logs, "diagnose", broken)
+    assert main(["diagnose", str(folder / "sound.ulg")]) == USER_ERROR
+    told = capsys.readouterr().out
+    assert "tells nothing of what is wrong: " in told
+    assert "sensor_combined" in told
+    assert "negative" not in told
 
 
 def test_folders_are_searched_and_every_log_is_told_of(folder: Path, capsys: Captured) -> None:

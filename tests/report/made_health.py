@@ -98,8 +98,11 @@ def write_documents(
     diagnoses: Sequence[Diagnosis] = (),
     rows: Sequence[HealthRow] | None = None,
     effects: Sequence[Effect] = (DRAG, SILENT),
+    refused: Sequence[dict[str, str]] = (),
+    *,
+    readable: bool = True,
 ) -> Path:
-    """Write the three documents into `results/analyze/<flight>`."""
+    """Write the three documents into `results/analyze/<flight>`; `refused` is why it is not replayed."""
     folder.mkdir(parents=True, exist_ok=True)
     name = folder.name
     told: dict[str, Any] = {
@@ -112,7 +115,8 @@ def write_documents(
     health = told | {"mission": "", "start_us": START_US, "rows": [one.document() for one in found]}
     write_document(folder / "health.json", health)
     told_causes = [one.document(START_US) for one in diagnoses]
-    write_document(folder / "diagnosis.json", {"flight": name, "diagnoses": told_causes})
+    diagnosis = {"flight": name, "diagnoses": told_causes, "readable": readable, "refused": list(refused)}
+    write_document(folder / "diagnosis.json", diagnosis | {"not_told": {}})
     write_document(folder / "effects.json", {"flight": name, "effects": [one.document() for one in effects]})
     return folder
 

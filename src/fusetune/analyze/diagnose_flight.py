@@ -22,6 +22,7 @@ from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise, sensor_noise
+from fusetune.finding import from_documents, of_severity
 from fusetune.px4.flight import Flight
 from fusetune.px4.ulog.used_topics import is_used
 from fusetune.save.flight_folder import METADATA_FILE, load_flight, read_flight_document
@@ -84,12 +85,20 @@ def diagnose_flight(
             "start_us": start_us,
             "duration_s": logged.duration_s,
             "replayable": is_replayable,
+            "readable": "topics" in metadata,
+            "refused": _refusals(metadata["verdict"]),
             "diagnoses": [one.document(start_us) for one in found],
             "not_told": asked.failed,
         },
     }
     _write(Path(output_folder), documents)
     return found
+
+
+def _refusals(verdict: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Why a log is not replayed, each with what would mend it; of a replayable one there are none."""
+    failed = of_severity(from_documents(verdict["findings"]), "fail")
+    return [{"found": one.found, "remedy": one.remedy} for one in failed]
 
 
 class _Asked:

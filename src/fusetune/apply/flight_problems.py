@@ -50,7 +50,7 @@ def problem_findings(flights: Sequence[FlightDiagnoses]) -> tuple[Finding, ...]:
 def _finding(cause: str, found: Sequence[tuple[str, Mapping[str, Any]]], number: int) -> Finding:
     worst = max((one for _, one in found), key=lambda one: (_WORSE[one["severity"]], one["confidence"]))
     names = [flight for flight, _ in found]
-    where = f"on {len(names)} of {number} flights" if number > 1 else "on the flight"
+    where = f"on {len(names)} of {number} flights" if number > 1 else f"on {names[0]}"
     return Finding(
         id=f"diagnosis.{cause}",
         severity=cast(Severity, worst["severity"]),
@@ -75,6 +75,12 @@ def problem_sentence(findings: Sequence[Finding]) -> str:
     first = [one for one in findings if not one.evidence.get("mended_by_parameter")]
     if not first:
         return ""
-    told = "; ".join(f"{one.found[0].lower()}{one.found[1:]}" for one in first[:3])
+    told = "; ".join(_within_a_sentence(one.found) for one in first[:3])
     more = f"; and {len(first) - 3} more" if len(first) > 3 else ""
     return f"Mend this first, and tune on flights after it, for it may change the choice: {told}{more}."
+
+
+def _within_a_sentence(words: str) -> str:
+    """With a small first letter, but for names such as GNSS and IMU."""
+    first = words.split(maxsplit=1)[0]
+    return words if len(first) > 1 and first.isupper() else f"{words[0].lower()}{words[1:]}"

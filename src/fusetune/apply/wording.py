@@ -119,7 +119,7 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
             f"{found}but that interval includes no difference at all, so these flights do not show that a change "
             "would help."
         )
-    if not gains_enough(best, settings):
+    if best.bound is not None and not gains_enough(best, settings):
         return (
             f"{found}but a change is made only for a gain that matters, at least "
             f"{settings.smallest_gain_percent:g} % beyond doubt."

@@ -32,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = (
         "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot "
         "be read; "
-        "3 a failure."
+        "3 a failure. A test ratio compares how far a measurement lies from what the filter expected with how far it "
+        "may: above 1 the filter rejects it."
     )
 
 

@@ -41,6 +41,11 @@ def signed(value: object, digits: int = 1, kind: str = "number") -> Cell:
     return Cell(f"{value:+.{digits}f}".replace("-", "−"), kind)
 
 
+def unit_cell(unit: str) -> Cell:
+    """A unit beside a figure, powers of PX4's spelling raised."""
+    return Cell(unit.replace("^2", "²"), "quiet")
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[Cell | str]], caption: str = "") -> str:
     """A table that scrolls sideways on a small screen."""
     parts = ['<div class="scroll"><table>']
@@ -61,7 +66,7 @@ def _is_number(column: Sequence[Cell | str]) -> bool:
 
 def _cell(cell: Cell | str) -> str:
     if isinstance(cell, str):
-        return f"<td>{escape(cell)}</td>"
+        return f"<td>{_prose(cell)}</td>"
     kind = f' class="{escape(cell.kind)}"' if cell.kind else ""
     hint = f' title="{escape(cell.hint)}"' if cell.hint else ""
     return f"<td{kind}{hint}>{link(cell.text, cell.link) if cell.link else escape(cell.text)}</td>"

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fusetune.analyze.diagnosis.diagnosis import how_sure
 from fusetune.finding import Severity
 
 WORST_FIRST: tuple[Severity, ...] = ("fail", "warning", "note", "pass", "does-not-apply")
@@ -26,7 +27,6 @@ SEVERITY_COLOURS: Mapping[str, str] = {
 }
 """In pictures; page.css has the same for the text."""
 
-_SURE = ((0.9, "sure"), (0.7, "likely"), (0.0, "possible"))
 _EDGE_S = 2.0
 """A cause that begins or ends so near to take-off or landing holds from or to there."""
 
@@ -62,8 +62,7 @@ def worst_of(findings: list[Mapping[str, Any]]) -> str:
 
 def confidence_words(confidence: float) -> str:
     """How sure: a word for it, the same as in the terminal, with the figure."""
-    word = next(word for least, word in _SURE if confidence >= least)
-    return f"{word} ({100.0 * confidence:.0f} %)"
+    return f"{how_sure(confidence)} ({100.0 * confidence:.0f} %)"
 
 
 def cause_words(cause: str) -> str:

@@ -218,3 +218,15 @@ def test_a_real_log_that_begins_armed_says_so(shared_logs: Path) -> None:
         assert vibration.tones.fundamental_hz == pytest.approx(95.0, abs=3.0)
         assert vibration.tones.throttle == "varied"
         assert vibration.limited is None
+
+
+def test_a_magnetometer_that_holds_one_value_tells_no_noise() -> None:
+    """At rest and in flight: no division by what is not there, and the parameter stays as it flies."""
+    topics = made_topics(np.random.default_rng(1))
+    table = topics["vehicle_magnetometer", 0]
+    topics["vehicle_magnetometer", 0] = {
+        name: values if name.startswith("timestamp") else np.zeros_like(values) for name, values in table.items()
+    }
+    magnetometer = starting(sensor_noise(made_flight(topics), AIRBORNE))["EKF2_MAG_NOISE"]
+    assert magnetometer.start_with == magnetometer.flown
+    assert "tell no noise" in magnetometer.words

@@ -82,3 +82,11 @@ def found(cause: str, severity: str = "warning", confidence: float = 0.9, **told
         "source": "PX4's guide",
     }
     return document | told
+
+
+def made_diagnosis(
+    flight: str, diagnoses: Sequence[dict[str, Any]], refused: str = "", *, readable: bool = True
+) -> dict[str, Any]:
+    """A document `diagnosis.json`; `refused` is why the flight is not replayed."""
+    reasons = [{"found": refused, "remedy": "Log the flight again"}] if refused else []
+    return {"flight": flight, "diagnoses": list(diagnoses), "readable": readable, "refused": reasons, "not_told": {}}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tests.apply.fleet.made_fleet import VEHICLE, date, found, row, write_health_rows
+from tests.apply.fleet.made_fleet import VEHICLE, date, found, made_diagnosis, row, write_health_rows
 
 from fusetune.apply.fleet.fleet import write_fleet
 from fusetune.apply.fleet.flights import read_fleet_table
@@ -55,7 +55,7 @@ def test_the_document_tells_flights_causes_and_figures(health: Path, tmp_path: P
         "a": [found("vibration", "warning"), found("gnss_delay", "note")],
         "b": [found("vibration", "fail")],
     }.items():
-        write_document(tmp_path / f"{flight}.json", {"flight": flight, "diagnoses": diagnoses})
+        write_document(tmp_path / f"{flight}.json", made_diagnosis(flight, diagnoses))
     output = tmp_path / "fleet.json"
     write_fleet(health, [tmp_path / "a.json", tmp_path / "b.json"], output)
     document = read_document(output)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.apply.fleet.made_fleet import date, found, row, write_health_rows
+from tests.apply.fleet.made_fleet import date, found, made_diagnosis, row, write_health_rows
 
 from fusetune.apply.fleet import changes as module
 from fusetune.apply.fleet.fleet import write_fleet
@@ -18,12 +18,12 @@ FLIGHTS = 24
 CHANGED = 14
 
 
-def made_page(root: Path, rows: list[dict], diagnoses: dict[str, list[dict]]) -> str:
+def made_page(root: Path, rows: list[dict], diagnoses: dict[str, list[dict] | dict]) -> str:
     health = write_health_rows(root / "analyze" / "health.parquet", rows)
     files = [root / "analyze" / flight / "diagnosis.json" for flight in diagnoses]
     for file, one in zip(files, diagnoses.values(), strict=True):
         file.parent.mkdir(parents=True)
-        write_document(file, {"flight": file.parent.name, "diagnoses": one})
+        write_document(file, one if isinstance(one, dict) else made_diagnosis(file.parent.name, one))
     (root / "apply").mkdir()
     write_fleet(health, files, root / "apply" / "fleet.json")
     pages = [root / "report" / "flights" / f"{flight}.html" for flight in diagnoses]
@@ -69,7 +69,7 @@ def test_the_answer_names_the_worst_the_change_and_the_odd_flight(page: str) -> 
     assert f"From flight_{CHANGED} ({date(CHANGED)[:10]}, with another firmware) on" in answer
     assert "GNSS: horizontal accuracy was" in answer
     assert "&lt;odd&gt; stands out most from the flights of its vehicle, in 1 figure." in answer
-    assert "21 flights without a diagnosis" in answer
+    assert "21 logs without a diagnosis, unreadable or too damaged" in answer
 
 
 def test_flights_stand_against_causes_with_links_to_their_pages(page: str) -> None:
@@ -115,3 +115,16 @@ def test_figures_far_off_without_a_cause_are_no_green_answer(tmp_path: Path) -> 
     page = made_page(tmp_path, [row("only", "gnss.eph", 9.0, severity="fail", threshold=3.0)], {"only": []})
     assert 'class="decision is-warning"' in page
     assert "1 of 1 flight have figures far beyond their limits" in told(page)
+
+
+def test_refused_logs_are_told_and_make_no_green_answer(tmp_path: Path) -> None:
+    rows = [row(name, "gnss.eph", 1.0, threshold=3.0) for name in ("slow", "x")]
+    diagnoses = {
+        "slow": made_diagnosis("slow", [], "the IMU is logged at 20 Hz"),
+        "x": made_diagnosis("x", [], "the log is empty", readable=False),
+    }
+    page = told(made_page(tmp_path, rows, diagnoses))
+    assert "No cause of trouble shows on 0 of 2 flights; the others cannot be replayed" in page
+    assert "1 log without a diagnosis, unreadable or too damaged: x." in page
+    assert "1 log that cannot be replayed, so less can be told: slow." in page
+    assert page.count("(refused)") == 2

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from PIL import Image
 from tests.report.made_health import LATE, SHAKEN, SILENT, health_rows, rejected, write_documents, write_log
 
+from fusetune.analyze.diagnosis.diagnosis import Sign
 from fusetune.errors import UserError
 from fusetune.report.flight_page.page import TIMELINE_FILE, build_flight_page, plot_flight_timeline
 from fusetune.storage.documents import write_document
@@ -77,7 +79,7 @@ def test_the_page_needs_no_network(shaken: str) -> None:
 
 
 def test_problems_stand_before_passes_and_these_behind_a_click(shaken: str) -> None:
-    health = shaken[shaken.index("Health of sensors and filter") :]
+    health = shaken[shaken.index("Health of sensors and filter") :].replace("&nbsp;", " ")
     assert health.index("gnss_vel_vertical: samples rejected: 20 %") < health.index("baro_hgt: samples rejected: 2 %")
     assert health.index("baro_hgt: samples rejected") < health.index("<details>")
     assert "22.0 to 30.0 s" in health
@@ -101,6 +103,63 @@ def test_a_sound_flight_is_said_to_be_sound(tmp_path: Path) -> None:
     assert "No figure lies beyond its limit." in words
     assert "This flight tells none of them" in words
     assert "Why" not in words.split("What could be set")[0]
+
+
+def test_a_log_that_cannot_be_read_is_not_said_to_be_sound(tmp_path: Path) -> None:
+    refused = {"found": "the log is empty", "remedy": "Copy the log from the vehicle once more"}
+    folder = write_documents(tmp_path / "analyze" / "x", rows=(), effects=(), refused=(refused,), readable=False)
+    words = told(page_of(folder))
+    assert "This log cannot be read Nothing can be told of the flight: The log is empty. Copy the log" in words
+    assert "Health of sensors" not in words
+    assert "othing wrong" not in words
+
+
+def test_a_refused_log_says_so_with_and_without_a_cause(tmp_path: Path) -> None:
+    refused = {"found": "the IMU is logged at 20 Hz", "remedy": "Log it faster"}
+    silent = told(page_of(write_documents(tmp_path / "analyze" / "silent", refused=(refused,))))
+    assert "What this log tells is too little to say whether anything is wrong" in silent
+    assert "othing wrong" not in silent
+    found = told(page_of(write_documents(tmp_path / "analyze" / "found", (SHAKEN,), refused=(refused,))))
+    assert found.index("shakes the IMU") < found.index("cannot be replayed, so less can be told of the flight:")
+    for words in (silent, found):
+        assert "The IMU is logged at 20 Hz. Log it faster." in words
+
+
+def test_the_answer_does_not_hide_what_the_health_table_says(tmp_path: Path) -> None:
+    problems = (rejected("gnss_pos", 0.3, 22.0, 30.0), rejected("baro_hgt", 0.02, 24.0, 25.0, "warning"))
+    page = page_of(write_documents(tmp_path / "analyze" / "both", (LATE,), health_rows(*problems)))
+    head = told(page[: page.index("<h2>Why")])
+    assert "2 figures of sensors and filter lie beyond the limit, 1 far beyond it" in head
+    # the limit of a share has the unit of the words beside it
+    assert "samples rejected: 30 % 1 %" in told(page)
+
+
+def test_what_is_usual_has_the_form_of_the_words(tmp_path: Path) -> None:
+    signs = (
+        Sign("readings scatter by 92% of the field", 0.919, 0.25, "1"),
+        Sign("the field is 2.09 times as strong as there", 1.09, 0.25, "1"),
+    )
+    told_page = told(page_of(write_documents(tmp_path / "analyze" / "field", (replace(SHAKEN, signs=signs),))))
+    assert "readings scatter by 92 % of the field (usual: up to 25 %)" in told_page
+    # of a figure that the words do not tell the usual one would only confuse
+    assert "2.09 times as strong as there (usual" not in told_page
+
+
+def test_measured_values_have_words_and_units(tmp_path: Path) -> None:
+    values = {
+        "worst_pdop": float("nan"),
+        "EKF2_ACC_NOISE": 0.5,
+        "imu_shaking_m_s2": 12.966,
+        "clipped_share": 0.0048,
+        "vision_turn_deg": 90.0,
+    }
+    words = told(page_of(write_documents(tmp_path / "analyze" / "values", (replace(SHAKEN, values=values),))))
+    assert "Values to set EKF2_ACC_NOISE = 0.5 Measured IMU shaking: 12.97 m/s²" in words
+    assert "clipped share: 0.48 %" in words
+    assert "vision turn: 90°" in words
+    # what is not known is null in the document, which any JSON reader takes, and not told
+    assert "NaN" not in (tmp_path / "analyze" / "values" / "diagnosis.json").read_text(encoding="utf-8")
+    assert "worst" not in words
 
 
 def test_figures_that_no_cause_explains_are_told_as_such(tmp_path: Path) -> None:

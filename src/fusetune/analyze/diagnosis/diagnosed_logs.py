@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
 from fusetune.errors import UserError
+from fusetune.finding import Finding, of_severity
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.discovery import discover_logs, printable
 from fusetune.save.verdict import judge
@@ -51,19 +51,8 @@ class DiagnosedLog:
         document: dict[str, Any] = {"log": self.log, "duration_s": round((self.stop_us - self.start_us) * 1e-6, 3)}
         document["error"] = None if self.error is None else {"reason": self.error.reason, "remedy": self.error.remedy}
         document["not_replayed"] = list(self.not_replayed)
-        document["findings"] = [_as_json(one.document(self.start_us)) for one in self.found]
+        document["findings"] = [one.document(self.start_us) for one in self.found]
         return document
-
-
-def _as_json(value: Any) -> Any:
-    """Plain numbers; null for those that JSON does not have."""
-    if isinstance(value, dict):
-        return {name: _as_json(one) for name, one in value.items()}
-    if isinstance(value, list):
-        return [_as_json(one) for one in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value
 
 
 def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iterator[DiagnosedLog]:
@@ -95,16 +84,28 @@ def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iter
 
 
 def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
+    refused: tuple[Finding, ...] = ()
     try:
         flight = read_ulog(path)
         observed = ObservedFlight(flight, AS_FLOWN)
-        found, why_not = diagnose(observed, experiments), judge(observed.flight).reasons
+        verdict = judge(observed.flight)
+        refused = of_severity(verdict.findings, "fail")
+        found, why_not = diagnose(observed, experiments), verdict.reasons
     except UserError as error:
         return DiagnosedLog(shown, error=error)
     except OSError as error:
         reason = f"cannot be read ({error.strerror or error})"
         return DiagnosedLog(shown, error=UserError(shown, reason, "Mend its permissions, or copy it again"))
     except _DAMAGED as error:
+        if refused:
+            return DiagnosedLog(shown, error=_untold(shown, refused))
         reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
         return DiagnosedLog(shown, error=UserError(shown, reason, "Copy the log from the vehicle again"))
     return DiagnosedLog(shown, found, flight.start_timestamp, flight.last_timestamp, why_not)
+
+
+def _untold(shown: str, refused: Sequence[Finding]) -> UserError:
+    """A log that can be read and tells nothing, for the reason why it is not replayed."""
+    reasons = "; ".join(one.found for one in refused)
+    remedies = ". ".join(dict.fromkeys(one.remedy for one in refused if one.remedy))
+    return UserError(shown, f"tells nothing of what is wrong: {reasons}", remedies or "Log the flight again")

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+SURE = ((0.9, "sure"), (0.7, "likely"), (0.0, "possible"))
+"""From which confidence on what is said of a cause, in the terminal and on pages."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +60,8 @@ class Diagnosis:
     values: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def document(self, start_of_log_us: int) -> dict[str, Any]:
-        """As JSON holds it: times in seconds from the start of the log."""
-        return {
+        """As JSON holds it: times in seconds from the start of the log, null for figures that are none."""
+        document = {
             "id": self.id,
             "cause": self.cause,
             "severity": self.severity,
@@ -69,3 +73,20 @@ class Diagnosis:
             "values": dict(self.values),
             "source": self.source,
         }
+        return {name: _as_json(value) for name, value in document.items()}
+
+
+def how_sure(confidence: float) -> str:
+    """A word for a confidence as it is told, in whole percent, so that 90 % is never two words."""
+    return next(word for least, word in SURE if round(confidence, 2) >= least)
+
+
+def _as_json(value: Any) -> Any:
+    """Plain numbers; null for those that JSON does not have."""
+    if isinstance(value, dict):
+        return {name: _as_json(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [_as_json(one) for one in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

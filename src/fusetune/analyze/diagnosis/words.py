@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fusetune.analyze.diagnosis.diagnosed_logs import DiagnosedLog
-from fusetune.analyze.diagnosis.diagnosis import Diagnosis
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, how_sure
 
 LABELS = {"fail": "FAIL", "warning": "warning", "note": "note"}
-SURE = ((0.9, "sure"), (0.7, "likely"), (0.0, "possible"))
 
 
 def log_lines(one: DiagnosedLog) -> Iterator[str]:
@@ -16,7 +15,12 @@ def log_lines(one: DiagnosedLog) -> Iterator[str]:
     if one.error is not None:
         yield f"{one.log}: {one.error.reason}. {one.error.remedy}."
         return
-    yield f"{one.log}: nothing found" if not one.found else f"{one.log}:"
+    if one.found:
+        yield f"{one.log}:"
+    else:
+        yield f"{one.log}: nothing found" + (
+            ", and too little known to say that nothing is wrong" if one.not_replayed else ""
+        )
     if one.not_replayed:
         yield f"  not replayed, so less can be told: {'; '.join(one.not_replayed)}"
     for found in one.found:
@@ -25,7 +29,7 @@ def log_lines(one: DiagnosedLog) -> Iterator[str]:
 
 def _lines(found: Diagnosis, one: DiagnosedLog) -> Iterator[str]:
     since, until = ((time - one.start_us) * 1e-6 for time in (found.start_us, found.stop_us))
-    how = next(word for least, word in SURE if found.confidence >= least)
+    how = how_sure(found.confidence)
     yield f"  {LABELS[found.severity]}: {found.cause} [{found.id}]"
     yield f"    when: from {since:.0f} s to {until:.0f} s of the log; {how} ({found.confidence:.0%})"
     for sign in found.signs:

@@ -10,6 +10,8 @@ from fusetune.analyze.health.health_row import HealthRow, Origin
 from fusetune.analyze.health.settings import Levels
 from fusetune.finding import Evidence, Finding, Severity
 
+_WHOLE_BELOW = 1e9
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -99,4 +101,6 @@ def _is_beyond(value: float, level: float, least: bool) -> bool:
 def _written(figure: str, value: float, unit: str) -> str:
     if figure.endswith("_share") and not unit:
         return f"{100.0 * value:.3g} %"
-    return f"{value:.4g} {unit}".strip()
+    # flags and counts, which four digits would round
+    digits = ".0f" if float(value).is_integer() and abs(value) < _WHOLE_BELOW else ".4g"
+    return f"{value:{digits}} {unit}".strip()

@@ -214,6 +214,8 @@ def _noise(
         words += f" PX4 is told {present:.2g}, less than the noise that is there: begin with {start:g}."
         if metadata.maximum is not None and least > metadata.maximum:
             words += f" PX4 allows no more than {metadata.maximum:g}."
+    elif least == 0.0:
+        words += " Its readings hold one value and tell no noise."
     elif least is not None:
         words += f" PX4 is told {present:.2g}, {present / least:.1f} times the noise that is there. {MORE}."
     return StartingNoise(

@@ -40,27 +40,38 @@ def write_fleet(health_table: AnyPath, diagnoses: Sequence[AnyPath], output: Any
     UserError
         A file is missing or damaged, or holds something else.
     """
-    found = dict(read_as(file, _diagnosed, "what is wrong with a flight") for file in diagnoses)
-    document = fleet_document(read_fleet_table(health_table), found)
+    read = [read_as(file, _diagnosed, "what is wrong with a flight") for file in diagnoses]
+    found = {name: causes for name, causes, is_told, _ in read if is_told}
+    refused = {name: reasons for name, _, _, reasons in read if reasons}
+    document = fleet_document(read_fleet_table(health_table), found, refused)
     with atomic_path(output) as temporary:
         write_document(temporary, rounded(document, _SIGNIFICANT_DIGITS), lines=True, allow_nan=False)
 
 
-def _diagnosed(document: dict[str, Any]) -> tuple[str, list[dict[str, Any]]]:
-    return document["flight"], [dict(one) for one in document["diagnoses"]]
+def _diagnosed(document: dict[str, Any]) -> tuple[str, list[dict[str, Any]], bool, list[str]]:
+    """Name, causes, whether it was asked for causes at all, why it is not replayed."""
+    is_told = bool(document["readable"]) and "diagnosis" not in document["not_told"]
+    refused = [str(one["found"]) for one in document["refused"]]
+    return document["flight"], [dict(one) for one in document["diagnoses"]], is_told, refused
 
 
-def fleet_document(table: FleetTable, diagnoses: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]:
+def fleet_document(
+    table: FleetTable,
+    diagnoses: Mapping[str, Sequence[Mapping[str, Any]]],
+    refused: Mapping[str, Sequence[str]] | None = None,
+) -> dict[str, Any]:
     """All that the fleet's flights tell together, as JSON holds it.
 
     Parameters
     ----------
     diagnoses : by flight, as `Diagnosis.document` tells them, what explains most first
+    refused : by flight, why it cannot be replayed
     """
+    refused = refused or {}
     steps, drifts = changes(table)
     return {
         "product": f"fusetune {fusetune.__version__}",
-        "flights": [_flight(table, row, diagnoses) for row in range(len(table.flights))],
+        "flights": [_flight(table, row, diagnoses, refused) for row in range(len(table.flights))],
         "causes": _causes(table, diagnoses),
         "figures": [_figure(table, column) for column in range(len(table.figures))],
         "changes": [asdict(one) for one in steps],
@@ -69,7 +80,12 @@ def fleet_document(table: FleetTable, diagnoses: Mapping[str, Sequence[Mapping[s
     }
 
 
-def _flight(table: FleetTable, row: int, diagnoses: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]:
+def _flight(
+    table: FleetTable,
+    row: int,
+    diagnoses: Mapping[str, Sequence[Mapping[str, Any]]],
+    refused: Mapping[str, Sequence[str]],
+) -> dict[str, Any]:
     flight = table.flights[row]
     counts = {name: int(np.count_nonzero(table.severities[row] == place)) for place, name in enumerate(SEVERITIES)}
     told = ("id", "cause", "severity", "confidence", "since_s", "until_s")
@@ -77,6 +93,7 @@ def _flight(table: FleetTable, row: int, diagnoses: Mapping[str, Sequence[Mappin
     return asdict(flight) | {
         "counts": {name: count for name, count in counts.items() if name != SEVERITIES[0]},
         "is_diagnosed": found is not None,
+        "refused": list(refused.get(flight.name, ())),
         "findings": [{name: one[name] for name in told} for one in found or ()],
     }
 

@@ -41,7 +41,8 @@ def draw_trends(table: FleetTable, columns: Sequence[int], changes: Sequence[Map
     changes : of `fleet.json`
     """
     rows = np.flatnonzero([bool(one.date) for one in table.flights])
-    colours = vehicle_colours(table)
+    shown = {table.flights[row].vehicle for row in rows}
+    colours = {vehicle: colour for vehicle, colour in vehicle_colours(table).items() if vehicle in shown}
     figure, panels = _panels(len(columns), foot=0.16 * -(-min(len(colours), 8) // 4))
     for axes, column in zip(panels, columns, strict=True):
         name = table.figures[column]

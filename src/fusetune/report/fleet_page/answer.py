@@ -28,7 +28,9 @@ def fleet_answer(results: FleetResults) -> str:
     elif troubled := sum(one["counts"]["fail"] > 0 for one in results.flights):
         kind, title = "warning", f"{troubled} of {total} have figures far beyond their limits"
     else:
-        kind, title = "pass", f"No cause of trouble shows on {total}"
+        told = sum(not one["refused"] for one in results.flights)
+        asked = total if told == len(results.flights) else f"{told} of {total}; the others cannot be replayed"
+        kind, title = ("pass" if told else "warning"), f"No cause of trouble shows on {asked}"
     said = bullets([*_causes(results), *_unexplained(results), *_changes(results), *_outliers(results)])
     return f'<section class="decision is-{kind}"><h2>{escape(title)}</h2>{said}</section>'
 
@@ -56,7 +58,10 @@ def _unexplained(results: FleetResults) -> Iterator[str]:
               f"explains: {listed(unknown)}."  # fmt: skip
     silent = [one["name"] for one in results.flights if not one["is_diagnosed"]]
     if silent:
-        yield f"{count_words(len(silent), 'flight')} without a diagnosis: {listed(silent)}."
+        yield f"{count_words(len(silent), 'log')} without a diagnosis, unreadable or too damaged: {listed(silent)}."
+    less = [one["name"] for one in results.flights if one["is_diagnosed"] and one["refused"]]
+    if less:
+        yield f"{count_words(len(less), 'log')} that cannot be replayed, so less can be told: {listed(less)}."
 
 
 def _changes(results: FleetResults) -> Iterator[str]:

@@ -35,17 +35,25 @@ class FleetResults:
 
     @property
     def worst_first(self) -> tuple[Document, ...]:
-        """Flights by their worst finding, then by how many figures lie beyond their limits."""
+        """Flights by their worst finding, then by how many figures lie beyond their limits, then the refused ones."""
 
-        def order(flight: Document) -> tuple[int, int, int, str]:
+        def order(flight: Document) -> tuple[int, int, int, bool, str]:
             counts = flight["counts"]
-            return rank(worst_of(flight["findings"])), -counts["fail"], -counts["warning"], flight["name"]
+            worst = rank(worst_of(flight["findings"]))
+            return worst, -counts["fail"], -counts["warning"], not flight["refused"], flight["name"]
 
         return tuple(sorted(self.flights, key=order))
 
+    @property
+    def vehicles(self) -> int:
+        """How many vehicles flew, as far as the logs could be read."""
+        return len({one["vehicle"] for one in self.flights if one["is_diagnosed"]})
+
     def has_trouble(self, flight: Document) -> bool:
-        """Whether a cause was found on a flight, or a figure lies beyond its limit."""
-        return bool(flight["findings"]) or flight["counts"]["fail"] + flight["counts"]["warning"] > 0
+        """Whether a cause was found on a flight, a figure lies beyond its limit, or too little is known to say."""
+        return (
+            bool(flight["findings"] or flight["refused"]) or flight["counts"]["fail"] + flight["counts"]["warning"] > 0
+        )
 
 
 def read_fleet_results(fleet_file: AnyPath, health_table: AnyPath, links: Mapping[str, str]) -> FleetResults:

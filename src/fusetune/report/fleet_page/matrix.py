@@ -20,7 +20,8 @@ def matrix_section(results: FleetResults) -> str:
     shown = [one for one in flights if one not in clean] if len(clean) > _MOST_CLEAN_SHOWN else list(flights)
     text = (
         "A field is red where the flight must not be repeated like this, orange where something is to be mended, blue "
-        "where it is worth knowing; where the pointer rests it says how sure. Beside: figures of the health table "
+        "where it is worth knowing; where the pointer rests it says how sure. Of a refused log little "
+        "or nothing can be told; its page says why. Beside: figures of the health table "
         "beyond their limits."
     )
     parts = [paragraph(text, "note")]
@@ -51,6 +52,9 @@ def _row(flight: Document, causes: list[str], results: FleetResults) -> str:
     found = {one["id"]: one for one in reversed(flight["findings"])}
     marks = "".join(_mark(found.get(cause)) for cause in causes)
     numbers = "".join(_count(counts[severity], severity) for severity in ("fail", "warning"))
+    if flight["refused"]:
+        reasons = escape("; ".join(flight["refused"]))
+        title += f' <span class="quiet" title="{reasons}">(refused)</span>'
     return f'<td class="short">{title}</td>{marks}{numbers}{told}'
 
 

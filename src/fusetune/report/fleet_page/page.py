@@ -75,7 +75,7 @@ def build_fleet_page(
         pooled_sensors_section(sorted(figures.glob("pooled_*.svg"))),
         figures_section(results),
     )
-    vehicles = count_words(len(results.table.vehicles), "vehicle")
+    vehicles = count_words(results.vehicles, "vehicle")
     origin = f"{results.product}, {count_words(len(results.flights), 'flight')} of {vehicles}"
     folder.mkdir(parents=True, exist_ok=True)
     write_page(output, PageHead("All flights", "All flights: what is wrong, and what changed", origin), sections)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from fusetune.report.counted import count_words
 from fusetune.report.flight_page.flight_results import Document, FlightResults
-from fusetune.report.markup import Cell, details, number, paragraph, section, table
+from fusetune.report.markup import Cell, details, number, paragraph, section, table, unit_cell
+from fusetune.report.severity_words import worst_of
 
 EFFECT_WORDS: Mapping[str, str] = {
     "drag": "drag of the airframe",
@@ -23,6 +24,7 @@ EFFECT_WORDS: Mapping[str, str] = {
     "airspeed_scale": "scale of the airspeed",
     "output_predictor": "output predictor",
     "imu_lever_arm": "place of the IMU",
+    "gnss_antenna": "place of the GNSS antenna",
 }
 
 
@@ -41,6 +43,8 @@ def effects_section(results: FlightResults) -> str:
             "flight's value is to be tried like any other set before it is kept."
         )
         head = ("effect", "parameter", "flies now", "flight says", "interval", "unit", "what to make of it")
+        if worst_of(list(results.diagnoses)) in ("fail", "warning"):
+            text += " Mend first what is wrong: what is broken spoils these values, too."
         parts += [paragraph(text), table(head, [_estimate_row(*one) for one in told])]
     elif results.effects:
         parts.append(paragraph("This flight tells none of them: what it takes to tell stands below."))
@@ -65,7 +69,7 @@ def _estimate_row(_: Document, estimate: Document, effect: str) -> tuple[Cell | 
         number(told),
         number(estimate["value"]),
         Cell(f"{number(lower).text} to {number(upper).text}", "short"),
-        Cell(str(estimate["unit"]), "quiet"),
+        unit_cell(str(estimate["unit"])),
         _advice(told, lower, upper, estimate["value"]),
     )
 

@@ -30,6 +30,9 @@ class FlightResults:
     diagnoses : what explains most first
     health : rows of the health table
     effects : as the tuners tell them
+    is_readable : whether anything of the log could be read
+    refusals : why it is not replayed, `found` and `remedy`; of a flight that is, none
+    untold : what could not be told of it at all, as `health`
     """
 
     flight: str
@@ -41,6 +44,9 @@ class FlightResults:
     diagnoses: tuple[Document, ...]
     health: tuple[Document, ...]
     effects: tuple[Document, ...]
+    is_readable: bool = True
+    refusals: tuple[Document, ...] = ()
+    untold: tuple[str, ...] = ()
 
     @property
     def times(self) -> FlightTimes:
@@ -86,17 +92,28 @@ def read_flight_results(folder: AnyPath) -> FlightResults:
         One of the three documents is missing or damaged, or tells of something else.
     """
     folder = Path(folder)
-    diagnoses = read_as(folder / DIAGNOSIS_FILE, lambda one: tuple(one["diagnoses"]), "what is wrong with a flight")
+    told = read_as(folder / DIAGNOSIS_FILE, _diagnosed, "what is wrong with a flight")
     effects = read_as(folder / EFFECTS_FILE, lambda one: tuple(one["effects"]), "the effects on a flight")
 
     def with_health(document: Document) -> FlightResults:
-        told = {name: str(document[name] or "") for name in ("flight", "vehicle", "firmware", "date", "mission")}
+        names = ("flight", "vehicle", "firmware", "date", "mission")
+        named: dict[str, Any] = {name: str(document[name] or "") for name in names}
         return FlightResults(
+            **named,
             **told,
             start_us=int(document["start_us"]),
-            diagnoses=diagnoses,
             health=tuple(document["rows"]),
             effects=effects,
         )
 
     return read_as(folder / HEALTH_FILE, with_health, "the health of a flight")
+
+
+def _diagnosed(document: Document) -> dict[str, Any]:
+    """What `diagnosis.json` tells, by the names of `FlightResults`."""
+    return {
+        "diagnoses": tuple(document["diagnoses"]),
+        "is_readable": bool(document["readable"]),
+        "refusals": tuple(document["refused"]),
+        "untold": tuple(document["not_told"]),
+    }

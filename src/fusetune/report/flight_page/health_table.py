@@ -11,13 +11,20 @@ from fusetune.report.markup import Cell, details, number, paragraph, section, ta
 from fusetune.report.severity_words import rank
 
 _TOLD = {"fail": "fail", "warning": "warning", "note": "note"}
+_WORDS = (
+    "fail: far beyond the limit, warning: beyond it. A test ratio compares how far a measurement lies from what the "
+    "filter expected with how far it may: above 1 the filter rejects the measurement."
+)
 
 
 def health_table_section(results: FlightResults) -> str:
-    """Problems, then each group with its passes, then what does not apply."""
+    """Problems, then each group with its passes, then what does not apply; empty of a log that could not be read."""
+    if not results.is_readable:
+        return ""
     problems = results.problems
     parts = []
     if problems:
+        parts.append(paragraph(_WORDS, "note"))
         head = ("", "what", "limit", "when", "what to do")
         alike: dict[str, list[Document]] = defaultdict(list)
         for row in problems:
@@ -51,10 +58,24 @@ def _problem_row(alike: list[Document], results: FlightResults) -> tuple[Cell | 
     return (
         Cell(_TOLD[row["severity"]], f"short is-{row['severity']}"),
         words + (f"; beyond it on instance {also}, too" if also else ""),
-        number(row["threshold"]),
+        _limit(row),
         Cell("" if when is None else _span(*when), "short"),
         str(row["remedy"]),
     )
+
+
+def _unit(row: Document) -> str:
+    """Shares are told in percent, as the words about them do."""
+    return "%" if row["id"].endswith("_share") else str(row["unit"])
+
+
+def _in_unit(row: Document, value: float | None) -> float | None:
+    return 100.0 * value if value is not None and row["id"].endswith("_share") else value
+
+
+def _limit(row: Document) -> Cell:
+    told = number(_in_unit(row, row["threshold"]))
+    return told if row["threshold"] is None else Cell(f"{told.text} {_unit(row)}".rstrip(), f"{told.kind} short")
 
 
 def _span(start: float, stop: float) -> str:
@@ -73,9 +94,9 @@ def _group(group: str, rows: list[Document]) -> str:
         (
             Cell(figure_words(row["id"]), f"is-{row['severity']}" if row["severity"] in _TOLD else ""),
             *((number(row["instance"]),) if several else ()),
-            number(row["figure"]),
-            Cell(str(row["unit"]), "quiet"),
-            number(row["threshold"]),
+            number(_in_unit(row, row["figure"])),
+            Cell(_unit(row), "quiet"),
+            number(_in_unit(row, row["threshold"])),
             Cell(str(row["origin"]), "quiet"),
         )
         for row in rows

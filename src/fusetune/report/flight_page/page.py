@@ -114,7 +114,11 @@ def build_flight_page(
         health_table_section(results),
         sensors_section(read_document(noise), figures) if noise.exists() else "",
     )
-    told = (results.vehicle or "unknown vehicle", results.firmware or "unknown firmware", results.mission,
+    told = (_known(results.vehicle, "vehicle"), _known(results.firmware, "firmware"), results.mission,
             results.date.replace("T", " ").replace("Z", " UTC"))  # fmt: skip
     Path(output).parent.mkdir(parents=True, exist_ok=True)
     write_page(output, PageHead(results.flight, results.flight, ", ".join(one for one in told if one)), sections)
+
+
+def _known(name: str, what: str) -> str:
+    return f"unknown {what}" if name in ("", "unknown") else name

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fusetune.report.flight_page.flight_results import Document
-from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
+from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table, unit_cell
 from fusetune.storage.files import AnyPath
 
 _PICTURES = {
@@ -60,7 +60,7 @@ def _starting_row(one: Document) -> tuple[Cell | str, ...]:
     changed = abs(one["start_with"] - one["flown"]) > 1e-6 * abs(one["flown"])
     return (
         Cell(str(one["parameter"]), "mono"),
-        Cell(str(one["unit"]), "quiet"),
+        unit_cell(str(one["unit"])),
         number(one["flown"]),
         number(one["at_rest"]),
         number(one["in_flight"]),

@@ -25,17 +25,38 @@ def health_section(diagnoses: Sequence[Mapping[str, Any]], flight_pages: Mapping
     if not diagnoses:
         return ""
     found = [one for one in diagnoses if one["diagnoses"]]
+    silent = [one for one in diagnoses if one["refused"] and not one["diagnoses"]]
     found.sort(key=lambda one: (rank(worst_of(one["diagnoses"])), -len(one["diagnoses"]), one["flight"]))
-    clean = len(diagnoses) - len(found)
-    none = f"On {clean} of {count_words(len(diagnoses), 'flight')} nothing wrong was found."
-    if not found:
-        return section("What is wrong with the flights", paragraph(none))
+    clean = len(diagnoses) - len(found) - len(silent)
+    none = f"On {clean} of {count_words(len(diagnoses), 'flight')} no cause of trouble was found."
     folder = Path(page).parent
     links = {name: os.path.relpath(target, folder) for name, target in flight_pages.items()}
+    untold = _untold(silent, links)
+    if not found:
+        return section("What is wrong with the flights", paragraph(none), untold)
     text = "No parameter cures what is broken: mend it first, then tune."
-    head = ("flight", "", "what is wrong", "how sure", "what to do")
+    head = ("flight", "what is wrong", "", "how sure", "what to do")
     rows = [_row(one["flight"], one["diagnoses"], links) for one in found]
-    return section("What is wrong with the flights", paragraph(text), table(head, rows), paragraph(none, "note"))
+    return section(
+        "What is wrong with the flights", paragraph(text), table(head, rows), paragraph(none, "note"), untold
+    )
+
+
+def _untold(silent: Sequence[Mapping[str, Any]], links: Mapping[str, str]) -> str:
+    """Logs that tell nothing, or too little to find anything wrong."""
+    if not silent:
+        return ""
+    rows = [
+        (
+            Cell(one["flight"], "flight", links.get(one["flight"], "")),
+            "; ".join(reason["found"] for reason in one["refused"]),
+            "; ".join(dict.fromkeys(reason["remedy"] for reason in one["refused"] if reason["remedy"])),
+        )
+        for one in silent
+    ]
+    told = "tell" if len(silent) != 1 else "tells"
+    text = f"{count_words(len(silent), 'log')} {told} nothing, or too little to say whether anything is wrong:"
+    return paragraph(text, "note") + table(("log", "why not", "what to do"), rows)
 
 
 def _row(flight: str, diagnoses: Sequence[Mapping[str, Any]], links: Mapping[str, str]) -> tuple[Cell | str, ...]:
@@ -43,9 +64,9 @@ def _row(flight: str, diagnoses: Sequence[Mapping[str, Any]], links: Mapping[str
     worst = worst_of(list(diagnoses))
     more = f" (and {len(diagnoses) - 1} more)" if len(diagnoses) > 1 else ""
     return (
-        Cell(flight, "short", links.get(flight, "")),
+        Cell(flight, "flight", links.get(flight, "")),
+        Cell(str(first["cause"]).rstrip(".") + more, "said"),
         Cell(SEVERITY_WORDS[worst], f"short is-{worst}"),
-        str(first["cause"]).rstrip(".") + more,
         Cell(confidence_words(first["confidence"]), "short"),
-        str(first["remedy"]),
+        Cell(str(first["remedy"]), "advice"),
     )
