@@ -71,10 +71,12 @@ def _cause(diagnosis: Document, times: FlightTimes, is_told: bool) -> str:
     """One cause; when, how sure and what to do are left out where the head of the page has told them."""
     seen = [one for one in diagnosis["evidence"] if one["origin"] != "replay"]
     replayed = [one for one in diagnosis["evidence"] if one["origin"] == "replay"]
+    tried = diagnosis.get("experiment")
     parts = [
         "" if is_told else _facts(diagnosis, times),
         _headed("What the log shows", bullets([_sign(one) for one in seen])),
         _headed("What the replay shows", bullets([_sign(one) for one in replayed])),
+        _headed("What was tried", paragraph(_sentence(_capital(tried["words"]))) if tried else ""),
         _headed("Values to set, or measured", bullets(list(_values(diagnosis["values"])))),
         "" if is_told else _headed("What to do", _what_to_do(diagnosis)),
         paragraph(f"The signs are known from: {diagnosis['source']}", "note") if diagnosis["source"] else "",
@@ -108,7 +110,7 @@ def _sign(sign: Mapping[str, Any]) -> str:
 
 
 def _is_named(value: float, words: str) -> bool:
-    """Whether words tell a value already, as rounded as it may be; those of an experiment do."""
+    """Whether words tell a value already, as rounded as it may be."""
     told = [one for one in re.findall(r"-?\d+(?:\.\d+)?", words) if float(one)]
     return any(round(value, len(one.partition(".")[2])) == float(one) for one in told)
 
@@ -116,6 +118,10 @@ def _is_named(value: float, words: str) -> bool:
 def _values(values: Mapping[str, float]) -> Iterator[str]:
     for name, value in values.items():
         yield f"{name} = {number(value, 4).text}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _sentence(text: str) -> str:
