@@ -123,12 +123,13 @@ def _read(file: Path) -> Verdict:
 
 def _ask(case: Case, saved: Path, fault: Mapping[str, Any]) -> Verdict:
     from fusetune.analyze.diagnosis.diagnose import diagnose
+    from fusetune.analyze.diagnosis.diagnosed_logs import AS_FLOWN
     from fusetune.analyze.effects.all_effects import all_effects
 
     flight = load_flight(saved)
     start = time.process_time()
     try:
-        observed = ObservedFlight(flight)
+        observed = ObservedFlight(flight, AS_FLOWN)
         found = diagnose(observed)
         cpu_s = time.process_time() - start
         effects = all_effects(observed)

@@ -86,7 +86,10 @@ def experiment_for(diagnosis: Diagnosis, signs: Signs) -> Experiment | None:
         )
     motion, one = signs.motion, signs.magnetometer
     if diagnosis.id == "motor_magnetic_field" and motion is not None and one is not None:
-        coefficient = in_step(one)
+        found = in_step(one)
+        if found is None:
+            return None
+        coefficient = found
         return Experiment(
             "with the field of the motors taken out",
             ("mag",),

@@ -39,9 +39,9 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         size = abs(effect.value)
         if size < COEFFICIENT_FROM + 0.5 * effect.error or effect.range_m < LEAST_RANGE_M:
             continue
-        sign = "more" if effect.value > 0.0 else "less"
+        side = "more" if effect.value > 0.0 else "less"
         words = (
-            f"flying {direction} the barometer reads up to {effect.range_m:.1f} m {sign} (coefficient "
+            f"flying {direction} the barometer reads up to {effect.range_m:.1f} m {side} (coefficient "
             f"{effect.value:+.2f} ± {2.0 * effect.error:.2f})"
         )
         seen.append((Sign(words, size, COEFFICIENT_FROM, "1", "replay"), PARAMETERS[direction]))
