@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.analyze.diagnosis.made_signs import AIR, signs
 
 from fusetune.analyze.diagnosis import diagnose as whole
@@ -19,6 +21,7 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.experiments import trial_of, tried
 from fusetune.analyze.diagnosis.explained_away import MAKES, explained_away
 from fusetune.analyze.diagnosis.innovation_signs import LARGEST, ratios_of
+from fusetune.analyze.diagnosis.reliability import calibrated
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.px4.flight import Flight
@@ -80,6 +83,21 @@ def test_bad_innovations_without_a_cause_are_told_as_unknown(monkeypatch: pytest
 def test_a_figure_at_its_level_is_a_toss_of_a_coin_and_none_is_certain() -> None:
     assert confidence(1.0, 1.0) == pytest.approx(0.5)
     assert 0.9 < confidence(4.0, 1.0) < confidence(1e9, 1.0) <= MOST_SURE
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_a_share_that_is_right_grows_with_what_signs_say(one: float, other: float) -> None:
+    low, high = sorted((one, other))
+    assert 0.0 <= calibrated(low) <= calibrated(high) < 1.0
+
+
+def test_what_is_told_is_the_share_that_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = claim("vibration", sure=0.5)
+    monkeypatch.setattr(whole, "Signs", lambda _: signs())
+    monkeypatch.setattr(whole, "CAUSES", {"vibration": lambda _: made})
+    (found,) = diagnose(ObservedFlight(Flight("made")))
+    # 17 of 19 diagnoses around a half were right
+    assert found.confidence == pytest.approx(17 / 19, abs=0.05)
 
 
 @pytest.fixture(scope="module")
