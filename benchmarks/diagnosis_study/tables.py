@@ -95,8 +95,12 @@ def pairs_table(verdicts: Sequence[Verdict]) -> str:
 
 
 def reliability_table(verdicts: Sequence[Verdict]) -> str:
-    """How many diagnoses were right, by how sure they were; right is what was injected, visible or not."""
-    said = np.array([(one.confidence, one.id in verdict.injected) for verdict in verdicts for one in verdict.named])
+    """How many diagnoses were right, by how sure they were; right is what was injected, visible or not.
+
+    `unknown` claims no cause.
+    """
+    named = [(verdict, one) for verdict in verdicts for one in verdict.named if one.id in KINDS]
+    said = np.array([(one.confidence, one.id in verdict.injected) for verdict, one in named])
     rows = ["| confidence | diagnoses | mean confidence | right |", "| --- | --- | --- | --- |"]
     for least, most in pairwise(CONFIDENCES):
         own = said[(said[:, 0] >= least) & (said[:, 0] < most)] if len(said) else said
