@@ -35,7 +35,10 @@ def diagnose(observed: ObservedFlight, experiments: int = AT_MOST) -> tuple[Diag
     if not any(one.severity != "note" for one in left):
         unknown = _unknown(signs)
         left += [unknown] if unknown is not None else []
-    return tuple(replace(one, confidence=calibrated(one.confidence)) for one in in_order(left))
+    # what is unknown claims no cause
+    return tuple(
+        one if one.id == UNKNOWN else replace(one, confidence=calibrated(one.confidence)) for one in in_order(left)
+    )
 
 
 def in_order(found: Sequence[Diagnosis]) -> tuple[Diagnosis, ...]:

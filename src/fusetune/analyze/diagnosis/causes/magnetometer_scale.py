@@ -32,6 +32,8 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         is_sure = down is True
     scale = _tuned(signs, scale)
     off = float(np.abs(scale - 1.0).max())
+    if off < OFF_FROM:
+        return None
     told = ", ".join(f"{axis} {value:.2f}" for axis, value in zip("xyz", scale, strict=True))
     words = f"readings are the field times {told}"
     return diagnosed(
