@@ -205,6 +205,9 @@ def test_the_tuner_tells_a_scale_of_the_down_axis_from_a_field_along_it() -> Non
     assert field(signs(**upright, told_by=Tuned(CAL_MAG0_ZSCALE=(0.8, 0.78, 0.82)))) is None
     assert scale(signs(**upright, told_by=Tuned(CAL_MAG0_ZSCALE=(1.0, 0.97, 1.03)))) is None
     assert field(signs(**upright, told_by=Tuned(CAL_MAG0_ZSCALE=(1.0, 0.97, 1.03)))) is not None
+    # at its best estimate no axis is off
+    assert scale(signs(**magnetometer(SCALED), told_by=Tuned(CAL_MAG0_XSCALE=(1.01, 0.98, 1.04),
+        CAL_MAG0_YSCALE=(0.99, 0.96, 1.02)))) is None  # fmt: skip
     # without it both are told
     assert scale(signs(**upright, told_by=Tuned())) is not None
     assert field(signs(**upright, told_by=Tuned())) is not None
