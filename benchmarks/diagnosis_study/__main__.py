@@ -19,6 +19,8 @@ from .kinds import KINDS
 from .tables import study_tables
 from .verdicts import verdicts
 
+SEEDS, HEALTHIES, CALMS, PAIRED = 20, 200, 20, 50
+"""How many flights of each kind and group there were when levels were set; what comes after had no say."""
 DOCUMENT = Path("docs/diagnosis.md")
 
 
@@ -43,11 +45,14 @@ def _cases(options: argparse.Namespace) -> Iterator[Case]:
     """All cases, the first ones of every group first; larger groups keep pace with the kinds."""
     counts = dict.fromkeys(options.kinds, options.seeds)
     counts |= {HEALTHY: options.healthy, CALM: options.calm, PAIRS: options.pairs}
+    after = dict.fromkeys(counts, 0)
+    if options.fresh:
+        after = dict.fromkeys(options.kinds, SEEDS) | {HEALTHY: HEALTHIES, CALM: CALMS, PAIRS: PAIRED}
     rounds = max(options.seeds, 1)
     for number in range(rounds):
         for group, count in counts.items():
             for one in range(count * number // rounds, count * (number + 1) // rounds):
-                yield case_of(group, one)
+                yield case_of(group, after[group] + one)
 
 
 def _options() -> argparse.Namespace:
@@ -55,10 +60,13 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), help="of faults; by default all"
     )
-    parser.add_argument("--seeds", type=int, default=20, help="flights of each kind")
-    parser.add_argument("--healthy", type=int, default=200, help="flights without a fault")
-    parser.add_argument("--calm", type=int, default=20, help="flights for drag, in calm air")
-    parser.add_argument("--pairs", type=int, default=50, help="flights with two faults")
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="flights of each kind")
+    parser.add_argument("--healthy", type=int, default=HEALTHIES, help="flights without a fault")
+    parser.add_argument("--calm", type=int, default=CALMS, help="flights for drag, in calm air")
+    parser.add_argument("--pairs", type=int, default=PAIRED, help="flights with two faults")
+    parser.add_argument(
+        "--fresh", action="store_true", help="flights that had no say when levels were set: those after the usual ones"
+    )
     parser.add_argument(
         "--folder", type=Path, default=Path("results/diagnosis_study"), help="takes flights and what was said of them"
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -93,6 +94,26 @@ def pairs_table(verdicts: Sequence[Verdict]) -> str:
     )
 
 
+def reliability_table(verdicts: Sequence[Verdict]) -> str:
+    """How many diagnoses were right, by how sure they were; right is what was injected, visible or not.
+
+    `unknown` claims no cause.
+    """
+    named = [(verdict, one) for verdict in verdicts for one in verdict.named if one.id in KINDS]
+    said = np.array([(one.confidence, one.id in verdict.injected) for verdict, one in named])
+    rows = ["| confidence | diagnoses | mean confidence | right |", "| --- | --- | --- | --- |"]
+    for least, most in pairwise(CONFIDENCES):
+        own = said[(said[:, 0] >= least) & (said[:, 0] < most)] if len(said) else said
+        if len(own):
+            label = f"{least:g} to {min(most, 1.0):g}"
+            rows.append(f"| {label} | {len(own)} | {100.0 * own[:, 0].mean():.1f} % | {_percent(list(own[:, 1]))} |")
+    return "\n".join(rows)
+
+
+CONFIDENCES = (0.0, 0.9, 0.94, 0.96, 0.97, 0.975, 1.01)
+"""Edges of the table's rows: of as many diagnoses each, about."""
+
+
 def cost_table(verdicts: Sequence[Verdict]) -> str:
     """CPU seconds of a diagnosis, and flights without an answer."""
     answered = np.array([one.cpu_s for one in verdicts if not one.problem])
@@ -116,5 +137,6 @@ def study_tables(verdicts: Sequence[Verdict], estimates: str) -> Mapping[str, st
         "healthy": healthy_table(verdicts),
         "pairs": pairs_table(verdicts),
         "estimates": estimates,
+        "reliability": reliability_table(verdicts),
         "cost": cost_table(verdicts),
     }

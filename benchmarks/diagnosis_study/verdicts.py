@@ -123,14 +123,16 @@ def _read(file: Path) -> Verdict:
 
 def _ask(case: Case, saved: Path, fault: Mapping[str, Any]) -> Verdict:
     from fusetune.analyze.diagnosis.diagnose import diagnose
+    from fusetune.analyze.diagnosis.diagnosed_logs import AS_FLOWN
     from fusetune.analyze.effects.all_effects import all_effects
 
     flight = load_flight(saved)
     start = time.process_time()
     try:
-        found = diagnose(ObservedFlight(flight))
+        observed = ObservedFlight(flight, AS_FLOWN)
+        found = diagnose(observed)
         cpu_s = time.process_time() - start
-        effects = all_effects(ObservedFlight(flight))
+        effects = all_effects(observed)
     except Exception as error:  # a flight that breaks the diagnosis counts as one that it does not name
         return Verdict(case.group, case.number, fault, (), (), (), 0.0, f"{type(error).__name__}: {error}")
     named = tuple(Named(one.id, one.severity, one.confidence, one.explains, dict(one.values)) for one in found)

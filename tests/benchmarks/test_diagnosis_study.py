@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import benchmarks.diagnosis_study.__main__ as study
 import numpy as np
 import pytest
 from benchmarks.diagnosis_study.cases import CALM, HEALTHY, PAIRS, airborne_s, case_of
 from benchmarks.diagnosis_study.estimates import QUANTITIES, compared, estimates_table
 from benchmarks.diagnosis_study.kinds import KINDS
-from benchmarks.diagnosis_study.tables import confusion_table, healthy_table, pairs_table, shares_table
+from benchmarks.diagnosis_study.tables import (
+    confusion_table,
+    healthy_table,
+    pairs_table,
+    reliability_table,
+    shares_table,
+)
 from benchmarks.diagnosis_study.verdicts import Named, Told, Verdict
 
 from fusetune.execute.parameters import flown_parameters
@@ -100,6 +107,27 @@ def test_a_pair_counts_when_both_are_named() -> None:
     table = pairs_table(said)
     assert "| 4 | 50.0 % | 25.0 % |" in table
     assert "gnss_glitch 2, vibration 1" in table
+
+
+def test_a_diagnosis_counts_by_how_sure_it_was_and_is_right_where_that_was_injected() -> None:
+    # each at 0.9: two of glitches, one of them wrongly of vibration, and one of a healthy flight
+    said = [
+        verdict("gnss_glitch", ["gnss_glitch", "vibration"]),
+        verdict("gnss_glitch", ["gnss_glitch"], visible=False),
+    ]
+    rows = reliability_table([*said, verdict(HEALTHY, ["baro_drift"])]).splitlines()
+    assert rows[2:] == ["| 0.9 to 0.94 | 4 | 90.0 % | 50.0 % |"]
+
+
+def test_fresh_flights_are_none_of_those_that_levels_were_set_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = ["study", "--fresh", "--kinds", "vibration", "--seeds", "2", "--healthy", "1", "--calm", "1", "--pairs", "1"]
+    monkeypatch.setattr("sys.argv", few)
+    options = study._options()
+    drawn = [(case.group, case.number) for case in study._cases(options)]
+    assert sorted(drawn) == [(CALM, 20), (HEALTHY, 200), (PAIRS, 50), ("vibration", 20), ("vibration", 21)]
+    monkeypatch.setattr("sys.argv", ["study"])
+    usual = study._options()
+    assert (usual.seeds, usual.healthy, usual.calm, usual.pairs) == (20, 200, 20, 50)
 
 
 def test_estimates_are_compared_with_the_truth_in_their_own_unit() -> None:

@@ -26,12 +26,23 @@ from tests.analyze.diagnosis.made_signs import (
     with_values,
 )
 
-from fusetune.analyze.diagnosis.causes import gnss_delay, vision_yaw
+from fusetune.analyze.delays.lag import Lag
+from fusetune.analyze.delays.velocity_place import VelocityPlace
+from fusetune.analyze.diagnosis.causes import (
+    gnss_delay,
+    gnss_lever_arm,
+    magnetic_disturbance,
+    magnetometer_scale,
+    static_pressure,
+    vision_yaw,
+)
 from fusetune.analyze.diagnosis.causes.registry import CAUSES
 from fusetune.analyze.diagnosis.claims import AtLimit, NoiseClaim
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.diagnosis.gnss_signs import Jump
 from fusetune.analyze.diagnosis.height_errors import Effect
+from fusetune.analyze.diagnosis.signs import Signs
+from fusetune.analyze.effects.estimate import Estimate
 from fusetune.save.checks.standstill import Standstill
 
 
@@ -69,7 +80,8 @@ WRONG: dict[str, dict[str, Any]] = {
     "gnss_interference": {"gnss": replace(GNSS, jamming=170.0, jammed=AIR[0], satellites=7.0)},
     "gnss_lever_arm": {"gnss_motion": replace(GNSS_MOTION, arm=np.array([0.3, 0.1, 0.0]))},
     "baro_ground_effect": barometer(ground=effect(-3.0)),
-    "static_pressure": barometer(speed={"forward": effect(0.6), "backward": effect(0.1), "sideways": effect(0.3)}),
+    "static_pressure": barometer(speed={"forward": effect(0.6), "backward": effect(0.1), "sideways": effect(0.3)})
+    | {"told_by": lambda _: {"EKF2_PCOEF_XP": Estimate("EKF2_PCOEF_XP", "", 0.0, -0.5, -0.6, -0.4, 0.05, 300)}},
     "propeller_wash": barometer(thrust=effect(-4.0)),
     "baro_drift": {"barometer": replace(BAROMETER, drift=6.0, inertial_drift=5.5)},
     "range_obstruction": {"range": replace(RANGE, short_share=0.3, constant_share=1.0, short=AIR[0], short_m=0.4)},
@@ -113,23 +125,115 @@ def test_every_cause_is_tried() -> None:
     assert set(CAUSES) - set(WRONG) == {"gnss_delay", "vision_yaw"}
 
 
-def test_a_delay_is_claimed_only_where_the_smoothed_velocity_agrees(monkeypatch: pytest.MonkeyPatch) -> None:
+def place(delay_s: float = 0.112, error_s: float = 0.006, arm: tuple[float, ...] = (0.0, 0.0, 0.0)) -> VelocityPlace:
+    return VelocityPlace(Lag(delay_s, error_s, 1000, 300), np.array(arm), np.diag([0.015**2] * 3))
+
+
+def asked(found: VelocityPlace | None, **others: Any) -> Signs:
+    """Signs of a flight whose smoothed velocity tells a place."""
+    flight = signs(**others, is_replayed=True)
+    flight.observed.__dict__["gnss_place"] = found
+    return flight
+
+
+def test_a_delay_is_claimed_only_where_the_smoothed_velocity_agrees_and_tells_its_value() -> None:
     off = replace(GNSS_MOTION, fit=replace(FIT, delay_s=0.2))
-    flight = signs(gnss_motion=off)
-    flight.observed.__dict__["replayed"] = None
-    agrees = replace_lag(0.19, 0.006)
-    monkeypatch.setattr(gnss_delay, "velocity_delay", lambda *_: agrees)
-    found = gnss_delay.diagnose(flight)
+    found = gnss_delay.diagnose(asked(place(0.188), gnss_motion=off))
     assert found is not None
-    assert found.values == {"EKF2_GPS_DELAY": 200.0}
-    monkeypatch.setattr(gnss_delay, "velocity_delay", lambda *_: replace_lag(0.115, 0.006))
-    assert gnss_delay.diagnose(flight) is None
+    assert found.values == {"EKF2_GPS_DELAY": 190.0}
+    assert "188 ms" in found.cause
+    assert gnss_delay.diagnose(asked(place(0.115), gnss_motion=off)) is None
 
 
-def replace_lag(delay_s: float, error_s: float) -> Any:
-    from fusetune.analyze.delays.lag import Lag
+def test_the_antenna_is_where_the_smoothed_velocity_says() -> None:
+    off = replace(GNSS_MOTION, arm=np.array([0.3, 0.1, 0.0]))
+    found = gnss_lever_arm.diagnose(asked(place(arm=(0.26, 0.0, 0.0)), gnss_motion=off))
+    assert found is not None
+    assert found.values == {"EKF2_GPS_POS_X": 0.26, "EKF2_GPS_POS_Y": 0.0, "EKF2_GPS_POS_Z": 0.0}
+    # 0.22 m with an error of 0.015 m may be less than the 0.2 m that a warning is worth
+    small = gnss_lever_arm.diagnose(asked(place(arm=(0.0, 0.0, -0.22)), gnss_motion=off))
+    assert small is not None
+    assert (small.severity, found.severity) == ("note", "warning")
+    assert gnss_lever_arm.diagnose(asked(place(), gnss_motion=off)) is None
 
-    return Lag(delay_s, error_s, 1000, 300)
+
+def test_places_are_those_of_the_parameters_whose_imu_has_a_place_of_its_own() -> None:
+    off = replace(GNSS_MOTION, arm=np.array([0.3, 0.0, 0.0]))
+    told = {"EKF2_IMU_POS_X": 0.1, "EKF2_GPS_POS_X": 0.1}
+    found = gnss_lever_arm.diagnose(asked(place(arm=(0.4, 0.0, 0.0)), gnss_motion=off, told=told))
+    assert found is not None
+    assert found.values["EKF2_GPS_POS_X"] == 0.4
+    assert found.signs[0].figure == pytest.approx(0.3)
+
+
+class Tuned:
+    """Tuners that tell some estimates: value, and the two sides of its interval."""
+
+    def __init__(self, **estimates: tuple[float, float, float]) -> None:
+        self.told = {
+            name: Estimate(name, "", 1.0 if name.endswith("SCALE") else None, value, low, high, 0.01, 100)
+            for name, (value, low, high) in estimates.items()
+        }
+
+    def __call__(self, _: str) -> dict[str, Estimate]:
+        return self.told
+
+
+PRESSED = barometer(speed={"forward": effect(1.4), "backward": effect(0.1), "sideways": effect(0.1)})
+
+
+def test_static_pressure_warns_where_the_tuner_tells_it_and_with_its_values() -> None:
+    found = static_pressure.diagnose(signs(**PRESSED, told_by=Tuned(EKF2_PCOEF_XP=(-0.24, -0.44, -0.04))))
+    assert found is not None
+    assert (found.severity, found.values) == ("warning", {"EKF2_PCOEF_XP": -0.24})
+    alone = static_pressure.diagnose(signs(**PRESSED, told_by=Tuned()))
+    assert alone is not None
+    assert alone.severity == "note"
+    assert alone.confidence <= static_pressure.UNCONFIRMED
+    assert static_pressure.diagnose(signs(**PRESSED, told_by=Tuned(EKF2_PCOEF_XP=(-0.02, -0.1, 0.06)))) is None
+
+
+def test_the_tuner_tells_a_scale_of_the_down_axis_from_a_field_along_it() -> None:
+    upright = magnetometer(
+        with_values(UPRIGHT | {"scale": replace(UPRIGHT["scale"], left=0.005)}, "scale", scale_z=1.27)
+    )
+    scale, field = magnetometer_scale.diagnose, magnetic_disturbance.diagnose
+    found = scale(signs(**upright, told_by=Tuned(CAL_MAG0_ZSCALE=(0.8, 0.78, 0.82))))
+    assert found is not None
+    assert found.values["mag_scale_z"] == pytest.approx(1.25)
+    assert found.confidence > 0.5
+    assert field(signs(**upright, told_by=Tuned(CAL_MAG0_ZSCALE=(0.8, 0.78, 0.82)))) is None
+    assert scale(signs(**upright, told_by=Tuned(CAL_MAG0_ZSCALE=(1.0, 0.97, 1.03)))) is None
+    assert field(signs(**upright, told_by=Tuned(CAL_MAG0_ZSCALE=(1.0, 0.97, 1.03)))) is not None
+    # at its best estimate no axis is off
+    assert scale(signs(**magnetometer(SCALED), told_by=Tuned(CAL_MAG0_XSCALE=(1.01, 0.98, 1.04),
+        CAL_MAG0_YSCALE=(0.99, 0.96, 1.02)))) is None  # fmt: skip
+    # without it both are told
+    assert scale(signs(**upright, told_by=Tuned())) is not None
+    assert field(signs(**upright, told_by=Tuned())) is not None
+
+
+def test_a_field_of_the_body_comes_before_a_scale_that_leaves_more() -> None:
+    # log 10 of a sound quadrotor: both below the noise of its thinned readings, 0.0045 G
+    found = with_values(fits(0.0154, scale=0.0043, body_field=0.0041), "scale", scale_y=1.1, scale_z=0.86)
+    assert magnetometer_scale.diagnose(signs(**magnetometer(found, noise=0.0045))) is None
+
+
+@pytest.mark.parametrize(
+    ("id", "name", "value"),
+    [
+        ("baro_ground_effect", "EKF2_GND_EFF_DZ", 3.6),
+        ("airspeed_scale", "ASPD_SCALE_1", 1.38),
+        ("flow_scale", "SENS_FLOW_SCALE", 1.41),
+        ("vision_scale", "vision_scale", 0.69),
+        ("motor_magnetic_field", "motor_field_x", 4.2),
+    ],
+)
+def test_a_cause_that_is_an_effect_tells_the_value_of_its_tuner(id: str, name: str, value: float) -> None:
+    tuned = Tuned(**{name: (value, 0.9 * value, 1.1 * value)})
+    found = CAUSES[id](signs(**WRONG[id], told_by=tuned))
+    assert found is not None
+    assert found.values == {name: value}
 
 
 def test_a_turned_frame_of_vision_matters_where_vision_says_that_it_knows_north() -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.analyze.diagnosis.made_signs import AIR, signs
 
 from fusetune.analyze.diagnosis import diagnose as whole
@@ -16,9 +18,10 @@ from fusetune.analyze.diagnosis.causes.registry import CAUSES
 from fusetune.analyze.diagnosis.diagnose import UNKNOWN, diagnose, in_order
 from fusetune.analyze.diagnosis.diagnosed_logs import AS_FLOWN
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
-from fusetune.analyze.diagnosis.experiments import tried
+from fusetune.analyze.diagnosis.experiments import trial_of, tried
 from fusetune.analyze.diagnosis.explained_away import MAKES, explained_away
 from fusetune.analyze.diagnosis.innovation_signs import LARGEST, ratios_of
+from fusetune.analyze.diagnosis.reliability import calibrated
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.px4.flight import Flight
@@ -82,11 +85,27 @@ def test_a_figure_at_its_level_is_a_toss_of_a_coin_and_none_is_certain() -> None
     assert 0.9 < confidence(4.0, 1.0) < confidence(1e9, 1.0) <= MOST_SURE
 
 
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_a_share_that_is_right_grows_with_what_signs_say(one: float, other: float) -> None:
+    low, high = sorted((one, other))
+    assert 0.0 <= calibrated(low) <= calibrated(high) < 1.0
+
+
+def test_what_is_told_is_the_share_that_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = claim("vibration", sure=0.5)
+    monkeypatch.setattr(whole, "Signs", lambda _: signs())
+    monkeypatch.setattr(whole, "CAUSES", {"vibration": lambda _: made})
+    (found,) = diagnose(ObservedFlight(Flight("made")))
+    # 17 of 19 diagnoses around a half were right
+    assert found.confidence == pytest.approx(17 / 19, abs=0.05)
+
+
 @pytest.fixture(scope="module")
 def told_wrong(survey_flight: Flight) -> Flight:
-    """The simulated survey with PX4 told 120 ms more than the receiver needs."""
+    """The simulated survey with PX4 told 120 ms more than the receiver needs, and gates at which that shows."""
     parameters = replace(survey_flight.parameters, initial={**survey_flight.parameters.initial})
     parameters.initial["EKF2_GPS_DELAY"] = float(parameters.initial.get("EKF2_GPS_DELAY", 110.0)) + 120.0
+    parameters.initial |= {"EKF2_GPS_V_GATE": 1.5, "EKF2_GPS_P_GATE": 1.5}
     return replace(survey_flight, parameters=parameters)
 
 
@@ -96,9 +115,12 @@ def test_a_wrong_delay_is_found_on_a_simulated_flight_and_borne_out_by_a_replay(
     assert found
     assert found[0].id == "gnss_delay"
     assert found[0].values["EKF2_GPS_DELAY"] == pytest.approx(told - 120.0, abs=15.0)
-    experiment = found[0].signs[-1]
-    assert experiment.words.startswith("with EKF2_GPS_DELAY")
-    assert experiment.figure < experiment.usual
+    trial = found[0].trial
+    assert trial is not None
+    assert trial.outcome == "better"
+    assert trial.after < trial.before
+    assert trial.words.startswith("the replay with EKF2_GPS_DELAY")
+    assert not any("replay" in sign.words for sign in found[0].signs)
 
 
 def test_an_experiment_that_contradicts_lets_a_claim_fall(told_wrong: Flight, survey_flight: Flight) -> None:
@@ -108,6 +130,24 @@ def test_an_experiment_that_contradicts_lets_a_claim_fall(told_wrong: Flight, su
     borne_out = tried(right, Signs(ObservedFlight(told_wrong, AS_FLOWN)))
     assert borne_out is not None
     assert borne_out.confidence > 0.7
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "outcome", "words"),
+    [
+        (0.3, 0.2, "better", "is better: mean test ratio of gnss_vel 0.3 before, 0.2 after"),
+        (0.3, 0.28, "no better", "is no better: mean test ratio of gnss_vel 0.3 before, 0.28 after"),
+        (0.1, 0.2, "worse", "is worse: mean test ratio of gnss_vel 0.1 before, 0.2 after"),
+        # an octorotor whose compass the filter had given up: nothing changes, and there was nothing to mend
+        (0.00277, 0.00277, "tells nothing", "is the same, so the filter made no use of it"),
+        # 17 % less of a ratio that is a sixth of what noise alone makes is no evidence
+        (0.006, 0.005, "tells nothing", "tells nothing, these sources are fine with it as well"),
+    ],
+)
+def test_what_a_replay_shows_is_told_plainly(before: float, after: float, outcome: str, words: str) -> None:
+    trial = trial_of("without it", "gnss_vel", before, after)
+    assert trial.outcome == outcome
+    assert words in trial.words
 
 
 def test_without_experiments_nothing_is_replayed_twice(told_wrong: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,7 +216,15 @@ def test_more_than_one_cause_may_hold(shared_logs: Path, log: str) -> None:
     assert ALSO[log] in [one.id for one in of_log(shared_logs / f"{log}.ulg")]
 
 
-@pytest.mark.parametrize("log", SOUND)
-def test_sound_real_flights_show_no_failure(shared_logs: Path, log: str) -> None:
+TRUE_OF_SOUND = {"gnss_delay"}
+"""The receiver of seven flights of one quadrotor is 144 to 172 ms late on each, together 153 to 172, told 110."""
+
+
+@pytest.mark.parametrize("log", [*SOUND, "synthetic__fw_airspeed"])
+def test_what_is_told_of_sound_real_flights_is_true_and_no_failure(shared_logs: Path, log: str) -> None:
     (file,) = shared_logs.glob(f"{log}*.ulg")
-    assert [one.id for one in of_log(file) if one.severity == "fail"] == []
+    found = of_log(file)
+    assert [one.id for one in found if one.severity == "fail"] == []
+    # the compass of this octorotor is as bad as on its flights 28 and 29
+    if log != "SkyRats__log_3_":
+        assert {one.id for one in found if one.severity == "warning"} <= TRUE_OF_SOUND

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.analyze.diagnosis.made_motion import HEADING_OFF, made_motion
+from tests.analyze.diagnosis.made_motion import FLYING, HEADING_OFF, made_motion
 
 from fusetune.analyze.diagnosis.field_fits import FieldFit, FieldReadings, field_fits
+from fusetune.analyze.diagnosis.magnetometer_signs import earth_field, magnetometer_signs
+from fusetune.px4.flight import Flight
 
 MOTION = made_motion()
 ROWS = np.arange(800, 6200, 25)
@@ -68,3 +70,40 @@ def test_without_a_heading_a_turn_about_the_vertical_is_none() -> None:
     assert found["mounting"].turn is not None
     assert abs(found["mounting"].turn[2, 2]) < 0.5
     assert found["as_told"].heading != pytest.approx(HEADING_OFF, abs=0.5)
+
+
+def flown(change: object = None) -> Flight:
+    """A flight at 47° N, 8° E with the magnetometer's readings at 50 Hz."""
+    fix = {"timestamp": MOTION.time[:1], "fix_type": np.array([3])}
+    fix |= {"latitude_deg": np.array([47.4]), "longitude_deg": np.array([8.5])}
+    earth = earth_field(Flight("made", {("vehicle_gps_position", 0): fix}))
+    assert earth is not None
+    rows = np.arange(0, MOTION.time.size, 2)
+    clean = FieldReadings(
+        MOTION.time[rows] * 1e-6, np.zeros((rows.size, 3)), MOTION.rotation[rows], MOTION.thrust[rows]
+    )
+    field = clean.expected(earth, HEADING_OFF)
+    field = field if change is None else change(field)  # type: ignore[operator]
+    field = field + NOISE * np.random.default_rng(3).normal(size=field.shape)
+    table = {"timestamp": MOTION.time[rows], "timestamp_sample": MOTION.time[rows]}
+    table |= {f"magnetometer_ga[{axis}]": field[:, axis].astype(np.float32) for axis in range(3)}
+    return Flight("made", {("vehicle_gps_position", 0): fix, ("vehicle_magnetometer", 0): table})
+
+
+def test_a_wrong_heading_of_gnss_is_no_fault_of_the_magnetometer() -> None:
+    # 26° off, as on legs along one line; the readings fit the field under a heading of their own
+    one = magnetometer_signs(flown(), MOTION, FLYING, (HEADING_OFF + np.radians(26.0), np.radians(3.6)))
+    assert one is not None
+    assert not one.by_gnss
+    # means over half a second of a vehicle that turns leave a little more than noise; a heading that is 26° off 0.05
+    assert one.fits["as_told"].left < 0.005
+
+
+def test_a_field_of_the_body_and_a_mounting_are_no_wrong_heading() -> None:
+    for change in (lambda field: field + np.array([0.08, -0.05, 0.0]), lambda field: field @ ABOUT_DOWN_45.T):
+        one = magnetometer_signs(flown(change), MOTION, FLYING, (HEADING_OFF, np.radians(1.0)))
+        assert one is not None
+        assert one.by_gnss
+
+
+ABOUT_DOWN_45 = np.array([[0.5**0.5, -(0.5**0.5), 0.0], [0.5**0.5, 0.5**0.5, 0.0], [0.0, 0.0, 1.0]])

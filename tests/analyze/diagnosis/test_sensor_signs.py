@@ -1,5 +1,7 @@
 """Signs of single sensors on made readings: IMU at rest, GNSS jumps, range finder, airspeed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.analyze.diagnosis.made_motion import FLYING, made_motion, true_rotation
@@ -8,6 +10,7 @@ from fusetune.analyze.diagnosis.airspeed_signs import airspeed_signs
 from fusetune.analyze.diagnosis.beam_signs import RangeSigns, range_signs
 from fusetune.analyze.diagnosis.gnss_signs import GnssSigns, gnss_signs
 from fusetune.analyze.diagnosis.imu_signs import gyro_bias, imu_signs
+from fusetune.analyze.diagnosis.motion import Motion
 from fusetune.ekf2.numerics.constants import ONE_G, RADIUS_OF_EARTH
 from fusetune.px4.flight import Flight, TopicTable
 
@@ -41,6 +44,27 @@ def test_the_bias_at_rest_is_read_directly() -> None:
     assert np.degrees(one.change).max() < 0.1
 
 
+def test_a_steady_bank_on_the_ground_is_no_bias() -> None:
+    # a wing that rolls at 4 °/s for two seconds before it is called airborne: gyros alone take it for rest
+    flight = imu(0.3)
+    table = flight.topics["sensor_combined", 0]
+    still = np.arange(1000, dtype=np.int64)
+    for name, values in table.items():
+        table[name] = np.concatenate([values[still % 300], values])
+    table["timestamp"][:1000] = MOTION.time[0] - 10_000 * (1000 - still)
+    time = table["timestamp"]
+    rolls = (time >= FLYING[0][0] - 4_000_000) & (time < FLYING[0][0] - 2_000_000)
+    since_s = (time[rolls] - time[rolls][0]) * 1e-6
+    roll = np.radians(4.0) * since_s
+    table["gyro_rad[0]"][rolls] += np.radians(4.0)
+    table["accelerometer_m_s2[1]"][rolls] -= ONE_G * np.sin(roll)
+    table["accelerometer_m_s2[2]"][rolls] = -ONE_G * np.cos(roll)
+    one = gyro_bias(flight, None, FLYING)
+    assert one is not None
+    assert np.degrees(one.at_rest) == pytest.approx([0.0, 0.3, 0.0], abs=0.05)
+    assert np.degrees(one.change).max() < 0.3
+
+
 def test_missing_samples_are_gaps_and_a_share() -> None:
     flight = imu()
     table = flight.topics["sensor_combined", 0]
@@ -55,7 +79,7 @@ def test_missing_samples_are_gaps_and_a_share() -> None:
     assert one.lost_share == pytest.approx(0.32 / 60.0, rel=0.02)
 
 
-def gnss(**changed: np.ndarray) -> GnssSigns:
+def gnss(motion: Motion | None = None, **changed: np.ndarray) -> GnssSigns:
     time = np.arange(FLYING[0][0] - 2_000_000, FLYING[0][1], 200_000, dtype=np.int64)
     velocity = MOTION.at(time, MOTION.velocity)
     step_s = np.diff(time, prepend=time[:1]) * 1e-6
@@ -68,7 +92,7 @@ def gnss(**changed: np.ndarray) -> GnssSigns:
         "eph": np.full(time.size, 0.8), "epv": np.full(time.size, 1.2), "s_variance_m_s": np.full(time.size, 0.2),
         **{f"vel_{axis}_m_s": velocity[:, i] for i, axis in enumerate("ned")},
     }  # fmt: skip
-    one = gnss_signs(table | changed, FLYING)
+    one = gnss_signs(table | changed, FLYING, motion)
     assert one is not None
     return one
 
@@ -87,6 +111,20 @@ def test_a_jump_is_seen_where_it_begins_and_ends() -> None:
     one = gnss(place=place)
     assert [jump.size for jump in one.jumps] == pytest.approx([9.0, 9.0], abs=0.7)
     assert one.jumps[1].time - one.jumps[0].time == 40 * 200_000
+
+
+def test_a_stop_that_the_imu_feels_is_no_jump_of_the_velocity() -> None:
+    time = np.arange(FLYING[0][0] - 2_000_000, FLYING[0][1], 200_000, dtype=np.int64)
+    stops = FLYING[0][0] + 31_000_000
+    velocity = MOTION.at(time, MOTION.velocity)
+    velocity[time >= stops, 0] += 7.0
+    moved = np.cumsum(velocity * np.diff(time, prepend=time[:1])[:, None] * 1e-6, axis=0)
+    changed = {"vel_n_m_s": velocity[:, 0], "place": moved - np.cumsum(
+        MOTION.at(time, MOTION.velocity) * np.diff(time, prepend=time[:1])[:, None] * 1e-6, axis=0
+    )}  # fmt: skip
+    felt = MOTION.free_velocity + 7.0 * (MOTION.time >= stops - 100_000)[:, None] * np.array([0.6, 0.8, 0.0])
+    assert [one.of_velocity for one in gnss(motion=MOTION, **changed).jumps] == [True]
+    assert gnss(motion=replace(MOTION, free_velocity=felt), **changed).jumps == ()
 
 
 def test_a_jump_of_a_receiver_that_says_that_it_is_poor_is_none() -> None:

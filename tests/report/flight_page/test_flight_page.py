@@ -50,6 +50,7 @@ def test_the_answer_stands_first(shaken: str) -> None:
         "Also: GNSS is later than PX4 is told worth knowing",
         "What the log shows",
         "What the replay shows",
+        "What was tried",
         "EKF2_ACC_NOISE = 0.5",
         "What could be set from this flight",
         "Health of sensors and filter",
@@ -61,8 +62,15 @@ def test_the_answer_stands_first(shaken: str) -> None:
 def test_a_sign_tells_what_is_usual_unless_its_words_do(shaken: str) -> None:
     words = told(shaken)
     assert "18.9 m/s² (usual: up to 4.9 m/s²)" in words
-    assert "goes from 0.003 to 0.3" in words
-    assert "goes from 0.003 to 0.3 (usual" not in words
+    assert "the bias moves by 0.4 m/s² in the air" in words
+    assert "in the air (usual" not in words
+
+
+def test_an_experiment_is_no_evidence_and_told_apart(shaken: str) -> None:
+    words = told(shaken)
+    showed, tried = words.index("What the replay shows"), words.index("What was tried")
+    assert "ACC_NOISE" not in words[showed:tried]
+    assert words[tried:].startswith("What was tried The replay with EKF2_ACC_NOISE 0.8 is no better")
 
 
 def test_a_cause_of_the_whole_flight_says_so(shaken: str) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fusetune.analyze.diagnosis.causes.registry import CAUSES
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.experiments import AT_MOST, with_experiments
 from fusetune.analyze.diagnosis.explained_away import explained_away
 from fusetune.analyze.diagnosis.innovation_signs import GATE
+from fusetune.analyze.diagnosis.reliability import calibrated
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 
@@ -33,7 +35,10 @@ def diagnose(observed: ObservedFlight, experiments: int = AT_MOST) -> tuple[Diag
     if not any(one.severity != "note" for one in left):
         unknown = _unknown(signs)
         left += [unknown] if unknown is not None else []
-    return in_order(left)
+    # what is unknown claims no cause
+    return tuple(
+        one if one.id == UNKNOWN else replace(one, confidence=calibrated(one.confidence)) for one in in_order(left)
+    )
 
 
 def in_order(found: Sequence[Diagnosis]) -> tuple[Diagnosis, ...]:

@@ -30,6 +30,24 @@ class Sign:
 
 
 @dataclass(frozen=True)
+class Trial:
+    """What a replay with the cause taken away showed; no sign, as it may speak for the cause, against it or not at all.
+
+    Attributes
+    ----------
+    words : what was done and what came of it, plainly, with the figures before and after
+    before, after : mean test ratio of the sources that the cause spoils
+    outcome : `better` speaks for the cause, `worse` against it; `no better`, though there was something to mend; `tells
+        nothing` where these sources are fine with the cause as well
+    """
+
+    words: str
+    before: float
+    after: float
+    outcome: Literal["better", "no better", "worse", "tells nothing"]
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """A cause, what shows it, and what to do.
 
@@ -45,6 +63,7 @@ class Diagnosis:
     remedy : what to do, in the order in which to do it; parameters by name
     source : where the signs are known from
     values : values to set or measured, by name; names of measured ones end in their unit
+    trial : what the replay without the cause showed; None where it was not tried
     """
 
     id: str
@@ -58,6 +77,7 @@ class Diagnosis:
     remedy: str
     source: str
     values: Mapping[str, float] = field(default_factory=dict, hash=False)
+    trial: Trial | None = None
 
     def document(self, start_of_log_us: int) -> dict[str, Any]:
         """As JSON holds it: times in seconds from the start of the log, null for figures that are none."""
@@ -72,6 +92,7 @@ class Diagnosis:
             "remedy": self.remedy,
             "values": dict(self.values),
             "source": self.source,
+            "experiment": None if self.trial is None else vars(self.trial),
         }
         return {name: _as_json(value) for name, value in document.items()}
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
+from fusetune.analyze.diagnosis.causes.motor_magnetic_field import in_step
+from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Trial
 from fusetune.analyze.diagnosis.innovation_signs import SourceRatios, replayed_ratios
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
@@ -26,11 +27,15 @@ AT_MOST = 2
 """By default: with them a minute of flight is diagnosed in half a second."""
 FALLS, GROWS = 0.9, 1.25
 """Mean test ratios are alike between these: what a replay changes by chance."""
-FALLS_BY, GROWS_BY = 0.0002, 0.002
-"""Smaller differences of mean ratios say nothing."""
-SURER, LESS_SURE = 0.5, 0.6
-"""A claim that the experiment bears out loses half of its doubt, one that it contradicts keeps this of its
-confidence."""
+FALLS_BY, GROWS_BY = 0.002, 0.005
+"""Smaller differences of mean ratios say nothing: quotients of tiny numbers are no evidence."""
+SAME = 1e-3
+"""A replay whose ratios change by less did as the flight did."""
+SOUND = 0.02
+"""Half of what a filter that claims the right noise shows behind a gate of 5 σ (1/25): nothing is left to mend."""
+SURER, NOT_BORNE_OUT, LESS_SURE = 0.5, 0.9, 0.6
+"""A claim that the experiment bears out loses half of its doubt; one that it does not bear out, or contradicts, keeps
+this of its confidence."""
 LEAST_CONFIDENCE = 0.4
 """A claim below falls."""
 
@@ -79,9 +84,12 @@ def experiment_for(diagnosis: Diagnosis, signs: Signs) -> Experiment | None:
         return Experiment(
             words, judged, edit=lambda flight: _without(flight, sensor, diagnosis.start_us, diagnosis.stop_us)
         )
-    if diagnosis.id == "motor_magnetic_field" and signs.motion is not None:
-        coefficient = np.array([values[f"motor_field_{axis}_gauss"] for axis in "xyz"])
-        motion = signs.motion
+    motion, one = signs.motion, signs.magnetometer
+    if diagnosis.id == "motor_magnetic_field" and motion is not None and one is not None:
+        found = in_step(one)
+        if found is None:
+            return None
+        coefficient = found
         return Experiment(
             "with the field of the motors taken out",
             ("mag",),
@@ -183,20 +191,38 @@ def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
     compared = _compared(before, after, experiment.judged)
     if compared is None:
         return diagnosis
-    was, now = compared
-    words = (
-        f"{experiment.words} the mean test ratio of {_named(before, after, experiment.judged)} goes from "
-        f"{was:.3f} to {now:.3f}"
-    )
-    signed = (*diagnosis.signs, Sign(words, now, was, "1", "replay"))
+    trial = trial_of(experiment.words, _named(before, after, experiment.judged), *compared)
     sure = diagnosis.confidence
-    if was - now > FALLS_BY and now < FALLS * was:
+    if trial.outcome == "better":
         sure = 1.0 - SURER * (1.0 - sure)
-    elif now - was > GROWS_BY and now > GROWS * was:
-        sure *= LESS_SURE
+    elif trial.outcome != "tells nothing":
+        sure *= LESS_SURE if trial.outcome == "worse" else NOT_BORNE_OUT
         if sure < LEAST_CONFIDENCE:
             return None
-    return dataclasses.replace(diagnosis, signs=signed, confidence=round(sure, 3))
+    return dataclasses.replace(diagnosis, trial=trial, confidence=round(sure, 3))
+
+
+def trial_of(done: str, sources: str, before: float, after: float) -> Trial:
+    """What a replay showed, in words.
+
+    Parameters
+    ----------
+    done : what was done in it, as `without magnetometer from 4 s to 42 s`
+    sources : that should do better, by name
+    before, after : their mean test ratio
+    """
+    figures = f"mean test ratio of {sources} {before:.3g} before, {after:.3g} after"
+    if before - after > FALLS_BY and after < FALLS * before:
+        return Trial(f"the replay {done} is better: {figures}", before, after, "better")
+    if after - before > GROWS_BY and after > GROWS * before:
+        return Trial(f"the replay {done} is worse: {figures}", before, after, "worse")
+    if abs(after - before) <= SAME * before:
+        words = f"the replay {done} is the same, so the filter made no use of it: {figures}"
+        return Trial(words, before, after, "tells nothing")
+    if before < SOUND:
+        words = f"the replay {done} tells nothing, these sources are fine with it as well: {figures}"
+        return Trial(words, before, after, "tells nothing")
+    return Trial(f"the replay {done} is no better: {figures}", before, after, "no better")
 
 
 def _replayed(prepared: PreparedFlight, experiment: Experiment) -> ReplayedSet:

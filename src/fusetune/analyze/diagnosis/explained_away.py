@@ -14,7 +14,18 @@ GRACE_US = 3_000_000
 """Consequences outlive their cause: filters settle within some seconds."""
 
 MAKES: Mapping[str, tuple[str, ...]] = {
-    "accelerometer_clipping": ("vibration", "baro_drift", "noise_claim", "gnss_delay", "gnss_lever_arm"),
+    "accelerometer_clipping": (
+        "vibration",
+        "baro_drift",
+        "noise_claim",
+        "gnss_delay",
+        "gnss_lever_arm",
+        "static_pressure",
+        "range_step",
+        "vision_scale",
+        "vision_delay",
+        "magnetic_disturbance",
+    ),
     "vibration": (
         "noise_claim",
         "baro_drift",

@@ -76,12 +76,13 @@ def field_fits(readings: FieldReadings, earth: Array, heading: float | None) -> 
 
     Returns
     -------
-    By cause; `as_told` is none
+    By cause; `as_told` is none, nor is `own_heading`, under which nothing but the heading is another
     """
     ones = np.ones(readings.time_s.size)
     thrust = readings.thrust - float(np.mean(readings.thrust))
     found = {
         "as_told": _linear(readings, earth, heading, []),
+        "own_heading": _linear(readings, earth, None, []),
         "body_field": _linear(readings, earth, heading, [("body_field", ones)]),
         "motor_field": _linear(readings, earth, heading, [("body_field", ones), ("motor_field", thrust)]),
         "scale": _scales(readings, earth, heading),

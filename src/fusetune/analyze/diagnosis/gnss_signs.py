@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.diagnosis.gnss_motion import FIX_3D
+from fusetune.analyze.diagnosis.motion import Motion
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.ekf2.numerics.constants import RADIUS_OF_EARTH
 from fusetune.px4.flight import TopicTable
@@ -83,8 +84,15 @@ class GnssSigns:
     position_noise: float
 
 
-def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> GnssSigns | None:
-    """Look at the messages; None without any in the air."""
+def gnss_signs(
+    table: TopicTable | None, airborne: tuple[Interval, ...], motion: Motion | None = None
+) -> GnssSigns | None:
+    """Look at the messages; None without any in the air.
+
+    Parameters
+    ----------
+    motion : of the replay; without it the velocity may not change faster than vehicles mostly do
+    """
     if table is None or not airborne or "fix_type" not in table:
         return None
     time = table["timestamp"].astype(np.int64)
@@ -120,7 +128,7 @@ def gnss_signs(table: TopicTable | None, airborne: tuple[Interval, ...]) -> Gnss
         warned = (table["jamming_state"][in_air] >= JAMMING_WARNING) & (
             table["jamming_state"][in_air] <= JAMMING_CRITICAL
         )
-    jumps, position_noise = _jumps(table, time, good, told)
+    jumps, position_noise = _jumps(table, time, good, told, motion)
     return GnssSigns(
         samples=int(np.count_nonzero(in_air)),
         ever_fixed=bool(fixed.any()),
@@ -186,7 +194,11 @@ def _lost(time: Times, fixed: npt.NDArray[np.bool_], airborne: tuple[Interval, .
 
 
 def _jumps(
-    table: TopicTable, time: Times, good: npt.NDArray[np.bool_], told: Mapping[str, Array]
+    table: TopicTable,
+    time: Times,
+    good: npt.NDArray[np.bool_],
+    told: Mapping[str, Array],
+    motion: Motion | None,
 ) -> tuple[tuple[Jump, ...], float]:
     rows = np.flatnonzero(good)
     if rows.size < 20 or "latitude_deg" not in table:
@@ -209,14 +221,29 @@ def _jumps(
         steady = np.maximum(reported[1:], reported[:-1]) < WORSE * max(_median(reported), 1e-6)
         # of a velocity the vehicle's own acceleration is a part
         limit = max(least, JUMP_SIGMAS * float(np.median(size)) / 1.1774)
+        unfelt = size
         if of_velocity:
+            # whatever the heading, what the IMU felt is no jump
+            unfelt = size - _gained(at, motion) if motion is not None else size
             limit = max(limit, 2.0 * float(np.percentile(size, 98)), MOST_ACCELERATION * float(np.median(step_s)))
         found += [
-            Jump(int(at[i + 1]), float(size[i]), of_velocity) for i in np.flatnonzero((size > limit) & usual & steady)
+            Jump(int(at[i + 1]), float(size[i]), of_velocity)
+            for i in np.flatnonzero((size > limit) & (unfelt > least) & usual & steady)
         ]
     noise = float(np.median(np.abs(moved - np.median(moved, axis=0)))) / _NORMAL / np.sqrt(2.0)
     return tuple(sorted(found, key=lambda one: one.time)), noise
 
 
+def _gained(at: Times, motion: Motion) -> Array:
+    """(N - 1,) most that the IMU's velocity changed by around the steps between (N,) messages, m/s.
+
+    Receivers are late by up to `LATE_US`, and what they filter comes over more than a step.
+    """
+    ends = [motion.at(at - late, motion.free_velocity) for late in range(0, LATE_US + 1, LATE_US // 4)]
+    first, last = np.array([one[:-1] for one in ends]), np.array([one[1:] for one in ends])
+    return np.asarray(np.linalg.norm(last[None] - first[:, None], axis=3).max(axis=(0, 1)))
+
+
+LATE_US = 400_000
 MOST_ACCELERATION = 12.0
 """m/s²; a vehicle that gains more in a step between two messages is not believed."""

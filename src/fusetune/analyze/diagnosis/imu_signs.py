@@ -18,8 +18,9 @@ Times = npt.NDArray[np.int64]
 IMU, STATUS = "sensor_combined", "vehicle_imu_status"
 LONG_GAP_S = 0.05
 """Loggers lose single samples; the estimator misses nothing of these."""
-REST_RATE_RAD_S, REST_S = 0.01, 1.0
-"""At rest a gyro's second means differ by less."""
+REST_RATE_RAD_S, REST_FORCE_M_S2, REST_S = 0.01, 0.25, 1.0
+"""At rest second means of gyros and accelerometers differ by less. A steady turn is none for the gyros alone: a bank
+of 1.5° moves gravity by so much."""
 BIAS_OVER_S = 5.0
 
 
@@ -183,8 +184,8 @@ def gyro_bias(flight: Flight, steps: ReplayedSteps | None, airborne: tuple[Inter
     time = table["timestamp"].astype(np.int64)
     before = time < airborne[0][0] - REST_MARGIN_US
     after = time > airborne[-1][1] + REST_MARGIN_US
-    rate = stacked(table, "gyro_rad")
-    parts = [_at_rest(time[rows], rate[rows]) for rows in (before, after)]
+    rate, force = stacked(table, "gyro_rad"), stacked(table, "accelerometer_m_s2")
+    parts = [_at_rest(time[rows], rate[rows], force[rows]) for rows in (before, after)]
     at_rest = np.median(parts[0][1], axis=0) if len(parts[0][0]) else np.full(3, np.nan)
     parts.insert(1, _estimated(steps, airborne))
     seconds, course = (np.concatenate([part[i] for part in parts]) for i in range(2))
@@ -192,20 +193,24 @@ def gyro_bias(flight: Flight, steps: ReplayedSteps | None, airborne: tuple[Inter
     return GyroBias(at_rest, seconds, course, change)
 
 
-def _at_rest(time: Times, rate: Array) -> tuple[Array, Array]:
-    """Second means of the rates, where neighbours are alike: (K,) s, (K, 3)."""
+def _at_rest(time: Times, rate: Array, force: Array) -> tuple[Array, Array]:
+    """Second means of the rates, where neighbours are alike and gravity stays where it is: (K,) s, (K, 3)."""
     nothing = np.zeros(0), np.zeros((0, 3))
     if time.size < 50:
         return nothing
     second = ((time - time[0]) * 1e-6 / REST_S).astype(np.int64)
     counts = np.bincount(second)
-    means = np.column_stack([np.bincount(second, axis) / np.maximum(counts, 1) for axis in rate.T])
+    means, pulls = (
+        np.column_stack([np.bincount(second, axis) / np.maximum(counts, 1) for axis in values.T])
+        for values in (rate, force)
+    )
     at = time[0] * 1e-6 + REST_S * (np.arange(counts.size) + 0.5)
     full = counts > 0.8 * np.median(counts)
-    means, at = means[full], at[full]
+    means, pulls, at = means[full], pulls[full], at[full]
     if len(means) < 2:
         return nothing
     near = np.abs(np.diff(means, axis=0)).max(axis=1) < REST_RATE_RAD_S
+    near &= np.linalg.norm(np.diff(pulls, axis=0), axis=1) < REST_FORCE_M_S2
     still = np.r_[near, False] | np.r_[False, near]
     # a vehicle that is carried turns by its neighbours' differences, one at rest does not
     return (at[still], means[still]) if np.mean(still) > 0.5 else nothing

@@ -93,6 +93,9 @@ def magnetometer_signs(
     noise = reading_noise / np.sqrt(together)
     known = heading[0] if heading is not None and heading[1] < CERTAIN_HEADING else None
     fits = field_fits(readings, earth, known)
+    if known is not None and _is_heading_wrong(fits, known):
+        known = None
+        fits = field_fits(readings, earth, known)
     strength = float(np.linalg.norm(earth))
     at = known if known is not None else fits["body_field"].heading
     still = ((airborne[0][0] - 60_000_000, airborne[0][0] - 500_000),)
@@ -119,6 +122,20 @@ def magnetometer_signs(
         undisturbed=calm,
         compass_off=_compass_off(readings, earth, at),
     )
+
+
+def _is_heading_wrong(fits: dict[str, FieldFit], heading: float) -> bool:
+    """Whether the heading of GNSS is off and not the magnetometer, whose readings fit under another one alone.
+
+    A field of the body turns with the vehicle and does not; a mounting does, but by more than `MOST_OFF`. Legs along
+    one line tell GNSS the heading worse than its error says.
+    """
+    own = fits["own_heading"]
+    off = abs(float(np.angle(np.exp(1j * (own.heading - heading)))))
+    return own.left < 0.5 * fits["body_field"].left and off < MOST_OFF
+
+
+MOST_OFF = np.radians(35.0)
 
 
 def _compass_off(readings: FieldReadings, earth: Array, heading: float) -> float:

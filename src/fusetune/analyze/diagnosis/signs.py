@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.diagnosis.airspeed_signs import AirspeedSigns, airspeed_signs
 from fusetune.analyze.diagnosis.barometer_signs import BarometerSigns, barometer_signs
 from fusetune.analyze.diagnosis.beam_signs import RangeSigns, range_signs
@@ -18,6 +19,7 @@ from fusetune.analyze.diagnosis.imu_signs import GyroBias, ImuSigns, gyro_bias, 
 from fusetune.analyze.diagnosis.innovation_signs import SourceRatios, flown_ratios, replayed_ratios
 from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns, magnetometer_signs
 from fusetune.analyze.diagnosis.motion import Motion, motion_of
+from fusetune.analyze.diagnosis.told_effects import ToldEffects
 from fusetune.analyze.diagnosis.vision_signs import VisionSigns, vision_signs
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
@@ -105,7 +107,7 @@ class Signs:
     @cached_property
     def gnss(self) -> GnssSigns | None:
         """Messages of the receiver."""
-        return gnss_signs(self.table("vehicle_gps_position"), self.airborne)
+        return gnss_signs(self.table("vehicle_gps_position"), self.airborne, self.motion)
 
     @cached_property
     def gnss_sound(self) -> tuple[Interval, ...]:
@@ -132,6 +134,16 @@ class Signs:
         if self.motion is None:
             return None
         return gnss_motion(self.table("vehicle_gps_position"), self.motion, self.gnss_sound, self.parameters)
+
+    @cached_property
+    def told_by(self) -> ToldEffects:
+        """Estimates of the tuners of single effects."""
+        return ToldEffects(self.observed if self.is_replayed else None)
+
+    @property
+    def gnss_place(self) -> VelocityPlace | None:
+        """Delay and antenna by the smoothed velocity; dearer than other signs, so asked where one speaks."""
+        return self.observed.gnss_place if self.is_replayed else None
 
     @cached_property
     def magnetometer(self) -> MagnetometerSigns | None:

@@ -34,4 +34,6 @@ def _lines(found: Diagnosis, one: DiagnosedLog) -> Iterator[str]:
     yield f"    when: from {since:.0f} s to {until:.0f} s of the log; {how} ({found.confidence:.0%})"
     for sign in found.signs:
         yield f"    why: {sign.words}"
+    if found.trial is not None:
+        yield f"    tried: {found.trial.words}"
     yield f"    do: {found.remedy}"

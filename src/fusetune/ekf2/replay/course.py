@@ -56,7 +56,7 @@ class Course:
         """
         before = self.branch()
         for begin, end in self.stretches(0, 1):
-            self.run(begin, end)
+            self.advance(begin, end)
         fresh = self.ekf.copy()
         run = self.reach(1, state.time_us)
         if self.ekf["time_delayed_us"][0] < state.time_us:
@@ -73,10 +73,10 @@ class Course:
         lag = max(int(self.ekf["time_latest_us"][0]) - horizon - HORIZON_MARGIN_US, 0) if horizon else 0
         near = min(max(int(np.searchsorted(self.inputs.arrays.imu["time_us"], time_us + lag)), run), runs)
         for begin, end in self.stretches(run, near):
-            self.run(begin, end)
+            self.advance(begin, end)
         while near < runs and self.ekf["time_delayed_us"][0] < time_us:
             for begin, end in self.stretches(near, near + 1):
-                self.run(begin, end)
+                self.advance(begin, end)
             near += 1
         return near
 
@@ -101,11 +101,15 @@ class Course:
 
     def run(self, start: int, stop: int) -> RecordArrays:
         """Process some runs; copies of what they recorded."""
-        self.recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
-        views, arrays = views_of(self.ekf), self.inputs.arrays.of_runs(start, stop)
-        run_estimator(self.ekf[0], self.params[0], arrays, views, self.recorder[0], self.records, stop - start)
+        self.advance(start, stop)
         done = self.recorder[0]
         counts = (done["innovation_rows"], done["update_rows"], done["update_rows"], done["flag_rows"])
         return RecordArrays(
             *(joined_rows([rows[:count]], rows.dtype) for rows, count in zip(self.records, counts, strict=True))
         )
+
+    def advance(self, start: int, stop: int) -> None:
+        """Process some runs; what they record stays until the next."""
+        self.recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
+        views, arrays = views_of(self.ekf), self.inputs.arrays.of_runs(start, stop)
+        run_estimator(self.ekf[0], self.params[0], arrays, views, self.recorder[0], self.records, stop - start)

@@ -105,10 +105,12 @@ def _cause(diagnosis: Document, times: FlightTimes, is_told: bool) -> str:
     """One cause; when, how sure and what to do are left out where the head of the page has told them."""
     seen = [one for one in diagnosis["evidence"] if one["origin"] != "replay"]
     replayed = [one for one in diagnosis["evidence"] if one["origin"] == "replay"]
+    tried = diagnosis.get("experiment")
     parts = [
         "" if is_told else _facts(diagnosis, times),
         _headed("What the log shows", bullets([_sign(one) for one in seen])),
         _headed("What the replay shows", bullets([_sign(one) for one in replayed])),
+        _headed("What was tried", paragraph(_sentence(_capital(tried["words"]))) if tried else ""),
         _headed("Values to set", bullets(list(_values_to_set(diagnosis["values"])))),
         _headed("Measured", bullets(list(_measured(diagnosis["values"])))),
         "" if is_told else _headed("What to do", _what_to_do(diagnosis)),
@@ -166,6 +168,10 @@ def _measured(values: Mapping[str, float]) -> Iterator[str]:
     for name, value in values.items():
         if not name.isupper() and value is not None:
             yield figure_in_words(name, value)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _sentence(text: str) -> str:

@@ -19,6 +19,8 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     if off < level:
         return None
     told = signs.parameters.get("ASPD_SCALE_1", 1.0)
+    tuned = signs.told_by("airspeed").get("ASPD_SCALE_1")
+    mended = tuned.value if tuned is not None else told / one.scale
     words = f"airspeed is {one.scale:.2f} (±{2.0 * one.error:.2f}) times what velocity and wind make"
     return diagnosed(
         signs,
@@ -28,6 +30,6 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         confidence(off, level, 0.95),
         [Sign(words, off, OFF_FROM, "1", "replay")],
         touches=("airspeed",),
-        remedy=f"Set ASPD_SCALE_1 to {told / one.scale:.2f}; check the tube's place and hoses first",
-        values={"ASPD_SCALE_1": round(told / one.scale, 3)},
+        remedy=f"Set ASPD_SCALE_1 to {mended:.2f}; check the tube's place and hoses first",
+        values={"ASPD_SCALE_1": round(mended, 3)},
     )

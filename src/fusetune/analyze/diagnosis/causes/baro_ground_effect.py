@@ -20,7 +20,10 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     dip, error = -errors.ground.value, errors.ground.error
     if dip < DIP_FROM_M + SIGMAS * error or abs(errors.thrust.value) > dip:
         return None
-    zone = round(MARGIN * dip, 1)
+    told = signs.told_by("ground_effect").get("EKF2_GND_EFF_DZ")
+    if told is not None and told.upper < MARGIN * DIP_FROM_M:
+        return None
+    zone = round(told.value if told is not None else MARGIN * dip, 1)
     words = f"near the ground the barometer reads {dip:.1f} m (±{2.0 * error:.1f}) less"
     return diagnosed(
         signs,

@@ -24,6 +24,9 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     off, other = abs(one.scale - 1.0), abs(by_turning - 1.0)
     if off < LEAST_OFF or (one.scale - 1.0) * (by_turning - 1.0) <= 0.0 or other < OFF_FROM + SIGMAS * by_turning_error:
         return None
+    tuned = signs.told_by("flow").get("SENS_FLOW_SCALE")
+    values = {"flow_scale": round(by_turning, 3)} if tuned is None else {"SENS_FLOW_SCALE": round(tuned.value, 3)}
+    factor = 1.0 / max(by_turning, 0.1) if tuned is None else tuned.value
     found = [
         Sign(f"flow is {one.scale:.2f} times what the motion over the ground makes", off, OFF_FROM, "1", "replay"),
         Sign(f"and {by_turning:.2f} times what turning makes", other, OFF_FROM, "1", "replay"),
@@ -36,6 +39,6 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         confidence(off, OFF_FROM, 0.95),
         found,
         touches=("optical_flow",),
-        values={"flow_scale": round(by_turning, 3)},
-        remedy=f"Correct the sensor's scale by {1.0 / max(by_turning, 0.1):.2f} (SENS_FLOW_SCALE, or its lens)",
+        values=values,
+        remedy=f"Correct the sensor's scale by {factor:.2f} (SENS_FLOW_SCALE, or its lens)",
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fusetune.analyze.delays.velocity_place import velocity_place
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
@@ -15,7 +14,7 @@ FAILS_FROM_MS = 150.0
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:
-    """By the velocity's error in proportion to the acceleration, confirmed by the smoothed velocity's own estimate."""
+    """By the velocity's error in proportion to the acceleration; the value is that of the smoothed velocity."""
     motion = signs.gnss_motion
     if motion is None:
         return None
@@ -24,26 +23,17 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     off = value - told
     if abs(off) < MATTERS_MS + SIGMAS * error:
         return None
-    words = (
-        f"velocity lags behind the motion by {value:.0f} ms (±{2.0 * SIGMAS / 2.0 * error:.0f}), PX4 is told {told:.0f}"
-    )
+    words = f"velocity lags behind the motion by {value:.0f} ms (±{SIGMAS * error:.0f}), PX4 is told {told:.0f}"
     found = [Sign(words, abs(off), MATTERS_MS + SIGMAS * error, "ms", "replay")]
-    place = velocity_place(signs.observed.replayed, "gnss_vel", signs.gnss_sound, told * 1e-3)
-    smooth = None if place is None else place.lag
-    if smooth is not None:
-        again, spread = 1e3 * smooth.delay_s, 1e3 * smooth.standard_error_s
+    place = signs.gnss_place
+    if place is not None:
+        # the estimate that is told of the flight elsewhere, too; the regression above is what it costs to ask whether
+        again, spread = 1e3 * place.lag.delay_s, 1e3 * place.lag.standard_error_s
         if (again - told) * off <= 0.0 or abs(again - told) < 0.5 * MATTERS_MS + CONFIRMED_SIGMAS * spread:
             return None
-        found.append(
-            Sign(
-                f"the smoothed velocity says {again:.0f} ms (±{2.0 * spread:.0f})",
-                abs(again - told),
-                MATTERS_MS,
-                "ms",
-                "replay",
-            )
-        )
-        value = (value / error**2 + again / spread**2) / (error**-2 + spread**-2)
+        words = f"the smoothed velocity says {again:.0f} ms (±{2.0 * spread:.0f})"
+        found.insert(0, Sign(words, abs(again - told), MATTERS_MS, "ms", "replay"))
+        value = again
     limit = PARAMETERS["EKF2_GPS_DELAY"]
     mended = min(max(10.0 * round(value / 10.0), limit.minimum or 0.0), limit.maximum or 300.0)
     return diagnosed(
@@ -51,7 +41,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         "gnss_delay",
         f"GNSS is {value:.0f} ms late, and PX4 is told {told:.0f}",
         "fail" if abs(off) > FAILS_FROM_MS else "warning",
-        confidence(abs(off), MATTERS_MS + SIGMAS * error, 0.95 if smooth is not None else 0.8),
+        confidence(abs(off), MATTERS_MS + SIGMAS * error, 0.95 if place is not None else 0.8),
         found,
         touches=("gnss_vel", "gnss_pos"),
         values={"EKF2_GPS_DELAY": mended},

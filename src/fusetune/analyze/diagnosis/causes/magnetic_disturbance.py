@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
-from fusetune.analyze.diagnosis.causes.magnetometer_scale import as_sure_of_a_field, scaled, scaled_down
+from fusetune.analyze.diagnosis.causes.magnetometer_scale import as_sure_of_a_field, down_axis, scaled, scaled_down
 from fusetune.analyze.diagnosis.causes.motor_magnetic_field import in_step
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.signs import Signs
@@ -40,13 +40,16 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     body = np.array([fits["body_field"].values[f"body_field_{axis}"] for axis in "xyz"])
     size = float(np.linalg.norm(body)) / earth
     if one.by_gnss and size > BODY_FROM and fits["body_field"].left < 0.4 * fits["as_told"].left:
+        down = down_axis(signs) if scaled_down(one) is not None else False
+        if down:
+            return None
         words = f"a constant field of the body of {size:.0%} of the earth's was not calibrated"
         return _diagnosis(
             signs,
             "The compass feels a constant field of the body",
             [Sign(words, size, BODY_FROM, "1", "replay")],
             None,
-            as_sure_of_a_field(one) if scaled_down(one) is not None else 1.0,
+            as_sure_of_a_field(one) if down is None else 1.0,
         )
     found = []
     if abs(one.strength - 1.0) > STRENGTH_FROM:

@@ -24,10 +24,16 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return None
     scale = scaled(one)
     is_sure = scale is not None
-    scale = scale if scale is not None else scaled_down(one)
     if scale is None:
-        return None
+        scale = scaled_down(one)
+        down = down_axis(signs) if scale is not None else None
+        if scale is None or down is False:
+            return None
+        is_sure = down is True
+    scale = _tuned(signs, scale)
     off = float(np.abs(scale - 1.0).max())
+    if off < OFF_FROM:
+        return None
     told = ", ".join(f"{axis} {value:.2f}" for axis, value in zip("xyz", scale, strict=True))
     words = f"readings are the field times {told}"
     return diagnosed(
@@ -52,6 +58,9 @@ def scaled(one: MagnetometerSigns) -> np.ndarray | None:
         left = max(fits[name].left ** 2 - noise2, 0.0)
         scale = np.array([fits[name].values[f"scale_{axis}"] for axis in "xyz"])
         if (scale <= 0.2).any() or float(np.abs(scale - 1.0).max()) < OFF_FROM:
+            continue
+        # a field of the body comes before a scale that leaves as much
+        if fits[name].left > fits["body_field"].left:
             continue
         if left < least * as_told and left < 0.7 * body and one.by_gnss:
             return scale
@@ -78,6 +87,37 @@ def scaled_down(one: MagnetometerSigns) -> np.ndarray | None:
 
 
 UPRIGHT = 0.4
+
+
+def down_axis(signs: Signs) -> bool | None:
+    """Whether it is the scale of the down axis that is off, or a field along it: None where tilts do not tell.
+
+    The tuner of the effect fits both beside each other.
+    """
+    down = _scales(signs).get("Z")
+    if down is None:
+        return None
+    value, lower, upper = down
+    if abs(value - 1.0) > OFF_FROM:
+        return True
+    return False if max(abs(lower - 1.0), abs(upper - 1.0)) < OFF_FROM else None
+
+
+def _tuned(signs: Signs, scale: np.ndarray) -> np.ndarray:
+    """Scale (3,) with the axes that the tuner of the effect tells."""
+    told = _scales(signs)
+    return np.array([told[axis][0] if axis in told else one for axis, one in zip("XYZ", scale, strict=True)])
+
+
+def _scales(signs: Signs) -> dict[str, tuple[float, float, float]]:
+    """Reading over field of each axis that the tuner tells, with its interval; what it tells is what mends that."""
+    found = {}
+    for name, one in signs.told_by("magnetometer").items():
+        if name.endswith("SCALE") or name.startswith("magnetometer_scale_"):
+            now = one.told if one.told is not None else 1.0
+            axis = name[-6] if name.endswith("SCALE") else name[-1].upper()
+            found[axis] = now / one.value, now / one.upper, now / one.lower
+    return found
 
 
 def as_sure_of_a_field(one: MagnetometerSigns) -> float:

@@ -41,8 +41,18 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         [Sign(words, size, FIELD_FROM, "1", "replay")],
         touches=("mag",),
         remedy=REMEDY,
-        values={f"motor_field_{axis}_gauss": round(float(value), 4) for axis, value in zip("xyz", field, strict=True)},
+        values=_tuned(signs)
+        or {f"motor_field_{axis}_gauss": round(float(value), 4) for axis, value in zip("xyz", field, strict=True)},
     )
+
+
+def _tuned(signs: Signs) -> dict[str, float]:
+    """What the tuner of the effect tells: PX4's compensation, or the field over what the motors draw."""
+    told = signs.told_by("magnetometer")
+    return {name: round(one.value, 4) for name, one in told.items() if name.endswith("COMP") or name in MOTOR_FIELD}
+
+
+MOTOR_FIELD = tuple(f"motor_field_{axis}" for axis in "xyz")
 
 
 def in_step(one: MagnetometerSigns) -> np.ndarray | None:

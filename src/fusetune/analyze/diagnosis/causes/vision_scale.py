@@ -18,6 +18,8 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     off, level = abs(one.scale - 1.0), OFF_FROM + SIGMAS * one.scale_error
     if off < level or one.scale < 0.05:
         return None
+    tuned = signs.told_by("vision").get("vision_scale")
+    scale = tuned.value if tuned is not None else one.scale
     words = f"vision's way is {one.scale:.2f} (±{2.0 * one.scale_error:.2f}) times the vehicle's"
     return diagnosed(
         signs,
@@ -27,6 +29,6 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         confidence(off, level, 0.95),
         [Sign(words, off, OFF_FROM, "1", "replay")],
         touches=("ev",),
-        values={"vision_scale": round(one.scale, 3)},
-        remedy=f"Give vision its scale (stereo, IMU or a known length), or divide by {one.scale:.2f} before it is sent",
+        values={"vision_scale": round(scale, 3)},
+        remedy=f"Give vision its scale (stereo, IMU or a known length), or divide by {scale:.2f} before it is sent",
     )
