@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from fusetune.analyze.analyze_flight import AnalysisSettings
 from fusetune.analyze.delays.lag import Lag
-from fusetune.analyze.delays.sensor_delays import ARM_PARAMETERS
 from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.apply.search.kept_pairs import KeptPairs
 from fusetune.apply.search.measured_place import DELAY
@@ -25,6 +24,7 @@ from fusetune.apply.search.workers import FlightTrier
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.around_present import not_exercised
 from fusetune.design.search_settings import SearchSettings
+from fusetune.design.tunable_parameters import ARM_PARAMETERS
 from fusetune.save.exercise import exercise_of
 from fusetune.save.flight_folder import read_metadata
 

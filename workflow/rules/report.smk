@@ -115,6 +115,9 @@ rule sensors:
     input:
         expand("results/report/sensors/{flight}.html", flight=LOGS),
         "results/report/all_sensors.html",
+    resources:
+        mem_mb=LIBRARIES_MB,
+        runtime=5,
 
 
 rule fleet_page:

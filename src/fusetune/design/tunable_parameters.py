@@ -18,6 +18,9 @@ from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 Kind = Literal["process noise", "bias noise", "measurement noise", "gate", "delay", "lever arm"]
 Scale = Literal["log", "linear"]
 
+ARM_PARAMETERS = {"gnss": ("EKF2_GPS_POS_X", "EKF2_GPS_POS_Y", "EKF2_GPS_POS_Z")}
+"""Sensor of velocities → parameters that tell PX4 where it is."""
+
 DELAY_LIMIT, DELAY_SUFFIX = "EKF2_DELAY_MAX", "_DELAY"
 
 

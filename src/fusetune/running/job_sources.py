@@ -63,7 +63,7 @@ JOB_SOURCES = {
     "score": (*BASE, "ekf2", "save", *_SCORED),
     "apply": (*BASE, "analyze/delays", "analyze/effects", "analyze/trials", "design", "apply"),
     "search": (*TRIED, "analyze/effects", "apply"),
-    "report": (*BASE, "design", "apply", "report"),
+    "report": (*BASE, "analyze/diagnosis", "design", "apply", "report"),
 }
 """Kind of job → files and folders of the package."""
 

@@ -16,7 +16,7 @@ from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
-from fusetune.design.tunable_parameters import DELAY_LIMIT
+from fusetune.design.tunable_parameters import ARM_PARAMETERS, DELAY_LIMIT
 from fusetune.px4.aid_sources import AID_SOURCES, SENSORS
 from fusetune.px4.flight import Flight
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
@@ -33,8 +33,6 @@ LAGGED: Mapping[str, Series] = {
 }  # fmt: skip
 """Sensor → its measurements beside the motion; velocities are estimated by `velocity_place`."""
 VELOCITIES = {"gnss": "gnss_vel"}
-ARM_PARAMETERS = {"gnss": ("EKF2_GPS_POS_X", "EKF2_GPS_POS_Y", "EKF2_GPS_POS_Z")}
-"""Sensor of velocities → parameters that tell PX4 where it is."""
 IMU_PARAMETERS = ("EKF2_IMU_POS_X", "EKF2_IMU_POS_Y", "EKF2_IMU_POS_Z")
 
 

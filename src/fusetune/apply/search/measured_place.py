@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from fusetune.analyze.delays.pooled_place import pooled_place
-from fusetune.analyze.delays.sensor_delays import ARM_PARAMETERS
 from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.apply.search.space import Space
+from fusetune.design.tunable_parameters import ARM_PARAMETERS
 from fusetune.px4.aid_sources import SENSORS
 
 _ERRORS = 3.0

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fusetune.analyze.delays.sensor_delays import ARM_PARAMETERS
 from fusetune.design.search_settings import SearchSettings
-from fusetune.design.tunable_parameters import DELAY_SUFFIX
+from fusetune.design.tunable_parameters import ARM_PARAMETERS, DELAY_SUFFIX
 from fusetune.px4.aid_sources import SENSORS
 
 if TYPE_CHECKING:
