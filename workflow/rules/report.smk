@@ -93,7 +93,8 @@ rule sensor_page:
 
 rule all_sensors_page:
     input:
-        expand("results/analyze/{flight}/sensor_noise.json", flight=LOGS),
+        noise=expand("results/analyze/{flight}/sensor_noise.json", flight=LOGS),
+        health=expand("results/analyze/{flight}/health.json", flight=LOGS),
     output:
         "results/report/all_sensors.html",
     log:

@@ -1,5 +1,6 @@
 """Draw each sensor over all flights, and write their page."""
 
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
@@ -12,4 +13,5 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
-    build_pooled_sensor_page(list(snakemake.input), figures, snakemake.output[0], {"All flights": "results/fleet.html"})
+    folders = [Path(file).parent for file in snakemake.input.noise]
+    build_pooled_sensor_page(folders, figures, snakemake.output[0], {"All flights": "results/fleet.html"})

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from fusetune.analyze.flight_files import SENSOR_NOISE_FILE
+from fusetune.analyze.flight_files import HEALTH_FILE, SENSOR_NOISE_FILE
 from fusetune.analyze.sensor_noise.pooled import pooled_sensors
 from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise_of
 from fusetune.report.figures.noise_figures import plot_pooled_sensors, plot_sensor_noise
@@ -51,28 +52,43 @@ def build_sensor_page(
 
 
 def build_pooled_sensor_page(
-    noise_files: Sequence[AnyPath], figure_folder: AnyPath, output: AnyPath, pages: Mapping[str, AnyPath] | None = None
+    flight_folders: Sequence[AnyPath],
+    figure_folder: AnyPath,
+    output: AnyPath,
+    pages: Mapping[str, AnyPath] | None = None,
 ) -> None:
-    """Draw each sensor over the flights that it was on, and write their page as one HTML file.
+    """Draw each sensor of each vehicle over the flights that it was on, and write their page as one HTML file.
 
     Parameters
     ----------
-    noise_files : `results/analyze/<flight>/sensor_noise.json`, oldest flight first
+    flight_folders : `results/analyze/<flight>` with `sensor_noise.json` and `health.json`, oldest flight first
     figure_folder : takes the figures
     output : `results/report/all_sensors.html`
     pages : words → other pages that it leads to
     """
-    documents = [read_document(file) for file in noise_files]
-    pooled = pooled_sensors([one for one in documents if one["sensors"]])
+    # the ids of devices are those of bus and address, so vehicles share them
+    by_vehicle: dict[str, list[dict[str, Any]]] = {}
+    for folder in map(Path, flight_folders):
+        told = read_document(folder / SENSOR_NOISE_FILE)
+        if told["sensors"]:
+            by_vehicle.setdefault(read_document(folder / HEALTH_FILE)["vehicle"], []).append(told)
     parts = [page_links(pages or {}, output)]
-    drawn = plot_pooled_sensors(pooled, figure_folder) if pooled else ()
-    for one, picture in zip(pooled, drawn, strict=False):
-        device = f", device {one.device_id}" if one.device_id else ""
-        count = f"{len(one.flights)} flight{'s' if len(one.flights) != 1 else ''}"
-        parts.append(section(f"{one.sensor.name}{device}, {count}", figure(picture, _POOLED)))
-    # of all sensors together, behind theirs
-    parts += [section("Allan deviation", figure(picture, _POOLED_ALLAN)) for picture in drawn[len(pooled) :]]
-    if not pooled:
+    for number, (vehicle, documents) in enumerate(by_vehicle.items()):
+        parts += _of_vehicle(vehicle or "Unknown vehicle", documents, Path(figure_folder) / str(number))
+    if not by_vehicle:
         parts.append(paragraph("No log's sensors could be read."))
     Path(output).parent.mkdir(parents=True, exist_ok=True)
     write_page(output, PageHead("All sensors", "All sensors, over all flights", "each device by itself"), parts)
+
+
+def _of_vehicle(vehicle: str, documents: Sequence[Mapping[str, Any]], figures: Path) -> list[str]:
+    pooled = pooled_sensors(documents)
+    drawn = plot_pooled_sensors(pooled, figures)
+    parts = []
+    for one, picture in zip(pooled, drawn, strict=False):
+        device = f", device {one.device_id}" if one.device_id else ""
+        count = f"{len(one.flights)} flight{'s' if len(one.flights) != 1 else ''}"
+        parts.append(section(f"{vehicle}: {one.sensor.label}{device}, {count}", figure(picture, _POOLED)))
+    # of all sensors together, behind theirs
+    parts += [section(f"{vehicle}: Allan deviation", figure(one, _POOLED_ALLAN)) for one in drawn[len(pooled) :]]
+    return parts
