@@ -29,7 +29,7 @@ from fusetune.save.exercise import exercise_of
 from fusetune.save.flight_folder import read_metadata
 
 from .true_figures import FIGURES, JudgedFlight, KeptFigures
-from .truth_ground import TruthGround
+from .truth_ground import TruthGround, change_percent
 from .worlds import FRESH, SEARCHED, SearchWorld
 
 Array = npt.NDArray[np.float64]
@@ -120,8 +120,7 @@ class WorldSearch:
 
     def change_percent(self, values: Mapping[str, float]) -> Array:
         """(4,) of the mean true figures on fresh flights against those of the present set."""
-        own, present = (self.truth.figures(one, list(FRESH)).mean(axis=0) for one in (values, {}))
-        return np.asarray(100.0 * (own / present - 1.0))
+        return change_percent(self.truth, values, FRESH)
 
     def _right(self, name: str, found: Mapping[str, float]) -> float:
         """As the world has it; else where the true velocity error is smallest, by a parabola through the best three."""

@@ -11,6 +11,8 @@ RUN_AGAIN = "Delete it and run the pipeline again"
 """What mends a damaged file of results."""
 FOLDER_AGAIN = "Delete the whole folder {folder} and run the pipeline again"
 """What mends a file in the folder of a saved flight: the pipeline knows the folder, not the files in it."""
+OF_DAMAGE = (LookupError, ValueError, TypeError, ArithmeticError)
+"""What code ends in that is given a log from which damage, or the logger, took a topic, a field or its values."""
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 _MAKE_ROOM = "Make room on that disk and start again; what is finished stays"

@@ -22,6 +22,7 @@ from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise, sensor_noise
+from fusetune.errors import OF_DAMAGE
 from fusetune.finding import from_documents, of_severity
 from fusetune.px4.flight import Flight
 from fusetune.px4.ulog.used_topics import is_used
@@ -32,9 +33,6 @@ from fusetune.storage.files import AnyPath, atomic_path
 Told = TypeVar("Told")
 
 REPLAYABLE = "replayable"
-
-_DAMAGED = (LookupError, ValueError, TypeError, ArithmeticError)
-"""What a topic or a field that is missing can end in."""
 
 
 def diagnose_flight(
@@ -111,7 +109,7 @@ class _Asked:
     def about(self, what: str, nothing: Told, ask: Callable[[], Told]) -> Told:
         try:
             return ask()
-        except _DAMAGED as error:
+        except OF_DAMAGE as error:
             # a flight whose verdict is sound has all that is asked for: then it is a fault of the program
             if self._is_replayable:
                 raise

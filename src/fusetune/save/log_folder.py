@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusetune.errors import UserError
+from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.ekf2_parameters import migrate
@@ -148,8 +148,7 @@ def _demand_checksum(source: _Source, read: str) -> None:
 def _judge(flight: Flight, thresholds: VerdictThresholds, deadline: Deadline) -> Verdict:
     try:
         return judge(canonical(flight), thresholds, deadline)
-    except (LookupError, ValueError, TypeError, ArithmeticError) as error:
-        # damage can take any field away from any topic
+    except OF_DAMAGE as error:
         reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
         return unreadable(flight.name, UserError(flight.name, reason, "Copy the log from the vehicle again"))
 

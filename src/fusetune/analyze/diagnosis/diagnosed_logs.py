@@ -13,7 +13,7 @@ from fusetune.analyze.diagnosis.experiments import AT_MOST
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
-from fusetune.errors import UserError
+from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.finding import Finding, of_severity
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.discovery import discover_logs, printable
@@ -22,8 +22,6 @@ from fusetune.storage.files import AnyPath
 
 AS_FLOWN = ReplaySettings(None, ReconstructionSettings(), StartSettings())
 """The log is repaired and started as the pipeline does it; what a filter predicts without a sensor is not asked."""
-_DAMAGED = (LookupError, ValueError, TypeError, ArithmeticError)
-"""What damage can end in that leaves no field of a topic in its place."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
     except OSError as error:
         reason = f"cannot be read ({error.strerror or error})"
         return DiagnosedLog(shown, error=UserError(shown, reason, "Mend its permissions, or copy it again"))
-    except _DAMAGED as error:
+    except OF_DAMAGE as error:
         if refused:
             return DiagnosedLog(shown, error=_untold(shown, refused))
         reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"

@@ -8,7 +8,7 @@ from fusetune.analyze.replaying.prepared_flight import prepare
 from fusetune.analyze.replaying.replay_flight import write_replay
 from fusetune.analyze.replaying.set_input import read_set_files
 from fusetune.analyze.replaying.settings import ReplaySettings
-from fusetune.errors import UserError
+from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.px4.layouts.estimator_instances import of_one_instance
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
@@ -48,8 +48,7 @@ def replay_log(
     flown = flight if settings.reconstruction is not None else of_one_instance(flight)
     try:
         prepared = prepare(canonical(flown), settings.reconstruction, settings.start)
-    except (LookupError, ValueError, TypeError, ArithmeticError) as error:
-        # damage, or the logger, can take any topic and any field away
+    except OF_DAMAGE as error:
         reason = f"cannot be replayed ({type(error).__name__}: {error})"
         raise UserError(log, reason, "See what the command `fusetune save` says of it") from error
     for name, (params, overrides) in sets.items():
