@@ -112,7 +112,7 @@ class Place:
 def make_place(folder: Path, target: str) -> Place:
     """A working folder; its two logs are the same flight with other noise."""
     sys.path.insert(0, str(ROOT / "src"))
-    from fusetune.design.mission import load_mission
+    from fusetune.design.missions.mission import load_mission
     from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
     from fusetune.execute import simulate
     from fusetune.execute.vehicle import load_vehicle

@@ -109,7 +109,7 @@ def peak_bytes() -> int:
 
 def simulated(log: Path, minutes: float, with_estimator: bool) -> tuple[Path, float]:
     """Write a simulated flight of about this length, laps of the survey mission; the time that took."""
-    from fusetune.design.mission import load_mission
+    from fusetune.design.missions.mission import load_mission
     from fusetune.execute.simulation import fly
     from fusetune.execute.vehicle import load_vehicle
     from fusetune.execute.world.flight_plan import plan_flight

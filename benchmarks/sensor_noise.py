@@ -20,7 +20,7 @@ from fusetune.analyze.flight.phases import airborne_intervals
 from fusetune.analyze.sensor_noise.allan import KINDS, allan_curve
 from fusetune.analyze.sensor_noise.allan_fit import NoiseFigure, allan_figures
 from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.execute.noise import gauss_markov, random_walk, white_noise
 from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import load_vehicle

@@ -25,7 +25,7 @@ from fusetune.analyze.scoring.score_flight import score_saved_flight
 from fusetune.analyze.sensors.source_whiteness import horizon_s
 from fusetune.apply.consistency import SourceNoise, source_noises
 from fusetune.apply.settings import DecisionSettings
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import GnssError, Vehicle

@@ -33,7 +33,7 @@ from fusetune.analyze.trust.compared_innovations import replayed_innovations
 from fusetune.analyze.trust.fidelity import NLL_CAP, NLL_SOURCES
 from fusetune.analyze.trust.grade import grade_flight
 from fusetune.analyze.trust.grade_causes import cost_of
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.results import ReplayResult

@@ -88,7 +88,7 @@ def up_to_date(request: pytest.FixtureRequest) -> UpToDate:
 @pytest.fixture(scope="session")
 def survey_flight(project_root: Path) -> Flight:
     """The survey mission as a simulated vehicle flies it, with its own estimator on board; not to be changed."""
-    from fusetune.design.mission import load_mission
+    from fusetune.design.missions.mission import load_mission
     from fusetune.execute.simulation import fly
     from fusetune.execute.vehicle import load_vehicle
     from fusetune.px4.layouts.release_layouts import canonical

@@ -18,7 +18,7 @@ from fusetune.analyze.delays.flight_delays import write_delays
 from fusetune.analyze.replaying.replay_flight import replay_saved_flight
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings, WithholdingSettings
 from fusetune.analyze.scoring.score_flight import score_saved_flight
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.design.study import load_study
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import Vehicle, load_vehicle

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fusetune.design.mission import Mission
+from fusetune.design.missions.mission import Mission
 from fusetune.execute.right_values import right_values
 from fusetune.execute.sensors.faults import Fault, parse_faults
 from fusetune.execute.vehicle import Vehicle

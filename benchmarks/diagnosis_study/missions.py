@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusetune.design.mission import Home, Landing, Mission, Takeoff, Waypoint
+from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Waypoint
 
 LAT, LON, ALT = 47.397742, 8.545594, 488.0
 METRES_PER_DEGREE = math.pi / 180.0 * 6_371_008.8

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fusetune.configuration import Configuration
-from fusetune.design.mission import Mission, load_mission
+from fusetune.design.missions.mission import Mission, load_mission
 from fusetune.design.study import Study, load_study
 from fusetune.errors import UserError
 from fusetune.execute.sensors.faults import parse_faults

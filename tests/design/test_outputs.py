@@ -40,7 +40,8 @@ def test_parameter_file_has_lines_as_qgroundcontrol_reads_them(project_root: Pat
 
 def test_reading_a_study_loads_no_numeric_library(project_root: Path) -> None:
     code = (
-        "import sys; from fusetune.design.study import load_study; from fusetune.design.mission import load_mission;"
+        "import sys; from fusetune.design.study import load_study; "
+        "from fusetune.design.missions.mission import load_mission;"
         "print(sorted({'numpy', 'pandas', 'pyarrow', 'scipy', 'numba', 'matplotlib'} & set(sys.modules)))"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

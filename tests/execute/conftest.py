@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fusetune.design.mission import Home, Landing, Mission, Takeoff, Waypoint
+from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Waypoint
 from fusetune.execute.vehicle import InertialSensor, Vehicle, Vibration, load_vehicle
 from fusetune.execute.world.flight_plan import FlightPlan, plan_flight
 from fusetune.execute.world.truth import Truth, simulate_truth

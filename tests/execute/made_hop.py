@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.shared_folder import ROOT
 
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import load_vehicle
 

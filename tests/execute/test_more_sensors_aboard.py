@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from fusetune.design.mission import Mission
+from fusetune.design.missions.mission import Mission
 from fusetune.execute.logger import NO_SAMPLE
 from fusetune.execute.sensors.faults import DefaultProfile, Fault, InstanceWhipsaw, ToldWrong, parse_faults
 from fusetune.execute.simulation import fly

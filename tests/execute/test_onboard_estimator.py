@@ -9,7 +9,7 @@ import pytest
 from pyulog import ULog
 from scipy.spatial.transform import Rotation
 
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.replay import replay

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from fusetune.design.mission import Mission
+from fusetune.design.missions.mission import Mission
 from fusetune.errors import UserError
 from fusetune.execute.logger import NO_SAMPLE
 from fusetune.execute.sensors.faults import DefaultProfile, Fault, LoggerDropout, parse_faults

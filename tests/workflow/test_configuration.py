@@ -19,7 +19,7 @@ from tests.settings.configuration_texts import configuration_text, faults_text, 
 
 from fusetune.analyze.replaying.settings import IN_USE
 from fusetune.configuration import Configuration, read_configuration
-from fusetune.design.mission import Mission
+from fusetune.design.missions.mission import Mission
 from fusetune.errors import UserError
 from fusetune.execute.vehicle import Vehicle
 from fusetune.save.thresholds import VerdictThresholds

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.execute import simulate
 from fusetune.execute.sensors.faults import parse_faults
 from fusetune.execute.vehicle import load_vehicle

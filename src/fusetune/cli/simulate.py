@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fly and tell for how long; always `DONE`."""
-    from fusetune.design.mission import load_mission
+    from fusetune.design.missions.mission import load_mission
     from fusetune.execute import simulate
     from fusetune.execute.sensors.faults import load_faults
     from fusetune.execute.vehicle import load_vehicle

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fusetune.design.mission import Mission, Waypoint, load_mission
+from fusetune.design.missions.mission import Mission, Waypoint, load_mission
 from fusetune.design.parameter_sets import ParameterSet
 from fusetune.design.study import Study, load_study
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS

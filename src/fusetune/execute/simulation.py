@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fusetune.design.mission import Mission
+from fusetune.design.missions.mission import Mission
 from fusetune.errors import UserError
 from fusetune.execute.instances import second_imu, with_second_instance
 from fusetune.execute.logger import ekf2_timestamps, logged_topics

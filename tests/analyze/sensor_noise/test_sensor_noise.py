@@ -173,7 +173,7 @@ def test_pooled_over_flights_of_one_device(noise: SensorNoise) -> None:
 
 def test_what_vibration_makes_of_a_simulated_vehicle_is_what_was_put_in(project_root: Path) -> None:
     """`mistuned_quadrotor.yaml`: at rest 0.0025 and 0.00012 per √Hz, vibration at hover 0.08 and 0.006."""
-    from fusetune.design.mission import load_mission
+    from fusetune.design.missions.mission import load_mission
     from fusetune.execute.simulation import fly
     from fusetune.execute.vehicle import load_vehicle
 

@@ -21,7 +21,7 @@ from fusetune.analyze.sensors.source_whiteness import (
     variogram,
     variogram_lags,
 )
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import GnssError, load_vehicle
 

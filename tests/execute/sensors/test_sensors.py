@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from fusetune.design.mission import Mission
+from fusetune.design.missions.mission import Mission
 from fusetune.execute.noise import gauss_markov, random_stream, random_walk
 from fusetune.execute.sensors.barometer import vehicle_air_data
 from fusetune.execute.sensors.faults import GnssGlitch, GnssOutage, MagneticDisturbance

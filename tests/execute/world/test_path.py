@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusetune.design.mission import Home, Landing, Mission, Takeoff, Waypoint
+from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Waypoint
 from fusetune.execute.vehicle import Limits
 from fusetune.execute.world.filtered_path import FilteredPath
 from fusetune.execute.world.flight_plan import FlightPlan, plan_flight

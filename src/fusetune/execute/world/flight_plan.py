@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusetune.design.mission import Mission, Waypoint
+from fusetune.design.missions.mission import Mission, Waypoint
 from fusetune.execute.vehicle import Limits
 from fusetune.execute.world.earth import TangentFrame
 from fusetune.execute.world.filtered_path import FilteredPath, window_lengths

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusetune.design.mission import distance_m, load_mission
+from fusetune.design.missions.mission import distance_m, load_mission
 from fusetune.design.outputs import plan_items, write_mission_plan
 from fusetune.errors import UserError
 

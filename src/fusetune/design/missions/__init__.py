@@ -1,0 +1,1 @@
+"""Missions: read, checked, made from shapes, planned and written."""
