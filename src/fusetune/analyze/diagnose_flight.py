@@ -72,7 +72,7 @@ def diagnose_flight(
     untold = SensorNoise(name, int(logged.start_timestamp), (), (), {}, (), 0.0)
     noise = asked.about("sensor noise", untold, lambda: sensor_noise(observed.flight, observed.airborne))
     nothing: tuple[Diagnosis, ...] = ()
-    found = asked.about("diagnosis", nothing, lambda: diagnose(observed))
+    found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=effects))
     start_us = int(logged.start_timestamp)
     documents = {
         HEALTH_FILE: health_document(logged, rows),
