@@ -3,8 +3,8 @@
     python -m benchmarks.diagnosed_logs LOGS_DIR                       # prints the table
     python -m benchmarks.diagnosed_logs LOGS_DIR docs/diagnosis.md     # puts it there
 
-LOGS_DIR holds ULog files named owner__name.ulg; of those that stand in `KNOWN` it is said whether the diagnosis agrees. The
-status is 1 where one does not. CPU is that of the whole diagnosis in one process, with everything imported.
+LOGS_DIR holds ULog files named owner__name.ulg; of those that stand in `KNOWN` it is said whether the diagnosis agrees.
+The status is 1 where one does not. CPU is that of the whole diagnosis in one process, with everything imported.
 """
 
 from __future__ import annotations

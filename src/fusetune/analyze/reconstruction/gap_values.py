@@ -137,8 +137,8 @@ def solved_without(matrix: np.ndarray, values: np.ndarray, lacking: np.ndarray) 
     """Solutions (G, N) of the equations without those rows and columns that each of G lacks, 0 there.
 
     A few of N are lacking: with M the inverse of the whole matrix, that of the block that is left is
-    M_kk − M_kl M_ll⁻¹ M_lk (of the block-wise inverse, Banachiewicz 1937), so that only as many equations as are lacking
-    are solved for each.
+    M_kk − M_kl M_ll⁻¹ M_lk (of the block-wise inverse, Banachiewicz 1937), so that only as many equations as are
+    lacking are solved for each.
 
     Parameters
     ----------
