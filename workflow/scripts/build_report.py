@@ -26,7 +26,5 @@ with logged_job(snakemake.log[0]):
     flights = {Path(page).stem for page in snakemake.input.pages}
     report = Path(snakemake.input.summary[0]).parent
     for folder in ("flights", "sensors"):
-        print(
-            *(f"removed, as its log is gone: {one}" for one in remove_former_flights(report / folder, flights)),
-            sep="\n",
-        )
+        for one in remove_former_flights(report / folder, flights):
+            print(f"removed, as its log is gone: {one}")

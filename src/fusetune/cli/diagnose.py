@@ -30,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="replay a flight at most N times with a claimed cause taken away (2)",
     )
     parser.epilog = (
-        "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot "
-        "be read, or is too poor to be replayed and shows no more than notes; 3 a failure. A test ratio compares how far a measurement lies from what the filter expected with how far it "
-        "may: above 1 the filter rejects it."
+        "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot be "
+        "read, or that cannot be replayed and shows no more than notes; 3 a failure. A test ratio compares how far a "
+        "measurement lies from what the filter expected with how far it may: above 1 the filter rejects it."
     )
 
 
