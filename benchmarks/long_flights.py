@@ -1,11 +1,11 @@
 """Cost of long flights: CPU seconds per minute of flight, and peak memory of the jobs that a flight takes, as Markdown.
 
-    python -m benchmarks.long_flights [--minutes 10 20 60]
+    python -m benchmarks.long_flights [--minutes 10 20 60] [--jobs save diagnose]
 
 Simulated flights, laps of the survey mission with the vehicle's own estimator on board, at full rate and thinned as the
-default logging profile thins a log. Each is saved, analysed with all sets of the shipped study and drawn, each job in a
-process of its own and as the workflow runs it; of the analysis the largest step is told, too. Where the cost is linear
-in the length, the figures of a column agree.
+default logging profile thins a log. Each is saved, diagnosed, analysed with all sets of the shipped study and drawn,
+each job in a process of its own and as the workflow runs it; of the analysis the largest step is told, too. Where the
+cost is linear in the length, the figures of a column agree.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +30,14 @@ from fusetune.save.flight_folder import read_metadata
 # All else is imported where it is needed: what a job does not load must not count as its memory.
 
 STUDY = ROOT / "config/studies/paper_table11.yaml"
+JOBS = ("save", "diagnose", "analyse", "draw")
 ANALYSIS_STEPS = ("write_replays", "write_as_flown", "grade_flight", "write_flight_fidelity", "write_scores")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, nargs="+", default=[10.0, 20.0, 60.0])
+    parser.add_argument("--jobs", nargs="+", choices=JOBS, default=JOBS, help="that are measured; all build on save")
     parser.add_argument("--job", nargs=2, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.job:
@@ -47,35 +49,39 @@ def main() -> None:
     from fusetune.px4.ulog.writer import write_ulog
     from fusetune.save.flight_folder import load_flight
 
+    jobs = [job for job in JOBS if job in options.jobs or job == "save"]
     steps = ", ".join(step.replace("_", " ") for step in ANALYSIS_STEPS)
-    print(f"| flight | MB | CPU s a minute: save | analyse | draw | peak MB: save | analyse ({steps}) | draw |")
-    print("|---|---|---|---|---|---|---|---|")
+    peaks = [f"peak MB: {job} ({steps})" if job == "analyse" else f"peak MB: {job}" for job in jobs]
+    head = ["flight", "MB", *(f"CPU s a minute: {job}" for job in jobs), *peaks]
+    print(f"| {' | '.join(head)} |")
+    print("|---" * len(head) + "|")
     for minutes in (2.0, *options.minutes):
         with tempfile.TemporaryDirectory() as scratch:
             log, _ = simulated(Path(scratch) / "full_rate.ulg", minutes, True)
-            rows = [_row("full rate", log)]
+            rows = [_row("full rate", log, jobs)]
             small = thinned(canonical(load_flight(log.with_suffix(".saved"))), Thinning())
             log.unlink()
             log = log.with_name("thinned.ulg")
             write_ulog(log, small)
-            rows.append(_row("thinned", log))
+            rows.append(_row("thinned", log, jobs))
         # the first flight is there to compile and to warm up
         if minutes > 2.0:
             print("\n".join(f"| {' | '.join(cells)} |" for cells in rows), flush=True)
 
 
-def _row(kind: str, log: Path) -> list[str]:
-    save, analyse, draw = (_in_own_process(job, log) for job in ("save", "analyse", "draw"))
+def _row(kind: str, log: Path, jobs: Sequence[str]) -> list[str]:
+    done = [_in_own_process(job, log) for job in jobs]
     metadata = read_metadata(log.with_suffix(".saved"))
     minutes = (metadata["last_timestamp"] - metadata["start_timestamp"]) / 6e7
-    steps = ", ".join(f"{analyse['steps'][step] / 1e6:.0f}" for step in ANALYSIS_STEPS)
+    peaks = []
+    for one in done:
+        steps = ", ".join(f"{one['steps'][step] / 1e6:.0f}" for step in ANALYSIS_STEPS if step in one["steps"])
+        peaks.append(f"{one['peak'] / 1e6:.0f}" + (f" ({steps})" if steps else ""))
     return [
         f"{minutes:.1f} min, {kind}",
         f"{log.stat().st_size / 1e6:.0f}",
-        *(f"{job['cpu_s'] / minutes:.2f}" for job in (save, analyse, draw)),
-        f"{save['peak'] / 1e6:.0f}",
-        f"{analyse['peak'] / 1e6:.0f} ({steps})",
-        f"{draw['peak'] / 1e6:.0f}",
+        *(f"{one['cpu_s'] / minutes:.2f}" for one in done),
+        *peaks,
     ]
 
 
@@ -97,6 +103,10 @@ def _measured(job: str, log: Path) -> dict[str, Any]:
         from fusetune.save import save_log
 
         work: Callable[[], object] = lambda: save_log(log, saved)  # noqa: E731
+    elif job == "diagnose":
+        from fusetune.analyze.diagnose_flight import diagnose_flight
+
+        work = lambda: diagnose_flight(saved, analysis)  # noqa: E731
     elif job == "analyse":
         work = _analysis(saved, analysis, steps)
     else:

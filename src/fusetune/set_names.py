@@ -14,8 +14,10 @@ with them mended."""
 FOUND = "found"
 """What a search found; on a flight, what it found without that flight."""
 
+ANTENNA_MENDED = "antenna_mended"
+
 EFFECT_SETS = {
-    "antenna_mended": "gnss_antenna",
+    ANTENNA_MENDED: "gnss_antenna",
     "static_pressure_mended": "static_pressure",
     "ground_effect_mended": "ground_effect",
     "drag_mended": "drag",

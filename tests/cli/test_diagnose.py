@@ -11,10 +11,12 @@ import pytest
 
 from fusetune.analyze.diagnosis import diagnosed_logs as logs
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign, how_sure
+from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.cli import main
 from fusetune.cli.command import DONE, FOUND_FAILURE, USER_ERROR
 from fusetune.px4.flight import Flight
 from fusetune.px4.ulog.writer import write_ulog
+from fusetune.save.verdict import Verdict
 
 Captured = pytest.CaptureFixture[str]
 WARNS = 1
@@ -57,10 +59,21 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("name", "status"), [("sound", DONE), ("noted", DONE), ("shaken", WARNS), ("day/broken", FOUND_FAILURE)]
+    ("name", "status", "refused"),
+    [
+        ("sound", DONE, USER_ERROR),
+        ("noted", DONE, USER_ERROR),
+        ("shaken", WARNS, WARNS),
+        ("day/broken", FOUND_FAILURE, FOUND_FAILURE),
+    ],
 )
-def test_the_status_is_that_of_the_worst_finding(folder: Path, name: str, status: int) -> None:
-    assert main(["diagnose", str(folder / f"{name}.ulg")]) == status
+def test_the_status_is_that_of_the_worst_finding_and_a_log_without_replay_is_not_said_to_be_sound(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, status: int, refused: int
+) -> None:
+    log = folder / f"{name}.ulg"
+    assert main(["diagnose", str(log)]) == refused
+    monkeypatch.setattr(ObservedFlight, "verdict", Verdict("as if whole", ()))
+    assert main(["diagnose", str(log)]) == status
 
 
 def test_a_log_that_cannot_be_read_ends_with_2_unless_there_is_a_failure(folder: Path, capsys: Captured) -> None:

@@ -19,6 +19,7 @@ def tell() -> None:
     lines.tell(ProgressLine("round 2"))
     lines.tell(SENTENCE)
     lines.tell("  in   columns")
+    lines.tell_below("    why: its end stands to the right of where it begins")
     lines.tell(ProgressLine("round 3"))
     lines.end()
 
@@ -31,6 +32,7 @@ def test_into_a_file_every_line_stands_by_itself(capsys: pytest.CaptureFixture[s
         "round 2",
         SENTENCE,
         "  in   columns",
+        "    why: its end stands to the right of where it begins",
         "round 3",
     ]
 
@@ -51,6 +53,8 @@ def test_on_a_terminal_progress_takes_the_place_of_what_was_before(
         "of a terminal, and so goes on in the",
         "next one of it.",
         "  in   columns",
+        "    why: its end stands to the right of",
+        "      where it begins",
         "round 3",
         "",
     ]

@@ -86,22 +86,28 @@ def mended_delays():
 
 
 def effect_values():
-    """Sets that take single effects as the flights measure them, with what they change; none beside a search."""
-    if not MENDS_DELAYS or not SETTINGS.effects.try_measured or SEARCH:
+    """Sets that take single effects as the flights measure them, with what they change."""
+    if not MENDS_DELAYS or not SETTINGS.effects.try_measured:
         return {}
     return told_in_one_line(read_document, checkpoints.join_delays.get().output.effects)["sets"]
 
 
+def effects_are_mended():
+    """Whether these have delays mended, too: where any is proved wrong that comes before all else, but a search that
+    moves delays finds them itself, and no set beside it has them mended."""
+    return bool(mended_delays() and SETS.mendable)
+
+
 def effect_sets():
-    """Names of these, with the delays mended where any is proved wrong: a delay comes before all else."""
-    return [mended_name(name) if mended_delays() else name for name in effect_values()]
+    """Names of these."""
+    return [mended_name(name) if effects_are_mended() else name for name in effect_values()]
 
 
 def effect_overrides(wildcards):
     """Params function: what they change."""
     sets = replace(SETS, effects=effect_values())
     present = present_found().parameters
-    if mended_delays():
+    if effects_are_mended():
         return sets.mended(sets.effects, present, mended_delays())
     return sets.overrides(sets.effects, present)
 

@@ -13,8 +13,10 @@ rule diagnose_flight:
         "results/benchmarks/diagnose/{flight}.tsv"
     conda:
         "../envs/fusetune.yaml"
+    # it holds log and replay at once, and a thinned log is the smaller one of a flight as long
     resources:
-        **replay_resources(3),
+        mem_mb=of_its_logs(KERNELS_MB, DIAGNOSED_MB_PER_MB),
+        runtime=of_its_logs(10, 0.1),
     params:
         replay=asdict(SETTINGS.replay),
         health=asdict(SETTINGS.health),

@@ -5,6 +5,7 @@ import os
 
 KERNELS_MB = 350  # Python, its libraries and the compiled estimator
 LIBRARIES_MB = 200
+DIAGNOSED_MB_PER_MB = 11.0  # of a flight that is diagnosed, for each MB of its log
 SEARCHED_MB_PER_MB = 8.0  # of a flight on which sets are tried in memory, for each MB of its log
 MOST_PREPARED = 12  # flights that a process of a search holds
 SIMULATED_LOG_MB = 10.0  # of a flight that is not simulated yet

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fusetune.report.former_flights import remove_former_flights
 from fusetune.report.page import build_report
 
 from job import logged_job
@@ -22,3 +23,8 @@ with logged_job(snakemake.log[0]):
         list(snakemake.input.pages),
         snakemake.input.fleet,
     )
+    flights = {Path(page).stem for page in snakemake.input.pages}
+    report = Path(snakemake.input.summary[0]).parent
+    for folder in ("flights", "sensors"):
+        for one in remove_former_flights(report / folder, flights):
+            print(f"removed, as its log is gone: {one}")

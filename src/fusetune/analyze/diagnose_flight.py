@@ -7,6 +7,7 @@ a log that could not be read there is nothing to tell.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -64,7 +65,8 @@ def diagnose_flight(
     used = {entry["topic"] for entry in metadata.get("topics", ()) if is_used(entry["topic"])}
     # of a log that could not be read nothing was saved
     logged = load_flight(flight_folder, topics=used) if used else Flight(name)
-    observed = ObservedFlight(logged, replay)
+    # nothing here asks what the filter predicts without a sensor, which takes most of a replay's time and memory
+    observed = ObservedFlight(logged, replace(replay, withholding=None))
     asked = _Asked(is_replayable)
     no_rows: tuple[HealthRow, ...] = ()
     rows = asked.about("health", no_rows, lambda: health_rows(observed, health))
@@ -72,7 +74,7 @@ def diagnose_flight(
     untold = SensorNoise(name, int(logged.start_timestamp), (), (), {}, (), 0.0)
     noise = asked.about("sensor noise", untold, lambda: sensor_noise(observed.flight, observed.airborne))
     nothing: tuple[Diagnosis, ...] = ()
-    found = asked.about("diagnosis", nothing, lambda: diagnose(observed))
+    found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=effects))
     start_us = int(logged.start_timestamp)
     documents = {
         HEALTH_FILE: health_document(logged, rows),

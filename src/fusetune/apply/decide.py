@@ -127,7 +127,8 @@ def decide(
     better = _vetoed_but_better(ranked)
     told = read_joined_effects(effects) if effects is not None else None
     problems = problem_findings([one for one in map(read_diagnoses, diagnoses) if vehicle.without(one.flight) is None])
-    measured = effect_findings(told, choice, sets) if told is not None else ()
+    changed = [one.name for one in changes]
+    measured = effect_findings(told, choice, ranked, changed, settings) if told is not None else ()
     late = confirmed(delay_findings(read_joined(delays) if delays is not None else ()), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 HELP = "tell what is wrong with a vehicle from its logs, since when, how sure, and what to do"
 WARNS = 1
-"""Exit status where there is no worse than a warning; of a log that cannot be read it is `USER_ERROR`, between the
+"""Exit status where there is no worse than a warning; of a log that tells nothing it is `USER_ERROR`, between the
 two."""
 
 
@@ -30,10 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="replay a flight at most N times with a claimed cause taken away (2)",
     )
     parser.epilog = (
-        "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot "
-        "be read; "
-        "3 a failure. A test ratio compares how far a measurement lies from what the filter expected with how far it "
-        "may: above 1 the filter rejects it."
+        "Exit status, of several logs the largest: 0 nothing, or notes alone; 1 a warning; 2 a log that cannot be "
+        "read, or that cannot be replayed and shows no more than notes; 3 a failure. A test ratio compares how far a "
+        "measurement lies from what the filter expected with how far it may: above 1 the filter rejects it."
     )
 
 
@@ -47,15 +46,17 @@ def run(options: argparse.Namespace) -> int:
     """
     from fusetune.analyze.diagnosis.diagnosed_logs import diagnosed_logs
     from fusetune.analyze.diagnosis.words import log_lines
+    from fusetune.cli.lines import Lines
 
-    status, before = DONE, "["
+    status, before, lines = DONE, "[", Lines()
     for one in diagnosed_logs(options.logs, options.experiments):
         status = max(status, _status(one))
         if options.json:
             print(before, json.dumps(one.document(), ensure_ascii=False, allow_nan=False), sep="\n", flush=True)
             before = ","
         else:
-            print(*log_lines(one), sep="\n", flush=True)
+            for line in log_lines(one):
+                lines.tell_below(line)
     if options.json:
         print("]")
     return status
@@ -65,7 +66,12 @@ def _status(one: DiagnosedLog) -> int:
     if one.error is not None:
         return USER_ERROR
     severities = {found.severity for found in one.found}
-    return FOUND_FAILURE if "fail" in severities else WARNS if "warning" in severities else DONE
+    if "fail" in severities:
+        return FOUND_FAILURE
+    if "warning" in severities:
+        return WARNS
+    # what was hardly looked at is not said to be sound
+    return USER_ERROR if one.not_replayed else DONE
 
 
 def _number(text: str) -> int:

@@ -31,6 +31,15 @@ class Lines:
         else:
             print(f"{start}{_wrapped(line, min(width, _WIDEST))}", flush=True)
 
+    def tell_below(self, line: str) -> None:
+        """Print a line of a list; on a terminal it goes on a little to the right of where it begins."""
+        if not self._on_terminal:
+            print(line, flush=True)
+            return
+        width = max(min(shutil.get_terminal_size().columns, _WIDEST), 20)
+        below = " " * (len(line) - len(line.lstrip()) + 2)
+        print(textwrap.fill(line, width, subsequent_indent=below, break_long_words=False, break_on_hyphens=False))
+
     def end(self) -> None:
         """Leave the line about progress as it is: what follows begins a new one."""
         if self._open:

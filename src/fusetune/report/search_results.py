@@ -39,7 +39,7 @@ class SearchResults:
 
     @property
     def is_change(self) -> bool:
-        """Whether the decision takes what was found."""
+        """Whether the decision changes anything."""
         return bool(self.decision["status"] == "change")
 
 

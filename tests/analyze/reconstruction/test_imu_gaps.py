@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fusetune.analyze.reconstruction.gap_values import fill_missing
+from fusetune.analyze.reconstruction.gap_values import fill_missing, solved_without
 from fusetune.analyze.reconstruction.gyro_by_attitude import correct_gyro
 from fusetune.analyze.reconstruction.imu_gaps import fill_imu_gaps, find_imu_gaps
 from fusetune.analyze.reconstruction.trial_gaps import try_gaps, variance_per_second
@@ -169,3 +169,16 @@ def test_quaternion_product_of_rotation_vectors_about_one_axis_adds_them(seed):
     axis /= np.linalg.norm(axis)
     product = multiply(from_rotation_vector(0.3 * axis), from_rotation_vector(0.5 * axis))
     np.testing.assert_allclose(product, from_rotation_vector(0.8 * axis), atol=1e-15)
+
+
+def test_equations_of_which_some_are_lacking_are_solved_as_if_they_had_never_been():
+    """Against NumPy's solution of each block that is left."""
+    chance = np.random.default_rng(1)
+    root = chance.normal(size=(12, 12))
+    matrix = root @ root.T + np.eye(12)
+    lacking = chance.random((40, 12)) < 0.3
+    values = np.where(lacking, 0.0, chance.normal(size=(40, 12)))
+    for row, gone, found in zip(values, lacking, solved_without(matrix, values, lacking), strict=True):
+        expected = np.linalg.solve(matrix[np.ix_(~gone, ~gone)], row[~gone])
+        np.testing.assert_allclose(found[~gone], expected, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(found[gone], 0.0, atol=1e-12)

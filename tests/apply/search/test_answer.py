@@ -22,6 +22,7 @@ def documents(status: str, changes: int, **other: Any) -> tuple[dict[str, Any], 
     changed = [{"name": name, "previous": 1.0, "value": 2.0, "unit": "m"} for name in names]
     decision = {
         "status": status,
+        "chosen": "found" if status == "change" else "present",
         "changes": changed if status == "change" else [],
         "ranking": [],
         "next_steps": [{"text": "Fly."}],
@@ -70,3 +71,13 @@ def test_where_nothing_was_found_there_is_nothing_to_doubt() -> None:
     text = "\n".join(answer_lines(*documents("keep", 0), []))
     assert "found nothing that is better" in text
     assert "Against it" not in text
+
+
+def test_where_a_single_effect_is_chosen_what_was_found_is_told_as_not_taken() -> None:
+    search, decision = documents("change", 1)
+    decision |= {"chosen": "antenna_mended"}
+    lines = answer_lines(search, decision, [])
+    assert lines[1] == "  EKF2_P0  1 → 2 m"
+    text = "\n".join(lines)
+    assert "Found, and not taken: EKF2_P0 1 → 2." in text
+    assert "Against it: antenna_mended, a single effect as the flights measure it, is to be preferred." in text

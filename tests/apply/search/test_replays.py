@@ -6,10 +6,14 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from fusetune.analyze.delays.lag import Lag
+from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.trials.tried_set import ONE_STEP, WITHHELD, Column, Rejections, Sums, TriedSet
 from fusetune.apply.search.comparison import TriedBase
 from fusetune.apply.search.kept_pairs import KeptPairs
-from fusetune.apply.search.replays import MOST_IN_BATCH, Batch, ReplayGround, Tried
+from fusetune.apply.search.replays import MOST_IN_BATCH, Batch, ReplayGround, Tried, tells_place
 from fusetune.apply.search.requests import Ask, values_of
 from fusetune.apply.settings import DecisionSettings
 
@@ -84,3 +88,24 @@ def test_before_delays_are_right_sources_are_trusted_all_the_same() -> None:
     ground = ReplayGround(Counting(), DecisionSettings())
     assert ground.weighed_by("delays").trust(0.0) == 1.0
     assert ground.weighed_by("all").trust(0.0) == 0.0
+
+
+def test_a_place_that_was_told_once_stays_in_whatever_order_batches_come() -> None:
+    """It is told where the base itself is compared, and batches of other sets come without."""
+    place = VelocityPlace(Lag(0.11, 0.002, 100, 300), np.zeros(3), np.eye(3))
+    with_base, without = (BASE, SETS[0]), SETS[1:3]
+    batches = [("a", BASE, with_base), ("a", BASE, without)]
+    assert [tells_place(batch) for batch in batches] == [True, False]
+    tried = [
+        (("a", BASE, sets), (TriedBase("", {}, DID, place if sets is with_base else None), (DID,) * len(sets)))
+        for sets in (with_base, without)
+    ]
+    for order in (tried, tried[::-1]):
+        ground = ReplayGround(Counting(), DecisionSettings())
+        for batch, did in order:
+            ground.know(batch, did)
+        (compared,) = ground.compare([(("a",), Ask("delays", BASE, (BASE,)))])
+        assert compared.places == (place,)
+        # what is written of a batch follows from the batch, not from what else is known
+        written = ground.pairs([(("a",), Ask("all", BASE, without))])
+        assert [about.place for _, (about, _) in written] == [None]

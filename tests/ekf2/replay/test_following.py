@@ -8,6 +8,7 @@ import pytest
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.following import follow
+from fusetune.ekf2.replay.replay import begin_course
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.logged_state import logged_states
 
@@ -61,3 +62,19 @@ def test_following_can_begin_from_a_logged_state(flight):
     found = departures(flight, states, states[0])
     assert found[0].since >= states[0].time_us
     assert len(found) == len(states) - 1
+
+
+def test_a_course_stops_at_the_first_run_after_which_the_horizon_has_come_to_a_time(flight):
+    """As one that goes on by single runs and looks at the horizon after each."""
+    inputs = build_inputs(flight)
+    params = complete(flight.parameters.initial, {}, flight.release)
+    (course, run, _), (slow, single, _) = (begin_course(inputs, params) for _ in range(2))
+    start = int(inputs.arrays.imu["time_us"][0])
+    for wanted in (start + 1_234_567, start + 1_234_568, start + 3_000_000):
+        run = course.reach(run, wanted)
+        while slow.ekf["time_delayed_us"][0] < wanted:
+            single += slow.advance(single, single + 1)
+        assert run == single
+        assert course.ekf.tobytes() == slow.ekf.tobytes()
+    samples = len(inputs.arrays.imu)
+    assert course.reach(samples - 2, int(inputs.arrays.imu["time_us"][-1]) + 1) == samples

@@ -17,7 +17,6 @@ from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.finding import Finding, of_severity
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.discovery import discover_logs, printable
-from fusetune.save.verdict import judge
 from fusetune.storage.files import AnyPath
 
 AS_FLOWN = ReplaySettings(None, ReconstructionSettings(), StartSettings())
@@ -86,7 +85,7 @@ def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
     try:
         flight = read_ulog(path)
         observed = ObservedFlight(flight, AS_FLOWN)
-        verdict = judge(observed.flight)
+        verdict = observed.verdict
         refused = of_severity(verdict.findings, "fail")
         found, why_not = diagnose(observed, experiments), verdict.reasons
     except UserError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +22,7 @@ from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns, mag
 from fusetune.analyze.diagnosis.motion import Motion, motion_of
 from fusetune.analyze.diagnosis.told_effects import ToldEffects
 from fusetune.analyze.diagnosis.vision_signs import VisionSigns, vision_signs
+from fusetune.analyze.effects.estimate import Effect
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.finding import Finding
@@ -31,7 +33,6 @@ from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.checks.magnetometer_mounting import magnetometer_mounting
 from fusetune.save.checks.standstill import Standstill, flying_steps, standstill
 from fusetune.save.thresholds import VerdictThresholds
-from fusetune.save.verdict import Verdict, judge
 
 STUCK_COLUMNS = {
     "mag": ("vehicle_magnetometer", ("magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]")),
@@ -50,19 +51,16 @@ class Signs:
     Attributes
     ----------
     observed : the flight
+    effects : what tuners of single effects told of it already
     """
 
     observed: ObservedFlight
-
-    @cached_property
-    def verdict(self) -> Verdict:
-        """Whether the flight can be replayed."""
-        return judge(self.observed.flight)
+    effects: Sequence[Effect] = ()
 
     @cached_property
     def is_replayed(self) -> bool:
         """Whether there is a replay: of a log that is refused there is none, and rules go by what it holds."""
-        return self.verdict.status == "replayable" and bool(self.observed.airborne)
+        return self.observed.verdict.status == "replayable" and bool(self.observed.airborne)
 
     @property
     def airborne(self) -> tuple[Interval, ...]:
@@ -138,7 +136,7 @@ class Signs:
     @cached_property
     def told_by(self) -> ToldEffects:
         """Estimates of the tuners of single effects."""
-        return ToldEffects(self.observed if self.is_replayed else None)
+        return ToldEffects(self.observed if self.is_replayed else None, self.effects)
 
     @property
     def gnss_place(self) -> VelocityPlace | None:

@@ -5,7 +5,7 @@ They cost more than signs do, so one is asked where a sign speaks, once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from fusetune.analyze.effects.airspeed import estimate_airspeed_scale
 from fusetune.analyze.effects.estimate import Effect, Estimate
@@ -26,12 +26,27 @@ TUNERS: Mapping[str, Callable[[ObservedFlight], tuple[Effect, ...]]] = {
 }
 """Tuner → what it tells; that of the magnetometer tells several effects out of one fit."""
 
+EFFECTS: Mapping[str, tuple[str, ...]] = {
+    "static_pressure": ("static_pressure",),
+    "ground_effect": ("ground_effect",),
+    "magnetometer": ("motor_magnetic_field", "hard_iron", "magnetometer_scale", "declination"),
+    "airspeed": ("airspeed_scale",),
+    "flow": ("optical_flow",),
+    "vision": ("vision_lever_arm",),
+}
+"""Tuner → ids of the effects that it tells."""
+
 
 class ToldEffects:
-    """Estimates of one flight by their names, as `EKF2_PCOEF_XP`; empty where there is no replay or none is told."""
+    """Estimates of one flight by their names, as `EKF2_PCOEF_XP`; empty where there is no replay or none is told.
 
-    def __init__(self, observed: ObservedFlight | None) -> None:
-        self._observed = observed
+    Parameters
+    ----------
+    known : effects that tuners told of this flight already, and are not asked again
+    """
+
+    def __init__(self, observed: ObservedFlight | None, known: Sequence[Effect] = ()) -> None:
+        self._observed, self._known = observed, {one.id: one for one in known}
         self._asked: dict[str, dict[str, Estimate]] = {}
 
     def __call__(self, tuner: str) -> Mapping[str, Estimate]:
@@ -39,6 +54,7 @@ class ToldEffects:
         if self._observed is None:
             return {}
         if tuner not in self._asked:
-            effects = TUNERS[tuner](self._observed)
+            told = [self._known[one] for one in EFFECTS[tuner] if one in self._known]
+            effects = told or TUNERS[tuner](self._observed)
             self._asked[tuner] = {one.name: one for effect in effects for one in effect.estimates}
         return self._asked[tuner]

@@ -15,6 +15,6 @@ class EffectSettings:
     try_measured: bool = setting(
         True,
         "where two flights or more measure an effect (antenna, static pressure, ground effect, drag, lever arms, range "
-        "finder) beyond doubt otherwise than PX4 is told, a set with the measured values is compared like any other; "
-        "not beside a search, nor with `delays.mend: false`",
+        "finder) beyond doubt otherwise than PX4 is told, a set with the measured values is compared like any other, "
+        "beside a search, too; not with `delays.mend: false`",
     )

@@ -19,6 +19,7 @@ from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.save.verdict import Verdict, judge
 from fusetune.set_names import AS_FLOWN
 
 GROUND_EFFECT_US = 5_000_000
@@ -42,6 +43,11 @@ class ObservedFlight:
     def flight(self) -> Flight:
         """In the layout of v1.16, with the sensors of the estimator instance that was primary at the time."""
         return canonical(self.logged)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether it can be replayed, by the thresholds that are in use unless told otherwise."""
+        return judge(self.flight)
 
     @cached_property
     def parameters(self) -> dict[str, float]:

@@ -61,7 +61,7 @@ def _line_is_nearer(
     if len(trial) < MIN_TRIALS:
         return False
     left_out = present.copy()
-    rows = np.repeat(trial, length) + np.concatenate([np.arange(n) for n in length])
+    rows = np.repeat(trial, length) + _place_within(length)
     left_out[rows] = False
     starts = np.concatenate([[0], np.cumsum(length)[:-1]])
     truth = np.add.reduceat(deviation[rows], starts)
@@ -102,11 +102,14 @@ def autocovariance(deviation: np.ndarray, present: np.ndarray, lags: int) -> np.
 
 
 def _on_the_line(signal: np.ndarray, first: np.ndarray, count: np.ndarray) -> np.ndarray:
-    parts = []
-    for start, length in zip(first.tolist(), count.tolist(), strict=True):
-        share = np.arange(1, length + 1) / (length + 1)
-        parts.append(signal[start - 1] + share * (signal[start + length] - signal[start - 1]))
-    return np.concatenate([np.zeros(0), *parts])
+    before, after = signal[first - 1], signal[first + count]
+    share = (_place_within(count) + 1) / np.repeat(count + 1, count)
+    return np.asarray(np.repeat(before, count) + share * np.repeat(after - before, count))
+
+
+def _place_within(count: np.ndarray) -> np.ndarray:
+    """0, 1, … of each gap, one gap after the other."""
+    return np.asarray(np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count))
 
 
 def _conditional_mean(
@@ -126,12 +129,32 @@ def _conditional_mean(
     whole = known.all(axis=1)
     weights[whole] = np.linalg.solve(between, values[whole].T).T
     if not whole.all():
-        part = known[~whole]
-        matrix = np.where(part[:, :, None] & part[:, None, :], between, 0.0)
-        diagonal = np.arange(len(offset))
-        matrix[:, diagonal, diagonal] = np.diag(between)
-        weights[~whole] = np.linalg.solve(matrix, values[~whole][:, :, None])[:, :, 0]
+        weights[~whole] = solved_without(between, values[~whole], ~known[~whole])
     return np.where(known, weights, 0.0) @ towards.T
+
+
+def solved_without(matrix: np.ndarray, values: np.ndarray, lacking: np.ndarray) -> np.ndarray:
+    """Solutions (G, N) of the equations without those rows and columns that each of G lacks, 0 there.
+
+    A few of N are lacking: with M the inverse of the whole matrix, that of the block that is left is
+    M_kk − M_kl M_ll⁻¹ M_lk (of the block-wise inverse, Banachiewicz 1937), so that only as many equations as are
+    lacking are solved for each.
+
+    Parameters
+    ----------
+    matrix : (N, N) symmetric
+    values : (G, N), 0 where lacking
+    """
+    inverse = np.linalg.inv(matrix)
+    solved = values @ inverse
+    number = lacking.sum(axis=1)
+    for some in np.unique(number):
+        rows = np.flatnonzero(number == some)
+        columns = np.nonzero(lacking[rows])[1].reshape(len(rows), some)
+        block = inverse[columns[:, :, None], columns[:, None, :]]
+        of_lacking = np.linalg.solve(block, solved[rows[:, None], columns][:, :, None])
+        solved[rows] -= np.matmul(inverse[columns].transpose(0, 2, 1), of_lacking)[:, :, 0]
+    return solved
 
 
 def _joint_covariance(covariance: np.ndarray, length: int) -> np.ndarray:

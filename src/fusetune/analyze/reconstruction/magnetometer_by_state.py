@@ -8,6 +8,7 @@ filter's gains make of it. That mean is found and given back to the reconstructe
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -42,7 +43,10 @@ OBSERVATION_VARIANCE_MIN = 1e-4
 
 @dataclass(frozen=True)
 class Noise:
-    """The table, and in how many of the intervals between logged states noise explains the departure."""
+    """The table, and in how many of the intervals between logged states noise explains the departure.
+
+    Where too few are explained, whatever those to come show, they are not looked at.
+    """
 
     table: TopicTable
     explained: int
@@ -51,7 +55,7 @@ class Noise:
     @property
     def used(self) -> bool:
         """Whether the vehicle's filter reacts as the replay does, so that the noise was given back."""
-        return self.intervals > 0 and self.explained >= MIN_EXPLAINED * self.intervals
+        return self.intervals > 0 and _are_enough(self.explained, self.intervals)
 
 
 def add_noise_by_state(
@@ -87,6 +91,10 @@ def add_noise_by_state(
     return found
 
 
+def _are_enough(explained: int, intervals: int) -> bool:
+    return explained >= MIN_EXPLAINED * intervals
+
+
 def noise_of_measured(field: np.ndarray, measured: np.ndarray) -> float:
     """Standard deviation of the noise, Gauss: what a measured sample is off the smoothed ones on both sides of it."""
     alone = np.flatnonzero(measured[1:-1] & ~measured[:-2] & ~measured[2:]) + 1
@@ -117,6 +125,7 @@ def _one_pass(
     variance = max(parameters["EKF2_MAG_NOISE"] ** 2, OBSERVATION_VARIANCE_MIN)
     shift = np.zeros((len(fused), 3))
     explained = intervals = 0
+    times = [state.time_us for state in states]
     for departure, within in _intervals(follow(build_inputs(flight), parameters, states, start), fused):
         missing = within & ~measured
         samples, lacking = int(within.sum()), int(missing.sum())
@@ -129,6 +138,9 @@ def _one_pass(
         if np.sqrt(np.mean(mean**2)) <= MAX_SHIFT * deviation:
             explained += 1
             shift[missing] = mean
+        left = len(times) - bisect_right(times, departure.until)
+        if not _are_enough(explained + left, intervals + left):
+            break
     for axis in range(3):
         name = f"magnetometer_ga[{axis}]"
         table[name] = (table[name] + shift[:, axis]).astype(table[name].dtype)

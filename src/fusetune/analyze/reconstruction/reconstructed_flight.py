@@ -118,10 +118,12 @@ def _with_noise(
     noise = add_noise_by_state(flight, measured, parameters, states, start)
     if not noise.intervals:
         return step
-    explained = f"{noise.explained} of {noise.intervals} intervals between logged states"
+    where = "intervals between logged states"
     if not noise.used:
-        return replace(step, what=f"{step.what}; its noise explains only {explained} and is left out")
+        few = f"only {noise.explained} of the first {noise.intervals} {where}"
+        return replace(step, what=f"{step.what}; its noise explains {few} and is left out")
     topics[MAG, 0] = noise.table
+    explained = f"{noise.explained} of {noise.intervals} {where}"
     return replace(step, what=f"{step.what}, with the noise that explains {explained}")
 
 

@@ -42,7 +42,7 @@ from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whitenes
 from fusetune.analyze.sensors.told_noise import told_noises
 from fusetune.analyze.smoothing.smoothed_velocity import smoothed_velocity
 from fusetune.px4.flight import Flight
-from fusetune.set_names import PRESENT
+from fusetune.set_names import ANTENNA_MENDED, PRESENT, mended_name
 from fusetune.storage.files import AnyPath
 from fusetune.storage.freed_memory import give_back_freed_memory
 
@@ -181,7 +181,7 @@ def score_sets(
         add_onboard(table, scored.onboard, window, settings, records[0].parameters)
         fused = {source for record in records for source in record.fused_sources}
         references = read_references(flight, fused, records[0].parameters)
-        reference = smoothed_velocity(kept[0], flight, window.intervals, STEP_US)
+        reference = smoothed_velocity(_with_measured_antenna(kept), flight, window.intervals, STEP_US)
         differences = SmoothedScores(reference)
         whiteness, moved = _add_state_figures(table, kept, flight, references, window, settings, differences)
         smoothed = differences.rows(flight.name, window.block_edges(settings.block_s))
@@ -195,6 +195,16 @@ def score_sets(
     summary["excitation"] = None if moved is None else moved.document()
     summary["smoothed_reference"] = None if reference is None else reference.document
     return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, smoothed, summary)
+
+
+def _with_measured_antenna(kept: Sequence[ReplayedSet]) -> ReplayedSet:
+    """The replay that the smoothed velocity is made of: the present one, or the one with the antenna as measured.
+
+    The measured velocities are those of the antenna, less what the told place makes of them. Made with a wrong place,
+    the reference has the present set's error, and a set that mends it would seem to be farther off the truth.
+    """
+    names = (ANTENNA_MENDED, mended_name(ANTENNA_MENDED))
+    return next((one for one in kept if one.name in names), kept[0])
 
 
 def _flight_after_warm_up(

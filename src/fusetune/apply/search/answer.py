@@ -7,6 +7,7 @@ from typing import Any
 
 from fusetune.apply.search.words import worth_sentences
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.set_names import FOUND, PRESENT
 
 _MOST_PARAMETERS = 5
 
@@ -42,8 +43,7 @@ def _lines(document: Mapping[str, Any], decision: Mapping[str, Any], what_matter
     if decision["status"] == "change":
         yield from _changes(document, decision)
     yield from worth_sentences(document)
-    if decision["status"] != "change":
-        yield from why_kept(document, decision)
+    yield from why_kept(document, decision)
     yield from what_matters[:1]
     if decision["next_steps"]:
         yield f"Next: {decision['next_steps'][0]['text']}"
@@ -56,7 +56,7 @@ def _changes(document: Mapping[str, Any], decision: Mapping[str, Any]) -> Iterat
         (
             one["name"],
             _from_to(one["previous"], one["value"], one["unit"]),
-            _about(document["parameters"].get(one["name"])),
+            _about(document["parameters"].get(one["name"]) if takes_found(decision) else None),
         )
         for one in changes[:_MOST_PARAMETERS]
     ]
@@ -75,10 +75,15 @@ def _about(one: Mapping[str, Any] | None) -> str:
     return f"without it errors {one['alone_percent']:.1f} % larger{bound}"
 
 
+def takes_found(decision: Mapping[str, Any]) -> bool:
+    """Whether the decision changes to what the search found, and not to a set beside it, or to nothing."""
+    return bool(decision["status"] == "change" and decision["chosen"] == FOUND)
+
+
 def why_kept(document: Mapping[str, Any], decision: Mapping[str, Any]) -> list[str]:
-    """Why what was found is not taken; empty where nothing was found."""
+    """Why what was found is not taken; empty where it is, and where nothing was found."""
     found = {name: one for name, one in document["parameters"].items() if one["is_changed"]}
-    if not found:
+    if not found or takes_found(decision):
         return []
     values = [f"{name} {_from_to(one['present'], one['found'], unit_of(name))}" for name, one in found.items()]
     more = f" and {len(values) - _MOST_PARAMETERS} more" if len(values) > _MOST_PARAMETERS else ""
@@ -86,6 +91,8 @@ def why_kept(document: Mapping[str, Any], decision: Mapping[str, Any]) -> list[s
     reasons = [*document["objections"], *_reasons(decision)]
     if reasons:
         told.append(f"Against it: {'; '.join(reasons[:2])}.")
+    elif decision["chosen"] != PRESENT:
+        told.append(f"Against it: {decision['chosen']}, a single effect as the flights measure it, is to be preferred.")
     elif document["exploratory"]:
         told.append("Against it: so few flights show nothing firm.")
     elif decision["status"] == "keep":
@@ -98,7 +105,7 @@ def _from_to(now: float, found: float, unit: str) -> str:
 
 
 def _reasons(decision: Mapping[str, Any]) -> list[str]:
-    return [str(reason) for one in decision["ranking"] if not one["is_present"] for reason in one["reasons"]]
+    return [str(reason) for one in decision["ranking"] if one["name"] == FOUND for reason in one["reasons"]]
 
 
 def unit_of(parameter: str) -> str:

@@ -18,6 +18,16 @@ Batch = tuple[str, Values, tuple[Values, ...]]
 Tried = tuple[TriedBase, tuple[TriedSet, ...]]
 
 
+def tells_place(batch: Batch) -> bool:
+    """Whether it is asked where the receiver's antenna sits: it is read where the base itself is compared.
+
+    It costs several replays, and follows from the batch alone, so that what is kept of one is the same whenever it is
+    made.
+    """
+    _, base, sets = batch
+    return base in sets
+
+
 class Trier(Protocol):
     """What replays: in this process, or in others."""
 
@@ -53,7 +63,9 @@ class ReplayGround:
     def know(self, batch: Batch, tried: Tried) -> None:
         """Take over what was tried before."""
         flight, base, sets = batch
-        self._bases[flight, base] = tried[0]
+        before, now = self._bases.get((flight, base)), tried[0]
+        # batches come in any order, and not all of them tell the place
+        self._bases[flight, base] = replace(now, place=before.place) if before and now.place is None else now
         self._tried.update({Request(flight, base, one): did for one, did in zip(sets, tried[1], strict=True)})
 
     def compare(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[Comparison]:
@@ -64,10 +76,13 @@ class ReplayGround:
     def pairs(self, asks: Sequence[tuple[Sequence[str], Ask]]) -> list[tuple[Batch, Tried]]:
         """All that some asks need to be compared, in batches; what is not known is replayed first."""
         self._try_all(asks)
-        return [
-            (batch, (self._bases[batch[:2]], tuple(self._tried[Request(batch[0], batch[1], one)] for one in batch[2])))
-            for batch in _batches(asks, {}, {})
-        ]
+        return [(batch, self._known(batch)) for batch in _batches(asks, {}, {})]
+
+    def _known(self, batch: Batch) -> Tried:
+        flight, base, sets = batch
+        about = self._bases[flight, base]
+        about = about if tells_place(batch) else replace(about, place=None)
+        return about, tuple(self._tried[Request(flight, base, one)] for one in sets)
 
     def _compared(self, flights: Sequence[str], ask: Ask) -> Comparison:
         bases = [self._bases[flight, ask.base] for flight in flights]

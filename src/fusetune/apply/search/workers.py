@@ -9,7 +9,7 @@ from concurrent.futures import as_completed
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.trials.tried_flight import TrialSettings, TriedFlight, prepare_trials
 from fusetune.apply.search.comparison import TriedBase
-from fusetune.apply.search.replays import Batch, Tried
+from fusetune.apply.search.replays import Batch, Tried, tells_place
 from fusetune.apply.search.requests import Values
 from fusetune.running.worker_processes import worker_processes
 from fusetune.storage.files import AnyPath
@@ -42,7 +42,8 @@ class FlightTrier:
         """What the sets of a batch did."""
         name, base, sets = batch
         flight = self._flight(name, base)
-        about = TriedBase(flight.reason, flight.whiteness, flight.base_set, flight.place)
+        place = flight.place if tells_place(batch) else None
+        about = TriedBase(flight.reason, flight.whiteness, flight.base_set, place)
         return about, tuple(flight.base_set if one == base else flight.try_set(dict(one)) for one in sets)
 
     def _flight(self, name: str, base: Values) -> TriedFlight:

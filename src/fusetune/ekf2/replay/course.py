@@ -30,6 +30,8 @@ from fusetune.px4.layouts.logged_state import LoggedState
 RUNS_PER_STRETCH = 8192
 HORIZON_MARGIN_US = 12_000
 """The horizon moves by one update interval at a time, so that its lag differs by less than this."""
+NO_TIME_US = np.iinfo(np.int64).max
+"""No horizon comes to it."""
 
 
 class Course:
@@ -68,17 +70,15 @@ class Course:
 
     def reach(self, run: int, time_us: int) -> int:
         """Go on from a run until the horizon has come to a time or the samples end; the run to go on with."""
-        runs = len(self.inputs.arrays.imu)
-        horizon = int(self.ekf["time_delayed_us"][0])
-        lag = max(int(self.ekf["time_latest_us"][0]) - horizon - HORIZON_MARGIN_US, 0) if horizon else 0
-        near = min(max(int(np.searchsorted(self.inputs.arrays.imu["time_us"], time_us + lag)), run), runs)
-        for begin, end in self.stretches(run, near):
-            self.advance(begin, end)
-        while near < runs and self.ekf["time_delayed_us"][0] < time_us:
-            for begin, end in self.stretches(near, near + 1):
-                self.advance(begin, end)
-            near += 1
-        return near
+        times = self.inputs.arrays.imu["time_us"]
+        while run < len(times) and (horizon := int(self.ekf["time_delayed_us"][0])) < time_us:
+            lag = int(self.ekf["time_latest_us"][0]) - horizon + HORIZON_MARGIN_US if horizon else 0
+            near = min(max(int(np.searchsorted(times, time_us + lag)), run + 1), len(times))
+            for begin, end in self.stretches(run, near):
+                run = begin + self.advance(begin, end, time_us)
+                if run < end:
+                    return run
+        return run
 
     def branch(self) -> Course:
         """Another course that starts where this one is."""
@@ -108,8 +108,17 @@ class Course:
             *(joined_rows([rows[:count]], rows.dtype) for rows, count in zip(self.records, counts, strict=True))
         )
 
-    def advance(self, start: int, stop: int) -> None:
-        """Process some runs; what they record stays until the next."""
+    def advance(self, start: int, stop: int, horizon_us: int = NO_TIME_US) -> int:
+        """Process some runs, those after which the horizon has come to a time left out; what they record stays until
+        the next.
+
+        Returns
+        -------
+        How many were processed
+        """
         self.recorder[["innovation_rows", "update_rows", "flag_rows"]] = 0
         views, arrays = views_of(self.ekf), self.inputs.arrays.of_runs(start, stop)
-        run_estimator(self.ekf[0], self.params[0], arrays, views, self.recorder[0], self.records, stop - start)
+        done = run_estimator(
+            self.ekf[0], self.params[0], arrays, views, self.recorder[0], self.records, stop - start, horizon_us
+        )
+        return int(done)

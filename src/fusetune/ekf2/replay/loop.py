@@ -28,8 +28,11 @@ MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
 
 
 @entry_kernel
-def run_estimator(ekf, params, inputs, views, recorder, records, runs):
-    """Process a stretch of a flight; `inputs` are of its runs."""
+def run_estimator(ekf, params, inputs, views, recorder, records, runs, horizon_us):
+    """Process a stretch of a flight, to its end or until the fusion time horizon has come to `horizon_us`.
+
+    `inputs` are of its runs; returned is how many were processed.
+    """
     for run in range(runs):
         arrivals = inputs.arrivals[run]
         if arrivals.command >= 0:
@@ -45,6 +48,9 @@ def run_estimator(ekf, params, inputs, views, recorder, records, runs):
         if update(ekf, params, inputs):
             save_declination(ekf, params)
             record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
+        if ekf.time_delayed_us >= horizon_us:
+            return run + 1
+    return runs
 
 
 @kernel

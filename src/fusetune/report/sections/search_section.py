@@ -50,8 +50,7 @@ def search_answer(results: SearchResults) -> str:
     parts = [paragraph(one) for one in worth_sentences(search)]
     if results.is_change:
         parts.append(bullets(decision["cautions"]))
-    else:
-        parts += [paragraph(one) for one in why_kept(search, decision)]
+    parts += [paragraph(one) for one in why_kept(search, decision)]
     parts.append(
         paragraph(
             "Prediction errors: how far off the estimator was when it predicted a measurement before it saw it, and "
