@@ -34,8 +34,9 @@ _RATIOS = 10.0 ** np.arange(-6.0, 3.0, 1.0)
 """Of the disturbance's growth in a second, squared, to the variance of a measurement: first look."""
 _FINER = (0.5, 0.25, 0.125)
 """Powers of ten by which the search goes on."""
-_FIRST_OF_WALK = 1e4
-"""Variance with which a walk begins, against what it gains in all."""
+_FIRST_OF_WALK = 1e3
+"""Standard deviation with which a walk begins, against the largest target: anywhere. It must not grow with the density
+that is looked for, or a target far from 0, as an altitude above the sea, makes a large density the likeliest."""
 _CONFIDENCE = 0.95
 UNCERTAINTY = 1.25
 """Factor on all standard errors: ratio and memory are taken as known, and on made flights with known truth errors were
@@ -171,6 +172,13 @@ class _Equations:
     border: Array
     corner: Array
 
+    @property
+    def anywhere(self) -> Array:
+        """(S,) variances with which walks begin of which nothing is known."""
+        size = np.sqrt(np.mean(np.square(self.rows.walking), axis=0))
+        largest = max(float(np.max(np.abs(self.rows.target))), self.scale)
+        return np.square(_FIRST_OF_WALK * largest / (np.maximum(size, 1e-9) * self.scale))
+
     @classmethod
     def of(cls, rows: WalkingRows) -> _Equations | None:
         states = rows.walking.shape[1]
@@ -219,7 +227,7 @@ class _Solved:
         self.kept = 0.0 if memory_s <= 0.0 else math.exp(-step / memory_s)
         if math.isinf(memory_s):
             self.gained = ratio * step
-            self.first = np.full(states, self.gained * knots * _FIRST_OF_WALK)
+            self.first = given.anywhere
             if rows.starts is not None:
                 self.first = np.minimum(self.first, np.square(rows.starts / given.scale))
         else:
