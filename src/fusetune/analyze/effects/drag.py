@@ -71,6 +71,20 @@ class DragFit:
         course = self.fit.course + self.parameters[[WIND_N, WIND_E]]
         return np.column_stack([np.interp(time_s, self.fit.knot_s, one) for one in course.T])
 
+    def wind_errors(self, time_s: Array) -> Array:
+        """How the wind may be off, (N, 2, 8) m/s at times (N,), s: eight courses, each times a normal number of its own.
+
+        What drag and offsets are off by, the wind that is left over follows: drag that is too large by a share makes
+        the wind too large by that share of the speed.
+        """
+        moved = self.fit.follows.copy()
+        moved[:, 0, WIND_N] += 1.0
+        moved[:, 1, WIND_E] += 1.0
+        size, turn = np.linalg.eigh(self.fit.covariance)
+        courses = (moved @ (turn * np.sqrt(np.maximum(size, 0.0)))).reshape(self.fit.knot_s.size, -1)
+        between = np.column_stack([np.interp(time_s, self.fit.knot_s, one) for one in courses.T])
+        return between.reshape(time_s.size, 2, size.size)
+
 
 def fit_drag(observed: ObservedFlight) -> DragFit | str:
     """Fit drag and wind together; a refusal in words where the flight does not tell them."""

@@ -84,6 +84,8 @@ class WalkingFit:
     memory_s : τ
     knot_s : (M,) times of the knots
     course : (M, S) x at the knots
+    covariance : (P, P) of the constants, whose diagonal is that of `standard_error`
+    follows : (M, S, P) how far the course moves with each constant
     residual : (N,) e
     blocks : number of blocks with measurements
     """
@@ -96,6 +98,8 @@ class WalkingFit:
     memory_s: float
     knot_s: Array
     course: Array
+    covariance: Array
+    follows: Array
     residual: Array
     blocks: int
     ratio: float = field(default=0.0)
@@ -269,15 +273,19 @@ class _Solved:
         promised = self.noise * np.sqrt(np.diag(self.covariance))
         spread, blocks = self._jackknife(net, residual)
         wider = spread > promised
+        errors = UNCERTAINTY * np.where(wider, spread, promised)
+        stretched = errors / np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
         return WalkingFit(
             constants=self.constants,
-            standard_error=UNCERTAINTY * np.where(wider, spread, promised),
+            standard_error=errors,
             freedom=np.where(wider, float(blocks - 1), float(self.freedom)),
             noise=self.noise,
             walk=self.noise * math.sqrt(self.ratio) if self.states else 0.0,
             memory_s=self.memory_s,
             knot_s=given.knot_s,
             course=course,
+            covariance=self.covariance * np.outer(stretched, stretched),
+            follows=-self.projected[:, :-1].reshape(given.knot_s.size, self.states, -1),
             residual=residual[: rows.target.size],
             blocks=blocks,
             ratio=self.ratio,
