@@ -30,7 +30,7 @@ def all_effects(observed: ObservedFlight) -> tuple[Effect, ...]:
         estimate_range_noise(observed, ranged),
         estimate_flow(observed),
         estimate_vision_arm(observed),
-        estimate_airspeed_scale(observed),
+        estimate_airspeed_scale(observed, drag),
         estimate_output_predictor(observed),
         estimate_imu_arm(observed),
     )
