@@ -12,6 +12,7 @@ from fusetune.analyze.diagnosis.explained_away import explained_away
 from fusetune.analyze.diagnosis.innovation_signs import GATE
 from fusetune.analyze.diagnosis.reliability import calibrated
 from fusetune.analyze.diagnosis.signs import Signs
+from fusetune.analyze.effects.all_effects import FlightEffects
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 
 UNKNOWN = "unknown"
@@ -20,7 +21,9 @@ UNKNOWN_FROM = 0.15
 SEVERITIES = ("note", "warning", "fail")
 
 
-def diagnose(observed: ObservedFlight, experiments: int = AT_MOST) -> tuple[Diagnosis, ...]:
+def diagnose(
+    observed: ObservedFlight, experiments: int = AT_MOST, effects: FlightEffects | None = None
+) -> tuple[Diagnosis, ...]:
     """What is wrong, what explains most first; empty where nothing is.
 
     A flight that cannot be replayed is asked, too: rules that need a replay say nothing then.
@@ -28,8 +31,9 @@ def diagnose(observed: ObservedFlight, experiments: int = AT_MOST) -> tuple[Diag
     Parameters
     ----------
     experiments : how many of the first claims are tried by another replay at most
+    effects : of the same flight, where they are asked for elsewhere as well
     """
-    signs = Signs(observed)
+    signs = Signs(observed, effects)
     found = [one for cause in CAUSES.values() if (one := cause(signs)) is not None]
     left = with_experiments(in_order(explained_away(found)), signs, experiments)
     if not any(one.severity != "note" for one in left):

@@ -2,11 +2,11 @@
 
     s |s| = k² a |a| + b + e
 
-s is the measured airspeed, whose square is the pressure that the sensor measures with an even noise e and a zero b. a is
-the air from ahead: of a fixed wing all of it, as EKF2 has it; of a multicopter what comes along the tube, as it flies
-sideways as well. The wind is that of the drag fit with what it may be off by (`DragFit.wind_errors`), or one of its own:
-then wind from all sides tells k from it, by circles or legs in opposite directions. What to set is 1/k of the sensor as
-it is.
+s is the measured airspeed, whose square is the pressure that the sensor measures, with an even noise e and a zero b. a
+is the air from ahead: of a fixed wing all of it, as EKF2 has it; of a multicopter, which flies sideways as well, what
+comes along the tube. The wind is that of the drag fit with what it may be off by (`DragFit.wind_errors`), or one of its
+own: then wind from all sides tells k from it, by circles or legs in opposite directions. What to set is 1/k of the
+sensor as it is.
 """
 
 from __future__ import annotations
@@ -74,8 +74,14 @@ class _Air:
 
     def rows(self, used: npt.NDArray[np.bool_]) -> _Air:
         """Some of the times."""
-        parts = (self.time_s, self.squared, self.forward, self.velocity, self.wind_errors)
-        return _Air(*(one[used] for one in parts), self.is_along)
+        return _Air(
+            self.time_s[used],
+            self.squared[used],
+            self.forward[used],
+            self.velocity[used],
+            self.wind_errors[used],
+            self.is_along,
+        )
 
     def ahead(self, off: Array, gusts: Array) -> tuple[Array, Array]:
         """Air from ahead, (N,) m/s, and how it changes with the wind, (N, 2)."""

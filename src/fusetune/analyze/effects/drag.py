@@ -72,7 +72,7 @@ class DragFit:
         return np.column_stack([np.interp(time_s, self.fit.knot_s, one) for one in course.T])
 
     def wind_errors(self, time_s: Array) -> Array:
-        """How the wind may be off, (N, 2, 8) m/s at times (N,), s: eight courses, each times a normal number of its own.
+        """How the wind may be off, (N, 2, 8) m/s at times (N,), s: courses, each times a standard normal number.
 
         What drag and offsets are off by, the wind that is left over follows: drag that is too large by a share makes
         the wind too large by that share of the speed.
