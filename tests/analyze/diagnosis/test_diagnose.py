@@ -72,11 +72,11 @@ def test_ratios_are_cut_before_they_are_averaged() -> None:
 def test_bad_innovations_without_a_cause_are_told_as_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     time = np.arange(AIR[0][0], AIR[0][1], 200_000)
     bad = ratios_of(time, np.where(np.arange(time.size) % 3, 0.1, 3.0), AIR, 0, "replay")
-    monkeypatch.setattr(whole, "Signs", lambda _: signs(ratios={"gnss_vel": bad}))
+    monkeypatch.setattr(whole, "Signs", lambda *_: signs(ratios={"gnss_vel": bad}))
     found = diagnose(ObservedFlight(Flight("made")))
     assert [one.id for one in found] == [UNKNOWN]
     assert found[0].signs[0].figure == pytest.approx(1 / 3, abs=0.01)
-    monkeypatch.setattr(whole, "Signs", lambda _: signs())
+    monkeypatch.setattr(whole, "Signs", lambda *_: signs())
     assert diagnose(ObservedFlight(Flight("made"))) == ()
 
 
@@ -93,7 +93,7 @@ def test_a_share_that_is_right_grows_with_what_signs_say(one: float, other: floa
 
 def test_what_is_told_is_the_share_that_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
     made = claim("vibration", sure=0.5)
-    monkeypatch.setattr(whole, "Signs", lambda _: signs())
+    monkeypatch.setattr(whole, "Signs", lambda *_: signs())
     monkeypatch.setattr(whole, "CAUSES", {"vibration": lambda _: made})
     (found,) = diagnose(ObservedFlight(Flight("made")))
     # 17 of 19 diagnoses around a half were right

@@ -285,7 +285,7 @@ class _Solved:
             knot_s=given.knot_s,
             course=course,
             covariance=self.covariance * np.outer(stretched, stretched),
-            follows=-self.projected[:, :-1].reshape(given.knot_s.size, self.states, -1),
+            follows=-self.projected[:, :-1].reshape(given.knot_s.size, self.states, self.constants.size),
             residual=residual[: rows.target.size],
             blocks=blocks,
             ratio=self.ratio,
