@@ -12,7 +12,7 @@ heading, which turns forward velocity into sideward.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.told import NO_MOTION, is_fixed_wing, refused
-from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
+from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking, log_information
 from fusetune.analyze.observed.body_motion import BodyMotion
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import MIN_OBSERVATION_VARIANCE
@@ -130,6 +130,8 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
         fit = fit_walking(rows, fit if number > _SEARCHED_FROM_NEW else None, refined=number == _REFINED)
         if fit is None:
             return f"too short a time in the air; {_WHAT_TO_FLY}"
+        if number >= _REFINED:
+            fit = _without_favour(fit, rows, values, rotation, velocity, gusts)
         change = fit.constants - values
         values = fit.constants.copy()
         # a negative drag has no place in the model: it is where the ellipse has its edge
@@ -139,6 +141,22 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
             break
     assert fit is not None
     return fit, values
+
+
+def _without_favour(
+    fit: WalkingFit, rows: WalkingRows, values: Array, rotation: Array, velocity: Array, gusts: Array
+) -> WalkingFit:
+    """Moved to the likeliest drag whatever the gusts were; with them it comes out too large, as smaller gusts do then."""
+    slope, now = np.zeros(values.size), log_information(rows, fit)
+    for index, least in ((M, 0.05), (KAPPA_X, 0.002), (KAPPA_Y, 0.002)):
+        moved = values.copy()
+        step = 0.02 * max(float(values[index]), least)
+        moved[index] += step
+        predicted = predicted_force(moved, rotation, velocity, gusts)
+        walking = [_slope(moved, one, rotation, velocity, gusts, predicted) for one in (WIND_N, WIND_E)]
+        slope[index] = (log_information(replace(rows, walking=np.column_stack(walking)), fit) - now) / step
+    shift = -0.5 * fit.promised @ slope
+    return replace(fit, constants=fit.constants + shift, course=fit.course + fit.follows @ shift)
 
 
 def predicted_force(values: Array, rotation: Array, velocity: Array, gusts: Array) -> Array:

@@ -84,7 +84,7 @@ class WalkingFit:
     memory_s : τ
     knot_s : (M,) times of the knots
     course : (M, S) x at the knots
-    covariance : (P, P) of the constants, whose diagonal is that of `standard_error`
+    promised : (P, P) covariance of the constants as the model has it, without any factor
     follows : (M, S, P) how far the course moves with each constant
     residual : (N,) e
     blocks : number of blocks with measurements
@@ -98,7 +98,7 @@ class WalkingFit:
     memory_s: float
     knot_s: Array
     course: Array
-    covariance: Array
+    promised: Array
     follows: Array
     residual: Array
     blocks: int
@@ -107,6 +107,12 @@ class WalkingFit:
     def half_width(self, index: int) -> float:
         """Half of the 95 % interval of a constant."""
         return float(stdtrit(self.freedom[index], 0.5 + 0.5 * _CONFIDENCE) * self.standard_error[index])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(P, P) of the constants, whose diagonal is that of `standard_error`."""
+        stretched = self.standard_error / np.sqrt(np.maximum(np.diag(self.promised), 1e-300))
+        return np.asarray(self.promised * np.outer(stretched, stretched))
 
     @cached_property
     def lag_one(self) -> float:
@@ -136,6 +142,18 @@ def fit_walking(rows: WalkingRows, like: WalkingFit | None = None, *, refined: b
     for _ in range(_ROUNDS):
         equations = replace(equations, scale=equations.solved(ratio, memory_s).noise)
     return equations.solved(ratio, memory_s).fit()
+
+
+def log_information(rows: WalkingRows, like: WalkingFit) -> float:
+    """Logarithm of the determinant of what rows and prior tell of the course, in units of the variance of `like`.
+
+    Where the columns c depend on constants, these are the likeliest only with half of it counted (Laplace's
+    approximation of the likelihood without the course): a large c makes the same course cheaper.
+    """
+    equations = _Equations.of(rows)
+    if equations is None:
+        return 0.0
+    return equations.solved(like.ratio, like.memory_s).log_information
 
 
 def _likeliest(equations: _Equations, rows: WalkingRows) -> tuple[float, float]:
@@ -241,7 +259,7 @@ class _Solved:
         expected = np.square(given.scale / rows.expected)
         corner = given.corner.copy()
         corner[:-1, :-1] += np.diag(expected)
-        log_determinant = 0.0
+        self.log_information = log_determinant = 0.0
         if states:
             band[0, states:] += 1.0 / self.gained
             band[0, :-states] += self.kept**2 / self.gained
@@ -250,7 +268,7 @@ class _Solved:
             factor = cholesky_banded(band, lower=True, check_finite=False)
             self.projected = cho_solve_banded((factor, True), given.border, check_finite=False)
             corner -= np.einsum("ki,kj->ij", given.border, self.projected)
-            log_determinant = 2.0 * float(np.sum(np.log(factor[0])))
+            self.log_information = log_determinant = 2.0 * float(np.sum(np.log(factor[0])))
             log_determinant += states * (knots - 1) * math.log(self.gained) + float(np.sum(np.log(self.first)))
         else:
             self.projected = np.zeros((0, corner.shape[0]))
@@ -274,7 +292,6 @@ class _Solved:
         spread, blocks = self._jackknife(net, residual)
         wider = spread > promised
         errors = UNCERTAINTY * np.where(wider, spread, promised)
-        stretched = errors / np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
         return WalkingFit(
             constants=self.constants,
             standard_error=errors,
@@ -284,7 +301,7 @@ class _Solved:
             memory_s=self.memory_s,
             knot_s=given.knot_s,
             course=course,
-            covariance=self.covariance * np.outer(stretched, stretched),
+            promised=self.noise**2 * self.covariance,
             follows=-self.projected[:, :-1].reshape(given.knot_s.size, self.states, self.constants.size),
             residual=residual[: rows.target.size],
             blocks=blocks,
