@@ -146,7 +146,7 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
 def _without_favour(
     fit: WalkingFit, rows: WalkingRows, values: Array, rotation: Array, velocity: Array, gusts: Array
 ) -> WalkingFit:
-    """Moved to the likeliest drag whatever the gusts were; with them it comes out too large, as smaller gusts do then."""
+    """Moved to the likeliest drag whatever the gusts were; together with them it is too large, as smaller gusts do."""
     slope, now = np.zeros(values.size), log_information(rows, fit)
     for index, least in ((M, 0.05), (KAPPA_X, 0.002), (KAPPA_Y, 0.002)):
         moved = values.copy()
