@@ -49,8 +49,8 @@ def fitted(motion: SimpleNamespace) -> DragFit:
 
 
 def test_gusts_do_not_make_the_drag_larger() -> None:
-    """Means of twenty flights within three of their standard errors; taken together with the gusts κ is a third more."""
-    found = np.array([fitted(flown(seed)[0]).parameters for seed in range(20)])
+    """Means of twenty flights within three of their standard errors; taken with the gusts κ is a third more."""
+    found = np.array([fitted(flown(seed)[0]).likeliest.constants for seed in range(20)])
     for index, true in ((M, MOMENTUM), (KAPPA_X, KAPPA)):
         assert abs(np.mean(found[:, index]) - true) < 3.0 * np.std(found[:, index]) / np.sqrt(20)
 

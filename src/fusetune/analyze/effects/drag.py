@@ -57,12 +57,14 @@ class DragFit:
     ----------
     fit : of the last round; constants in the order M … WIND_E
     parameters : (8,)
+    likeliest : with the constants that are the likeliest whatever the gusts were; `fit` has the likeliest with them
     rho : air density, kg/m³
     rows : of the motion that were used
     """
 
     fit: WalkingFit
     parameters: Array
+    likeliest: WalkingFit
     rho: float
     rows: npt.NDArray[np.bool_]
 
@@ -113,7 +115,7 @@ def air_density(observed: ObservedFlight) -> float:
     return rho if math.isfinite(rho) and rho > 0.1 else AIR_DENSITY_SEA_LEVEL
 
 
-def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[WalkingFit, Array] | str:
+def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[WalkingFit, Array, WalkingFit] | str:
     rotation, velocity = motion.rotation[used], motion.velocity[used]
     time_s, force = motion.time_s[used], motion.specific_force[used][:, :2].ravel(order="F")
     both = np.concatenate([time_s, time_s])
@@ -130,8 +132,6 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
         fit = fit_walking(rows, fit if number > _SEARCHED_FROM_NEW else None, refined=number == _REFINED)
         if fit is None:
             return f"too short a time in the air; {_WHAT_TO_FLY}"
-        if number >= _REFINED:
-            fit = _without_favour(fit, rows, values, rotation, velocity, gusts)
         change = fit.constants - values
         values = fit.constants.copy()
         # a negative drag has no place in the model: it is where the ellipse has its edge
@@ -140,7 +140,7 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
         if number > _REFINED and np.all(np.abs(change) < _STANDS + 0.02 * fit.standard_error):
             break
     assert fit is not None
-    return fit, values
+    return fit, values, _without_favour(fit, rows, values, rotation, velocity, gusts)
 
 
 def _without_favour(
@@ -156,7 +156,7 @@ def _without_favour(
         walking = [_slope(moved, one, rotation, velocity, gusts, predicted) for one in (WIND_N, WIND_E)]
         slope[index] = (log_information(replace(rows, walking=np.column_stack(walking)), fit) - now) / step
     shift = -0.5 * fit.promised @ slope
-    return replace(fit, constants=fit.constants + shift, course=fit.course + fit.follows @ shift)
+    return replace(fit, constants=fit.constants + shift)
 
 
 def predicted_force(values: Array, rotation: Array, velocity: Array, gusts: Array) -> Array:
@@ -203,12 +203,12 @@ def estimate_drag(observed: ObservedFlight, fitted: DragFit | str | None = None)
     missing: list[str] = []
     for index, axis in ((KAPPA_X, "X"), (KAPPA_Y, "Y")):
         name = f"EKF2_BCOEF_{axis}"
-        one = _reciprocal(fitted.fit, index, name, 0.5 * fitted.rho, told.get(name))
+        one = _reciprocal(fitted.likeliest, index, name, 0.5 * fitted.rho, told.get(name))
         if one is None:
             missing.append(name)
         else:
             found.append(one)
-    m = _share(fitted.fit, M, "EKF2_MCOEF", "1/s", 1.0 / momentum, told.get("EKF2_MCOEF"))
+    m = _share(fitted.likeliest, M, "EKF2_MCOEF", "1/s", 1.0 / momentum, told.get("EKF2_MCOEF"))
     if m is None:
         missing.append("EKF2_MCOEF")
     else:
