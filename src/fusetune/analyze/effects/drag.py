@@ -156,7 +156,9 @@ def _without_favour(
         walking = [_slope(moved, one, rotation, velocity, gusts, predicted) for one in (WIND_N, WIND_E)]
         slope[index] = (log_information(replace(rows, walking=np.column_stack(walking)), fit) - now) / step
     shift = -0.5 * fit.promised @ slope
-    return replace(fit, constants=fit.constants + shift)
+    # one step of a likelihood that is far from a parabola where it is large
+    within = fit.standard_error / np.maximum(np.abs(shift), 1e-12)
+    return replace(fit, constants=fit.constants + min(1.0, float(np.min(within))) * shift)
 
 
 def predicted_force(values: Array, rotation: Array, velocity: Array, gusts: Array) -> Array:

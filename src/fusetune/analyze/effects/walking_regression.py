@@ -301,7 +301,7 @@ class _Solved:
             memory_s=self.memory_s,
             knot_s=given.knot_s,
             course=course,
-            promised=self.noise**2 * self.covariance,
+            promised=np.asarray(self.noise**2 * self.covariance, np.float64),
             follows=-self.projected[:, :-1].reshape(given.knot_s.size, self.states, self.constants.size),
             residual=residual[: rows.target.size],
             blocks=blocks,
