@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from fusetune.analyze.diagnosis.diagnose import diagnose
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
-from fusetune.analyze.effects.all_effects import all_effects
+from fusetune.analyze.effects.all_effects import FlightEffects
 from fusetune.analyze.effects.joined_effects import effects_document
 from fusetune.analyze.flight_files import DIAGNOSIS_FILE, EFFECTS_FILE, HEALTH_FILE, SENSOR_NOISE_FILE
 from fusetune.analyze.health.health_files import health_document
@@ -70,11 +70,12 @@ def diagnose_flight(
     asked = _Asked(is_replayable)
     no_rows: tuple[HealthRow, ...] = ()
     rows = asked.about("health", no_rows, lambda: health_rows(observed, health))
-    effects = all_effects(observed) if is_replayable else ()
+    tuned = FlightEffects(observed)
+    effects = tuned.all() if is_replayable else ()
     untold = SensorNoise(name, int(logged.start_timestamp), (), (), {}, (), 0.0)
     noise = asked.about("sensor noise", untold, lambda: sensor_noise(observed.flight, observed.airborne))
     nothing: tuple[Diagnosis, ...] = ()
-    found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=effects))
+    found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=tuned))
     start_us = int(logged.start_timestamp)
     documents = {
         HEALTH_FILE: health_document(logged, rows),

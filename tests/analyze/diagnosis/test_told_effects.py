@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from fusetune.analyze.diagnosis import told_effects
-from fusetune.analyze.diagnosis.told_effects import EFFECTS, TUNERS, ToldEffects
-from fusetune.analyze.effects.all_effects import all_effects
+from fusetune.analyze.diagnosis.told_effects import ToldEffects
+from fusetune.analyze.effects import all_effects
+from fusetune.analyze.effects.all_effects import TUNERS, FlightEffects
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.px4.flight import Flight
 
@@ -14,12 +14,11 @@ from fusetune.px4.flight import Flight
 def test_what_was_told_already_is_taken_and_no_tuner_asked_again(
     survey_flight: Flight, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    observed = ObservedFlight(survey_flight)
-    asked = {tuner: ask(observed) for tuner, ask in TUNERS.items()}
-    assert {tuner: tuple(one.id for one in effects) for tuner, effects in asked.items()} == EFFECTS
-    anew = ToldEffects(observed)
-    expected = {tuner: anew(tuner) for tuner in TUNERS}
-    assert any(expected.values())
-    monkeypatch.setattr(told_effects, "TUNERS", {})
-    told = ToldEffects(observed, all_effects(observed))
-    assert {tuner: told(tuner) for tuner in EFFECTS} == expected
+    effects = FlightEffects(ObservedFlight(survey_flight))
+    told_first = {one.name: one for effect in effects.all() for one in effect.estimates}
+    assert told_first
+    tuners = tuple(TUNERS)
+    monkeypatch.setattr(all_effects, "TUNERS", {})
+    told = ToldEffects(effects)
+    assert {name: one for tuner in tuners for name, one in told(tuner).items()} == told_first
+    assert ToldEffects(None)(tuners[0]) == {}

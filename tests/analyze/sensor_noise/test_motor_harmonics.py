@@ -3,11 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fusetune.analyze.sensor_noise.motor_commands import MotorCommand, motor_command
+from fusetune.analyze.flight.throttle import Throttle
 from fusetune.analyze.sensor_noise.motor_harmonics import MotorTones, motor_tones, shown_at
 from fusetune.analyze.sensor_noise.sensor_series import SENSORS, SensorSeries
 from fusetune.analyze.sensor_noise.spectrum import spectrum, tones
-from fusetune.px4.flight import Flight
 
 RATE_HZ, LENGTH_S = 200.0, 60.0
 TIME = np.arange(0.0, LENGTH_S, 1.0 / RATE_HZ)
@@ -37,7 +36,7 @@ def found_in(signal: np.ndarray, *, follows: bool = True) -> MotorTones:
     whole = spectrum(given, WHOLE)
     assert whole is not None
     at = np.arange(0.0, LENGTH_S, 0.1)
-    command = MotorCommand(np.round(at * 1e6).astype(np.int64), throttle(at)) if follows else None
+    command = Throttle(np.round(at * 1e6).astype(np.int64), throttle(at), "made") if follows else None
     return motor_tones(given, WHOLE, tones(whole), command)
 
 
@@ -94,24 +93,6 @@ def test_second_multiple_is_known_where_it_is_folded() -> None:
 
 def test_where_a_log_shows_a_tone() -> None:
     assert [shown_at(f, 200.0) for f in (60.0, 130.0, 230.0, 200.0)] == pytest.approx([60.0, 70.0, 30.0, 0.0])
-
-
-def test_commands_of_each_release() -> None:
-    stamps = np.arange(20, dtype=np.int64) * 100_000
-    moving = np.linspace(0.4, 0.6, 20)
-    motors = {"timestamp": stamps, "control[0]": moving, "control[1]": moving + 0.1, "control[2]": np.full(20, np.nan)}
-    outputs = {"timestamp": stamps, "output[0]": 1000.0 + 1000.0 * moving, "output[1]": np.full(20, 1500.0)}
-    setpoint = {"timestamp": stamps, "xyz[2]": -moving}
-    for topics, expected in (
-        ({("actuator_motors", 0): motors, ("actuator_outputs", 0): outputs}, moving + 0.05),
-        ({("actuator_outputs", 0): outputs}, moving),
-        ({("actuator_controls_0", 0): {"timestamp": stamps, "control[3]": moving}}, moving),
-        ({("vehicle_thrust_setpoint", 0): setpoint}, moving),
-    ):
-        command = motor_command(Flight("made", topics=topics))
-        assert command is not None
-        assert command.throttle == pytest.approx(expected)
-    assert motor_command(Flight("made")) is None
 
 
 def test_floor_is_read_beside_the_shaking_of_motors() -> None:

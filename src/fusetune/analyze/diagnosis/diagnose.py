@@ -12,7 +12,7 @@ from fusetune.analyze.diagnosis.explained_away import explained_away
 from fusetune.analyze.diagnosis.innovation_signs import GATE
 from fusetune.analyze.diagnosis.reliability import calibrated
 from fusetune.analyze.diagnosis.signs import Signs
-from fusetune.analyze.effects.estimate import Effect
+from fusetune.analyze.effects.all_effects import FlightEffects
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 
 UNKNOWN = "unknown"
@@ -22,7 +22,7 @@ SEVERITIES = ("note", "warning", "fail")
 
 
 def diagnose(
-    observed: ObservedFlight, experiments: int = AT_MOST, effects: Sequence[Effect] = ()
+    observed: ObservedFlight, experiments: int = AT_MOST, effects: FlightEffects | None = None
 ) -> tuple[Diagnosis, ...]:
     """What is wrong, what explains most first; empty where nothing is.
 
@@ -31,8 +31,7 @@ def diagnose(
     Parameters
     ----------
     experiments : how many of the first claims are tried by another replay at most
-    effects : what tuners of single effects told of the flight already (`all_effects`); others are asked where a sign
-        speaks
+    effects : of the same flight, where they are asked for elsewhere as well
     """
     signs = Signs(observed, effects)
     found = [one for cause in CAUSES.values() if (one := cause(signs)) is not None]

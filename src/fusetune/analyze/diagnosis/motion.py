@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.flight.throttle import throttle
 from fusetune.analyze.replaying.replayed_set import ReplayedSet, ReplayedSteps
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.px4.flight import Flight
@@ -157,23 +158,15 @@ def climbed_by(time: Times, velocity: Array) -> Array:
     return np.asarray(-np.cumsum(velocity[:, 2] * np.diff(time, prepend=time[:1]) * 1e-6))
 
 
-THRUST_TOPICS = (
-    ("vehicle_thrust_setpoint", "xyz[2]", -1.0),
-    ("actuator_controls_0", "control[3]", 1.0),
-    ("actuator_motors", "control[0]", 1.0),
-)
-
-
 def _thrust(flight: Flight, time: Times, force: Array, airborne: tuple[Interval, ...]) -> tuple[Array, str]:
     """Thrust, about 1 in a hover: of setpoints where the log has them, else what the accelerometer feels of it."""
     in_air = inside(time, airborne)
-    for topic, name, sign in THRUST_TOPICS:
-        table = flight.topic(topic)
-        if table is not None and name in table and table["timestamp"].size > 10:
-            values = sign * np.interp(time, table["timestamp"], np.nan_to_num(table[name].astype(np.float64)))
-            usual = float(np.median(values[in_air]))
-            if usual > 0.02 and float(np.ptp(values[in_air])) > 0.0:
-                return values / usual, topic
+    asked = throttle(flight)
+    if asked is not None:
+        values = np.interp(time, asked.time, asked.share)
+        usual = float(np.median(values[in_air]))
+        if usual > 0.02 and float(np.ptp(values[in_air])) > 0.0:
+            return values / usual, asked.topic
     width = max(1, round(THRUST_OVER_S / max(float(np.median(np.diff(time))) * 1e-6, 1e-3)))
     felt = np.convolve(-force[:, 2] / ONE_G, np.full(width, 1.0 / width), mode="same")
     return np.where(in_air, felt, 0.0), "sensor_combined"

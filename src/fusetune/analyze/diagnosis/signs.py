@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,7 +21,7 @@ from fusetune.analyze.diagnosis.magnetometer_signs import MagnetometerSigns, mag
 from fusetune.analyze.diagnosis.motion import Motion, motion_of
 from fusetune.analyze.diagnosis.told_effects import ToldEffects
 from fusetune.analyze.diagnosis.vision_signs import VisionSigns, vision_signs
-from fusetune.analyze.effects.estimate import Effect
+from fusetune.analyze.effects.all_effects import FlightEffects
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.finding import Finding
@@ -51,11 +50,11 @@ class Signs:
     Attributes
     ----------
     observed : the flight
-    effects : what tuners of single effects told of it already
+    effects : its single effects, where they are asked for elsewhere as well
     """
 
     observed: ObservedFlight
-    effects: Sequence[Effect] = ()
+    effects: FlightEffects | None = None
 
     @cached_property
     def is_replayed(self) -> bool:
@@ -136,7 +135,7 @@ class Signs:
     @cached_property
     def told_by(self) -> ToldEffects:
         """Estimates of the tuners of single effects."""
-        return ToldEffects(self.observed if self.is_replayed else None, self.effects)
+        return ToldEffects((self.effects or FlightEffects(self.observed)) if self.is_replayed else None)
 
     @property
     def gnss_place(self) -> VelocityPlace | None:

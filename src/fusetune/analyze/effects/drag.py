@@ -12,7 +12,7 @@ heading, which turns forward velocity into sideward.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.told import NO_MOTION, is_fixed_wing, refused
-from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking
+from fusetune.analyze.effects.walking_regression import WalkingFit, WalkingRows, fit_walking, log_information
 from fusetune.analyze.observed.body_motion import BodyMotion
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import MIN_OBSERVATION_VARIANCE
@@ -57,12 +57,14 @@ class DragFit:
     ----------
     fit : of the last round; constants in the order M … WIND_E
     parameters : (8,)
+    likeliest : with the constants that are the likeliest whatever the gusts were; `fit` has the likeliest with them
     rho : air density, kg/m³
     rows : of the motion that were used
     """
 
     fit: WalkingFit
     parameters: Array
+    likeliest: WalkingFit
     rho: float
     rows: npt.NDArray[np.bool_]
 
@@ -70,6 +72,20 @@ class DragFit:
         """Wind at times (N,), s, north and east → (N, 2) m/s; the ends hold outside."""
         course = self.fit.course + self.parameters[[WIND_N, WIND_E]]
         return np.column_stack([np.interp(time_s, self.fit.knot_s, one) for one in course.T])
+
+    def wind_errors(self, time_s: Array) -> Array:
+        """How the wind may be off, (N, 2, 8) m/s at times (N,), s: courses, each times a standard normal number.
+
+        What drag and offsets are off by, the wind that is left over follows: drag that is too large by a share makes
+        the wind too large by that share of the speed.
+        """
+        moved = self.fit.follows.copy()
+        moved[:, 0, WIND_N] += 1.0
+        moved[:, 1, WIND_E] += 1.0
+        size, turn = np.linalg.eigh(self.fit.covariance)
+        courses = (moved @ (turn * np.sqrt(np.maximum(size, 0.0)))).reshape(self.fit.knot_s.size, -1)
+        between = np.column_stack([np.interp(time_s, self.fit.knot_s, one) for one in courses.T])
+        return between.reshape(time_s.size, 2, size.size)
 
 
 def fit_drag(observed: ObservedFlight) -> DragFit | str:
@@ -99,7 +115,7 @@ def air_density(observed: ObservedFlight) -> float:
     return rho if math.isfinite(rho) and rho > 0.1 else AIR_DENSITY_SEA_LEVEL
 
 
-def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[WalkingFit, Array] | str:
+def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[WalkingFit, Array, WalkingFit] | str:
     rotation, velocity = motion.rotation[used], motion.velocity[used]
     time_s, force = motion.time_s[used], motion.specific_force[used][:, :2].ravel(order="F")
     both = np.concatenate([time_s, time_s])
@@ -124,7 +140,25 @@ def _gauss_newton(motion: BodyMotion, used: npt.NDArray[np.bool_]) -> tuple[Walk
         if number > _REFINED and np.all(np.abs(change) < _STANDS + 0.02 * fit.standard_error):
             break
     assert fit is not None
-    return fit, values
+    return fit, values, _without_favour(fit, rows, values, rotation, velocity, gusts)
+
+
+def _without_favour(
+    fit: WalkingFit, rows: WalkingRows, values: Array, rotation: Array, velocity: Array, gusts: Array
+) -> WalkingFit:
+    """Moved to the likeliest drag whatever the gusts were; together with them it is too large, as smaller gusts do."""
+    slope, now = np.zeros(values.size), log_information(rows, fit)
+    for index, least in ((M, 0.05), (KAPPA_X, 0.002), (KAPPA_Y, 0.002)):
+        moved = values.copy()
+        step = 0.02 * max(float(values[index]), least)
+        moved[index] += step
+        predicted = predicted_force(moved, rotation, velocity, gusts)
+        walking = [_slope(moved, one, rotation, velocity, gusts, predicted) for one in (WIND_N, WIND_E)]
+        slope[index] = (log_information(replace(rows, walking=np.column_stack(walking)), fit) - now) / step
+    shift = -0.5 * fit.promised @ slope
+    # one step of a likelihood that is far from a parabola where it is large
+    within = fit.standard_error / np.maximum(np.abs(shift), 1e-12)
+    return replace(fit, constants=fit.constants + min(1.0, float(np.min(within))) * shift)
 
 
 def predicted_force(values: Array, rotation: Array, velocity: Array, gusts: Array) -> Array:
@@ -171,12 +205,12 @@ def estimate_drag(observed: ObservedFlight, fitted: DragFit | str | None = None)
     missing: list[str] = []
     for index, axis in ((KAPPA_X, "X"), (KAPPA_Y, "Y")):
         name = f"EKF2_BCOEF_{axis}"
-        one = _reciprocal(fitted.fit, index, name, 0.5 * fitted.rho, told.get(name))
+        one = _reciprocal(fitted.likeliest, index, name, 0.5 * fitted.rho, told.get(name))
         if one is None:
             missing.append(name)
         else:
             found.append(one)
-    m = _share(fitted.fit, M, "EKF2_MCOEF", "1/s", 1.0 / momentum, told.get("EKF2_MCOEF"))
+    m = _share(fitted.likeliest, M, "EKF2_MCOEF", "1/s", 1.0 / momentum, told.get("EKF2_MCOEF"))
     if m is None:
         missing.append("EKF2_MCOEF")
     else:

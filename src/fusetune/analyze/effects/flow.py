@@ -1,4 +1,4 @@
-"""Optical flow: its scale (`SENS_FLOW_SCALE`) and where it sits (`EKF2_OF_POS_*`).
+"""Optical flow: its scale (`SENS_FLOW_SCALE`), where it sits (`EKF2_OF_POS_*`) and how late it is (`EKF2_OF_DELAY`).
 
     flow = s (sight(v + ω × p) + turning) + offset + walk + e        sight = (v_y, −v_x) / distance
 
@@ -25,14 +25,20 @@ from fusetune.ekf2.feed.message_samples import flow_refusals, flow_samples, take
 Array = npt.NDArray[np.float64]
 
 LARGEST_SCALE_ERROR = 0.03
-LARGEST_ARM_ERROR_M = 0.065
+LARGEST_ARM_ERROR_M = 0.08
 """Standard errors above which they are not told; high above ground an arm moves the flow by next to nothing."""
+LARGEST_DELAY_ERROR_S = 0.015
+VELOCITY_UNCERTAINTY = 1.3
+"""Factor on the standard errors of arms: by what the velocity is off in turns, no walk is the whole (docs/effects.md).
+"""
 VELOCITY_MEMORIES_S = (2.0, 10.0)
 LEAST_DISTANCE_M = 0.8
 LARGEST_DELAY_S = 0.3
 """Further from what it is told no delay is looked for."""
-EXPECTED = np.array([np.inf, 1.0, 1.0, 1.0, 0.05, 0.05, 0.1])
-"""Standard deviations beforehand: scale; arm m; offsets rad/s; delay s."""
+EXPECTED = np.array([np.inf, 1.0, 1.0, 1.0, 0.05, 0.05, 0.1, 0.1])
+"""Standard deviations beforehand: scale; arm m; offsets rad/s; turn of the sensor against the heading, rad; delay s."""
+DELAY = 7
+"""Of the constants."""
 _FEWEST = 200
 _LEAST_SCALE = 0.1
 _KNOTS_S = 1.0
@@ -81,7 +87,8 @@ def _fitted(
     for axis, offset in enumerate(([one, zero], [zero, one])):
         # the sensor's own gyro is of the same time as its flow, whatever the delay
         later = -np.gradient(sight[:, axis], time_s)
-        columns = [sight[:, axis] + gyro[:, axis], arms[axis] / distance[:, None], *offset, later]
+        turned = sight[:, 1] if axis == 0 else -sight[:, 0]
+        columns = [sight[:, axis] + gyro[:, axis], arms[axis] / distance[:, None], *offset, turned, later]
         design.append(np.column_stack(columns))
     # the reference's own error of the velocity, along the body, wanders; far above ground it shows less
     rows = WalkingRows(
@@ -96,23 +103,34 @@ def _fitted(
     return fit_walking(rows, like)
 
 
-def estimate_flow(observed: ObservedFlight) -> Effect:
-    """Scale and lever arm of the optical flow sensor."""
-    name, motion = "optical_flow", observed.motion
-    table = observed.flight.topic("vehicle_optical_flow")
+def estimate_flow(observed: ObservedFlight) -> tuple[Effect, ...]:
+    """Effects `optical_flow`, scale and lever arm, and `flow_delay`."""
+    found = _fit(observed)
+    if isinstance(found, str):
+        return refused("optical_flow", found), refused("flow_delay", found)
+    fit, later_s, by_range = found
+    figures = {"residual_rad_s": fit.noise, "by_range": float(by_range), "later_s": later_s}
+    estimates, missing = _told(observed, fit)
+    refusal = f"{', '.join(missing)} not told: {_WHAT_TO_FLY}" if missing else ""
+    return Effect("optical_flow", tuple(estimates), refusal, figures), _delay(observed, fit, later_s)
+
+
+def _fit(observed: ObservedFlight) -> tuple[WalkingFit, float, bool] | str:
+    """The fit, by how much the flow is later than told, s, and whether a range finder gave the distance."""
+    motion, table = observed.motion, observed.flight.topic("vehicle_optical_flow")
     if table is None or motion is None:
-        return refused(name, NO_MOTION if motion is None else "the log has no optical flow (`vehicle_optical_flow`)")
+        return NO_MOTION if motion is None else "the log has no optical flow (`vehicle_optical_flow`)"
     samples, _ = flow_samples(table)
     time = samples["time_us"] - round(1e3 * observed.parameters.get("EKF2_OF_DELAY", 0.0))
     usable = taken(table, flow_refusals(table)) & np.isfinite(samples["flow_rate"]).all(axis=1)
     usable &= samples["quality"] > observed.parameters.get("EKF2_OF_QMIN", 0.0)
     usable &= inside(time, observed.airborne) & motion.covers(time)
     if np.count_nonzero(usable) < _FEWEST:
-        return refused(name, f"too few measurements of the flow in the air; {_WHAT_TO_FLY}")
+        return f"too few measurements of the flow in the air; {_WHAT_TO_FLY}"
     time, flow = time[usable], np.asarray(samples["flow_rate"][usable], np.float64)
     gyro = np.asarray(samples["gyro_rate"][usable], np.float64)[:, :2]
     if stands_still(flow):
-        return refused(name, "the optical flow repeats one value")
+        return "the optical flow repeats one value"
     ranges = measured_ranges(observed)
     later_s = 0.0
     fit: WalkingFit | None = None
@@ -120,18 +138,15 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
         fit = _fitted(observed, motion, ranges, _Flow(time - round(later_s * 1e6), flow, gyro), fit)
         if fit is None or fit.constants[0] <= _LEAST_SCALE:
             why = f"the flow does not follow the motion {LEAST_DISTANCE_M} m and more above ground"
-            return refused(name, f"{why}; {_WHAT_TO_FLY}")
-        later_s = float(np.clip(later_s + fit.constants[-1], -LARGEST_DELAY_S, LARGEST_DELAY_S))
+            return f"{why}; {_WHAT_TO_FLY}"
+        later_s = float(np.clip(later_s + fit.constants[DELAY], -LARGEST_DELAY_S, LARGEST_DELAY_S))
     assert fit is not None
-    figures = {"residual_rad_s": fit.noise, "by_range": float(ranges is not None), "later_s": later_s}
-    estimates, missing = _told(observed, fit, time.size)
-    refusal = f"{', '.join(missing)} not told: {_WHAT_TO_FLY}" if missing else ""
-    return Effect(name, tuple(estimates), refusal, figures)
+    return fit, later_s, ranges is not None
 
 
-def _told(observed: ObservedFlight, fit: WalkingFit, n: int) -> tuple[list[Estimate], list[str]]:
+def _told(observed: ObservedFlight, fit: WalkingFit) -> tuple[list[Estimate], list[str]]:
     """Scale and arms that the fit tells, and the names of those that it does not."""
-    estimates, missing = [], []
+    estimates, missing, n = [], [], fit.residual.size
     scale, half, error = float(fit.constants[0]), fit.half_width(0), float(fit.standard_error[0])
     if error > LARGEST_SCALE_ERROR:
         missing.append("SENS_FLOW_SCALE")
@@ -142,7 +157,8 @@ def _told(observed: ObservedFlight, fit: WalkingFit, n: int) -> tuple[list[Estim
         estimates.append(Estimate("SENS_FLOW_SCALE", "", told, unit / scale, lower, upper, unit * error / scale**2, n))
     for index, letter in enumerate("XYZ", start=1):
         name = f"EKF2_OF_POS_{letter}"
-        spread, width = float(fit.standard_error[index]) / scale, fit.half_width(index) / scale
+        wider = VELOCITY_UNCERTAINTY / scale
+        spread, width = wider * float(fit.standard_error[index]), wider * fit.half_width(index)
         if spread > LARGEST_ARM_ERROR_M:
             missing.append(name)
             continue
@@ -150,3 +166,13 @@ def _told(observed: ObservedFlight, fit: WalkingFit, n: int) -> tuple[list[Estim
         told = observed.parameters.get(name)
         estimates.append(Estimate(name, "m", told, value, value - width, value + width, spread, n))
     return estimates, missing
+
+
+def _delay(observed: ObservedFlight, fit: WalkingFit, later_s: float) -> Effect:
+    error_s, half_ms = float(fit.standard_error[DELAY]), 1e3 * fit.half_width(DELAY)
+    if error_s > LARGEST_DELAY_ERROR_S or abs(later_s) >= LARGEST_DELAY_S:
+        return refused("flow_delay", f"what is seen changes too little; {_WHAT_TO_FLY}", error_s=error_s)
+    told = observed.parameters.get("EKF2_OF_DELAY", 0.0)
+    value, n = told + 1e3 * later_s, fit.residual.size
+    found = Estimate("EKF2_OF_DELAY", "ms", told, value, value - half_ms, value + half_ms, 1e3 * error_s, n)
+    return Effect("flow_delay", (found,))

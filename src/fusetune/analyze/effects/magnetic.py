@@ -28,6 +28,8 @@ from fusetune.analyze.observed.observed_flight import ObservedFlight
 
 LARGEST_FIELD_ERROR_GAUSS = 0.003
 """Standard error of a field above which it is not told: about 1° of heading."""
+LARGEST_FIELD_SHARE = 0.05
+"""The same, of the field itself: a strong one is told where its interval is within a tenth of it."""
 LARGEST_IRON_ERROR_GAUSS = 0.005
 LEAST_TURN_DEG = 150.0
 """Of all headings; what is seen from one side is nearly one with the earth's field."""
@@ -88,7 +90,8 @@ def _motor(found: MagneticFit, calibration: _Calibration, figures: dict[str, flo
     span = float(np.ptp(np.percentile(found.power.power, [1.0, 99.0])))
     figures = figures | {"power_span": span, "CAL_MAG_COMP_TYP": float(found.power.kind)}
     errors = found.fit.standard_error[MOTOR]
-    if float(np.max(errors)) * span > LARGEST_FIELD_ERROR_GAUSS:
+    share = float(np.max(errors)) / max(float(np.linalg.norm(found.fit.constants[MOTOR])), 1e-12)
+    if float(np.max(errors)) * span > LARGEST_FIELD_ERROR_GAUSS and share > LARGEST_FIELD_SHARE:
         why = (
             "the field of the motors cannot be told from that of the body; log from boot, stand still for ten seconds"
             " before arming, then hover, climb fast and sink, and turn on the spot"

@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import inside
+from fusetune.analyze.flight.throttle import ASKED, FEWEST_ROWS, throttle
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.px4.flight import row_count
 
 Array = npt.NDArray[np.float64]
 
@@ -17,7 +19,8 @@ OFF, THROTTLE, CURRENT = 0, 1, 2
 """Values of CAL_MAG_COMP_TYP; the current is that of battery 0."""
 ARMED = 2
 _LEAST_RATE_HZ = 2.0
-_LEAST_CHANGE_A = 1.0
+_LEAST_CHANGES = {CURRENT: 1e-3, THROTTLE: 0.05}
+"""kA, and share of full throttle."""
 _THRUST_UNSURE_S = 2.0
 
 
@@ -39,24 +42,28 @@ class MotorPower:
 
 def motor_power(observed: ObservedFlight, time: npt.NDArray[np.int64]) -> MotorPower:
     """At times (N,), µs."""
-    for kind, unit, topic, column, factor in (
-        (CURRENT, "G/kA", "battery_status", "current_a", 1e-3),
-        (THROTTLE, "G", "vehicle_thrust_setpoint", "xyz[2]", -1.0),
-        (THROTTLE, "G", "actuator_controls_0", "control[3]", 1.0),
+    for kind, unit, drawn in (
+        (CURRENT, "G/kA", _current(observed)),
+        (THROTTLE, "G", throttle(observed.flight, ASKED) or throttle(observed.logged, ASKED)),
     ):
-        table = observed.flight.topic(topic) or observed.logged.topic(topic)
-        if table is None or column not in table or table["timestamp"].size < 10:
+        if drawn is None:
             continue
-        stamp = table["timestamp"].astype(np.int64)
-        values = np.nan_to_num(np.asarray(table[column], np.float64)) * factor
+        stamp, values = drawn[:2]
         rate_hz = (stamp.size - 1) / max((stamp[-1] - stamp[0]) * 1e-6, 1e-6)
-        change = _LEAST_CHANGE_A * 1e-3 if kind == CURRENT else 0.05
-        if rate_hz < _LEAST_RATE_HZ or np.ptp(values) < change:
+        if rate_hz < _LEAST_RATE_HZ or np.ptp(values) < _LEAST_CHANGES[kind]:
             continue
         power = np.interp(time, stamp, values)
         known = (time >= stamp[0] - 1_000_000) & (time <= stamp[-1] + 1_000_000)
         return MotorPower(kind, unit, np.where(known, power, np.nan))
     return MotorPower(OFF, "G", _thrust(observed, time))
+
+
+def _current(observed: ObservedFlight) -> tuple[npt.NDArray[np.int64], Array] | None:
+    """Times, µs, and current, kA, of battery 0."""
+    table = observed.flight.topic("battery_status") or observed.logged.topic("battery_status")
+    if table is None or "current_a" not in table or row_count(table) < FEWEST_ROWS:
+        return None
+    return table["timestamp"].astype(np.int64), 1e-3 * np.nan_to_num(np.asarray(table["current_a"], np.float64))
 
 
 def _thrust(observed: ObservedFlight, time: npt.NDArray[np.int64]) -> Array:

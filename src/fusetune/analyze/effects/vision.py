@@ -32,8 +32,9 @@ HEADING, SCALE, DELAY = 3, 4, 5
 """Of the constants; the first three are the arm."""
 EXPECTED = np.array([1.0, 1.0, 1.0, np.inf, 0.3, 0.1])
 """Standard deviations beforehand: arm m, heading rad, scale, delay s."""
-POSITION_UNCERTAINTY = 1.3
-"""Factor on the standard errors: the way drifts with GNSS, of which no walk is the whole (docs/effects.md)."""
+POSITION_UNCERTAINTY, WAY_ERROR_M = 1.3, 0.015
+"""Factor on the standard errors, and what is added to those of the arm: the way drifts with GNSS and in turns is off by
+some centimetres, of which no walk is the whole (docs/effects.md)."""
 LARGEST_SCALE_ERROR = 0.05
 LARGEST_DELAY_S = 0.3
 """Further from what it is told no delay is looked for."""
@@ -65,7 +66,9 @@ def estimate_vision_arm(observed: ObservedFlight) -> Effect:
     if found is None:
         return refused(name, f"too short a time in the air; {_WHAT_TO_FLY}")
     fit, heading, later_s = found
-    fit = replace(fit, standard_error=POSITION_UNCERTAINTY * fit.standard_error)
+    errors = POSITION_UNCERTAINTY * fit.standard_error
+    errors[:HEADING] = np.hypot(errors[:HEADING], WAY_ERROR_M)
+    fit = replace(fit, standard_error=errors)
     scale = 1.0 + float(fit.constants[SCALE])
     figures = {
         "residual_m": float(np.std(fit.residual)), "walk_m_sqrt_s": fit.walk, "heading_deg": math.degrees(heading),

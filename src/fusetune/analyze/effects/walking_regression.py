@@ -34,8 +34,9 @@ _RATIOS = 10.0 ** np.arange(-6.0, 3.0, 1.0)
 """Of the disturbance's growth in a second, squared, to the variance of a measurement: first look."""
 _FINER = (0.5, 0.25, 0.125)
 """Powers of ten by which the search goes on."""
-_FIRST_OF_WALK = 1e4
-"""Variance with which a walk begins, against what it gains in all."""
+_FIRST_OF_WALK = 1e3
+"""Standard deviation with which a walk begins, against the largest target: anywhere. It must not grow with the density
+that is looked for, or a target far from 0, as an altitude above the sea, makes a large density the likeliest."""
 _CONFIDENCE = 0.95
 UNCERTAINTY = 1.25
 """Factor on all standard errors: ratio and memory are taken as known, and on made flights with known truth errors were
@@ -83,6 +84,8 @@ class WalkingFit:
     memory_s : τ
     knot_s : (M,) times of the knots
     course : (M, S) x at the knots
+    promised : (P, P) covariance of the constants as the model has it, without any factor
+    follows : (M, S, P) how far the course moves with each constant
     residual : (N,) e
     blocks : number of blocks with measurements
     """
@@ -95,6 +98,8 @@ class WalkingFit:
     memory_s: float
     knot_s: Array
     course: Array
+    promised: Array
+    follows: Array
     residual: Array
     blocks: int
     ratio: float = field(default=0.0)
@@ -102,6 +107,12 @@ class WalkingFit:
     def half_width(self, index: int) -> float:
         """Half of the 95 % interval of a constant."""
         return float(stdtrit(self.freedom[index], 0.5 + 0.5 * _CONFIDENCE) * self.standard_error[index])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(P, P) of the constants, whose diagonal is that of `standard_error`."""
+        stretched = self.standard_error / np.sqrt(np.maximum(np.diag(self.promised), 1e-300))
+        return np.asarray(self.promised * np.outer(stretched, stretched))
 
     @cached_property
     def lag_one(self) -> float:
@@ -131,6 +142,18 @@ def fit_walking(rows: WalkingRows, like: WalkingFit | None = None, *, refined: b
     for _ in range(_ROUNDS):
         equations = replace(equations, scale=equations.solved(ratio, memory_s).noise)
     return equations.solved(ratio, memory_s).fit()
+
+
+def log_information(rows: WalkingRows, like: WalkingFit) -> float:
+    """Logarithm of the determinant of what rows and prior tell of the course, in units of the variance of `like`.
+
+    Where the columns c depend on constants, these are the likeliest only with half of it counted (Laplace's
+    approximation of the likelihood without the course): a large c makes the same course cheaper.
+    """
+    equations = _Equations.of(rows)
+    if equations is None:
+        return 0.0
+    return equations.solved(like.ratio, like.memory_s).log_information
 
 
 def _likeliest(equations: _Equations, rows: WalkingRows) -> tuple[float, float]:
@@ -170,6 +193,13 @@ class _Equations:
     band: Array
     border: Array
     corner: Array
+
+    @property
+    def anywhere(self) -> Array:
+        """(S,) variances with which walks begin of which nothing is known."""
+        size = np.sqrt(np.mean(np.square(self.rows.walking), axis=0))
+        largest = max(float(np.max(np.abs(self.rows.target))), self.scale)
+        return np.square(_FIRST_OF_WALK * largest / (np.maximum(size, 1e-9) * self.scale))
 
     @classmethod
     def of(cls, rows: WalkingRows) -> _Equations | None:
@@ -219,7 +249,7 @@ class _Solved:
         self.kept = 0.0 if memory_s <= 0.0 else math.exp(-step / memory_s)
         if math.isinf(memory_s):
             self.gained = ratio * step
-            self.first = np.full(states, self.gained * knots * _FIRST_OF_WALK)
+            self.first = given.anywhere
             if rows.starts is not None:
                 self.first = np.minimum(self.first, np.square(rows.starts / given.scale))
         else:
@@ -229,7 +259,7 @@ class _Solved:
         expected = np.square(given.scale / rows.expected)
         corner = given.corner.copy()
         corner[:-1, :-1] += np.diag(expected)
-        log_determinant = 0.0
+        self.log_information = log_determinant = 0.0
         if states:
             band[0, states:] += 1.0 / self.gained
             band[0, :-states] += self.kept**2 / self.gained
@@ -238,7 +268,7 @@ class _Solved:
             factor = cholesky_banded(band, lower=True, check_finite=False)
             self.projected = cho_solve_banded((factor, True), given.border, check_finite=False)
             corner -= np.einsum("ki,kj->ij", given.border, self.projected)
-            log_determinant = 2.0 * float(np.sum(np.log(factor[0])))
+            self.log_information = log_determinant = 2.0 * float(np.sum(np.log(factor[0])))
             log_determinant += states * (knots - 1) * math.log(self.gained) + float(np.sum(np.log(self.first)))
         else:
             self.projected = np.zeros((0, corner.shape[0]))
@@ -261,15 +291,18 @@ class _Solved:
         promised = self.noise * np.sqrt(np.diag(self.covariance))
         spread, blocks = self._jackknife(net, residual)
         wider = spread > promised
+        errors = UNCERTAINTY * np.where(wider, spread, promised)
         return WalkingFit(
             constants=self.constants,
-            standard_error=UNCERTAINTY * np.where(wider, spread, promised),
+            standard_error=errors,
             freedom=np.where(wider, float(blocks - 1), float(self.freedom)),
             noise=self.noise,
             walk=self.noise * math.sqrt(self.ratio) if self.states else 0.0,
             memory_s=self.memory_s,
             knot_s=given.knot_s,
             course=course,
+            promised=np.asarray(self.noise**2 * self.covariance, np.float64),
+            follows=-self.projected[:, :-1].reshape(given.knot_s.size, self.states, self.constants.size),
             residual=residual[: rows.target.size],
             blocks=blocks,
             ratio=self.ratio,

@@ -161,7 +161,11 @@ def _bounded_velocity(motion: InertialMotion, flight: Flight, parameters: Mappin
     if np.count_nonzero(usable) < _FEWEST_FIXES:
         return motion.bounded_velocity, False
     time = time[usable]
-    off = _interpolated(time, motion.time, motion.velocity) - samples["vel"][usable]
+    # the receiver tells the velocity of its antenna, which sweeps around the IMU as the vehicle turns
+    arm = np.array(
+        [parameters.get(f"EKF2_GPS_POS_{one}", 0.0) - parameters.get(f"EKF2_IMU_POS_{one}", 0.0) for one in "XYZ"]
+    )
+    off = _interpolated(time, motion.time, motion.velocity + motion.swept @ arm) - samples["vel"][usable]
     drift = slow_part(time, off, VELOCITY_KNOTS_S)
     # once more without what lies far off: a glitch must not bend the reference
     left = np.abs(off - drift)

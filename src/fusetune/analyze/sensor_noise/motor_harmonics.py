@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.signal import spectrogram
 
 from fusetune.analyze.flight.intervals import Interval
-from fusetune.analyze.sensor_noise.motor_commands import MotorCommand
+from fusetune.analyze.flight.throttle import Throttle
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
 from fusetune.analyze.sensor_noise.spectrum import Tone, segment_length
 
@@ -78,7 +78,7 @@ class MotorTones:
 
 
 def motor_tones(
-    series: SensorSeries, intervals: Sequence[Interval], found: Sequence[Tone], command: MotorCommand | None
+    series: SensorSeries, intervals: Sequence[Interval], found: Sequence[Tone], command: Throttle | None
 ) -> MotorTones:
     """Tell the motors' tones among those of a spectrum.
 
@@ -93,7 +93,7 @@ def motor_tones(
     throttle = "not logged"
     slopes: list[float | None] = [None] * len(found)
     if tracks is not None and command is not None:
-        at = np.interp(tracks.time, command.time, command.throttle)
+        at = np.interp(tracks.time, command.time, command.share)
         throttle = "varied" if float(np.std(at)) >= LEAST_THROTTLE_SPREAD else "constant"
         if throttle == "varied":
             slopes = [_slope(tracks, one, at) for one in found]

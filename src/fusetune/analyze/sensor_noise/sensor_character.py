@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.flight.throttle import Throttle
 from fusetune.analyze.sensor_noise.allan import AllanCurve, allan_curve
 from fusetune.analyze.sensor_noise.allan_fit import AllanFigures, allan_figures
 from fusetune.analyze.sensor_noise.distribution import Distribution, distributions
-from fusetune.analyze.sensor_noise.motor_commands import MotorCommand
 from fusetune.analyze.sensor_noise.sensor_series import Sensor, SensorSeries
 from fusetune.analyze.sensor_noise.spectrum import Spectrum, spectrum
 from fusetune.analyze.sensor_noise.standing_still import SHORTEST_S
@@ -82,7 +82,7 @@ class SensorCharacter:
 
 
 def sensor_character(
-    series: SensorSeries, still: Sequence[Interval], airborne: Sequence[Interval], command: MotorCommand | None
+    series: SensorSeries, still: Sequence[Interval], airborne: Sequence[Interval], command: Throttle | None
 ) -> SensorCharacter:
     """Measure one sensor.
 

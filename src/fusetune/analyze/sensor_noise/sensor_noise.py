@@ -9,8 +9,8 @@ from typing import Any
 
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import airborne_intervals
+from fusetune.analyze.flight.throttle import SOURCES, throttle
 from fusetune.analyze.flight_files import SENSOR_NOISE_FILE
-from fusetune.analyze.sensor_noise.motor_commands import motor_command
 from fusetune.analyze.sensor_noise.sensor_character import SensorCharacter, sensor_character
 from fusetune.analyze.sensor_noise.sensor_series import SensorName, sensor_series
 from fusetune.analyze.sensor_noise.standing_still import standing_still
@@ -27,10 +27,7 @@ SENSOR_NOISE_TOPICS = frozenset(
         *ESTIMATOR_TOPICS,
         "vehicle_imu",
         *(f"sensor_{one}{kind}" for one in ("gyro", "accel") for kind in ("", "_fifo")),
-        "actuator_motors",
-        "actuator_outputs",
-        "actuator_controls_0",
-        "vehicle_thrust_setpoint",
+        *SOURCES,
     }
 )
 """What is read of a saved flight, of any release."""
@@ -92,7 +89,7 @@ def sensor_noise(flight: Flight, airborne: Sequence[Interval]) -> SensorNoise:
     still: tuple[Interval, ...] = ()
     if "gyro" in series and "accel" in series:
         still = standing_still(flight, series["gyro"], series["accel"], airborne)
-    command = motor_command(flight)
+    command = throttle(flight)
     found = {name: sensor_character(one, still, airborne, command) for name, one in series.items()}
     flown = complete(flight.parameters.initial, {}, flight.release)
     starting = starting_noises(flight, found, flown)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fusetune.analyze.flight.intervals import Interval
-from fusetune.analyze.sensor_noise.motor_commands import MotorCommand
+from fusetune.analyze.flight.throttle import Throttle
 from fusetune.analyze.sensor_noise.motor_harmonics import MOST_HARMONIC, MotorTones, motor_tones, shown_at
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
 from fusetune.analyze.sensor_noise.spectrum import Spectrum, tones
@@ -62,7 +62,7 @@ def vibration(
     at_rest: Spectrum | None,
     in_flight: Spectrum | None,
     airborne: Sequence[Interval],
-    command: MotorCommand | None,
+    command: Throttle | None,
 ) -> Vibration:
     """Compare a sensor's spectra.
 

@@ -20,6 +20,7 @@ EFFECT_WORDS: Mapping[str, str] = {
     "range_lever_arm": "place of the range finder",
     "range_noise": "noise of the range finder",
     "optical_flow": "optical flow",
+    "flow_delay": "delay of the optical flow",
     "vision_lever_arm": "place of the camera",
     "airspeed_scale": "scale of the airspeed",
     "output_predictor": "output predictor",

@@ -1,7 +1,8 @@
-"""How hard the motors were asked to turn, as far as a log tells."""
+"""How hard the motors were asked to push, as far as a log tells: in one order and one unit for all who ask."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,32 +14,34 @@ FEWEST_ROWS = 10
 MOST_MOTORS = 8
 
 
-class MotorCommand(NamedTuple):
-    """Mean command of the motors that turn.
+class Throttle(NamedTuple):
+    """Share of full throttle.
 
     Attributes
     ----------
     time : (N,) int64, µs since boot
-    throttle : (N,) 0 to 1; of PWM outputs, microseconds from 1000 to 2000
+    share : (N,) 0 to 1
+    topic : that tells it
     """
 
     time: npt.NDArray[np.int64]
-    throttle: npt.NDArray[np.float64]
+    share: npt.NDArray[np.float64]
+    topic: str
 
 
-def motor_command(flight: Flight) -> MotorCommand | None:
-    """From `actuator_motors` (v1.13 and newer), the PWM outputs, or the thrust that was asked for; None without any."""
-    for topic, read in (
-        ("actuator_motors", _of_motors),
-        ("actuator_outputs", _of_outputs),
-        ("actuator_controls_0", _of_controls),
-        ("vehicle_thrust_setpoint", _of_setpoint),
-    ):
-        table = flight.topic(topic)
-        throttle = None if table is None or row_count(table) < FEWEST_ROWS else read(table)
-        if table is not None and throttle is not None and np.isfinite(throttle).sum() >= FEWEST_ROWS:
-            kept = np.isfinite(throttle)
-            return MotorCommand(np.asarray(table["timestamp"], np.int64)[kept], throttle[kept])
+def throttle(flight: Flight, topics: Collection[str] | None = None) -> Throttle | None:
+    """The thrust that was asked for (v1.14 and newer, then older), else what motors or outputs were told; None without.
+
+    Parameters
+    ----------
+    topics : of `SOURCES`, those that count; all of them if None
+    """
+    for topic, read in SOURCES.items():
+        table = flight.topic(topic) if topics is None or topic in topics else None
+        share = None if table is None or row_count(table) < FEWEST_ROWS else read(table)
+        if table is not None and share is not None and np.isfinite(share).sum() >= FEWEST_ROWS:
+            kept = np.isfinite(share)
+            return Throttle(np.asarray(table["timestamp"], np.int64)[kept], share[kept], topic)
     return None
 
 
@@ -71,3 +74,14 @@ def _mean_of_used(commands: npt.NDArray[np.float64]) -> npt.NDArray[np.float64] 
     chosen = commands[:, used]
     complete = np.isfinite(chosen).all(axis=1)
     return np.where(complete, np.where(np.isfinite(chosen), chosen, 0.0).mean(axis=1), np.nan)
+
+
+ASKED = ("vehicle_thrust_setpoint", "actuator_controls_0")
+"""Of these PX4 takes the throttle that it compensates magnetometers with."""
+SOURCES: Mapping[str, Callable[[TopicTable], npt.NDArray[np.float64] | None]] = {
+    "vehicle_thrust_setpoint": _of_setpoint,
+    "actuator_controls_0": _of_controls,
+    "actuator_motors": _of_motors,
+    "actuator_outputs": _of_outputs,
+}
+"""Topic → share of full throttle, the first one that tells counts."""
