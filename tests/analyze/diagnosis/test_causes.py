@@ -169,7 +169,8 @@ def test_places_are_those_of_the_parameters_whose_imu_has_a_place_of_its_own() -
 class Tuned:
     """Tuners that tell some estimates: value, and the two sides of its interval."""
 
-    def __init__(self, **estimates: tuple[float, float, float]) -> None:
+    def __init__(self, figures: dict[str, float] | None = None, **estimates: tuple[float, float, float]) -> None:
+        self.found = figures or {}
         self.told = {
             name: Estimate(name, "", 1.0 if name.endswith("SCALE") else None, value, low, high, 0.01, 100)
             for name, (value, low, high) in estimates.items()
@@ -178,8 +179,11 @@ class Tuned:
     def __call__(self, _: str) -> dict[str, Estimate]:
         return self.told
 
+    def figures(self, _: str) -> dict[str, float]:
+        return self.found
 
-PRESSED = barometer(speed={"forward": effect(1.4), "backward": effect(0.1), "sideways": effect(0.1)})
+
+PRESSED = barometer(speed={"forward": effect(0.4), "backward": effect(0.1), "sideways": effect(0.1)})
 
 
 def test_static_pressure_warns_where_the_tuner_tells_it_and_with_its_values() -> None:

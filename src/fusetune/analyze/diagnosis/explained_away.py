@@ -100,9 +100,18 @@ def explained_away(found: Iterable[Diagnosis]) -> list[Diagnosis]:
             continue
         for other in made:
             second = by_id.get(other)
-            if second is not None and other not in gone and _meet(first, second):
+            if second is not None and other not in gone and _meet(first, second) and _may_follow(second):
                 gone.add(other)
     return [one for one in found if one.id not in gone]
+
+
+HELD_AGAINST_OTHERS = ("EKF2_GPS_V_NOISE", "EKF2_GPS_P_NOISE")
+"""Noises that are measured with the IMU or GNSS; that of a barometer or magnetometer is of its own readings alone."""
+
+
+def _may_follow(second: Diagnosis) -> bool:
+    """Whether another cause can make it: of claimed noises those of sensors that are held against others."""
+    return second.id != "noise_claim" or all(name in HELD_AGAINST_OTHERS for name in second.values)
 
 
 def _meet(first: Diagnosis, second: Diagnosis) -> bool:

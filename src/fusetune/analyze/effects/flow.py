@@ -123,7 +123,10 @@ def estimate_flow(observed: ObservedFlight) -> Effect:
             return refused(name, f"{why}; {_WHAT_TO_FLY}")
         later_s = float(np.clip(later_s + fit.constants[-1], -LARGEST_DELAY_S, LARGEST_DELAY_S))
     assert fit is not None
-    figures = {"residual_rad_s": fit.noise, "by_range": float(ranges is not None), "later_s": later_s}
+    figures = {
+        "residual_rad_s": fit.noise, "by_range": float(ranges is not None), "later_s": later_s,
+        "later_error_s": float(fit.standard_error[-1]),
+    }  # fmt: skip
     estimates, missing = _told(observed, fit, time.size)
     refusal = f"{', '.join(missing)} not told: {_WHAT_TO_FLY}" if missing else ""
     return Effect(name, tuple(estimates), refusal, figures)
