@@ -128,15 +128,15 @@ def cost_table(verdicts: Sequence[Verdict]) -> str:
     )
 
 
-def study_tables(verdicts: Sequence[Verdict], estimates: str) -> Mapping[str, str]:
-    """All tables by the names of their places in docs/diagnosis.md."""
-    return {
+def study_tables(verdicts: Sequence[Verdict], estimates: str | None) -> Mapping[str, str]:
+    """All tables by the names of their places in docs/diagnosis.md; without estimates where there are none."""
+    tables = {
         "injected": kinds_table(),
         "shares": shares_table(verdicts),
         "confusion": confusion_table(verdicts),
         "healthy": healthy_table(verdicts),
         "pairs": pairs_table(verdicts),
-        "estimates": estimates,
         "reliability": reliability_table(verdicts),
         "cost": cost_table(verdicts),
     }
+    return tables if estimates is None else tables | {"estimates": estimates}

@@ -44,6 +44,13 @@ def test_a_consequence_goes_with_its_cause_and_stays_without() -> None:
     assert [one.id for one in explained_away([loss])] == ["gnss_loss"]
 
 
+def test_a_noise_of_readings_that_nothing_else_enters_follows_from_nothing() -> None:
+    gaps = claim("imu_gaps")
+    of_gnss, of_barometer = (claim("noise_claim", values={f"EKF2_{name}_NOISE": 0.1}) for name in ("GPS_V", "BARO"))
+    assert [one.id for one in explained_away([gaps, of_gnss])] == ["imu_gaps"]
+    assert [one.id for one in explained_away([gaps, of_barometer])] == ["imu_gaps", "noise_claim"]
+
+
 def test_what_happened_at_another_time_is_no_consequence() -> None:
     early = claim("gnss_interference", stop_us=20_000_000)
     late = claim("gnss_loss", start_us=40_000_000)
@@ -148,6 +155,22 @@ def test_what_a_replay_shows_is_told_plainly(before: float, after: float, outcom
     trial = trial_of("without it", "gnss_vel", before, after)
     assert trial.outcome == outcome
     assert words in trial.words
+
+
+def test_what_mends_one_source_and_spoils_another_bears_nothing_out() -> None:
+    trial = trial_of("without it", "gnss_vel, mag", 1.2, 0.4, ["gnss_vel"])
+    assert trial.outcome == "no better"
+    assert "but worse for gnss_vel" in trial.words
+
+
+def test_the_experiment_turns_the_compass_back_as_the_sign_says(shared_logs: Path) -> None:
+    # 13 s in the air are too short for a heading by GNSS: the sign goes by tilt alone
+    log = read_ulog(shared_logs / "erdemarslan380__sitl_windy.ulg")
+    found = diagnose(ObservedFlight(log, AS_FLOWN))[0]
+    assert found.id == "magnetometer_rotated"
+    assert found.trial is not None
+    assert found.trial.outcome == "better"
+    assert found.trial.after < 0.1 * found.trial.before
 
 
 def test_without_experiments_nothing_is_replayed_twice(told_wrong: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
