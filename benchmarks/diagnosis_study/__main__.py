@@ -35,7 +35,8 @@ def main() -> None:
     if options.fly_only:
         return
     found = list(verdicts(flights, options.folder / "verdicts", cases, causes_only=options.causes_only))
-    tables = study_tables(found, None if options.causes_only else estimates_table(found))
+    estimates = None if options.causes_only else estimates_table(found)
+    tables = study_tables(found, estimates, fresh=options.fresh)
     print("\n\n".join(tables.values()))
     if options.write:
         renew_tables(DOCUMENT, tables)

@@ -25,8 +25,8 @@ def kinds_table() -> str:
 def shares_table(verdicts: Sequence[Verdict]) -> str:
     """How often the right cause stands first, and among the first two, of each kind and of all."""
     rows = [
-        "| injected | flights | visible | first | among the first two | named of those not visible |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| injected | flights | first, of the visible | among the first two | named of those not visible |",
+        "| --- | --- | --- | --- | --- |",
     ]
     by_kind = {kind: [one for one in verdicts if one.group == kind] for kind in KINDS}
     for kind, own in by_kind.items():
@@ -39,9 +39,9 @@ def shares_table(verdicts: Sequence[Verdict]) -> str:
 def _shares(own: Sequence[Verdict]) -> str:
     visible = [one for one in own if one.is_visible]
     faint = [one for one in own if not one.is_visible]
-    cells = [str(len(own)), str(len(visible)), _percent([_place(one) == 0 for one in visible])]
-    cells.append(_percent([_place(one) < 2 for one in visible]))
-    cells.append(_percent([_place(one) < len(one.named) for one in faint]))
+    cells = [str(len(own)), _counts([_place(one) == 0 for one in visible])]
+    cells.append(_counts([_place(one) < 2 for one in visible]))
+    cells.append(_counts([_place(one) < len(one.named) for one in faint]))
     return " | ".join(cells)
 
 
@@ -53,6 +53,11 @@ def _place(verdict: Verdict) -> int:
 
 def _percent(holds: Sequence[bool]) -> str:
     return f"{100.0 * float(np.mean(holds)):.1f} %" if len(holds) else "–"
+
+
+def _counts(holds: Sequence[bool]) -> str:
+    """How many of how many, and the share."""
+    return f"{sum(holds)} of {len(holds)} ({_percent(holds)})" if len(holds) else "–"
 
 
 def confusion_table(verdicts: Sequence[Verdict]) -> str:
@@ -88,7 +93,7 @@ def pairs_table(verdicts: Sequence[Verdict]) -> str:
         [
             "| flights with two faults | both named | one named | missed |",
             "| --- | --- | --- | --- |",
-            f"| {len(own)} | {_percent([count == 2 for count in named])} | {_percent([count == 1 for count in named])} "
+            f"| {len(own)} | {_counts([count == 2 for count in named])} | {_counts([count == 1 for count in named])} "
             f"| {missed or NOTHING} |",
         ]
     )
@@ -128,8 +133,17 @@ def cost_table(verdicts: Sequence[Verdict]) -> str:
     )
 
 
-def study_tables(verdicts: Sequence[Verdict], estimates: str | None) -> Mapping[str, str]:
-    """All tables by the names of their places in docs/diagnosis.md; without estimates where there are none."""
+IN_VIEW = ("shares", "confusion", "healthy", "pairs", "reliability")
+"""Tables that stand in the document of the flights, too, with which levels were set."""
+
+
+def study_tables(verdicts: Sequence[Verdict], estimates: str | None, *, fresh: bool = True) -> Mapping[str, str]:
+    """All tables by the names of their places in docs/diagnosis.md; without estimates where there are none.
+
+    Parameters
+    ----------
+    fresh : whether these flights had no say when levels were set; of others there are `IN_VIEW`, so named
+    """
     tables = {
         "injected": kinds_table(),
         "shares": shares_table(verdicts),
@@ -139,4 +153,6 @@ def study_tables(verdicts: Sequence[Verdict], estimates: str | None) -> Mapping[
         "reliability": reliability_table(verdicts),
         "cost": cost_table(verdicts),
     }
+    if not fresh:
+        return {f"{name}_in_view": tables[name] for name in IN_VIEW}
     return tables if estimates is None else tables | {"estimates": estimates}

@@ -16,6 +16,7 @@ from benchmarks.diagnosis_study.tables import (
     pairs_table,
     reliability_table,
     shares_table,
+    study_tables,
 )
 from benchmarks.diagnosis_study.verdicts import Named, Told, Verdict
 
@@ -83,7 +84,7 @@ def test_first_and_among_the_first_two_are_counted_of_visible_faults() -> None:
         verdict("gnss_glitch", ["gnss_glitch"], visible=False),
     ]
     # of four visible ones, one stands first and one second
-    assert "| `gnss_glitch` | 6 | 4 | 25.0 % | 50.0 % | 50.0 % |" in shares_table(said)
+    assert "| `gnss_glitch` | 6 | 1 of 4 (25.0 %) | 2 of 4 (50.0 %) | 1 of 2 (50.0 %) |" in shares_table(said)
     assert "| `gnss_glitch` | gnss_accuracy 2, gnss_glitch 1, nothing 1 |" in confusion_table(said)
 
 
@@ -105,8 +106,18 @@ def test_a_pair_counts_when_both_are_named() -> None:
         verdict(PAIRS, ["gnss_glitch", "baro_drift", "vibration"]),
     ]
     table = pairs_table(said)
-    assert "| 4 | 50.0 % | 25.0 % |" in table
+    assert "| 4 | 2 of 4 (50.0 %) | 1 of 4 (25.0 %) |" in table
     assert "gnss_glitch 2, vibration 1" in table
+
+
+def test_tables_of_flights_in_view_have_places_of_their_own() -> None:
+    said = [verdict("gnss_glitch", ["gnss_glitch"])]
+    fresh, in_view = study_tables(said, None), study_tables(said, None, fresh=False)
+    assert not set(fresh) & set(in_view)
+    assert "estimates" not in fresh
+    assert in_view["confusion_in_view"] == fresh["confusion"]
+    document = study.DOCUMENT.read_text(encoding="utf-8")
+    assert all(f"<!-- {name} -->" in document for name in [*fresh, *in_view])
 
 
 def test_a_diagnosis_counts_by_how_sure_it_was_and_is_right_where_that_was_injected() -> None:

@@ -189,7 +189,7 @@ class Signs:
         level = np.hypot(*motion.velocity[inside(motion.time, self.airborne), :2].T)
         if float(np.max(level)) < LEAST_SPEED_M_S or isinstance(self.told_by.drag, str):
             return None
-        return self.told_by.drag.wind(motion.time * 1e-6)
+        return self.told_by.drag.wind(np.asarray(motion.time * 1e-6, np.float64))
 
     @cached_property
     def range(self) -> RangeSigns | None:
