@@ -105,6 +105,12 @@ def verdicts(flights: Path, kept: Path, cases: Sequence[Case], *, causes_only: b
         yield _read(file)
 
 
+def kept_verdicts(kept: Path) -> Iterator[Verdict]:
+    """What was said of every flight of a study, as it is kept."""
+    for file in sorted(kept.glob("*/*.json")):
+        yield _read(file)
+
+
 def _warm_up() -> None:
     """Imports are no part of what a flight costs."""
     import fusetune.analyze.diagnosis.diagnose

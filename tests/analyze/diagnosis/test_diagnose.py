@@ -21,7 +21,8 @@ from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
 from fusetune.analyze.diagnosis.experiments import trial_of, tried
 from fusetune.analyze.diagnosis.explained_away import MAKES, explained_away
 from fusetune.analyze.diagnosis.innovation_signs import LARGEST, ratios_of
-from fusetune.analyze.diagnosis.reliability import calibrated
+from fusetune.analyze.diagnosis.reliability import LARGEST as SUREST
+from fusetune.analyze.diagnosis.reliability import calibrated, said_of
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.px4.flight import Flight
@@ -98,13 +99,19 @@ def test_a_share_that_is_right_grows_with_what_signs_say(one: float, other: floa
     assert 0.0 <= calibrated(low) <= calibrated(high) < 1.0
 
 
+@given(st.floats(0.05, 0.85))
+def test_what_signs_said_is_read_off_what_is_told(said: float) -> None:
+    assert calibrated(said) < SUREST
+    assert said_of(calibrated(said)) == pytest.approx(said, abs=0.01)
+
+
 def test_what_is_told_is_the_share_that_is_right(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = claim("vibration", sure=0.5)
+    made = claim("vibration", sure=0.6)
     monkeypatch.setattr(whole, "Signs", lambda _: signs())
     monkeypatch.setattr(whole, "CAUSES", {"vibration": lambda _: made})
     (found,) = diagnose(ObservedFlight(Flight("made")))
-    # 17 of 19 diagnoses around a half were right
-    assert found.confidence == pytest.approx(17 / 19, abs=0.05)
+    # of 30 diagnoses that signs made so sure of 24 were right
+    assert found.confidence == pytest.approx(24 / 30, abs=0.03)
 
 
 @pytest.fixture(scope="module")
