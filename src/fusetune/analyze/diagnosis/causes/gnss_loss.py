@@ -25,12 +25,11 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         return _silent(signs)
     if not gnss.ever_fixed:
         found = [Sign(f"none of {gnss.samples} messages in the air has a 3D fix with a position", 1.0, 0.0, "1")]
-        aided = any(source.startswith(("ev_", "optical_flow")) for source in signs.ratios)
         return diagnosed(
             signs,
             "gnss_loss",
             "The GNSS receiver never has a fix",
-            "warning" if aided or signs.table("vehicle_visual_odometry") is not None else "fail",
+            "warning" if _is_aided(signs) else "fail",
             0.97,
             found,
             touches=("gnss",),
@@ -57,6 +56,12 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     )
 
 
+def _is_aided(signs: Signs) -> bool:
+    """Whether something else tells where the vehicle is."""
+    aided = any(source.startswith(("ev_", "optical_flow")) for source in signs.ratios)
+    return aided or signs.table("vehicle_visual_odometry") is not None
+
+
 def _silent(signs: Signs) -> Diagnosis | None:
     """Of a receiver without messages in the air: one that fell silent, or one that PX4 waits for and nobody sees."""
     in_air_s = sum(stop - start for start, stop in signs.airborne) * 1e-6
@@ -69,7 +74,7 @@ def _silent(signs: Signs) -> Diagnosis | None:
         signs,
         "gnss_loss",
         "GNSS is lost in flight" if reported else "PX4 is told to use GNSS, and no receiver reports",
-        "fail" if reported else "note",
+        "note" if not reported else "warning" if _is_aided(signs) else "fail",
         0.97,
         [Sign(words, in_air_s, LOST_FROM_S, "s")],
         touches=("gnss",),

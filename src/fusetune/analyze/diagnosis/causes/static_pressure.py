@@ -14,7 +14,7 @@ COEFFICIENT_FROM, TOGETHER = 0.12, 11.0
 """Share of the dynamic pressure: half of 0.24, which moves the height by 0.8 m at 8 m/s. χ² of three directions is
 above 11 by chance once in a hundred flights, hardly ever with a coefficient that large."""
 LARGEST_SHARE = 1.2
-"""No hole feels more than the dynamic pressure: what is beyond by more than its error is something else."""
+"""No hole feels more than the dynamic pressure: what is beyond is something else that came with the motion."""
 RANGE_FROM_M, LEAST_RANGE_M = 0.2, 0.12
 """Less than that no flight suffers from, whatever the coefficient."""
 PARAMETERS = {

@@ -9,8 +9,8 @@ from fusetune.analyze.diagnosis.vision_signs import LEAST_SPEED_M_S
 
 OFF_FROM, SIGMAS = 0.055, 3.0
 ASKED_FROM = 0.02
-"""The sign says less than there is by up to a third, and up to 0.045 where the delay is told wrong: the tuner is asked
-from there on, which misses the scale by some thousandths, but follows a frame that is turned, so both must agree."""
+"""The sign says less than there is by up to a third, and is off by 0.05 where the delay is told wrong: from here on the
+tuner is asked, which misses the scale by some thousandths, but follows a frame that is turned, so both must agree."""
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:
