@@ -1,8 +1,8 @@
 """The curve of `diagnosis/reliability.py`: `python -m benchmarks.diagnosis_study.reliability_fit FOLDER`.
 
-The folder is that of a study of fresh flights (`--fresh`): levels were set with the others, of which hardly any
-diagnosis is wrong. How good the curve is, flights say that had no say in it: each fifth of the numbers by the curve of
-the rest.
+The folder is that of a study of fresh flights (`--fresh`): levels were set with the others, on which unsure diagnoses
+are right more often than they will be. How good the curve is, flights say that had no say in it: each fifth of the
+numbers by the curve of the rest.
 """
 
 from __future__ import annotations

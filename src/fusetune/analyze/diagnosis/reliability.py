@@ -3,8 +3,8 @@
 What a rule and its experiment say orders diagnoses, but is no share of hits. The share is a logistic curve over the
 odds of what they say (Platt, 1999), its two figures drawn towards none (0 and 1). It was fitted to simulated flights
 with known faults, for each kind as many, one in three without any, that had no say when levels were set: on those that
-had hardly any diagnosis is wrong, however unsure (`benchmarks/diagnosis_study/reliability_fit.py`). docs/diagnosis.md
-shows what it is on flights that had no say in the curve.
+had, unsure ones are right more often than they will be (`benchmarks/diagnosis_study/reliability_fit.py`).
+docs/diagnosis.md shows what it is on flights that had no say in the curve.
 """
 
 from __future__ import annotations
