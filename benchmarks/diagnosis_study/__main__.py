@@ -34,8 +34,9 @@ def main() -> None:
             print(fly_case(flights, case), flush=True)
     if options.fly_only:
         return
-    found = list(verdicts(flights, options.folder / "verdicts", cases))
-    tables = study_tables(found, estimates_table(found))
+    found = list(verdicts(flights, options.folder / "verdicts", cases, causes_only=options.causes_only))
+    estimates = None if options.causes_only else estimates_table(found)
+    tables = study_tables(found, estimates, fresh=options.fresh)
     print("\n\n".join(tables.values()))
     if options.write:
         renew_tables(DOCUMENT, tables)
@@ -72,6 +73,9 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--flights", type=Path, help="where the flights are, if not there")
     parser.add_argument("--fly-only", action="store_true", help="make the flights and ask nothing")
+    parser.add_argument(
+        "--causes-only", action="store_true", help="ask no tuner; the table of their values stays as it is"
+    )
     parser.add_argument("--write", action="store_true", help="renew docs/diagnosis.md")
     return parser.parse_args()
 

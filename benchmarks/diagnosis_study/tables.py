@@ -25,8 +25,8 @@ def kinds_table() -> str:
 def shares_table(verdicts: Sequence[Verdict]) -> str:
     """How often the right cause stands first, and among the first two, of each kind and of all."""
     rows = [
-        "| injected | flights | visible | first | among the first two | named of those not visible |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| injected | flights | first, of the visible | among the first two | named of those not visible |",
+        "| --- | --- | --- | --- | --- |",
     ]
     by_kind = {kind: [one for one in verdicts if one.group == kind] for kind in KINDS}
     for kind, own in by_kind.items():
@@ -39,9 +39,9 @@ def shares_table(verdicts: Sequence[Verdict]) -> str:
 def _shares(own: Sequence[Verdict]) -> str:
     visible = [one for one in own if one.is_visible]
     faint = [one for one in own if not one.is_visible]
-    cells = [str(len(own)), str(len(visible)), _percent([_place(one) == 0 for one in visible])]
-    cells.append(_percent([_place(one) < 2 for one in visible]))
-    cells.append(_percent([_place(one) < len(one.named) for one in faint]))
+    cells = [str(len(own)), _counts([_place(one) == 0 for one in visible])]
+    cells.append(_counts([_place(one) < 2 for one in visible]))
+    cells.append(_counts([_place(one) < len(one.named) for one in faint]))
     return " | ".join(cells)
 
 
@@ -53,6 +53,11 @@ def _place(verdict: Verdict) -> int:
 
 def _percent(holds: Sequence[bool]) -> str:
     return f"{100.0 * float(np.mean(holds)):.1f} %" if len(holds) else "–"
+
+
+def _counts(holds: Sequence[bool]) -> str:
+    """How many of how many, and the share."""
+    return f"{sum(holds)} of {len(holds)} ({_percent(holds)})" if len(holds) else "–"
 
 
 def confusion_table(verdicts: Sequence[Verdict]) -> str:
@@ -88,7 +93,7 @@ def pairs_table(verdicts: Sequence[Verdict]) -> str:
         [
             "| flights with two faults | both named | one named | missed |",
             "| --- | --- | --- | --- |",
-            f"| {len(own)} | {_percent([count == 2 for count in named])} | {_percent([count == 1 for count in named])} "
+            f"| {len(own)} | {_counts([count == 2 for count in named])} | {_counts([count == 1 for count in named])} "
             f"| {missed or NOTHING} |",
         ]
     )
@@ -110,8 +115,8 @@ def reliability_table(verdicts: Sequence[Verdict]) -> str:
     return "\n".join(rows)
 
 
-CONFIDENCES = (0.0, 0.9, 0.94, 0.96, 0.97, 0.975, 1.01)
-"""Edges of the table's rows: of as many diagnoses each, about."""
+CONFIDENCES = (0.0, 0.75, 0.85, 0.92, 0.96, 0.985, 1.01)
+"""Edges of the table's rows."""
 
 
 def cost_table(verdicts: Sequence[Verdict]) -> str:
@@ -128,15 +133,26 @@ def cost_table(verdicts: Sequence[Verdict]) -> str:
     )
 
 
-def study_tables(verdicts: Sequence[Verdict], estimates: str) -> Mapping[str, str]:
-    """All tables by the names of their places in docs/diagnosis.md."""
-    return {
+IN_VIEW = ("shares", "confusion", "healthy", "pairs", "reliability")
+"""Tables that stand in the document of the flights, too, with which levels were set."""
+
+
+def study_tables(verdicts: Sequence[Verdict], estimates: str | None, *, fresh: bool = True) -> Mapping[str, str]:
+    """All tables by the names of their places in docs/diagnosis.md; without estimates where there are none.
+
+    Parameters
+    ----------
+    fresh : whether these flights had no say when levels were set; of others there are `IN_VIEW`, so named
+    """
+    tables = {
         "injected": kinds_table(),
         "shares": shares_table(verdicts),
         "confusion": confusion_table(verdicts),
         "healthy": healthy_table(verdicts),
         "pairs": pairs_table(verdicts),
-        "estimates": estimates,
         "reliability": reliability_table(verdicts),
         "cost": cost_table(verdicts),
     }
+    if not fresh:
+        return {f"{name}_in_view": tables[name] for name in IN_VIEW}
+    return tables if estimates is None else tables | {"estimates": estimates}

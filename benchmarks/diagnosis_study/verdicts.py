@@ -82,20 +82,32 @@ class Verdict:
         return tuple(one for one in self.named if one.severity in ALARMS)
 
 
-def verdicts(flights: Path, kept: Path, cases: Sequence[Case]) -> Iterator[Verdict]:
-    """What is said of each case, in order; asked where it is not kept from the same sources."""
+def verdicts(flights: Path, kept: Path, cases: Sequence[Case], *, causes_only: bool = False) -> Iterator[Verdict]:
+    """What is said of each case, in order; asked where it is not kept from the same sources.
+
+    Parameters
+    ----------
+    causes_only : whether the tuners, which take most of the time, are not asked
+    """
     sources = source_digest("px4", "ekf2", "analyze")
     _warm_up()
     for case in cases:
         folder = folder_of(flights, case)
         fault = json.loads((folder / FAULT_FILE).read_text(encoding="utf-8"))
-        key = hashlib.sha256(json.dumps([sources, fault], sort_keys=True).encode()).hexdigest()
+        asked = [sources, fault, "causes"] if causes_only else [sources, fault]
+        key = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
         file = kept / case.group / f"{case.number:02}.json"
         if not _is_kept(file, key):
-            verdict = _ask(case, folder / case.name, fault)
+            verdict = _ask(case, folder / case.name, fault, causes_only)
             file.parent.mkdir(parents=True, exist_ok=True)
             with atomic_path(file) as temporary:
                 temporary.write_text(json.dumps({"key": key, "verdict": asdict(verdict)}, indent=1), encoding="utf-8")
+        yield _read(file)
+
+
+def kept_verdicts(kept: Path) -> Iterator[Verdict]:
+    """What was said of every flight of a study, as it is kept."""
+    for file in sorted(kept.glob("*/*.json")):
         yield _read(file)
 
 
@@ -121,7 +133,7 @@ def _read(file: Path) -> Verdict:
     )
 
 
-def _ask(case: Case, saved: Path, fault: Mapping[str, Any]) -> Verdict:
+def _ask(case: Case, saved: Path, fault: Mapping[str, Any], causes_only: bool) -> Verdict:
     from fusetune.analyze.diagnosis.diagnose import diagnose
     from fusetune.analyze.diagnosis.diagnosed_logs import AS_FLOWN
     from fusetune.analyze.effects.all_effects import all_effects
@@ -132,7 +144,7 @@ def _ask(case: Case, saved: Path, fault: Mapping[str, Any]) -> Verdict:
         observed = ObservedFlight(flight, AS_FLOWN)
         found = diagnose(observed)
         cpu_s = time.process_time() - start
-        effects = all_effects(observed)
+        effects = () if causes_only else all_effects(observed)
     except Exception as error:  # a flight that breaks the diagnosis counts as one that it does not name
         return Verdict(case.group, case.number, fault, (), (), (), 0.0, f"{type(error).__name__}: {error}")
     named = tuple(Named(one.id, one.severity, one.confidence, one.explains, dict(one.values)) for one in found)

@@ -10,12 +10,14 @@ import pytest
 from benchmarks.diagnosis_study.cases import CALM, HEALTHY, PAIRS, airborne_s, case_of
 from benchmarks.diagnosis_study.estimates import QUANTITIES, compared, estimates_table
 from benchmarks.diagnosis_study.kinds import KINDS
+from benchmarks.diagnosis_study.reliability_fit import cross_validated, fitted_curve
 from benchmarks.diagnosis_study.tables import (
     confusion_table,
     healthy_table,
     pairs_table,
     reliability_table,
     shares_table,
+    study_tables,
 )
 from benchmarks.diagnosis_study.verdicts import Named, Told, Verdict
 
@@ -83,7 +85,7 @@ def test_first_and_among_the_first_two_are_counted_of_visible_faults() -> None:
         verdict("gnss_glitch", ["gnss_glitch"], visible=False),
     ]
     # of four visible ones, one stands first and one second
-    assert "| `gnss_glitch` | 6 | 4 | 25.0 % | 50.0 % | 50.0 % |" in shares_table(said)
+    assert "| `gnss_glitch` | 6 | 1 of 4 (25.0 %) | 2 of 4 (50.0 %) | 1 of 2 (50.0 %) |" in shares_table(said)
     assert "| `gnss_glitch` | gnss_accuracy 2, gnss_glitch 1, nothing 1 |" in confusion_table(said)
 
 
@@ -105,8 +107,18 @@ def test_a_pair_counts_when_both_are_named() -> None:
         verdict(PAIRS, ["gnss_glitch", "baro_drift", "vibration"]),
     ]
     table = pairs_table(said)
-    assert "| 4 | 50.0 % | 25.0 % |" in table
+    assert "| 4 | 2 of 4 (50.0 %) | 1 of 4 (25.0 %) |" in table
     assert "gnss_glitch 2, vibration 1" in table
+
+
+def test_tables_of_flights_in_view_have_places_of_their_own() -> None:
+    said = [verdict("gnss_glitch", ["gnss_glitch"])]
+    fresh, in_view = study_tables(said, None), study_tables(said, None, fresh=False)
+    assert not set(fresh) & set(in_view)
+    assert "estimates" not in fresh
+    assert in_view["confusion_in_view"] == fresh["confusion"]
+    document = study.DOCUMENT.read_text(encoding="utf-8")
+    assert all(f"<!-- {name} -->" in document for name in [*fresh, *in_view])
 
 
 def test_a_diagnosis_counts_by_how_sure_it_was_and_is_right_where_that_was_injected() -> None:
@@ -116,7 +128,20 @@ def test_a_diagnosis_counts_by_how_sure_it_was_and_is_right_where_that_was_injec
         verdict("gnss_glitch", ["gnss_glitch"], visible=False),
     ]
     rows = reliability_table([*said, verdict(HEALTHY, ["baro_drift"])]).splitlines()
-    assert rows[2:] == ["| 0.9 to 0.94 | 4 | 90.0 % | 50.0 % |"]
+    assert rows[2:] == ["| 0.85 to 0.92 | 4 | 90.0 % | 50.0 % |"]
+
+
+def test_the_curve_of_how_sure_finds_shares_that_were_put_in() -> None:
+    rng = np.random.default_rng(2)
+    said = rng.uniform(0.3, 0.97, 4000)
+    right = (rng.random(said.size) < 1.0 / (1.0 + np.exp(-(0.5 + 1.5 * np.log(said / (1.0 - said)))))).astype(float)
+    assert fitted_curve(said, right) == pytest.approx((0.5, 1.5), abs=0.15)
+    fold = np.arange(said.size) % 5
+    told = cross_validated(said, right, fold)
+    sure = told > 0.8
+    assert right[sure].mean() == pytest.approx(told[sure].mean(), abs=0.02)
+    # with nothing known it is what signs say
+    assert fitted_curve(np.zeros(0), np.zeros(0)) == pytest.approx((0.0, 1.0), abs=1e-3)
 
 
 def test_fresh_flights_are_none_of_those_that_levels_were_set_with(monkeypatch: pytest.MonkeyPatch) -> None:

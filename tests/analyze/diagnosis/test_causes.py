@@ -29,18 +29,24 @@ from tests.analyze.diagnosis.made_signs import (
 from fusetune.analyze.delays.lag import Lag
 from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.diagnosis.causes import (
+    baro_ground_effect,
+    flow_delay,
+    flow_rotation,
+    flow_scale,
     gnss_delay,
     gnss_lever_arm,
+    gnss_loss,
     magnetic_disturbance,
     magnetometer_scale,
     static_pressure,
+    vision_scale,
     vision_yaw,
 )
 from fusetune.analyze.diagnosis.causes.registry import CAUSES
 from fusetune.analyze.diagnosis.claims import AtLimit, NoiseClaim
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.diagnosis.gnss_signs import Jump
-from fusetune.analyze.diagnosis.height_errors import Effect
+from fusetune.analyze.diagnosis.height_errors import AXES, Effect
 from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.effects.estimate import Estimate
 from fusetune.save.checks.standstill import Standstill
@@ -169,9 +175,9 @@ def test_places_are_those_of_the_parameters_whose_imu_has_a_place_of_its_own() -
 class Tuned:
     """Tuners that tell some estimates: value, and the two sides of its interval."""
 
-    def __init__(self, **estimates: tuple[float, float, float]) -> None:
+    def __init__(self, error: float = 0.01, **estimates: tuple[float, float, float]) -> None:
         self.told = {
-            name: Estimate(name, "", 1.0 if name.endswith("SCALE") else None, value, low, high, 0.01, 100)
+            name: Estimate(name, "", 1.0 if name.endswith("SCALE") else None, value, low, high, error, 100)
             for name, (value, low, high) in estimates.items()
         }
 
@@ -179,7 +185,7 @@ class Tuned:
         return self.told
 
 
-PRESSED = barometer(speed={"forward": effect(1.4), "backward": effect(0.1), "sideways": effect(0.1)})
+PRESSED = barometer(speed={"forward": effect(0.4), "backward": effect(0.1), "sideways": effect(0.1)})
 
 
 def test_static_pressure_warns_where_the_tuner_tells_it_and_with_its_values() -> None:
@@ -191,6 +197,79 @@ def test_static_pressure_warns_where_the_tuner_tells_it_and_with_its_values() ->
     assert alone.severity == "note"
     assert alone.confidence <= static_pressure.UNCONFIRMED
     assert static_pressure.diagnose(signs(**PRESSED, told_by=Tuned(EKF2_PCOEF_XP=(-0.02, -0.1, 0.06)))) is None
+
+
+def test_no_share_of_the_pressure_is_beyond_the_pressure() -> None:
+    alone = {"told_by": Tuned()}
+    assert static_pressure.diagnose(signs(**barometer(speed=dict.fromkeys(AXES, effect(1.4))), **alone)) is None
+    assert static_pressure.diagnose(signs(**barometer(speed=dict.fromkeys(AXES, effect(0.3))), **alone)) is not None
+
+
+def test_the_tuner_decides_on_a_dip_that_the_sign_is_unsure_of() -> None:
+    def dip(sign: float, zone: float) -> Diagnosis | None:
+        told = Tuned(EKF2_GND_EFF_DZ=(zone, zone - 0.3, zone + 0.3))
+        return baro_ground_effect.diagnose(signs(**barometer(ground=effect(-sign, 0.17)), told_by=told))
+
+    # the zone is the dip and a tenth
+    found = dip(1.3, 1.65)
+    assert found is not None
+    assert found.values == {"EKF2_GND_EFF_DZ": 1.6}
+    assert dip(1.7, 1.1) is None
+    assert dip(0.6, 1.65) is None
+
+
+def test_the_tuner_decides_on_the_scale_of_vision_where_both_say_the_same_side() -> None:
+    def scale(sign: float, told: float) -> Diagnosis | None:
+        one = {"vision": replace(VISION, scale=sign, scale_error=0.02)}
+        return vision_scale.diagnose(signs(**one, told_by=Tuned(vision_scale=(told, told - 0.02, told + 0.02))))
+
+    found = scale(0.93, 0.91)
+    assert found is not None
+    assert found.values == {"vision_scale": 0.91}
+    assert scale(0.93, 0.99) is None
+    # vision in a frame that is turned leads the filter, and the tuner's motion with it
+    assert scale(1.0, 0.8) is None
+    assert scale(1.05, 0.8) is None
+
+
+def test_the_tuner_decides_on_the_scale_of_flow() -> None:
+    one = {"flow": replace(FLOW, scale=0.97, scale_error=0.1, rotation=np.array([0.1, 0.1]))}
+    found = flow_scale.diagnose(signs(**one, told_by=Tuned(SENS_FLOW_SCALE=(1.14, 1.13, 1.15))))
+    assert found is not None
+    assert found.values == {"SENS_FLOW_SCALE": 1.14}
+    assert flow_scale.diagnose(signs(**one, told_by=Tuned(SENS_FLOW_SCALE=(1.03, 1.02, 1.04)))) is None
+
+
+def test_the_lag_of_flow_is_that_of_whoever_tells_it_better() -> None:
+    unsure = {"flow": replace(FLOW, fit=replace(FIT, delay_s=0.08, delay_error_s=0.03))}
+    found = flow_delay.diagnose(signs(**unsure, told_by=Tuned(error=5.0, EKF2_OF_DELAY=(110.0, 100.0, 120.0))))
+    assert found is not None
+    assert found.values == {"EKF2_OF_DELAY": 110.0}
+    assert flow_delay.diagnose(signs(**unsure, told_by=Tuned(error=50.0, EKF2_OF_DELAY=(110.0, 10.0, 210.0)))) is None
+
+
+def test_turning_that_is_not_left_in_the_flow_is_no_turn_whatever_the_way_says() -> None:
+    # the way of a vehicle that shakes tells no scale: 0.04, give or take a quarter
+    shaken = replace(FLOW, scale=0.04, scale_error=0.25, rotation=np.full(2, 0.02), rotation_error=np.full(2, 0.01))
+    assert flow_rotation.not_turned(shaken)
+    # nor does it where the scale is off and not told
+    assert flow_rotation.not_turned(replace(shaken, scale=0.16, scale_error=0.22, rotation=np.full(2, 0.44)))
+    left = replace(FLOW, rotation=np.full(2, -1.0))
+    assert not flow_rotation.not_turned(left)
+    assert flow_rotation.diagnose(signs(flow=left)) is not None
+
+
+def test_a_receiver_that_never_reports_is_worth_knowing_and_one_that_falls_silent_a_failure() -> None:
+    silent = signs(gnss=None)
+    found = gnss_loss.diagnose(silent)
+    assert found is not None
+    assert found.severity == "note"
+    on_ground = {"timestamp": np.array([8_000_000]), "fix_type": np.array([3])}
+    silent.observed.flight.topics["vehicle_gps_position", 0] = on_ground
+    found = gnss_loss.diagnose(silent)
+    assert found is not None
+    assert found.severity == "fail"
+    assert gnss_loss.diagnose(signs({"EKF2_GPS_CTRL": 0.0}, gnss=None)) is None
 
 
 def test_the_tuner_tells_a_scale_of_the_down_axis_from_a_field_along_it() -> None:

@@ -15,9 +15,9 @@ THRUST, HEIGHT = MOTION.at(TIME, MOTION.thrust), MOTION.at(TIME, MOTION.height)
 CLIMBED = climbed_by(MOTION.time, MOTION.velocity)
 
 
-def found(more: np.ndarray | float) -> HeightErrors:
+def found(more: np.ndarray | float, wind: np.ndarray | None = None) -> HeightErrors:
     noise = 0.15 * np.random.default_rng(3).normal(size=TIME.size)
-    one = height_errors(TIME, MOTION.at(TIME, CLIMBED) + noise + more, MOTION, AROUND, CLIMBED)
+    one = height_errors(TIME, MOTION.at(TIME, CLIMBED) + noise + more, MOTION, AROUND, CLIMBED, wind)
     assert one is not None
     return one
 
@@ -44,10 +44,22 @@ def test_the_dip_near_the_ground_is_no_wash() -> None:
 
 
 def test_the_dynamic_pressure_is_found_by_direction() -> None:
-    ahead = np.maximum(MOTION.at(TIME, MOTION.air_velocity)[:, 0], 0.0)
+    ahead = np.maximum(MOTION.at(TIME, MOTION.air_velocity())[:, 0], 0.0)
     one = found(0.8 * ahead**2 / (2.0 * ONE_G))
     assert one.speed["forward"].value == pytest.approx(0.8, abs=0.15)
     assert_small(one, "forward")
+
+
+def test_the_pressure_is_that_of_the_air_and_not_of_the_way_over_ground() -> None:
+    # 4 m/s from the south-west: over ground the vehicle flies as fast forward as backward, through the air it does not
+    wind = np.tile(4.0 * np.sqrt(0.5), (MOTION.time.size, 2))
+    ahead = np.maximum(MOTION.at(TIME, MOTION.air_velocity(wind))[:, 0], 0.0)
+    pressed = 0.4 * ahead**2 / (2.0 * ONE_G)
+    known, unknown = found(pressed, wind), found(pressed)
+    assert known.speed["forward"].value == pytest.approx(0.4, abs=0.1)
+    assert_small(known, "forward")
+    assert abs(unknown.speed["forward"].value - 0.4) > abs(known.speed["forward"].value - 0.4)
+    assert known.explained(TIME, MOTION) == pytest.approx(pressed, abs=0.6)
 
 
 def test_a_drift_is_a_drift() -> None:

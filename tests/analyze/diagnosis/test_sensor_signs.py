@@ -65,6 +65,18 @@ def test_a_steady_bank_on_the_ground_is_no_bias() -> None:
     assert np.degrees(one.change).max() < 0.3
 
 
+def test_a_clock_that_steps_back_or_jumps_ends_no_sign_of_the_imu() -> None:
+    flight = imu(5.0)
+    time = flight.topics["sensor_combined", 0]["timestamp"] = MOTION.time.copy()
+    time[100:200] -= 3_000_000
+    time[50] = 10**16
+    one, bias = imu_signs(flight, FLYING), gyro_bias(flight, None, FLYING)
+    assert one is not None
+    assert bias is not None
+    assert one.resting_force == pytest.approx(ONE_G, abs=0.01)
+    assert np.degrees(bias.at_rest) == pytest.approx([0.0, 5.0, 0.0], abs=0.02)
+
+
 def test_missing_samples_are_gaps_and_a_share() -> None:
     flight = imu()
     table = flight.topics["sensor_combined", 0]
@@ -103,6 +115,12 @@ COUNT = int((FLYING[0][1] - FLYING[0][0] + 2_000_000) / 200_000)
 def test_a_sound_receiver_neither_jumps_nor_is_lost() -> None:
     one = gnss()
     assert (one.jumps, one.lost, one.poor, one.jammed) == ((), (), None, None)
+
+
+def test_a_fix_without_a_position_is_none() -> None:
+    one = gnss(latitude_deg=np.full(COUNT, np.nan), longitude_deg=np.full(COUNT, np.nan))
+    assert not one.ever_fixed
+    assert one.samples > 250
 
 
 def test_a_jump_is_seen_where_it_begins_and_ends() -> None:

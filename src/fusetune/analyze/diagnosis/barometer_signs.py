@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.diagnosis.gnss_signs import has_fix
 from fusetune.analyze.diagnosis.height_errors import HeightErrors, height_errors
 from fusetune.analyze.diagnosis.motion import Motion, climbed_by
 from fusetune.analyze.flight.intervals import Interval, inside
@@ -18,7 +19,6 @@ Times = npt.NDArray[np.int64]
 
 BEFORE_US, AFTER_US = 8_000_000, 3_000_000
 MEAN_OVER_S = 5.0
-FIX_3D = 3
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,18 @@ class BarometerSigns:
 
 
 def barometer_signs(
-    flight: Flight, motion: Motion, airborne: tuple[Interval, ...], stuck: Interval | None = None
+    flight: Flight,
+    motion: Motion,
+    airborne: tuple[Interval, ...],
+    stuck: Interval | None = None,
+    wind: Array | None = None,
 ) -> BarometerSigns | None:
-    """Look at the barometer, but for the time in which it was stuck, µs; None without one."""
+    """Look at the barometer, but for the time in which it was stuck, µs; None without one.
+
+    Parameters
+    ----------
+    wind : as `height_errors` takes it
+    """
     table = flight.topic("vehicle_air_data")
     if table is None:
         return None
@@ -57,7 +66,7 @@ def barometer_signs(
         time, height = time[works], height[works]
     around = ((airborne[0][0] - BEFORE_US, airborne[-1][1] + AFTER_US),)
     climbed = climbed_by(motion.time, motion.velocity)
-    errors = height_errors(time, height, motion, around, climbed)
+    errors = height_errors(time, height, motion, around, climbed, wind)
     rows = inside(time, airborne) & (time > motion.time[0]) & (time < motion.time[-1])
     if np.count_nonzero(rows) < 20:
         return None
@@ -74,7 +83,7 @@ def _drift(
     table = flight.topic("vehicle_gps_position")
     if table is None or "altitude_msl_m" not in table:
         return nothing
-    good = table["fix_type"] >= FIX_3D
+    good = has_fix(table) & np.isfinite(table["altitude_msl_m"])
     at, altitude = table["timestamp"][good].astype(np.int64), table["altitude_msl_m"][good].astype(np.float64)
     if at.size < 20:
         return nothing

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fusetune.analyze.diagnosis.causes.magnetometer_rotated import claimed_mounting
 from fusetune.analyze.diagnosis.causes.motor_magnetic_field import in_step
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Trial
 from fusetune.analyze.diagnosis.innovation_signs import SourceRatios, replayed_ratios
@@ -111,8 +112,8 @@ def experiment_for(diagnosis: Diagnosis, signs: Signs) -> Experiment | None:
             ("mag",),
             edit=lambda flight: _magnetometer(flight, lambda _, field: field / scale),
         )
-    if diagnosis.id == "magnetometer_rotated" and signs.magnetometer is not None:
-        turn = signs.magnetometer.fits["mounting"].turn
+    if diagnosis.id == "magnetometer_rotated":
+        turn = claimed_mounting(signs)
         if turn is not None:
             return Experiment(
                 "with the magnetometer turned back",
@@ -191,7 +192,8 @@ def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
     compared = _compared(before, after, experiment.judged)
     if compared is None:
         return diagnosis
-    trial = trial_of(experiment.words, _named(before, after, experiment.judged), *compared)
+    grown = [name for name in _shared(before, after, experiment.judged) if _grows(before[name].mean, after[name].mean)]
+    trial = trial_of(experiment.words, _named(before, after, experiment.judged), *compared, grown)
     sure = diagnosis.confidence
     if trial.outcome == "better":
         sure = 1.0 - SURER * (1.0 - sure)
@@ -202,7 +204,7 @@ def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
     return dataclasses.replace(diagnosis, trial=trial, confidence=round(sure, 3))
 
 
-def trial_of(done: str, sources: str, before: float, after: float) -> Trial:
+def trial_of(done: str, sources: str, before: float, after: float, grown: Sequence[str] = ()) -> Trial:
     """What a replay showed, in words.
 
     Parameters
@@ -210,11 +212,16 @@ def trial_of(done: str, sources: str, before: float, after: float) -> Trial:
     done : what was done in it, as `without magnetometer from 4 s to 42 s`
     sources : that should do better, by name
     before, after : their mean test ratio
+    grown : of these sources those that do worse by themselves: what mends one and spoils another bears nothing out
     """
     figures = f"mean test ratio of {sources} {before:.3g} before, {after:.3g} after"
-    if before - after > FALLS_BY and after < FALLS * before:
+    falls = before - after > FALLS_BY and after < FALLS * before
+    if falls and grown:
+        words = f"the replay {done} is better in the mean, but worse for {', '.join(grown)}: {figures}"
+        return Trial(words, before, after, "no better")
+    if falls:
         return Trial(f"the replay {done} is better: {figures}", before, after, "better")
-    if after - before > GROWS_BY and after > GROWS * before:
+    if _grows(before, after):
         return Trial(f"the replay {done} is worse: {figures}", before, after, "worse")
     if abs(after - before) <= SAME * before:
         words = f"the replay {done} is the same, so the filter made no use of it: {figures}"
@@ -223,6 +230,10 @@ def trial_of(done: str, sources: str, before: float, after: float) -> Trial:
         words = f"the replay {done} tells nothing, these sources are fine with it as well: {figures}"
         return Trial(words, before, after, "tells nothing")
     return Trial(f"the replay {done} is no better: {figures}", before, after, "no better")
+
+
+def _grows(before: float, after: float) -> bool:
+    return after - before > GROWS_BY and after > GROWS * before
 
 
 def _replayed(prepared: PreparedFlight, experiment: Experiment) -> ReplayedSet:

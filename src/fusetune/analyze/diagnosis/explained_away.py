@@ -38,7 +38,7 @@ MAKES: Mapping[str, tuple[str, ...]] = {
         "parameter_at_limit",
     ),
     "gyro_bias": ("magnetic_disturbance", "yaw_alignment", "motor_magnetic_field", "gnss_lever_arm", "gnss_delay"),
-    "imu_gaps": ("gnss_delay", "gnss_lever_arm", "vision_delay", "flow_delay", "noise_claim"),
+    "imu_gaps": ("noise_claim",),
     "gnss_interference": (
         "gnss_loss",
         "gnss_accuracy",
@@ -49,7 +49,7 @@ MAKES: Mapping[str, tuple[str, ...]] = {
         "baro_drift",
     ),
     "gnss_accuracy": ("noise_claim", "gnss_glitch", "gnss_delay", "gnss_lever_arm", "baro_drift"),
-    "gnss_glitch": ("baro_drift", "noise_claim", "gnss_delay", "gnss_lever_arm", "vision_yaw", "vision_scale"),
+    "gnss_glitch": ("baro_drift", "noise_claim", "gnss_delay", "gnss_lever_arm"),
     "gnss_loss": ("baro_drift",),
     "sensor_stuck": (
         "magnetic_disturbance",
@@ -57,8 +57,6 @@ MAKES: Mapping[str, tuple[str, ...]] = {
         "baro_drift",
         "gnss_glitch",
         "gnss_loss",
-        "range_obstruction",
-        "range_step",
         "gnss_delay",
         "gnss_lever_arm",
         "yaw_alignment",
@@ -86,7 +84,8 @@ MAKES: Mapping[str, tuple[str, ...]] = {
     "vision_scale": ("vision_delay",),
     "vision_delay": ("vision_scale",),
 }
-"""Cause → what it makes look like a cause of its own."""
+"""Cause → what it makes look like a cause of its own: what was seen with it alone, or what its own signs are made of.
+More would hide a second cause that is there."""
 
 
 def explained_away(found: Iterable[Diagnosis]) -> list[Diagnosis]:
@@ -100,9 +99,18 @@ def explained_away(found: Iterable[Diagnosis]) -> list[Diagnosis]:
             continue
         for other in made:
             second = by_id.get(other)
-            if second is not None and other not in gone and _meet(first, second):
+            if second is not None and other not in gone and _meet(first, second) and _may_follow(second):
                 gone.add(other)
     return [one for one in found if one.id not in gone]
+
+
+HELD_AGAINST_OTHERS = ("EKF2_GPS_V_NOISE", "EKF2_GPS_P_NOISE")
+"""Noises that are measured with the IMU or GNSS; that of a barometer or magnetometer is of its own readings alone."""
+
+
+def _may_follow(second: Diagnosis) -> bool:
+    """Whether another cause can make it: of claimed noises those of sensors that are held against others."""
+    return second.id != "noise_claim" or all(name in HELD_AGAINST_OTHERS for name in second.values)
 
 
 def _meet(first: Diagnosis, second: Diagnosis) -> bool:

@@ -89,9 +89,13 @@ def flow_signs(
     turned = 1.0 - float(np.average(own, weights=own_error**-2.0))
     size = max(float(np.hypot(fit.values[4], turned)), 0.1)
     by_turning = float(np.arctan2(fit.values[4], turned)), float(fit.errors[4] / size)
-    turn, turn_error = min((by_way, by_turning), key=lambda one: one[1]) if turned > LEAST_TURNED else by_way
+    tells = turned > LEAST_TURNED and by_turning[1] < LARGEST_TURN_ERROR_RAD
+    turn, turn_error = by_turning if tells else by_way
     return FlowSigns(fit, scale, float(fit.errors[0]), turn, turn_error, own, own_error)
 
 
 LEAST_TURNED = 0.3
 """With less of the turning in the flow, as of a gyro that does not tell it, its direction says nothing."""
+LARGEST_TURN_ERROR_RAD = np.radians(8.0)
+"""Where turning tells the direction as well as this it is believed, and not the way: a filter that uses the flow is led
+along by it, and its way with it, gyros are not."""

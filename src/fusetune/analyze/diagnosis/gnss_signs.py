@@ -96,7 +96,7 @@ def gnss_signs(
     if table is None or not airborne or "fix_type" not in table:
         return None
     time = table["timestamp"].astype(np.int64)
-    fixed = table["fix_type"] >= FIX_3D
+    fixed = has_fix(table)
     in_air = inside(time, airborne)
     if np.count_nonzero(in_air) < SMOOTHED:
         return None
@@ -153,6 +153,12 @@ def gnss_signs(
 JAMMING_WARNING, JAMMING_CRITICAL = 2, 3
 JAMMED_FROM, NOISY_FROM = 60.0, 130.0
 """u-blox receivers give 0–255 for continuous-wave jamming, and some 80–100 of noise in the open."""
+
+
+def has_fix(table: TopicTable) -> npt.NDArray[np.bool_]:
+    """(N,) whether a message has a 3D fix, and a position that is one."""
+    places = [table[name] for name in ("latitude_deg", "longitude_deg") if name in table]
+    return np.asarray((table["fix_type"] >= FIX_3D) & np.logical_and.reduce([np.isfinite(one) for one in places]))
 
 
 def is_poor(worst: Array | float, usual: float, limit: float) -> Any:

@@ -47,6 +47,7 @@ class HeightErrors:
     ground : m at the ground, with the thrust of a hover, against far above
     drift : m/s
     samples, blocks : measurements, and independent parts of the flight behind the errors
+    wind : (N, 2) at the times of the motion, north and east, m/s; None where it is not known
     """
 
     thrust: Effect
@@ -55,20 +56,21 @@ class HeightErrors:
     drift: Effect
     samples: int
     blocks: int
+    wind: Array | None = None
 
     def explained(self, time: Times, motion: Motion) -> Array:
         """(N,) m at some times: what it follows significantly but for time."""
         effects = (self.thrust, *(self.speed[axis] for axis in AXES), self.ground)
         sure = np.array([one.value if abs(one.value) > SIGMAS * one.error else 0.0 for one in effects])
-        return np.asarray(_followed(time, motion) @ sure)
+        return np.asarray(_followed(time, motion, self.wind) @ sure)
 
 
 SIGMAS = 3.0
 
 
-def _followed(time: Times, motion: Motion) -> Array:
+def _followed(time: Times, motion: Motion, wind: Array | None) -> Array:
     """(N, 5) thrust, speed by direction, nearness of the ground."""
-    velocity = motion.at(time, motion.air_velocity)
+    velocity = motion.at(time, motion.air_velocity(wind))
     ahead = velocity[:, 0] * np.abs(velocity[:, 0]) / (2.0 * ONE_G)
     above, thrust = np.maximum(motion.at(time, motion.height), 0.0), motion.at(time, motion.thrust)
     return np.column_stack(
@@ -83,7 +85,12 @@ def _followed(time: Times, motion: Motion) -> Array:
 
 
 def height_errors(
-    time: Times, height: Array, motion: Motion, intervals: tuple[Interval, ...], climbed: Array
+    time: Times,
+    height: Array,
+    motion: Motion,
+    intervals: tuple[Interval, ...],
+    climbed: Array,
+    wind: Array | None = None,
 ) -> HeightErrors | None:
     """The regression; None where there is too little of it.
 
@@ -92,6 +99,8 @@ def height_errors(
     time, height : (N,) µs, of the measurement, and m, up
     intervals : that count, µs
     climbed : (M,) height at the times of the motion, m, up, that owes little to this sensor
+    wind : (M, 2) at the times of the motion, north and east, m/s; where it is not known speed over ground stands for
+        speed through the air
     """
     usable = inside(time, intervals) & (time > motion.time[0]) & (time < motion.time[-1]) & np.isfinite(height)
     time, height = time[usable], height[usable]
@@ -101,7 +110,7 @@ def height_errors(
     every = max(1, int(1.0 / (FASTEST_HZ * max(step_s, 1e-3)) + 0.5))
     time, height, step_s = time[::every], height[::every], step_s * every
     order = order_of(step_s)
-    columns = np.column_stack([_followed(time, motion), (time - time[0]) * 1e-6])
+    columns = np.column_stack([_followed(time, motion, wind), (time - time[0]) * 1e-6])
     left = height - motion.at(time, climbed)
     rows = [
         Rows(
@@ -129,4 +138,5 @@ def height_errors(
         Effect(float(value), float(one), float(abs(value) * span))
         for value, one, span in zip(fit.solution, error, spans, strict=True)
     ]
-    return HeightErrors(found[0], dict(zip(AXES, found[1:4], strict=True)), found[4], found[5], time.size, blocks)
+    speed = dict(zip(AXES, found[1:4], strict=True))
+    return HeightErrors(found[0], speed, found[4], found[5], time.size, blocks, wind)

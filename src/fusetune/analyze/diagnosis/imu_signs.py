@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval, duration, inside
 from fusetune.analyze.replaying.replayed_set import ReplayedSteps
-from fusetune.px4.flight import Flight, TopicTable, stacked
+from fusetune.px4.flight import Flight, TopicTable, select_rows, stacked
 
 Array = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
@@ -58,7 +58,7 @@ class ImuSigns:
 
 def imu_signs(flight: Flight, airborne: tuple[Interval, ...]) -> ImuSigns | None:
     """Look at the IMU in the air; None where there are no samples of it."""
-    table = flight.topic(IMU)
+    table = _in_order(flight.topic(IMU))
     if table is None or not airborne:
         return None
     time = table["timestamp"].astype(np.int64)
@@ -91,6 +91,13 @@ def imu_signs(flight: Flight, airborne: tuple[Interval, ...]) -> ImuSigns | None
     )
 
 
+def _in_order(table: TopicTable | None) -> TopicTable | None:
+    """Samples in order of time: a clock that steps back is told of by the verdict, and ends no sign."""
+    if table is None or not bool((np.diff(table["timestamp"].astype(np.int64)) < 0).any()):
+        return table
+    return select_rows(table, np.argsort(table["timestamp"], kind="stable"))
+
+
 def _resting_force(table: TopicTable, takeoff: int) -> float:
     """Of the seconds that shake and turn little."""
     time = table["timestamp"].astype(np.int64)
@@ -98,8 +105,9 @@ def _resting_force(table: TopicTable, takeoff: int) -> float:
     force = np.linalg.norm(stacked(table, "accelerometer_m_s2")[rows], axis=1)
     if force.size < 100:
         return float("nan")
-    second = ((time[rows] - time[0]) * 1e-6).astype(np.int64)
-    counts = np.maximum(np.bincount(second), 1)
+    # a clock that jumps leaves seconds out
+    second = np.unique(((time[rows] - time[0]) * 1e-6).astype(np.int64), return_inverse=True)[1]
+    counts = np.bincount(second)
     mean = np.bincount(second, force) / counts
     spread = np.sqrt(np.maximum(np.bincount(second, force**2) / counts - mean**2, 0.0))
     still = (spread < RESTING_SHAKE) & (counts > 0.5 * np.median(counts))
@@ -178,7 +186,7 @@ class GyroBias:
 
 def gyro_bias(flight: Flight, steps: ReplayedSteps | None, airborne: tuple[Interval, ...]) -> GyroBias | None:
     """Bias at rest and in flight; None without gyros."""
-    table = flight.topic(IMU)
+    table = _in_order(flight.topic(IMU))
     if table is None or not airborne:
         return None
     time = table["timestamp"].astype(np.int64)
@@ -198,13 +206,12 @@ def _at_rest(time: Times, rate: Array, force: Array) -> tuple[Array, Array]:
     nothing = np.zeros(0), np.zeros((0, 3))
     if time.size < 50:
         return nothing
-    second = ((time - time[0]) * 1e-6 / REST_S).astype(np.int64)
+    seconds, second = np.unique(((time - time[0]) * 1e-6 / REST_S).astype(np.int64), return_inverse=True)
     counts = np.bincount(second)
     means, pulls = (
-        np.column_stack([np.bincount(second, axis) / np.maximum(counts, 1) for axis in values.T])
-        for values in (rate, force)
+        np.column_stack([np.bincount(second, axis) / counts for axis in values.T]) for values in (rate, force)
     )
-    at = time[0] * 1e-6 + REST_S * (np.arange(counts.size) + 0.5)
+    at = time[0] * 1e-6 + REST_S * (seconds + 0.5)
     full = counts > 0.8 * np.median(counts)
     means, pulls, at = means[full], pulls[full], at[full]
     if len(means) < 2:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.diagnosis.field_fits import FieldFit, FieldReadings, field_fits
+from fusetune.analyze.diagnosis.gnss_signs import has_fix
 from fusetune.analyze.diagnosis.motion import Motion
 from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.ekf2.feed.message_samples import mag_samples
@@ -22,7 +23,6 @@ MARGIN_US = 2_000_000
 """So long after take-off and before landing the ground's iron still shows."""
 CERTAIN_HEADING = np.radians(4.0)
 FEWEST = 12
-FIX_3D = 3
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class MagnetometerSigns:
 def earth_field(flight: Flight) -> Array | None:
     """Field at the place of the first fix, NED, Gauss; None without a fix."""
     table = flight.topic("vehicle_gps_position")
-    if table is None or "latitude_deg" not in table or not np.any(table["fix_type"] >= FIX_3D):
+    if table is None or "latitude_deg" not in table or not np.any(has_fix(table)):
         return None
-    first = int(np.argmax(table["fix_type"] >= FIX_3D))
+    first = int(np.argmax(has_fix(table)))
     declination, inclination, strength = field_at(
         float(table["latitude_deg"][first]), float(table["longitude_deg"][first])
     )

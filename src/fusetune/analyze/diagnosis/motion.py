@@ -67,11 +67,18 @@ class Motion:
         across = np.cross(self.body_rate[:, None, :], np.eye(3)).swapaxes(1, 2)
         return np.asarray(self.rotation @ across)
 
-    @property
-    def air_velocity(self) -> Array:
-        """(N, 3) velocity along the axes of the body, m/s; over the ground, as the wind is not known."""
+    def air_velocity(self, wind: Array | None = None) -> Array:
+        """(N, 3) velocity through the air along the axes of the body, m/s.
+
+        Parameters
+        ----------
+        wind : (N, 2) north and east, m/s; over the ground where it is not known
+        """
+        velocity = self.velocity
+        if wind is not None:
+            velocity = velocity - np.column_stack([wind, np.zeros(self.time.size)])
         # the replay's velocity is in its own frame, which is off from that of the gyros
-        turned = _about_down(self.velocity, -self.heading_off)
+        turned = _about_down(velocity, -self.heading_off)
         return np.einsum("nji,nj->ni", self.rotation, turned)
 
 

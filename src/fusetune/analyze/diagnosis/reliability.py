@@ -1,20 +1,30 @@
 """How often a diagnosis is right that its signs make so sure of.
 
-What a rule and its experiment say orders diagnoses, but is no share of hits. The share was counted on simulated flights
-with known faults, for each kind as many, one in five without any (`benchmarks/diagnosis_study`); docs/diagnosis.md
-shows what it is on flights that had no say in it.
+What a rule and its experiment say orders diagnoses, but is no share of hits. The share is a logistic curve over the
+odds of what they say (Platt, 1999), its two figures drawn towards none (0 and 1). It was fitted to simulated flights
+with known faults, for each kind as many, one in three without any, that had no say when levels were set: on those that
+had, unsure ones are right more often than they will be (`benchmarks/diagnosis_study/reliability_fit.py`).
+docs/diagnosis.md shows what it is on flights that had no say in the curve.
 """
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-SAID = (0.0, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)
-RIGHT = (0.0, 0.6, 0.85, 0.9, 0.95, 0.965, 0.985)
-"""What signs and experiments say, and the share that is right; between them linearly. Counted on 204 diagnoses of 307
-flights: 17 of 19 from 0.45 to 0.65, 36 of 38 to 0.85, 56 of 58 to 0.95, 88 of 89 above."""
+OFFSET, SLOPE = 0.62, 2.15
+LARGEST = 0.99
+"""Nobody is surer of a rule: of 240 diagnoses so sure 239 were right."""
+_LEAST = 1e-3
 
 
 def calibrated(said: float) -> float:
     """Share of the diagnoses so sure that are right, 0 to 1."""
-    return round(float(np.interp(said, SAID, RIGHT)), 3)
+    inside = min(max(said, _LEAST), 1.0 - _LEAST)
+    odds = OFFSET + SLOPE * math.log(inside / (1.0 - inside))
+    return round(min(1.0 / (1.0 + math.exp(-odds)), LARGEST), 3)
+
+
+def said_of(share: float) -> float:
+    """What signs and experiments said of a diagnosis that is told with this share; of the largest the least that is."""
+    odds = math.log(min(max(share, _LEAST), LARGEST) / (1.0 - min(max(share, _LEAST), LARGEST)))
+    return 1.0 / (1.0 + math.exp(-(odds - OFFSET) / SLOPE))

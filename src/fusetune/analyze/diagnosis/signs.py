@@ -22,14 +22,15 @@ from fusetune.analyze.diagnosis.motion import Motion, motion_of
 from fusetune.analyze.diagnosis.told_effects import ToldEffects
 from fusetune.analyze.diagnosis.vision_signs import VisionSigns, vision_signs
 from fusetune.analyze.effects.all_effects import FlightEffects
-from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.effects.static_pressure import LEAST_SPEED_M_S
+from fusetune.analyze.flight.intervals import Interval, inside
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.layouts.estimator_instances import instance_switches
 from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.save.checks.judged_flight import JudgedFlight
-from fusetune.save.checks.magnetometer_mounting import magnetometer_mounting
+from fusetune.save.checks.magnetometer_mounting import attitudes_and_fields, magnetometer_mounting, stillest_mounting
 from fusetune.save.checks.standstill import Standstill, flying_steps, standstill
 from fusetune.save.thresholds import VerdictThresholds
 
@@ -135,7 +136,11 @@ class Signs:
     @cached_property
     def told_by(self) -> ToldEffects:
         """Estimates of the tuners of single effects."""
-        return ToldEffects((self.effects or FlightEffects(self.observed)) if self.is_replayed else None)
+        return ToldEffects(self._tuned)
+
+    @cached_property
+    def _tuned(self) -> FlightEffects | None:
+        return (self.effects or FlightEffects(self.observed)) if self.is_replayed else None
 
     @property
     def gnss_place(self) -> VelocityPlace | None:
@@ -152,10 +157,17 @@ class Signs:
         return magnetometer_signs(self.observed.flight, self.motion, self.airborne, heading)
 
     @cached_property
-    def mounting(self) -> Finding | None:
-        """What the verdict says of the magnetometer's mounting, by tilt alone; None where it says nothing."""
+    def mounting(self) -> tuple[Finding, np.ndarray] | None:
+        """What the verdict says of the magnetometer's mounting, by tilt alone, and the mounting that it found.
+
+        The mounting is a rotation (3, 3) from axes that turn with the vehicle to those of the samples; None where the
+        verdict says nothing.
+        """
         found = magnetometer_mounting.findings(JudgedFlight(self.observed.flight, VerdictThresholds()))[0]
-        return found if found.severity == "warning" else None
+        together = attitudes_and_fields(self.observed.flight)
+        if found.severity != "warning" or together is None:
+            return None
+        return found, stillest_mounting(*together)[0]
 
     @cached_property
     def barometer(self) -> BarometerSigns | None:
@@ -164,7 +176,21 @@ class Signs:
             return None
         stuck = self.stuck.get("baro")
         out = (stuck.start_us, stuck.stop_us) if stuck is not None else None
-        return barometer_signs(self.observed.flight, self.motion, self.airborne, out)
+        return barometer_signs(self.observed.flight, self.motion, self.airborne, out, self.wind)
+
+    @cached_property
+    def wind(self) -> np.ndarray | None:
+        """Wind at the times of the motion by the drag that the vehicle feels, (N, 2), north and east, m/s.
+
+        None where the flight does not tell it, or is too slow for it to matter.
+        """
+        motion = self.motion
+        if motion is None:
+            return None
+        level = np.hypot(*motion.velocity[inside(motion.time, self.airborne), :2].T)
+        if float(np.max(level)) < LEAST_SPEED_M_S or self._tuned is None or isinstance(self._tuned.drag, str):
+            return None
+        return self._tuned.drag.wind(np.asarray(motion.time * 1e-6, np.float64))
 
     @cached_property
     def range(self) -> RangeSigns | None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from fusetune.check import check
 from fusetune.finding import Finding
-from fusetune.px4.flight import TopicTable, stacked
+from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.save.checks.judged_flight import MAG, JudgedFlight
 
 MIN_SAMPLES, MAX_SAMPLES = 24, 500
@@ -31,12 +31,10 @@ _REMEDY = "Compare CAL_MAG0_ROT (and SENS_BOARD_ROT) with how the sensor sits; i
 def magnetometer_mounting(judged: JudgedFlight) -> Finding:
     """Whether the field stands still over the ground, or would if the sensor were turned."""
     threshold = judged.limits.max_field_scatter_left
-    table, attitude = judged.flight.topic(MAG), judged.flight.topic(_ATTITUDE)
-    if table is None or attitude is None or "q[0]" not in attitude or "magnetometer_ga[0]" not in table:
+    found_together = attitudes_and_fields(judged.flight)
+    if found_together is None:
         return magnetometer_mounting.does_not_apply("without magnetometer or attitude the two cannot be compared")
-    # damaged numbers may be of the kind of NaN that even a cast complains of; they are left out
-    with np.errstate(invalid="ignore"):
-        q, measured = _together(table, attitude)
+    q, measured = found_together
     if len(measured) < MIN_SAMPLES:
         found = f"only {len(measured)} magnetometer samples with an attitude"
         return magnetometer_mounting.does_not_apply(found)
@@ -45,6 +43,17 @@ def magnetometer_mounting(judged: JudgedFlight) -> Finding:
         return magnetometer_mounting.passed("no other mounting would make the field stand stiller", left, threshold)
     found = f"the field turns as if the magnetometer sat otherwise, by {described(mounting)}"
     return magnetometer_mounting.warned(found, _REMEDY, left, threshold)
+
+
+def attitudes_and_fields(flight: Flight) -> tuple[np.ndarray, np.ndarray] | None:
+    """Attitudes (N, 4), w, x, y, z, body to NED, and samples (N, 3), Gauss, at the same times, as `stillest_mounting`
+    takes them; None where the log has one of them not."""
+    table, attitude = flight.topic(MAG), flight.topic(_ATTITUDE)
+    if table is None or attitude is None or "q[0]" not in attitude or "magnetometer_ga[0]" not in table:
+        return None
+    # damaged numbers may be of the kind of NaN that even a cast complains of; they are left out
+    with np.errstate(invalid="ignore"):
+        return _together(table, attitude)
 
 
 def stillest_mounting(q: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, float]:

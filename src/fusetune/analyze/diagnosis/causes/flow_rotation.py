@@ -18,11 +18,12 @@ REMEDY = (
 
 
 def not_turned(one: FlowSigns) -> bool:
-    """Whether scale alone explains what is left: turning is left as much as the scale is off."""
-    left = one.rotation - (1.0 - one.scale)
+    """Whether nothing is left of the turning, or scale alone explains it: as much is left as the scale is off."""
+    left = np.minimum(np.abs(one.rotation), np.abs(one.rotation - (1.0 - one.scale)))
+    level = np.maximum(LEFT_FROM + SIGMAS * np.minimum(one.rotation_error, 0.1), SIGMAS * one.scale_error)
     turn = abs(float(np.degrees(one.turn)))
     is_straight = turn < TURN_FROM_DEG + SIGMAS * min(float(np.degrees(one.turn_error)), 10.0)
-    return is_straight and bool((np.abs(left) < LEFT_FROM + SIGMAS * np.minimum(one.rotation_error, 0.1)).all())
+    return is_straight and bool((left < level).all())
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:

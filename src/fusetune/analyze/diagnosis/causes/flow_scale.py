@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
@@ -22,9 +24,16 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     by_turning = 1.0 - float(np.average(one.rotation, weights=one.rotation_error**-2.0))
     by_turning_error = float(np.sum(one.rotation_error**-2.0) ** -0.5)
     off, other = abs(one.scale - 1.0), abs(by_turning - 1.0)
-    if off < LEAST_OFF or (one.scale - 1.0) * (by_turning - 1.0) <= 0.0 or other < OFF_FROM + SIGMAS * by_turning_error:
+    if other < LEAST_OFF or (one.scale - 1.0) * (by_turning - 1.0) <= 0.0:
         return None
     tuned = signs.told_by("flow").get("SENS_FLOW_SCALE")
+    if tuned is not None:
+        # the scale itself is that by which the tuner divides
+        off, level = abs((tuned.told or 1.0) / tuned.value - 1.0), OFF_FROM
+    else:
+        level = OFF_FROM + SIGMAS * by_turning_error if off > LEAST_OFF else math.inf
+    if (off if tuned is not None else other) < level:
+        return None
     values = {"flow_scale": round(by_turning, 3)} if tuned is None else {"SENS_FLOW_SCALE": round(tuned.value, 3)}
     factor = 1.0 / max(by_turning, 0.1) if tuned is None else tuned.value
     found = [

@@ -38,10 +38,19 @@ def diagnose(signs: Signs) -> Diagnosis | None:
                 return _diagnosis(signs, found, confidence(FITS_BELOW / max(share, 1e-3), 1.0), _turn(turned.turn))
         return None
     if signs.mounting is not None:
-        left = 1.0 / max(signs.mounting.figure or 1.0, 1e-3)
-        found = [Sign(signs.mounting.found, left, 1.0 / FITS_BELOW, "1")]
+        verdict, _ = signs.mounting
+        left = 1.0 / max(verdict.figure or 1.0, 1e-3)
+        found = [Sign(verdict.found, left, 1.0 / FITS_BELOW, "1")]
         return _diagnosis(signs, found, confidence(left, 1.5, 0.9), "a quarter turn or two")
     return None
+
+
+def claimed_mounting(signs: Signs) -> np.ndarray | None:
+    """Rotation (3, 3) from axes that turn with the vehicle to those of the samples: that of the sign that spoke."""
+    magnetometer = signs.magnetometer
+    if magnetometer is not None and magnetometer.by_gnss:
+        return magnetometer.fits["mounting"].turn
+    return signs.mounting[1] if signs.mounting is not None else None
 
 
 def _turn(turn: np.ndarray) -> str:

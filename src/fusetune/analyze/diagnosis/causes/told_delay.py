@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from fusetune.analyze.diagnosis.causes.claim import confidence, diagnosed
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis, Sign
-from fusetune.analyze.diagnosis.lagged_regression import LaggedFit
 from fusetune.analyze.diagnosis.signs import Signs
 
 MATTERS_MS, SIGMAS = 20.0, 3.0
@@ -17,7 +16,7 @@ def told_wrong(
     id: str,
     label: str,
     parameter: str,
-    fit: LaggedFit,
+    lag_s: tuple[float, float],
     source: str,
     *,
     earliest_ms: float,
@@ -28,11 +27,12 @@ def told_wrong(
     Parameters
     ----------
     label : of the sensor, at the beginning of a sentence
+    lag_s : by how much the sensor is late, and the standard error
     source : how the names of its aid sources begin
     earliest_ms : a lag below is none, the fit has found something else
     first : what to do before the parameter is set
     """
-    told, value, error = signs.parameters[parameter], 1e3 * fit.delay_s, 1e3 * fit.delay_error_s
+    told, value, error = signs.parameters[parameter], 1e3 * lag_s[0], 1e3 * lag_s[1]
     off, level = abs(value - told), MATTERS_MS + SIGMAS * error
     if off < level or value < earliest_ms:
         return None

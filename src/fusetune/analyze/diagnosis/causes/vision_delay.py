@@ -22,7 +22,7 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         "vision_delay",
         "Vision",
         "EKF2_EV_DELAY",
-        one.fit,
+        (one.fit.delay_s, one.fit.delay_error_s),
         "ev",
         earliest_ms=EARLIEST_MS,
         first="Synchronise the clocks of camera and autopilot; else ",
