@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fusetune.design.missions.mission import distance_m, load_mission
-from fusetune.design.outputs import plan_items, write_mission_plan
+from fusetune.design.missions.plan_writing import plan_items, write_mission_plan
 from fusetune.errors import UserError
 
 DOCUMENT = {

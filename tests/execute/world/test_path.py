@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fusetune.design.missions.filtered_path import FilteredPath
+from fusetune.design.missions.limits import Limits
 from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Waypoint
-from fusetune.execute.vehicle import Limits
-from fusetune.execute.world.filtered_path import FilteredPath
 from fusetune.execute.world.flight_plan import FlightPlan, plan_flight
 
 LIMITS = Limits(12.0, 3.0, 1.5, 4.0, 12.0, 60.0, 120.0)
