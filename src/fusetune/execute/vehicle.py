@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from fusetune.design.missions.endurance import Drag, Endurance
 from fusetune.design.missions.limits import Limits
 from fusetune.design.names import NAME_PATTERN, one_line
 from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
@@ -262,10 +263,16 @@ class Vehicle:
     vision: Vision | None = setting(None, "external vision; without it there is none")
     airspeed: AirspeedSensor | None = setting(None, "pitot tube; without it there is none")
     battery: Battery | None = setting(None, "battery with a current sensor; without it none is logged")
+    endurance: Endurance | None = setting(None, "how long it flies; without it no share of the battery is told")
     parameters: dict[str, float] = setting(
         {}, "PX4 parameters that differ from PX4's defaults, whatever set is flown", pattern=PARAMETER_PATTERN
     )
     description: str = setting("", "what the vehicle is")
+
+    @property
+    def drag(self) -> Drag:
+        """Its drag in the air."""
+        return Drag(self.airframe.linear_drag_1_s, self.airframe.quadratic_drag_1_m)
 
 
 def load_vehicle(path: str | os.PathLike[str]) -> Vehicle:

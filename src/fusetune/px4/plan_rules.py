@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from itertools import pairwise
+from typing import Any, TypeGuard
 
 from fusetune.px4.plan_commands import (
     ALTITUDE_MODES,
@@ -183,7 +184,7 @@ def _order_problems(items: Sequence[Any]) -> Iterator[str]:
     numbered = [
         (place, item["doJumpId"]) for place, item in flat if _is_whole(item.get("doJumpId")) and item["doJumpId"] >= 1
     ]
-    for (_, before), (place, number) in zip(numbered, numbered[1:], strict=False):
+    for (_, before), (place, number) in pairwise(numbered):
         if number <= before:
             yield f"{place}.doJumpId is {number}, after {before}; expected ascending numbers, each once"
     known = {number for _, number in numbered}
@@ -276,11 +277,11 @@ def _coordinate_problems(coordinates: Sequence[float | None], name: str, first: 
             yield f"{name}[{first + index}] is {_shown(value)}; expected {-limit:g} to {limit:g} degrees"
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _is_whole(value: Any) -> bool:
+def _is_whole(value: Any) -> TypeGuard[int]:
     # QGroundControl reads every number as a double: 2.0 is 2
     return _is_number(value) and float(value).is_integer()
 

@@ -101,10 +101,8 @@ def _limits(fence: Fence, home: LocalMap) -> Iterator[tuple[str, _Beyond]]:
         yield words, _Circle(home.to_local(circle.lat, circle.lon), circle.radius_m, circle.inside)
     for number, polygon in enumerate(fence.polygons):
         corners = tuple(home.to_local(lat, lon) for lat, lon in polygon.points)
-        yield (
-            f"fence.polygons[{number}] ({'within' if polygon.inside else 'out of'} it)",
-            _Polygon(corners, polygon.inside),
-        )
+        words = f"fence.polygons[{number}] ({'within' if polygon.inside else 'out of'} it)"
+        yield words, _Polygon(corners, polygon.inside)
 
 
 @dataclass(frozen=True)

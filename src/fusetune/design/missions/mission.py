@@ -93,8 +93,8 @@ class Landing:
     """How the mission ends."""
 
     mode: LandingMode = required(
-        "land under the last waypoint, return to home and land there, or leave the landing to the pilot, who takes over "
-        "at the last waypoint"
+        "land under the last waypoint, return to home and land there, or hover at the last waypoint until the pilot "
+        "takes over"
     )
     descent_speed_m_s: float = setting(0.8, "speed of the descent", unit="m/s", above=0, high=5)
     ground_s: float = setting(5.0, "time on the ground after touch-down", unit="s", low=3, high=600)

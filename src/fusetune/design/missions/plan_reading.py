@@ -1,8 +1,8 @@
 """What a QGroundControl plan flies, in the words of a mission file.
 
 Items are followed as PX4 follows them: one after the other, through surveys and corridors, and back where one jumps.
-What a mission does not say otherwise - camera, gimbal, region of interest, rally points - is told in a note; it stays in
-the plan, which is written as it was read (`MissionPlan.document`).
+What a mission does not say (camera, gimbal, region of interest, rally points) is told in a note; it stays in the plan,
+which is written as it was read (`MissionPlan.document`).
 """
 
 from __future__ import annotations
@@ -155,8 +155,7 @@ class _Follower:
             if "TransectStyleComplexItem" not in item:
                 raise UserError(
                     self.path,
-                    f"{label} is a {kind}, of which the plan holds no waypoints: QGroundControl makes them when it sends "
-                    "it",
+                    f"{label} is a {kind}, whose waypoints stand in no plan: QGroundControl makes them as it sends it",
                     "Send it to a vehicle or to SITL, read it back, and save that as a plan",
                 )
             if item["TransectStyleComplexItem"].get("FollowTerrain"):
@@ -171,7 +170,7 @@ class _Follower:
         for _ in range(MOST_STEPS):
             if index >= len(items):
                 return
-            place, item = items[index]
+            _, item = items[index]
             number = int(item.get("doJumpId", index + 1))
             label = f"item {number} (command {int(item['command'])})"
             if item["command"] == Command.DO_JUMP:

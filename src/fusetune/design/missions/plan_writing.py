@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from fusetune.design.missions.fence import Fence
 from fusetune.design.missions.mission import Mission, Waypoint, mission_of_plan
 from fusetune.design.missions.plan_reading import FLY_OVER_ACCEPTANCE_M
 from fusetune.px4.plan_file import (
@@ -40,16 +41,14 @@ def document_of(mission: Mission) -> dict[str, Any]:
         if mission_of_plan(mission.plan, "plan").waypoints != mission.waypoints:
             raise ValueError("the waypoints are not those of the plan that the mission was read from")
         return dict(mission.plan.document)
-    home, fence = mission.home, mission.fence
+    home, fence = mission.home, mission.fence or Fence()
     return plan_document(
         Plan(
             PlanPosition(home.lat, home.lon, home.alt),
             tuple(plan_items(mission)),
             hover_speed_m_s=mission.speed_m_s,
-            circles=tuple(PlanCircle(one.lat, one.lon, one.radius_m, one.inside) for one in fence.circles)
-            if fence
-            else (),
-            polygons=tuple(PlanPolygon(one.points, one.inside) for one in fence.polygons) if fence else (),
+            circles=tuple(PlanCircle(one.lat, one.lon, one.radius_m, one.inside) for one in fence.circles),
+            polygons=tuple(PlanPolygon(one.points, one.inside) for one in fence.polygons),
         )
     )
 

@@ -188,8 +188,8 @@ class FigureEight(Shape):
             return None
         least = speed_m_s**2 / HARDEST_TURN_M_S2
         return (
-            f"radius_m is {self.radius_m:g}, which asks for {asked:.1f} m/s² sideways at {speed_m_s:g} m/s; expected at "
-            f"least {least:.0f} m, or a smaller speed_m_s"
+            f"radius_m is {self.radius_m:g}, which asks for {asked:.1f} m/s² sideways at {speed_m_s:g} m/s; expected "
+            f"at least {least:.0f} m, or a smaller speed_m_s"
         )
 
 
