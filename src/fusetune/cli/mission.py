@@ -43,10 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Check, tell, and write what is asked for; always `DONE`."""
     from fusetune.design.missions.asked_mission import asked_mission
-    from fusetune.design.missions.outlook import PlannedVehicle, outlook
+    from fusetune.design.missions.outlook import outlook
     from fusetune.design.missions.plan_reading import PLAN_SUFFIX
     from fusetune.design.missions.plan_writing import write_mission_plan
     from fusetune.errors import UserError
+    from fusetune.execute.planned_vehicle import planned_vehicle
 
     if options.out is not None and options.out.suffix.casefold() != PLAN_SUFFIX:
         raise UserError(options.out, "is no plan", "Name a file that ends with .plan")
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     keys = {key: value for key, value in asked.items() if value is not None}
     purpose = [one.strip() for one in options.purpose.split(",") if one.strip()]
     mission = asked_mission(options.file, options.shape, purpose, options.home, **keys)
-    vehicle = _vehicle(options.vehicle) if options.vehicle is not None else PlannedVehicle()
+    vehicle = planned_vehicle(options.vehicle)
     found = outlook(mission, vehicle, file=options.file or "the mission")
     for line in _lines(mission, found, vehicle):
         print(line)
@@ -81,18 +82,8 @@ def _home(text: str) -> list[float]:
     return numbers
 
 
-def _vehicle(file: Path) -> PlannedVehicle:
-    from fusetune.design.missions.outlook import PlannedVehicle
-    from fusetune.execute.vehicle import load_vehicle
-
-    vehicle = load_vehicle(file)
-    return PlannedVehicle(vehicle.name, vehicle.limits, vehicle.endurance, vehicle.drag)
-
-
 def _lines(mission: Mission, found: Outlook, vehicle: PlannedVehicle) -> Iterator[str]:
-    from fusetune.design.missions.outlook import answer_sentence
-
-    yield answer_sentence(found)
+    yield found.answer
     head = ("leg", "from", "to", "length", "height", "speed", "")
     yield " " + f"{head[0]:<14}{head[1]:>7}{head[2]:>7}{head[3]:>9}{head[4]:>9}{head[5]:>10}"
     for leg in found.legs:
@@ -126,8 +117,9 @@ def _motion_line(mission: Mission, vehicle: PlannedVehicle) -> str:
     time_us = (1e6 * motion.time_s).astype("int64")
     moved = excitation(time_us, motion.velocity, attitude_of(motion), [(int(time_us[0]), int(time_us[-1]))])
     assert moved is not None
+    turning = max(moved.yaw_rate_deg_s, moved.roll_pitch_rate_deg_s)
     return (
-        f"Moves: {moved.horizontal_acceleration_m_s2:.1f} m/s² RMS horizontally ({BRISK_M_S2:g} tells the delay of "
-        f"GNSS), {max(moved.yaw_rate_deg_s, moved.roll_pitch_rate_deg_s):.0f} °/s RMS turning ({TURNING_DEG_S:g} tells lever "
-        f"arms), {100.0 * moved.hover_share:.0f} % of the time hovering."
+        f"Moves: {moved.horizontal_acceleration_m_s2:.1f} m/s² RMS horizontally ({BRISK_M_S2:g} tells the delay), "
+        f"{turning:.0f} °/s RMS turning ({TURNING_DEG_S:g} tells lever arms), "
+        f"{100.0 * moved.hover_share:.0f} % of the time hovering."
     )

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.design.missions.endurance import GRAVITY_M_S2, NO_DRAG, Drag, Endurance, battery_share, power_over_hover
+from fusetune.design.missions.endurance import GRAVITY_M_S2, NO_DRAG, Drag, Endurance
 from fusetune.design.missions.fence import Fence, breaches
 from fusetune.design.missions.flown_path import FlownPath, flown_path
 from fusetune.design.missions.limits import PX4_LIMITS, Limits
 from fusetune.design.missions.mission import Mission
+from fusetune.design.missions.power_use import battery_share, power_over_hover
 from fusetune.design.missions.route import RouteLeg, route_of
 from fusetune.px4.local_map import LocalMap
 from fusetune.quaternions import multiply
@@ -115,9 +116,20 @@ class Outlook:
     legs: tuple[LegOutlook, ...]
     notes: tuple[str, ...]
 
+    @property
+    def answer(self) -> str:
+        """What a pilot asks first."""
+        minutes, seconds = divmod(round(self.duration_s), 60)
+        duration = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
+        battery = "" if self.battery is None else f", {100.0 * self.battery:.0f} % of the battery in still air"
+        return (
+            f"Mission {self.mission}: {duration} in the air, {self.distance_m:.0f} m, up to {self.highest_m:.0f} m "
+            f"high and {self.farthest_m:.0f} m away, {self.fastest_m_s:.1f} m/s{battery} ({self.vehicle})."
+        )
+
     def document(self) -> dict[str, Any]:
         """As a result file holds it."""
-        return asdict(self)
+        return {"answer": self.answer} | asdict(self)
 
 
 def motion_of(flown: FlownPath, step_s: float = STEP_S) -> PlannedMotion:
@@ -176,17 +188,6 @@ def attitude_of(motion: PlannedMotion) -> Array:
     tilt /= np.linalg.norm(tilt, axis=1, keepdims=True)
     half, zero = 0.5 * motion.yaw, np.zeros(len(down))
     return multiply(tilt, np.column_stack([np.cos(half), zero, zero, np.sin(half)]))
-
-
-def answer_sentence(found: Outlook) -> str:
-    """What a pilot asks first."""
-    minutes, seconds = divmod(round(found.duration_s), 60)
-    duration = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
-    battery = "" if found.battery is None else f", {100.0 * found.battery:.0f} % of the battery in still air"
-    return (
-        f"Mission {found.mission}: {duration} in the air, {found.distance_m:.0f} m, up to {found.highest_m:.0f} m high "
-        f"and {found.farthest_m:.0f} m away, {found.fastest_m_s:.1f} m/s{battery} ({found.vehicle})."
-    )
 
 
 def leg_names(route: Sequence[RouteLeg]) -> list[str]:

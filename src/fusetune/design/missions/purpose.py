@@ -29,9 +29,11 @@ DELAY_MS = 10.0
 """Standard error of the delay of GNSS that a flight made for it aims at; two such flights tell it to ±15 ms."""
 _VELOCITY_M_S, _GNSS_HZ = 0.3, 5.0
 """EKF2's default of EKF2_GPS_V_NOISE, and the rate of common receivers."""
-HOVER_S = 60.0
+HOVER_S = 40.0
 _FASTEST_M_S = 10.0
 _STEP_M, _CLIMB_M = 4.0, 10.0
+_JERK_S = 2.0 * PX4_LIMITS.acceleration_m_s2 / PX4_LIMITS.jerk_m_s3
+"""How long the acceleration builds up, as `flown_path` plans it."""
 
 
 @dataclass(frozen=True)
@@ -80,22 +82,26 @@ def _runs(field: Field) -> dict[str, Any]:
         "altitude_m": field.altitude_m,
         "distance_m": field.side_m,
         "climb_m": _CLIMB_M,
-        "speed_m_s": fastest_between_stops(field.side_m),
+        "speed_m_s": fastest_to_and_fro(field.side_m),
         "repeats": 2,
     }
 
 
-def _stop_and_go(field: Field) -> dict[str, Any]:
-    speed = fastest_between_stops(field.side_m)
+def _shuttle(field: Field) -> dict[str, Any]:
+    speed = fastest_to_and_fro(field.side_m)
     # velocity late by δ is off by a δ: the standard error of δ from N samples is σ / √(N a²), so ∫ a² dt has to be …
     wanted = (_VELOCITY_M_S / (1e-3 * DELAY_MS)) ** 2 / _GNSS_HZ
-    each = 2.0 * speed**2 / _velocity_window_s(speed)
+    # … and each time it turns back 2 v are gone through in the window of the velocity, smoothed by that of the jerk
+    window = _velocity_window_s(speed)
+    each = (2.0 * speed) ** 2 / window * (1.0 - _JERK_S / (3.0 * window))
     return {
-        "kind": "stop_and_go",
+        "kind": "shuttle",
         "altitude_m": field.altitude_m,
         "length_m": field.side_m,
-        "legs": max(2 * math.ceil(0.5 * wanted / each), 4),
+        "legs": max(2 * math.ceil(0.5 * wanted / each), 6),
         "speed_m_s": speed,
+        # a heading that stays: turning, a lever arm would look like a delay
+        "heading_deg": 0.0,
     }
 
 
@@ -117,11 +123,10 @@ def _velocity_window_s(speed_m_s: float) -> float:
     return math.hypot(2.0 * speed_m_s, vertical) / PX4_LIMITS.acceleration_m_s2
 
 
-def fastest_between_stops(length_m: float) -> float:
-    """Largest speed, in halves of m/s, that is reached on a leg between two stops."""
-    jerk_s = 2.0 * PX4_LIMITS.acceleration_m_s2 / PX4_LIMITS.jerk_m_s3
+def fastest_to_and_fro(length_m: float) -> float:
+    """Largest speed, in halves of m/s, that is reached on a leg between two ends."""
     speeds = [0.5 * half for half in range(2, int(2.0 * _FASTEST_M_S) + 1)]
-    return max((one for one in speeds if one * (_velocity_window_s(one) + jerk_s) <= length_m), default=1.0)
+    return max((one for one in speeds if one * (_velocity_window_s(one) + _JERK_S) <= length_m), default=1.0)
 
 
 MOTIONS: Mapping[str, Motion] = {
@@ -153,12 +158,12 @@ MOTIONS: Mapping[str, Motion] = {
         "fast along each axis of the vehicle with a heading that stays, and at rest between",
         _runs,
     ),
-    "stop_and_go": Motion(
+    "shuttle": Motion(
         (
             "EKF2_GPS_DELAY", "EKF2_EV_DELAY", "EKF2_OF_DELAY", "EKF2_GPS_V_NOISE", "EKF2_ACC_NOISE",
         ),
-        "accelerating and stopping, a late velocity is off by acceleration times delay",
-        _stop_and_go,
+        "turning back hard, a late velocity is off by acceleration times delay",
+        _shuttle,
     ),
     "figure_eight": Motion(
         ("EKF2_GPS_POS_*", "EKF2_IMU_POS_*", "EKF2_EV_POS_*", "EKF2_OF_*", "EKF2_GYR_NOISE", "EKF2_EV_DELAY"),

@@ -194,21 +194,30 @@ class FigureEight(Shape):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StopAndGo(Shape):
-    """Accelerates hard, stops, and comes back: the delay of GNSS."""
+class Shuttle(Shape):
+    """Flies to and fro along a line, turning back hard or resting at each end: the delay of GNSS."""
 
-    length_m: float = required("length of a leg", unit="m", above=2, high=2000)
-    legs: int = setting(6, "number of legs, to and fro", low=1, high=100)
-    hold_s: float = setting(1.0, "rest at each end", unit="s", above=0, high=60)
+    length_m: float = required("length of the line", unit="m", above=2, high=2000)
+    legs: int = setting(6, "how often along it", low=1, high=100)
+    hold_s: float = setting(
+        0.0, "rest at each end; without it the vehicle turns back at once", unit="s", low=0, high=60
+    )
     bearing_deg: float = setting(0.0, "direction of the first leg", unit="degrees", low=-360, high=360)
+    heading_deg: float | None = setting(
+        None, "heading that stays; without it the course", unit="degrees", low=-360, high=360
+    )
 
     def points(self, speed_m_s: float) -> Iterator[Point]:
         for leg in range(self.legs + 1):
             north, east = _turned(self.bearing_deg, (leg % 2 - 0.5) * self.length_m, 0.0)
-            yield Point(self.north_m + north, self.east_m + east, self.altitude_m, speed_m_s, hold_s=self.hold_s)
-
-
-Axis = Literal["forward_backward", "left_right", "up_down"]
+            yield Point(
+                self.north_m + north,
+                self.east_m + east,
+                self.altitude_m,
+                speed_m_s,
+                hold_s=self.hold_s,
+                heading_deg=self.heading_deg,
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,7 +268,7 @@ KINDS: dict[str, type[Shape]] = {
     "climb_steps": ClimbSteps,
     "hover": Hover,
     "yaw_turns": YawTurns,
-    "stop_and_go": StopAndGo,
+    "shuttle": Shuttle,
     "runs": Runs,
 }
 """Name in a file → shape."""
