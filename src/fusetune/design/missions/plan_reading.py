@@ -74,7 +74,11 @@ def read_mission_plan(path: str | os.PathLike[str]) -> MissionPlan:
         As of `read_plan`; the plan is for another vehicle or autopilot, follows terrain, or holds what PX4 refuses or
         what never ends.
     """
-    document = read_plan(path)
+    return followed_plan(read_plan(path), path)
+
+
+def followed_plan(document: Mapping[str, Any], path: str | os.PathLike[str]) -> MissionPlan:
+    """What the JSON object of a plan flies, which keeps the rules; `UserError` as of `read_mission_plan`."""
     _check_vehicle(document["mission"], path)
     return _Follower(document, path).followed()
 
@@ -229,18 +233,18 @@ class _Follower:
         self._add(label, place, self.takeoff_m, parameters[3])
 
     def _pass(self, label: str, item: Mapping[str, Any], parameters: list[float | None]) -> None:
-        place = _place(parameters)
+        lat, lon = parameters[4], parameters[5]
+        assert lat is not None
+        assert lon is not None
         if self.takeoff_m is None:
             raise UserError(self.path, f"{label} comes without a take-off before it", "Put a take-off first")
-        if place is None:
-            raise UserError(self.path, f"{label} has no place", "Give it latitude and longitude")
         keys: dict[str, Any] = {}
         if item["command"] == Command.WAYPOINT:
             radius = parameters[1] or 0.0
             keys = {"hold_s": parameters[0], "turn": "fly_over" if 0.0 < radius <= FLY_OVER_ACCEPTANCE_M else "fly_by"}
         elif item["command"] == Command.LOITER_TIME:
             keys = {"hold_s": parameters[0]}
-        self._add(label, place, self._height(label, item, parameters), parameters[3], **keys)
+        self._add(label, (lat, lon), self._height(label, item, parameters), parameters[3], **keys)
 
     def _add(
         self, label: str, place: tuple[float, float], height_m: float, heading_deg: float | None, **keys: Any
@@ -299,7 +303,7 @@ class _Follower:
 
 
 def _place(parameters: list[float | None]) -> tuple[float, float] | None:
-    """Latitude and longitude; None where the command has none: null, or zero and zero."""
+    """Latitude and longitude of take-off and landing; None where there is none: null, or zero and zero."""
     lat, lon = parameters[4], parameters[5]
     if lat is None or lon is None or (lat == 0.0 and lon == 0.0):
         return None
