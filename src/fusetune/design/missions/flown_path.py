@@ -138,7 +138,9 @@ def _parts(
             follower = route[index + 1]
             stays = follower.kind == "travel" and follower.length_m < NEAREST_WAYPOINTS_M
             stops = leg.hold_s > 0.0 or follower.kind != "travel" or stays
-            parts += _travel(index, place, place_of(leg), leg, limits, half_window_s, looking, stops=stops)
+            parts += _travel(
+                index, place, place_of(leg), leg, limits, half_window_s, looking, stops=stops, leaves=not stays
+            )
         place = parts[-1].end
         looking = parts[-1].yaw if parts[-1].yaw is not None else looking
     return parts
@@ -154,13 +156,15 @@ def _travel(
     looking: float,
     *,
     stops: bool,
+    leaves: bool = True,
 ) -> list[_Part]:
     distance = float(np.linalg.norm(target - start))
     direction = (target - start) / max(distance, 1e-9)
     yaw = _leg_yaw(direction, leg)
     if leg.kind == "travel" and distance < NEAREST_WAYPOINTS_M:
         turn_s = 0.0 if yaw is None else _turn_s(math.remainder(yaw - looking, math.tau), limits)
-        return [_Part(index, target, max(leg.hold_s + turn_s, 1e-3), yaw)]
+        # the filter sets out half its window before the next leg
+        return [_Part(index, target, leg.hold_s + turn_s + (half_window_s if leaves else 1e-3), yaw)]
     speed = leg_speed(direction, leg.speed_m_s, limits)
     parts = [_Part(index, target, max(distance, 1e-3) / speed, yaw)]
     if stops:

@@ -173,7 +173,11 @@ def mission_of(document: Mapping[str, Any], path: str | os.PathLike[str], labels
     ]
     raise_problems(path, problems, "Give lat and lon, or north_m and east_m")
     shapes = [*document.get("shapes", ()), *_for_purpose(document, path)]
-    entries += [(label, _entry(point, local)) for label, point in shape_points(shapes, speed, path)]
+    for label, point in shape_points(shapes, speed, path):
+        entry = _entry(point, local)
+        # a shape may begin where the one before ended
+        if not (entries and _is_no_way(entries[-1][1], entry)):
+            entries.append((label, entry))
     if not entries:
         raise_problems(path, ["there is nowhere to fly to"], "Give waypoints, shapes or a purpose")
     keys = {key: value for key, value in document.items() if key != "shapes"}
@@ -206,6 +210,17 @@ def _placed(entry: Mapping[str, Any], local: LocalMap, label: str, problems: lis
             f"{label} gives {' and '.join(given) or 'no place'}; expected lat and lon, or north_m and east_m"
         )
     return rest
+
+
+def _is_no_way(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
+    """Whether an entry asks for nothing after another: it neither leads elsewhere nor waits nor turns."""
+    stays = second.get("heading_deg") is None and not second.get("hold_s")
+    return stays and _apart_m(first, second) < NEAREST_WAYPOINTS_M
+
+
+def _apart_m(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
+    along = distance_m(first["lat"], first["lon"], second["lat"], second["lon"])
+    return math.hypot(along, second["alt"] - first["alt"])
 
 
 def _entry(point: Point, local: LocalMap) -> dict[str, Any]:
@@ -244,12 +259,10 @@ def _place_problems(mission: Mission, labels: Sequence[str]) -> Iterable[str]:
             yield f"{label} lies {distance / 1000:.1f} km from home; {expected}"
     pairs = zip(labels[1:], mission.waypoints, mission.waypoints[1:], strict=False)
     for label, first, second in pairs:
-        apart = math.hypot(distance_m(first.lat, first.lon, second.lat, second.lon), second.alt - first.alt)
-        # at the same place it may wait, or look elsewhere
-        if apart < NEAREST_WAYPOINTS_M and second.heading_deg is None and second.hold_s == 0.0:
+        if _is_no_way(vars(first), vars(second)):
             yield (
-                f"{label} lies {apart:.2f} m from the one before; expected at least "
-                f"{NEAREST_WAYPOINTS_M} m (use hold_s to wait at a place)"
+                f"{label} lies {_apart_m(vars(first), vars(second)):.2f} m from the one before; expected at least "
+                f"{NEAREST_WAYPOINTS_M} m (use hold_s to wait at a place, heading_deg to turn)"
             )
 
 
