@@ -5,8 +5,9 @@
 Both are flown by a quadrotor whose velocity errors and accelerometer are as noisy as its parameters say, and white, so
 that the likelihood of the innovations of GNSS velocity is that of the right model. Its second derivatives by delay (ms)
 and by the logarithm of the noise, the information in the flights, come from a quadratic through replays with five
-delays and five noises about the true ones. Printed for each mission: information of a flight and of a minute in the air, the
-correlation of the two estimates, and the standard errors of both from one flight.
+delays and five noises about the true ones. Printed for each mission: information of a flight and of a minute in the
+air, the root of its determinant a minute, the correlation of the two estimates, and the standard errors of both from
+one flight.
 """
 
 from __future__ import annotations
@@ -134,10 +135,10 @@ def main() -> None:
     options = arguments.parse_args()
     use_kernel_cache()
     print(
-        "| mission | minutes | information of delay, 1/ms² | a minute | of ln noise | a minute | correlation (each) | "
-        "standard error of delay, ms | of ln noise |"
+        "| mission | minutes | information of delay, 1/ms² | a minute | of ln noise | a minute | √det a minute | "
+        "correlation (each) | standard error of delay, ms | of ln noise |"
     )
-    print("|---" * 9 + "|")
+    print("|---" * 10 + "|")
     for name, mission in missions().items():
         told = [told_by(mission, FIRST_SEED + number) for number in range(options.flights)]
         mean = Told(float(np.mean([one.minutes for one in told])), np.mean([one.information for one in told], axis=0))
@@ -146,7 +147,8 @@ def main() -> None:
         each = " ".join(f"{one.correlation:+.2f}" for one in told)
         print(
             f"| {name} | {mean.minutes:.1f} | {delay:.3g} | {delay / mean.minutes:.3g} | {noise:.3g} | "
-            f"{noise / mean.minutes:.3g} | {mean.correlation:+.2f} ({each}) | {errors[0]:.1f} | {errors[1]:.3f} |",
+            f"{noise / mean.minutes:.3g} | {math.sqrt(np.linalg.det(mean.information)) / mean.minutes:.3g} | "
+            f"{mean.correlation:+.2f} ({each}) | {errors[0]:.1f} | {errors[1]:.3f} |",
             flush=True,
         )
 

@@ -95,6 +95,8 @@ def _map(axes: Axes, mission: Mission, motion: PlannedMotion, route: Sequence[Ro
         linewidths=2.0,
         capstyle="round",
         zorder=2,
+        # some thousand parts, which would be a path each
+        rasterized=True,
     )
     axes.add_collection(parts)
     bar = axes.figure.colorbar(parts, ax=axes, location="bottom", shrink=0.8, aspect=40, pad=0.02)
