@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import copy
 import json
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from tests.design.missions.made_plans import HOME, back, plan, simple, speed, survey, take_off, to, write
 
-from fusetune.design.missions.mission import load_mission
-from fusetune.design.missions.plan_writing import write_mission_plan
+from fusetune.design.missions.mission import load_mission, mission_of_plan
+from fusetune.design.missions.plan_reading import followed_plan
+from fusetune.design.missions.plan_writing import document_of, write_mission_plan
 from fusetune.design.missions.route import route_of
 from fusetune.errors import UserError
 from fusetune.px4.plan_file import read_plan
+from fusetune.px4.plan_rules import plan_problems
 
 ROI = simple(195, [0, 0, 0, 0, 47.398, 8.546, 0], mode=None)
 CAMERA = simple(206, [25, 0, 1, 0, 0, 0, 0], frame=2, mode=None)
@@ -144,3 +151,37 @@ def test_what_is_no_plan_is_told(tmp_path: Path, content: bytes, words: str) -> 
     with pytest.raises(UserError, match=r"a\.plan") as error:
         read_plan(path)
     assert words in str(error.value)
+
+
+JSON_VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-3, 300)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(max_size=3),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=2),
+    max_leaves=4,
+)
+
+
+def nodes(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    for key in keys:
+        yield (*place, key)
+        yield from nodes(value[key], (*place, key))
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_whatever_stands_at_a_place_ends_in_a_mission_or_in_a_message(data: st.DataObject) -> None:
+    document = copy.deepcopy(everything())
+    *way, last = data.draw(st.sampled_from(list(nodes(document))))
+    inner: Any = document
+    for key in way:
+        inner = inner[key]
+    inner[last] = data.draw(JSON_VALUES)
+    if any(plan_problems(document)):
+        return
+    with suppress(UserError):
+        mission = mission_of_plan(followed_plan(document, "a.plan"), "a.plan")
+        assert document_of(mission) == document

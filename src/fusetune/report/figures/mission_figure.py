@@ -23,9 +23,11 @@ from fusetune.storage.files import AnyPath
 
 _SPEEDS = "viridis_r"
 _ROUTE, _HEADING, _FENCE, _FORBIDDEN = "#999999", "#CC79A7", "#009E73", "#D55E00"
-_ROOM = 0.028
-"""Share of the width of a panel that a number takes."""
+_ROOM, _DIGIT = 0.028, 0.012
+"""Share of the width of the map that a number takes, and of the width of the profile that each of its digits does."""
 _SAME_M = 0.5
+_LEAST_HEADING = 30.0
+"""Degrees that the panel of the heading spans at least."""
 _MARGIN = 0.08
 
 
@@ -64,6 +66,9 @@ def mission_figure(mission: Mission, limits: Limits) -> Figure:
             _times(axes, motion.time_s[-1], ends_s, route)
         if row < len(profiles) - 1:
             axes.set_ylim(bottom=0.0)
+    low, high = axes.get_ylim()
+    if high - low < _LEAST_HEADING:
+        axes.set_ylim(0.5 * (low + high - _LEAST_HEADING), 0.5 * (low + high + _LEAST_HEADING))
     axes.set(xlabel="time in the air [s]")
     figure.suptitle(f"Mission {mission.name}", x=0.01, ha="left", fontsize=11)
     return figure
@@ -78,7 +83,7 @@ def _times(axes: Axes, duration_s: float, ends_s: Sequence[float], route: Sequen
                 end, 1.01, f"{leg.waypoint + 1}", fontsize=7, ha="center", va="bottom", color="#666666",
                 transform=axes.get_xaxis_transform(),
             )  # fmt: skip
-            free_from = end + _ROOM * duration_s
+            free_from = end + (0.01 + _DIGIT * len(str(leg.waypoint + 1))) * duration_s
 
 
 def _map(axes: Axes, mission: Mission, motion: PlannedMotion, route: Sequence[RouteLeg]) -> None:
@@ -152,12 +157,10 @@ def _numbers(route: Sequence[RouteLeg], apart_m: float) -> list[tuple[tuple[floa
 
 
 def _named(numbers: Sequence[int]) -> str:
-    """1, 1–5, or 1, 3, …, 9."""
+    """1, 1–5, or 1, …"""
     if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
         return f"{numbers[0]}–{numbers[-1]}"
-    if len(numbers) > 4:
-        return f"{numbers[0]}, {numbers[1]}, …, {numbers[-1]}"
-    return ", ".join(map(str, numbers))
+    return f"{numbers[0]}, …" if len(numbers) > 2 else ", ".join(map(str, numbers))
 
 
 def _fence(axes: Axes, mission: Mission) -> None:
