@@ -137,6 +137,10 @@ def _stays(legs: list[RouteLeg]) -> bool:
             {"shapes": [{"kind": "climb_steps", "altitude_m": 400, "step_m": 60, "steps": 3}]},
             ("shapes[0].steps end 580 m",),
         ),
+        (
+            {"shapes": [{"kind": "figure_eight", "altitude_m": 9, "radius_m": 900, "deviation_m": 0.01, "laps": 50}]},
+            ("shapes[0] ends beyond the 2000 points",),
+        ),
         ({}, ("nowhere to fly to", "Give waypoints, shapes or a purpose")),
         (
             {"waypoints": [{"north_m": 3, "alt": 9}]},

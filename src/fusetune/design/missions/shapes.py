@@ -10,12 +10,15 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, ClassVar, Literal
 
 from fusetune.settings.checking import raise_problems, validate
 from fusetune.settings.declaration import required, setting
 from fusetune.settings.kinds import built_of_kind, schema_of_kinds
 
+MOST_POINTS = 2000
+"""Of all shapes of a mission; PX4 stores hardly more items."""
 HARDEST_TURN_M_S2 = 3.0
 """MPC_ACC_HOR of PX4: a circle that asks for more is not flown as planned."""
 
@@ -167,7 +170,7 @@ class FigureEight(Shape):
         0.0, "direction from the centre of one circle to that of the other", unit="degrees", low=-360, high=360
     )
     deviation_m: float = setting(
-        0.3, "how far the straight way between two points is from the circle at most", unit="m", above=0, high=10
+        0.3, "how far the straight way between two points is from the circle at most", unit="m", low=0.01, high=10
     )
 
     def points(self, speed_m_s: float) -> Iterator[Point]:
@@ -299,7 +302,12 @@ def shape_points(
             problems.append(f"shapes[{number}].{problem}")
             continue
         place = f"shapes[{number}] ({entry['kind']}), point"
-        found += [(f"{place} {index}", point) for index, point in enumerate(shape.points(speed), 1)]
+        room = MOST_POINTS - len(found)
+        points = list(islice(shape.points(speed), room + 1))
+        if len(points) > room:
+            problems.append(f"shapes[{number}] ends beyond the {MOST_POINTS} points that a mission may have")
+            break
+        found += [(f"{place} {index}", point) for index, point in enumerate(points, 1)]
     raise_problems(file, problems, "Mend the named keys")
     return found
 
