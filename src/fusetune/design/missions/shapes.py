@@ -294,7 +294,8 @@ def shape_points(
         An entry is broken or cannot be flown; the message names entry, key and what was expected.
     """
     validate({"shapes": list(entries)}, _SCHEMA, file)
-    found, problems = [], []
+    found: list[tuple[str, Point]] = []
+    problems: list[str] = []
     for number, entry in enumerate(entries):
         shape = built_of_kind(KINDS, entry)
         speed = shape.speed_m_s or speed_m_s
