@@ -35,6 +35,7 @@ wildcard_constraints:
 localrules:
     all,
     design,
+    mission_map,
     list_flights,
     decide,
     plot_summary,
@@ -49,6 +50,7 @@ rule all:
     default_target: True
     input:
         rules.design.output,
+        rules.mission_map.output,
         rules.decide.output,
         rules.build_report.output,
         rules.join_health.output,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,7 +23,7 @@ def public_parameters(source: str) -> Iterator[tuple[str, str]]:
 
 
 def takes_only_path_objects(annotation: str) -> bool:
-    return "Path" in annotation.replace("os.PathLike[str]", "").replace("AnyPath", "")
+    return re.search(r"\bPath\b", annotation) is not None
 
 
 def test_what_counts_as_a_path_only() -> None:

@@ -64,7 +64,13 @@ class Configuration:
     )
     mission: str = setting(
         "config/missions/short_survey.yaml",
-        "file of the mission that is planned, and flown by the demonstration",
+        "file of the mission that is planned, and flown by the demonstration; `.yaml`, or a `.plan` of QGroundControl",
+        at_least=1,
+    )
+    mission_vehicle: str | None = setting(
+        None,
+        "file of the vehicle that the mission is planned for (limits, endurance); empty: that of the demonstration "
+        "while it is flown, else one with PX4's defaults",
         at_least=1,
     )
     present_flight: str | None = setting(

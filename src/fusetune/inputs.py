@@ -63,6 +63,8 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
             reason = f"demonstration.study is {study_file!r}, whose sets follow from flights"
             raise UserError(file, reason, "Name a study with sets of its own")
     mission = load_mission(settings.mission)
+    if settings.mission_vehicle is not None:
+        load_vehicle(settings.mission_vehicle)
     simulated = dict(_simulated_flights(study, settings.demonstration.flights_per_set))
     for flight in settings.demonstration.faults:
         # with logs, a study whose sets follow from them names no flights of the demonstration

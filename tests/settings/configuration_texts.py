@@ -11,7 +11,8 @@ from typing import Any, Literal, get_args, get_origin
 import yaml
 
 from fusetune.configuration import Configuration
-from fusetune.execute.sensors.faults import KINDS
+from fusetune.design.missions.shapes import KINDS as SHAPES
+from fusetune.execute.sensors.faults import KINDS as FAULTS
 from fusetune.settings.declaration import Declaration, DeclaredSetting, declared, meaning_of, without_none
 from fusetune.settings.schema import DIALECT, schema_of
 
@@ -54,8 +55,18 @@ def manual_text(kind: type) -> str:
 
 def faults_text() -> str:
     """The table of faults in `config/README.md`."""
-    rows = ["| kind | what happens | keys, those in brackets may be left out |", "|---|---|---|"]
-    for name, kind in KINDS.items():
+    return kinds_text(FAULTS, "what happens")
+
+
+def shapes_text() -> str:
+    """The table of shapes in `config/README.md`."""
+    return kinds_text(SHAPES, "what is flown, and what it tells of")
+
+
+def kinds_text(kinds: Mapping[str, type], meaning: str) -> str:
+    """A table of the kinds that the entries of a list may be of."""
+    rows = [f"| kind | {meaning} | keys, those in brackets may be left out |", "|---|---|---|"]
+    for name, kind in kinds.items():
         keys = (f"`{one.name}`" if one.default is MISSING else f"[`{one.name}`]" for one in declared(kind))
         rows.append(f"| `{name}` | {meaning_of(kind)} | {', '.join(keys)} |")
     return "\n".join(rows)
@@ -111,6 +122,8 @@ def _range_of(one: DeclaredSetting) -> str:
     if origin is tuple and declaration.choices:
         return "some of these" if one.default == declaration.choices else f"some of {_shown(declaration.choices)}"
     numbers = _numbers(declaration)
+    if arguments[-1:] == (...,):
+        return f"list {numbers}".strip()
     return f"{_COUNTED[len(arguments)]} numbers {numbers}".strip() if origin is tuple else numbers
 
 

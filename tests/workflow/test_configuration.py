@@ -15,7 +15,14 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 from tests.made_text import UpToDate
-from tests.settings.configuration_texts import configuration_text, faults_text, leaves, manual_text, schema_text
+from tests.settings.configuration_texts import (
+    configuration_text,
+    faults_text,
+    leaves,
+    manual_text,
+    schema_text,
+    shapes_text,
+)
 
 from fusetune.analyze.replaying.settings import IN_USE
 from fusetune.configuration import Configuration, read_configuration
@@ -32,6 +39,7 @@ def test_schema_file_and_manual_say_what_is_declared(project_root: Path, up_to_d
     manual = project_root / "config" / "README.md"
     up_to_date(manual, "settings", f"\n{manual_text(Configuration)}\n\n")
     up_to_date(manual, "mission", f"\n{manual_text(Mission)}\n\n")
+    up_to_date(manual, "shapes", f"\n{shapes_text()}\n\n")
     up_to_date(manual, "vehicle", f"\n{manual_text(Vehicle)}\n\n")
     up_to_date(manual, "faults", f"\n{faults_text()}\n\n")
 

@@ -27,6 +27,9 @@ if DEMONSTRATED and workflow.is_main_process:
     told_in_one_line(check_demonstration, SETTINGS, CONFIG_FILE)
 if DEMONSTRATED:
     CONFIGURATION_FILES.append(SETTINGS.demonstration.vehicle)
+MISSION_VEHICLE = [SETTINGS.mission_vehicle] if SETTINGS.mission_vehicle else []
+if DEMONSTRATED and not MISSION_VEHICLE:
+    MISSION_VEHICLE = [SETTINGS.demonstration.vehicle]
 
 
 def contents(*files):

@@ -30,3 +30,31 @@ rule design:
         "Design: write the mission plan and {INPUTS.study.name}'s parameter sets"
     script:
         "../scripts/design.py"
+
+
+rule mission_map:
+    input:
+        mission=SETTINGS.mission,
+        vehicle=MISSION_VEHICLE,
+    output:
+        map=report(
+            f"results/design/{INPUTS.mission.name}.svg",
+            caption="../report/mission.rst",
+            category="Design",
+            labels={"figure": "mission"},
+        ),
+        outlook=f"results/design/{INPUTS.mission.name}.json",
+    log:
+        "results/logs/mission_map.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB),
+        runtime=of_its_logs(5),
+    params:
+        contents=contents(SETTINGS.mission, *MISSION_VEHICLE),
+        code=DIGEST["mission"],
+    message:
+        "Design: plan the flight of the mission, draw its map"
+    script:
+        "../scripts/mission_map.py"

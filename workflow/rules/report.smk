@@ -189,6 +189,8 @@ rule build_report:
         diagnoses=expand("results/analyze/{flight}/diagnosis.json", flight=LOGS),
         pages=expand("results/report/flights/{flight}.html", flight=LOGS),
         fleet="results/fleet.html",
+        mission=rules.mission_map.output.outlook,
+        map=rules.mission_map.output.map,
     output:
         report(
             "results/report.html",

@@ -22,6 +22,7 @@ with logged_job(snakemake.log[0]):
         list(snakemake.input.diagnoses),
         list(snakemake.input.pages),
         snakemake.input.fleet,
+        snakemake.input.mission,
     )
     flights = {Path(page).stem for page in snakemake.input.pages}
     report = Path(snakemake.input.summary[0]).parent

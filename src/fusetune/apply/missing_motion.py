@@ -1,6 +1,7 @@
 """What these flights cannot tell because of how they were flown, and what kind of flight would.
 
-Limits come from the worlds of docs/next_flights.md, or from the formula that stands beside them.
+Limits come from the worlds of docs/next_flights.md, or from the formula that stands beside them; those of motions that
+missions are made of stand with these (`design/missions/purpose.py`).
 """
 
 from __future__ import annotations
@@ -13,19 +14,11 @@ from typing import Any
 from fusetune.analyze.delays.wrong_delays import FEWEST_FLIGHTS, JoinedDelay
 from fusetune.analyze.effects.joined_effects import JoinedEffects
 from fusetune.apply.evidence import AnalyzedFlight
+from fusetune.design.missions.purpose import BRISK_M_S2, TURNING_DEG_S
 from fusetune.set_names import EFFECT_SETS
-
-BRISK_M_S2 = 1.0
-"""RMS of the change of horizontal velocity over a second from which a flight of a minute tells the delay of GNSS: below
-0.4 (hovering) its interval reached 28 to 116 ms either way, between 0.7 and 1.1 mostly 12 to 60, above 3 mostly 3 to
-20."""
 
 SURE_DELAY_MS = 15.0
 """A delay whose interval reaches no further needs no other flight; as much off matters (`delays.matters_ms`)."""
-
-TURNING_DEG_S = 20.0
-"""RMS turning rate ω from which a flight tells a lever arm: N velocities with errors σ tell it to σ / (ω √N), which is
-0.05 m for 0.3 m/s, 5 Hz, a minute."""
 
 STILL_SHARE = 0.7
 """A flight of which more is spent hovering is one of hovering: noises found in it are those of hovering."""

@@ -9,12 +9,13 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, design, diagnose, fidelity, replay, save, search, simulate, study
+from fusetune.cli import cards, design, diagnose, fidelity, mission, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
 COMMANDS: Mapping[str, Command] = {
     "design": design,
+    "mission": mission,
     "study": study,
     "cards": cards,
     "simulate": simulate,

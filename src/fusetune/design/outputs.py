@@ -7,28 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fusetune.design.missions.mission import Mission, Waypoint, load_mission
+from fusetune.design.missions.mission import load_mission
+from fusetune.design.missions.plan_writing import write_mission_plan
 from fusetune.design.parameter_sets import ParameterSet
 from fusetune.design.study import Study, load_study
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.px4.parameters.params_file import ParamEntry, ParamsHeader, write_params
-from fusetune.px4.plan_file import (
-    Plan,
-    PlanItem,
-    PlanPosition,
-    change_speed,
-    land,
-    return_to_launch,
-    take_off,
-    waypoint,
-    write_plan,
-)
 from fusetune.storage.files import atomic_path
 
 AROUND_FOLDER = "around_present"
-
-FLY_OVER_ACCEPTANCE_M = 0.5
-"""PX4 turns once it is this near, so a small radius makes it cross the waypoint; 0 leaves the vehicle's own."""
 
 
 def write_design(
@@ -62,40 +49,6 @@ def write_study(study: Study, folder: str | os.PathLike[str], params_folder: str
     for parameter_set in study.sets:
         write_set_params(study, parameter_set, Path(params_folder) / f"{parameter_set.name}.params")
     write_sets_table(study, Path(folder) / "sets.parquet")
-
-
-def write_mission_plan(mission: Mission, path: str | os.PathLike[str]) -> None:
-    """Write the mission as a QGroundControl plan."""
-    home = PlanPosition(mission.home.lat, mission.home.lon, mission.home.alt)
-    write_plan(path, Plan(home, tuple(plan_items(mission)), hover_speed_m_s=mission.speed_m_s))
-
-
-def plan_items(mission: Mission) -> list[PlanItem]:
-    """Mission items: take-off, speed changes where the speed changes, waypoints, and the way down."""
-    home = mission.home
-    items = [
-        take_off(PlanPosition(home.lat, home.lon, mission.takeoff.altitude_m)),
-        change_speed(mission.waypoints[0].speed_m_s),
-    ]
-    speed_m_s = mission.waypoints[0].speed_m_s
-    for point in mission.waypoints:
-        if point.speed_m_s != speed_m_s:
-            items.append(change_speed(point.speed_m_s))
-            speed_m_s = point.speed_m_s
-        items.append(_waypoint_item(point))
-    if mission.landing.mode == "return":
-        return [*items, return_to_launch()]
-    last = mission.waypoints[-1]
-    return [*items, land(PlanPosition(last.lat, last.lon, 0.0))]
-
-
-def _waypoint_item(point: Waypoint) -> PlanItem:
-    return waypoint(
-        PlanPosition(point.lat, point.lon, point.alt),
-        hold_s=point.hold_s,
-        acceptance_radius_m=FLY_OVER_ACCEPTANCE_M if point.turn == "fly_over" else 0.0,
-        yaw_deg=point.heading_deg,
-    )
 
 
 def write_set_params(study: Study, parameter_set: ParameterSet, path: str | os.PathLike[str]) -> None:

@@ -8,24 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from fusetune.design.missions.endurance import Drag, Endurance
+from fusetune.design.missions.limits import Limits
 from fusetune.design.names import NAME_PATTERN, one_line
 from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
 from fusetune.settings.checking import raise_problems, read_checked
 from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits of the planned path."""
-
-    horizontal_speed_m_s: float = required("horizontal speed", unit="m/s", above=0, high=30)
-    climb_speed_m_s: float = required("speed upwards", unit="m/s", above=0, high=15)
-    descent_speed_m_s: float = required("speed downwards", unit="m/s", above=0, high=10)
-    acceleration_m_s2: float = required("acceleration", unit="m/s²", above=0.2, high=8)
-    jerk_m_s3: float = required("change of the acceleration", unit="m/s³", above=0.2, high=100)
-    yaw_rate_deg_s: float = required("rate of turn", unit="degrees/s", above=1, high=360)
-    yaw_acceleration_deg_s2: float = required("change of the rate of turn", unit="degrees/s²", above=5, high=1000)
 
 
 @dataclass(frozen=True)
@@ -274,10 +263,16 @@ class Vehicle:
     vision: Vision | None = setting(None, "external vision; without it there is none")
     airspeed: AirspeedSensor | None = setting(None, "pitot tube; without it there is none")
     battery: Battery | None = setting(None, "battery with a current sensor; without it none is logged")
+    endurance: Endurance | None = setting(None, "how long it flies; without it no share of the battery is told")
     parameters: dict[str, float] = setting(
         {}, "PX4 parameters that differ from PX4's defaults, whatever set is flown", pattern=PARAMETER_PATTERN
     )
     description: str = setting("", "what the vehicle is")
+
+    @property
+    def drag(self) -> Drag:
+        """Its drag in the air."""
+        return Drag(self.airframe.linear_drag_1_s, self.airframe.quadratic_drag_1_m)
 
 
 def load_vehicle(path: str | os.PathLike[str]) -> Vehicle:

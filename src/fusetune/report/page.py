@@ -25,6 +25,7 @@ from fusetune.report.sections.flight_sections import (
     single_flights_section,
 )
 from fusetune.report.sections.health_section import health_section
+from fusetune.report.sections.mission_section import mission_section
 from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.sensitivity_section import sensitivity_section
 from fusetune.report.sections.trust_section import trust_section
@@ -43,6 +44,7 @@ def build_report(
     diagnoses: Sequence[AnyPath] = (),
     flight_pages: Sequence[AnyPath] = (),
     fleet_page: AnyPath | None = None,
+    mission: AnyPath | None = None,
 ) -> None:
     """Write the report as one HTML file with its figures inside.
 
@@ -57,6 +59,7 @@ def build_report(
     diagnoses : `results/analyze/<flight>/diagnosis.json` of all flights
     flight_pages : `results/report/flights/<flight>.html`
     fleet_page : `results/fleet.html`
+    mission : `results/design/<mission>.json`
     """
     results = read_results(analyze_folders, apply_folder)
     figures = Path(figure_folder)
@@ -80,6 +83,7 @@ def build_report(
         truth_section(results),
         as_flown_section(results),
         single_flights_section(results, pictures),
+        mission_section(mission),
         provenance_section(results),
     )
     product = results.decision["provenance"]["product"]

@@ -38,6 +38,17 @@ TRIED = (*BASE, "design", "ekf2", "save", *_SCORED, "analyze/delays", "analyze/t
 
 JOB_SOURCES = {
     "design": (*BASE, "design"),
+    "mission": (
+        *BASE,
+        "design",
+        "ekf2",
+        "execute",
+        "report/__init__.py",
+        "report/figures/__init__.py",
+        "report/figures/drawing.py",
+        "report/figures/figures.mplstyle",
+        "report/figures/mission_figure.py",
+    ),
     "execute": (*BASE, "ekf2", "design", "execute"),
     "save": (*BASE, "design", "ekf2/feed", "save"),
     "replay": (

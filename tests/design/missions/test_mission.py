@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from fusetune.design.missions.mission import distance_m, load_mission
-from fusetune.design.outputs import plan_items, write_mission_plan
+from fusetune.design.missions.outlook import outlook
+from fusetune.design.missions.plan_writing import plan_items, write_mission_plan
 from fusetune.errors import UserError
 
 DOCUMENT = {
@@ -89,6 +90,13 @@ def test_plan_has_the_items_that_qgroundcontrol_flies(tmp_path: Path) -> None:
 def test_return_ends_the_plan_with_return_to_launch(tmp_path: Path) -> None:
     mission = load_mission(write(tmp_path, changed(landing={"mode": "return"})))
     assert int(plan_items(mission)[-1].command) == 20
+
+
+def test_shipped_missions_are_flown_within_their_fences(project_root: Path) -> None:
+    files = sorted((project_root / "config/missions").glob("*.yaml"))
+    assert len(files) >= 3
+    for file in files:
+        assert outlook(load_mission(file), file=file).duration_s > 40.0
 
 
 def test_shipped_mission_loads(project_root: Path) -> None:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Waypoint
-from fusetune.execute.vehicle import Limits
-from fusetune.execute.world.filtered_path import FilteredPath
+from fusetune.design.missions.filtered_path import FilteredPath
+from fusetune.design.missions.limits import Limits
+from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Waypoint, load_mission, mission_of
+from fusetune.design.missions.route import route_of
+from fusetune.execute.vehicle import Vehicle
 from fusetune.execute.world.flight_plan import FlightPlan, plan_flight
+from fusetune.execute.world.truth import simulate_truth
 
 LIMITS = Limits(12.0, 3.0, 1.5, 4.0, 12.0, 60.0, 120.0)
 
@@ -39,7 +44,7 @@ def test_derivatives_are_derivatives_of_each_other() -> None:
         assert np.allclose(numerical[2:-2], path.evaluate(time_s, order)[2:-2, 0], atol=6e-3)
 
 
-def mission_of(points: list[tuple[float, float, float, float, bool, bool]], altitude: float) -> Mission:
+def mission_through(points: list[tuple[float, float, float, float, bool, bool]], altitude: float) -> Mission:
     waypoints = tuple(
         Waypoint(47.0 + north / 111_000, 8.0 + east / 76_000, alt, speed, "fly_over" if over else "fly_by", 1.0 * hold)
         for north, east, alt, speed, over, hold in points
@@ -62,7 +67,7 @@ point = st.tuples(
 def test_limits_hold_for_any_mission(
     points: list[tuple[float, float, float, float, bool, bool]], altitude: float
 ) -> None:
-    plan = plan_flight(mission_of(points, altitude), LIMITS)
+    plan = plan_flight(mission_through(points, altitude), LIMITS)
     time_s = np.arange(plan.events.log_start_s, plan.events.end_s, 0.02)
     velocity, acceleration, jerk = (plan.path.evaluate(time_s, order) for order in (1, 2, 3))
     fastest = max(max(values[3] for values in points), 5.0)
@@ -135,3 +140,48 @@ def test_yaw_follows_the_course(mission: Mission, plan: FlightPlan) -> None:
     error = np.angle(np.exp(1j * (yaw - course)))[straight]
     assert straight.sum() > 300
     assert np.median(np.abs(error)) < 1e-6
+
+
+def test_the_survey_is_flown_as_it_always_was(project_root: Path, vehicle: Vehicle) -> None:
+    """As the version planned it that knew neither shapes nor turns in place; logs of a seed stay the same bytes."""
+    plan = plan_flight(load_mission(project_root / "config/missions/survey.yaml"), vehicle.limits)
+    assert plan.path.windows_s == pytest.approx((3.204001404494074, 2.0 / 3.0, 0.3), rel=1e-12)
+    times = [
+        19.085334036, 25.085334036, 27.170668071, 30.507166878, 32.592500913, 35.51117214, 38.733170011, 45.441712446,
+        47.527046482, 53.307396963, 58.385241981, 65.555910052, 74.980472057, 79.151140128, 89.150931315, 97.150931315,
+    ]  # fmt: skip
+    assert plan.path.times_s == pytest.approx(times, abs=1e-8)
+    assert plan.path.knots[8] == pytest.approx((-2.28230006, 20.477869861, -16.621713711), abs=1e-8)
+    assert plan.path.knots[10] == pytest.approx((39.805521274, 40.163736865, -15.999749424), abs=1e-8)
+    yaw = [0.34906585, 0.022629229, 0.001077394, 1.547786468, 3.134086523, 1.044121011, -0.009918831, -2.351715104]
+    assert plan.yaw.knots[1::2, 0] == pytest.approx(yaw, abs=1e-8)
+
+
+def test_runs_turns_and_holds_are_flown_where_the_route_has_them(vehicle: Vehicle) -> None:
+    shapes = [
+        {"kind": "yaw_turns", "altitude_m": 8, "hold_s": 1.0},
+        {"kind": "runs", "altitude_m": 8, "distance_m": 40, "climb_m": 6, "repeats": 1, "heading_deg": 60},
+    ]
+    document = {"name": "m", "home": {"lat": 47.0, "lon": 8.0, "alt": 400.0}, "takeoff": {"altitude_m": 8}}
+    mission = mission_of({**document, "shapes": shapes, "landing": {"mode": "return"}}, "m.yaml")
+    plan = plan_flight(mission, vehicle.limits)
+    truth = simulate_truth(plan, with_calm_air(vehicle), 1)
+    up = truth.time_s
+    for leg in route_of(mission)[1:-1]:
+        # the local map is a sphere: 0.3 % along the meridian
+        distance = np.linalg.norm(truth.position - np.array(leg.end), axis=1)
+        near = distance < 0.3
+        assert near.any(), leg
+        still = near & (np.linalg.norm(truth.velocity, axis=1) < 0.02)
+        assert still.sum() * truth.step_s > leg.hold_s, leg
+        if leg.heading_deg is not None:
+            yaw = np.degrees(plan.yaw.evaluate(up[still])[:, 0])
+            assert np.abs(np.mod(yaw - leg.heading_deg + 180.0, 360.0) - 180.0).min() < 1e-3, leg
+    running = (up > plan.events.takeoff_s + 60.0) & (np.hypot(*truth.velocity[:, :2].T) > 3.0)
+    heading = np.degrees(truth.attitude[running].as_euler("ZYX")[:, 0])
+    assert heading[: len(heading) // 2] == pytest.approx(60.0, abs=3.0)
+
+
+def with_calm_air(vehicle: Vehicle) -> Vehicle:
+    calm = dataclasses.replace(vehicle.environment, wind_speed_m_s=0.0, turbulence_wind_m_s=0.0)
+    return dataclasses.replace(vehicle, environment=calm)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from fusetune.design.parameter_check import PARAMETER_PATTERN
 from fusetune.settings.checking import read_checked, validate
-from fusetune.settings.declaration import built, required, setting
-from fusetune.settings.schema import schema_of
+from fusetune.settings.declaration import required, setting
+from fusetune.settings.kinds import built_of_kind, schema_of_kinds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -373,36 +373,10 @@ def parse_faults(entries: Sequence[Mapping[str, Any]], file: str | os.PathLike[s
         An entry is broken; the message names the entry, the key and what was expected.
     """
     validate({"faults": list(entries)}, _SCHEMA, file)
-    return tuple(
-        built(KINDS[entry["kind"]], {key: value for key, value in entry.items() if key != "kind"}) for entry in entries
-    )
+    return tuple(built_of_kind(KINDS, entry) for entry in entries)
 
 
-def _schema_of_kind(name: str, kind: type) -> dict[str, Any]:
-    """What holds of an entry of this kind."""
-    schema = schema_of(kind)
-    return {
-        "if": {"properties": {"kind": {"const": name}}, "required": ["kind"]},
-        "then": schema | {"properties": {"kind": {}} | schema["properties"]},
-    }
-
-
-_SCHEMA: dict[str, Any] = {
-    "type": "object",
-    "required": ["faults"],
-    "properties": {
-        "faults": {
-            "type": "array",
-            "description": "list of faults",
-            "items": {
-                "type": "object",
-                "required": ["kind"],
-                "properties": {"kind": {"enum": list(KINDS), "description": "what goes wrong"}},
-                "allOf": [_schema_of_kind(name, kind) for name, kind in KINDS.items()],
-            },
-        }
-    },
-}
+_SCHEMA = schema_of_kinds("faults", KINDS, "list of faults", "what goes wrong")
 
 
 def of_kind(faults: Sequence[Fault], kind: type[F]) -> list[F]:
