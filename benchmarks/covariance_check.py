@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fusetune.design.covariance.ekf2_covariance import CovarianceAlong
-from fusetune.design.covariance.ekf2_design import Ekf2Design, Settings
+from fusetune.design.covariance.ekf2_design import Ekf2Design, MissionWay, Settings
 from fusetune.design.covariance.ekf2_sensors import Ekf2Sensor
 from fusetune.design.missions.mission import Mission, load_mission
 from fusetune.ekf2.feed.inputs import build_inputs
@@ -206,7 +206,8 @@ def designed_along(vehicle: Vehicle, mission: Mission, with_barometer: bool) -> 
         "baro": Ekf2Sensor(barometer.rate_hz, used=with_barometer),
     }
     track = mission_track(mission, vehicle, DESIGN_SEED)
-    design = Ekf2Design(HERE, "check", Settings(sensors, vehicle.parameters), settle_s=SETTLE_S, track=track)
+    way = MissionWay(str(MISSION), str(VEHICLE), DESIGN_SEED)
+    design = Ekf2Design(HERE, "check", Settings(sensors, vehicle.parameters), way, settle_s=SETTLE_S, track=track)
     return design.along(design.settings)
 
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, design, diagnose, fidelity, replay, save, search, simulate, study
+from fusetune.cli import cards, covariance, design, diagnose, fidelity, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -17,6 +17,7 @@ COMMANDS: Mapping[str, Command] = {
     "design": design,
     "study": study,
     "cards": cards,
+    "covariance": covariance,
     "simulate": simulate,
     "save": save,
     "replay": replay,

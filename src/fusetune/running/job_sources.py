@@ -38,6 +38,16 @@ TRIED = (*BASE, "design", "ekf2", "save", *_SCORED, "analyze/delays", "analyze/t
 
 JOB_SOURCES = {
     "design": (*BASE, "design"),
+    "covariance": (
+        *BASE,
+        "covariance_design.py",
+        "design",
+        "ekf2",
+        "execute",
+        "report/figures/covariance_figures.py",
+        "report/figures/drawing.py",
+        "save/logged_track.py",
+    ),
     "execute": (*BASE, "ekf2", "design", "execute"),
     "save": (*BASE, "design", "ekf2/feed", "save"),
     "replay": (

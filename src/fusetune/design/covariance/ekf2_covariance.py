@@ -75,20 +75,22 @@ def covariance_along(flight: Flight, parameters: Mapping[str, float], window_us:
     imu_us = inputs.arrays.imu["time_us"]
     runs = np.searchsorted(imu_us, result.states["timestamp"][updates])
     course, first, _ = begin_course(inputs, parameters)
-    before, now, flags = [], [], []
+    before, now = [], []
+    estimated: set[str] = set()
     wanted = set(runs.tolist())
     for begin, end in course.stretches(first, int(runs[-1]) + 1, runs.tolist()):
         if begin in wanted:
             at, later = _uncorrected(course, inputs, begin)
             before.append(at)
             now.append(later)
-            flags.append([bool(course.ekf["cs"][name][0]) for name in ("wind", "mag")])
+            estimated |= {name for name in ("wind", "mag") if course.ekf["cs"][name][0]}
         course.advance(begin, end)
-    wind, field = np.array(flags).any(axis=0)
     measured = _inside(result.innovations["timestamp_sample"], window_us) & _IS_MEASURED[result.innovations["source"]]
     rejected = float(result.innovations["innovation_rejected"][measured].mean()) if measured.any() else 0.0
     horizon = result.states["timestamp_sample"][updates].astype(np.int64)
-    return CovarianceAlong(horizon, np.array(before), np.array(now), source, rejected, bool(wind), bool(field))
+    return CovarianceAlong(
+        horizon, np.array(before), np.array(now), source, rejected, "wind" in estimated, "mag" in estimated
+    )
 
 
 def _without_position(rows: RecordArrays) -> RecordArrays:

@@ -19,13 +19,14 @@ from fusetune.design.covariance.ekf2_sensors import (
     told_parameters,
 )
 from fusetune.design.covariance.evaluation import (
-    HALF_NOISE,
-    NO_DELAY,
-    TWICE_RATE,
+    DELAY,
+    NOISE,
+    RATE,
     WITHOUT,
+    Alternative,
     Deviation,
     Deviations,
-    Improvement,
+    alternatives,
 )
 from fusetune.design.covariance.perfect_flight import perfect_flight
 from fusetune.design.covariance.track import Track
@@ -39,6 +40,8 @@ from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
 
 _REMEDY = "Mend the named keys; config/covariance/ holds examples, docs/covariance.md says what they mean"
+FEW_REFUSED = 0.005
+"""Share of the measurements that may be refused without a word."""
 _DEG = float(np.degrees(1.0))
 
 GROUPS: Mapping[str, tuple[str, float, tuple[tuple[str, int], ...]]] = {
@@ -111,16 +114,29 @@ class Settings:
 
 
 @dataclass(frozen=True)
+class MissionWay:
+    """Files of a mission and of the simulated vehicle that flies it, and the seed of its gusts."""
+
+    mission: str
+    vehicle: str
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class LoggedWay:
+    """The log of a flight."""
+
+    log: str
+
+
+@dataclass(frozen=True)
 class Ekf2Design:
     """A design for EKF2; see `fusetune.design.covariance.evaluation.Design`."""
 
     file: Path
     name: str
     settings: Settings
-    mission: str | None = None
-    vehicle: str | None = None
-    log: str | None = None
-    seed: int = 1
+    way: LoggedWay | MissionWay
     settle_s: float = 20.0
     judged: tuple[str, ...] = tuple(GROUPS)
     variations: tuple[Variation, ...] = ()
@@ -128,29 +144,26 @@ class Ekf2Design:
     track: Track | None = field(default=None)
     """Given before anything is evaluated."""
 
-    def improvements(self) -> Iterator[Improvement]:
-        """For each sensor that is used and each noise of the IMU, as far as PX4 takes the values."""
+    def alternatives(self) -> Iterator[Alternative]:
+        """Of gyro, accelerometer and each sensor that is used; PX4 may not take all of them."""
         for name in ("gyro", "accelerometer"):
-            yield from self._possible(Improvement(name, HALF_NOISE, {f"{name}.sd": "÷2"}))
+            yield from alternatives(name, (NOISE,))
         for name, sensor in self.settings.sensors.items():
-            if not sensor.used:
-                continue
-            yield from self._possible(Improvement(name, HALF_NOISE, {f"{name}.sd": "÷2"}))
-            yield from self._possible(Improvement(name, TWICE_RATE, {f"{name}.rate_hz": "×2"}))
-            if sensor.delay_ms:
-                yield from self._possible(Improvement(name, NO_DELAY, {f"{name}.delay_ms": 0.0}))
-            yield from self._possible(Improvement(name, WITHOUT, {f"{name}.used": False}))
-
-    def _possible(self, one: Improvement) -> Iterator[Improvement]:
-        try:
-            self.changed(one.changes)
-        except UserError:
-            return
-        yield one
+            if sensor.used:
+                yield from alternatives(name, (NOISE, RATE, *((DELAY,) if sensor.delay_ms else ()), WITHOUT))
 
     def deviations(self, changes: Mapping[str, Value]) -> Deviations:
         """Of every state after some changes; along the track, in the air, settled."""
         return deviations_of(self.along(self.changed(changes)))
+
+    def notes(self) -> Iterator[str]:
+        """Whether the filter refused measurements that are as exact as the way."""
+        refused = self.along(self.settings).rejected
+        if refused > FEW_REFUSED:
+            yield (
+                f"EKF2 refused {100.0 * refused:.0f} % of the measurements along the way, so the figures hold for a "
+                "filter that does: the way jumps, or its IMU does not go with it"
+            )
 
     def along(self, settings: Settings) -> CovarianceAlong:
         """The covariances along the track.
@@ -194,17 +207,24 @@ class Ekf2Design:
         name, _, what = path.partition(".")
         if path in PARAMETERS:
             return _with_parameters(settings, {path: changed(_value(settings, path), change)})
-        noises = SENSOR_NOISES | PROCESS_NOISES
+        noises = {**SENSOR_NOISES, **PROCESS_NOISES}
         if what == "sd" and name in noises and (name in settings.sensors or name in PROCESS_NOISES):
             factor = factor_of(change)
             return _with_parameters(settings, {one: factor * _value(settings, one) for one in noises[name]})
         if name in settings.sensors and what in ("rate_hz", "delay_ms", "used"):
-            sensor = settings.sensors[name]
-            value = switched(change) if what == "used" else changed(getattr(sensor, what), change)
-            return replace(settings, sensors={**settings.sensors, name: replace(sensor, **{what: value})})
+            sensor = _changed_sensor(settings.sensors[name], what, change)
+            return replace(settings, sensors={**settings.sensors, name: sensor})
         known = [f"{one}.{word}" for one in settings.sensors for word in ("sd", "rate_hz", "delay_ms", "used")]
         known += [*(f"{one}.sd" for one in PROCESS_NOISES), *PARAMETERS]
         raise UserError(self.file, f"{path!r} is nothing that can change{nearest(path, known)}", _REMEDY)
+
+
+def _changed_sensor(sensor: Ekf2Sensor, what: str, change: Value) -> Ekf2Sensor:
+    if what == "used":
+        return replace(sensor, used=switched(change))
+    if what == "rate_hz":
+        return replace(sensor, rate_hz=changed(sensor.rate_hz, change))
+    return replace(sensor, delay_ms=changed(sensor.delay_ms, change))
 
 
 def _value(settings: Settings, name: str) -> float:
@@ -265,10 +285,7 @@ def ekf2_design(document: Mapping[str, Any], file: Path) -> Ekf2Design:
         file=file,
         name=given.name,
         settings=Settings(given.sensors, typed_values(given.parameters)),
-        mission=given.mission,
-        vehicle=given.vehicle,
-        log=given.log,
-        seed=given.seed,
+        way=LoggedWay(given.log) if given.log else MissionWay(given.mission or "", given.vehicle or "", given.seed),
         settle_s=given.settle_s,
         judged=given.judged,
         variations=given.variations,

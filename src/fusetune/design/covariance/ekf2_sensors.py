@@ -36,6 +36,9 @@ SWITCHED_ON = {"EKF2_OF_CTRL": 1, "EKF2_EV_CTRL": 15, "EKF2_ARSP_THR": 0.1, "EKF
 """Value of the switch of a sensor that is used where the parameters leave it switched off."""
 
 NOISE_BY_PARAMETER = {"EKF2_EV_NOISE_MD": 1}
+HORIZON_SHARE, HORIZON_MS = 1.25, 10.0
+"""How far beyond the longest delay EKF2 is told to look back: it counts in updates of 10 ms, and where the samples of
+the IMU make these 8 ms long it looks back less far than it is told, and fuses too late what is later than that."""
 LEAST_DELAY_MAX_MS = 20.0
 """Two of EKF2's intervals; its buffers need that."""
 DELAY_MAX = "EKF2_DELAY_MAX"
@@ -53,8 +56,8 @@ class Ekf2Sensor:
 def told_parameters(sensors: Mapping[str, Ekf2Sensor], parameters: Mapping[str, float]) -> dict[str, float]:
     """Parameters as a vehicle with these sensors would have them.
 
-    Sensors sit at the IMU. EKF2 is told their delays; it looks back no further than the longest of those that are used,
-    unless EKF2_DELAY_MAX is among the parameters. Values that the parameters do not have are PX4's defaults.
+    Sensors sit at the IMU. EKF2 is told their delays, and looks back as far as the longest of those used takes, unless
+    EKF2_DELAY_MAX is among the parameters. Values that the parameters do not have are PX4's defaults.
     """
     told = {name: metadata.default for name, metadata in PARAMETERS.items()} | dict(parameters)
     told |= {name: 0.0 for name in told if "_POS_" in name and name[-1] in "XYZ"} | NOISE_BY_PARAMETER
@@ -68,5 +71,6 @@ def told_parameters(sensors: Mapping[str, Ekf2Sensor], parameters: Mapping[str, 
     for name, sensor in sensors.items():
         told[SENSORS[name].delay_parameter] = sensor.delay_ms
     if DELAY_MAX not in parameters:
-        told[DELAY_MAX] = max([LEAST_DELAY_MAX_MS, *(sensor.delay_ms for sensor in used.values())])
+        longest_ms = max((sensor.delay_ms for sensor in used.values()), default=0.0)
+        told[DELAY_MAX] = max(LEAST_DELAY_MAX_MS, HORIZON_SHARE * longest_ms + HORIZON_MS)
     return told

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from fusetune.design.covariance.changes import Sweep, Value, Variation
+from fusetune.errors import UserError
 
 BASELINE = "as designed"
 
@@ -30,23 +31,45 @@ class Deviation:
     largest: float | None = None
     now: float | None = None
 
+    @property
+    def judged(self) -> float:
+        """That of the present where it is told, for a delay shows there alone; else that before a correction."""
+        return self.before if self.now is None else self.now
+
 
 Deviations = Mapping[str, Deviation]
 """By name of the state."""
 
 
 @dataclass(frozen=True)
-class Improvement:
-    """One change of one sensor that costs something and may pay."""
+class Alternative:
+    """One property of one sensor, better or worse than designed; of its presence, to do without it."""
 
     sensor: str
+    subject: str
     what: str
     changes: Mapping[str, Value]
 
     @property
     def name(self) -> str:
         """What it is called in tables and figures."""
-        return f"{self.sensor}: {self.what}"
+        return f"{self.sensor}: {self.subject} {self.what}" if self.what else f"{self.subject} {self.sensor}"
+
+
+NOISE, RATE, DELAY, WITHOUT = "noise", "rate", "delay", "without"
+BETTER = {NOISE: "÷2", RATE: "×2", DELAY: "÷2"}
+WORSE = {NOISE: "×2", RATE: "÷2", DELAY: "×2"}
+_CHANGED = {NOISE: "sd", RATE: "rate_hz", DELAY: "delay_ms"}
+
+
+def alternatives(sensor: str, subjects: Sequence[str]) -> Iterator[Alternative]:
+    """A sensor's properties, each better and worse, and to do without it."""
+    for subject in subjects:
+        if subject == WITHOUT:
+            yield Alternative(sensor, WITHOUT, "", {f"{sensor}.used": False})
+            continue
+        for factors in (BETTER, WORSE):
+            yield Alternative(sensor, subject, factors[subject], {f"{sensor}.{_CHANGED[subject]}": factors[subject]})
 
 
 class Design(Protocol):
@@ -72,12 +95,16 @@ class Design(Protocol):
         """Curves that its file asks for."""
         ...
 
-    def improvements(self) -> Iterator[Improvement]:
-        """For each sensor: half the noise, twice the rate, half the delay, and to do without."""
+    def alternatives(self) -> Iterator[Alternative]:
+        """For each sensor and noise what could be better and worse about it, and to do without."""
         ...
 
     def deviations(self, changes: Mapping[str, Value]) -> Deviations:
         """Of every state after some changes; `UserError` where they cannot be made."""
+        ...
+
+    def notes(self) -> Iterator[str]:
+        """What is to be known of it beside the figures, in sentences."""
         ...
 
 
@@ -86,15 +113,14 @@ class Evaluated:
     """Standard deviations after one variation."""
 
     name: str
-    sensor: str
-    """Whose improvement it is; empty of a variation that the file asks for."""
-    what: str
     deviations: Deviations
+    alternative: Alternative | None = None
+    """What it is of the design; None of a variation that the file asks for."""
 
     def change(self, base: Deviations, state: str) -> float:
         """Change of a state's standard deviation against the design, as a share."""
-        before = base[state].before
-        return self.deviations[state].before / before - 1.0 if before > 0.0 else 0.0
+        before = base[state].judged
+        return self.deviations[state].judged / before - 1.0 if before > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -117,29 +143,23 @@ class Evaluation:
     evaluated: tuple[Evaluated, ...]
     sweeps: tuple[Sweep, ...]
     points: tuple[SweepPoint, ...]
+    notes: tuple[str, ...] = ()
 
     def pays_most(self, state: str) -> Iterator[Evaluated]:
-        """For each sensor the improvement that takes most off a state, the largest first; never to do without it."""
+        """For each sensor the improvement that takes most off a state, the largest first."""
         best: dict[str, Evaluated] = {}
         for one in self.evaluated:
-            if one.sensor and one.what != WITHOUT:
-                known = best.get(one.sensor)
-                if known is None or one.change(self.base, state) < known.change(self.base, state):
-                    best[one.sensor] = one
+            of = one.alternative
+            if of is None or of.what != BETTER.get(of.subject):
+                continue
+            known = best.get(of.sensor)
+            if known is None or one.change(self.base, state) < known.change(self.base, state):
+                best[of.sensor] = one
         yield from sorted(best.values(), key=lambda one: one.change(self.base, state))
 
 
-HALF_NOISE, TWICE_RATE, HALF_DELAY, NO_DELAY, WITHOUT = (
-    "noise ÷2", "rate ×2", "delay ÷2", "no delay", "without it",
-)  # fmt: skip
-
-
-def evaluate(design: Design, improvements: Sequence[Improvement] | None = None) -> Evaluation:
+def evaluate(design: Design) -> Evaluation:
     """Tell the covariances of a design and of all that could be otherwise.
-
-    Parameters
-    ----------
-    improvements : which to try; by default all of `Design.improvements`
 
     Raises
     ------
@@ -147,13 +167,18 @@ def evaluate(design: Design, improvements: Sequence[Improvement] | None = None) 
         A change cannot be made, or what is left has no steady state.
     """
     base = design.deviations({})
-    tried = list(design.improvements()) if improvements is None else improvements
-    evaluated = [Evaluated(one.name, "", "", design.deviations(one.changes)) for one in design.variations]
-    evaluated += [Evaluated(one.name, one.sensor, one.what, design.deviations(one.changes)) for one in tried]
+    evaluated = [Evaluated(one.name, design.deviations(one.changes)) for one in design.variations]
+    for one in design.alternatives():
+        try:
+            evaluated.append(Evaluated(one.name, design.deviations(one.changes), one))
+        except UserError:
+            # PX4 does not take the value, or the rest of the sensors cannot do without: no alternative
+            continue
     points = [
         SweepPoint(sweep.name, line, point, design.deviations(sweep.changes(line, point)))
         for sweep in design.sweeps
         for line in sweep.lines
         for point in sweep.points
     ]
-    return Evaluation(design.name, design.judged, base, tuple(evaluated), design.sweeps, tuple(points))
+    notes = tuple(design.notes())
+    return Evaluation(design.name, design.judged, base, tuple(evaluated), design.sweeps, tuple(points), notes)

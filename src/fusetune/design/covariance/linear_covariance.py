@@ -27,7 +27,7 @@ LARGEST_DENOMINATOR = 1000
 """Of a period in seconds per hertz: 3.125 Hz is one, an irrational rate is none."""
 MOST_EVENTS = 200_000
 _AT_ONCE = {"step": 0, "measure": 1, "arrive": 2}
-"""Order of what happens at the same instant: the state moves on, is measured, and a measurement without delay arrives."""
+"""Order of what happens at one instant: the state moves on, is measured, and a measurement arrives."""
 
 
 class NoSteadyStateError(ValueError):

@@ -13,13 +13,14 @@ import numpy.typing as npt
 
 from fusetune.design.covariance.changes import Sweep, Value, Variation, changed, factor_of, switched
 from fusetune.design.covariance.evaluation import (
-    HALF_DELAY,
-    HALF_NOISE,
-    TWICE_RATE,
+    DELAY,
+    NOISE,
+    RATE,
     WITHOUT,
+    Alternative,
     Deviation,
     Deviations,
-    Improvement,
+    alternatives,
 )
 from fusetune.design.covariance.linear_covariance import NoSteadyStateError, covariance_before_correction
 from fusetune.design.covariance.linear_model import LinearModel, LinearSensor, State
@@ -107,17 +108,14 @@ class LinearDesign:
     variations: tuple[Variation, ...] = ()
     sweeps: tuple[Sweep, ...] = field(default=())
 
-    def improvements(self) -> Iterator[Improvement]:
-        """For each noise and each sensor that is used, what could be better about it."""
+    def alternatives(self) -> Iterator[Alternative]:
+        """Of each noise, and of each sensor that is used."""
         for noise in self.model.noises:
-            yield Improvement(noise, HALF_NOISE, {f"{noise}.sd": "÷2"})
-        for name, sensor in self.model.sensors_on.items():
-            yield Improvement(name, HALF_NOISE, {f"{name}.sd": "÷2"})
-            yield Improvement(name, TWICE_RATE, {f"{name}.rate_hz": "×2"})
-            if sensor.delay_s:
-                yield Improvement(name, HALF_DELAY, {f"{name}.delay_ms": "÷2"})
-            if len(self.model.sensors_on) > 1:
-                yield Improvement(name, WITHOUT, {f"{name}.used": False})
+            yield from alternatives(noise, (NOISE,))
+        used = self.model.sensors_on
+        for name, sensor in used.items():
+            subjects = (NOISE, RATE, *((DELAY,) if sensor.delay_s else ()), *((WITHOUT,) if len(used) > 1 else ()))
+            yield from alternatives(name, subjects)
 
     def deviations(self, changes: Mapping[str, Value]) -> Deviations:
         """Of every state after some changes."""
@@ -135,6 +133,10 @@ class LinearDesign:
             ) from error
         sd = np.sqrt(np.diag(P))
         return {state.name: Deviation(state.unit, float(sd[i])) for i, state in enumerate(model.states)}
+
+    def notes(self) -> Iterator[str]:
+        """None: all is in the figures."""
+        return iter(())
 
     def changed(self, changes: Mapping[str, Value]) -> LinearModel:
         """The model after some changes.
@@ -180,17 +182,19 @@ def _above_zero(value: float) -> float:
     return value
 
 
-def _not_negative(value: float) -> float:
+def _seconds(time_s: float, change: Value) -> float:
+    """A time that is told in milliseconds, after a change."""
+    value = changed(time_s * 1e3, change)
     if not value >= 0.0:
-        raise ValueError(f"lead to {value:g}; expected 0 or more")
-    return value
+        raise ValueError(f"lead to {value:g} ms; expected 0 or more")
+    return value * 1e-3
 
 
 _SENSOR_CHANGES: Mapping[str, Callable[[LinearSensor, Value], LinearSensor]] = {
     "sd": lambda sensor, change: replace(sensor, R=sensor.R * factor_of(change) ** 2),
     "rate_hz": lambda sensor, change: replace(sensor, rate_hz=_above_zero(changed(sensor.rate_hz, change))),
-    "delay_ms": lambda sensor, change: replace(sensor, delay_s=_not_negative(changed(sensor.delay_s * 1e3, change)) * 1e-3),
-    "phase_ms": lambda sensor, change: replace(sensor, phase_s=_not_negative(changed(sensor.phase_s * 1e3, change)) * 1e-3),
+    "delay_ms": lambda sensor, change: replace(sensor, delay_s=_seconds(sensor.delay_s, change)),
+    "phase_ms": lambda sensor, change: replace(sensor, phase_s=_seconds(sensor.phase_s, change)),
     "used": lambda sensor, change: replace(sensor, on=switched(change)),
 }  # fmt: skip
 
@@ -206,7 +210,8 @@ def linear_design(document: Mapping[str, Any], file: Path) -> LinearDesign:
     validate(document, schema_of(_LinearFile), file)
     given = built(_LinearFile, document)
     raise_problems(file, _contradictions(given), _REMEDY)
-    named, build = None, None
+    named: Any = None
+    build = None
     if given.model is not None:
         kind, build = _MODELS[given.model]
         validate(given.parameters, schema_of(kind), file)

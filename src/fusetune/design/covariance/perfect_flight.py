@@ -98,7 +98,9 @@ def _imu(track: Track) -> TopicTable:
 
 def _told_rows(track: Track) -> npt.NDArray[np.int64]:
     """Rows at which the vehicle tells of itself: at changes and now and then."""
-    changed = (np.diff(track.in_air.astype(int), prepend=-1) != 0) | (np.diff(track.at_rest.astype(int), prepend=-1) != 0)
+    changed = (np.diff(track.in_air.astype(int), prepend=-1) != 0) | (
+        np.diff(track.at_rest.astype(int), prepend=-1) != 0
+    )
     every = np.diff(track.timestamp_us // STATUS_INTERVAL_US, prepend=-1) > 0
     return np.flatnonzero(changed | every)
 

@@ -1,4 +1,4 @@
-"""A way through the air, as an estimator's covariances need it; who made it, a simulation or a log, is not its business."""
+"""A way through the air, as an estimator's covariances need it, whoever made it: a simulation, or a log."""
 
 from __future__ import annotations
 
