@@ -68,8 +68,9 @@ def told_parameters(sensors: Mapping[str, Ekf2Sensor], parameters: Mapping[str, 
         ]
         if not any(switch.is_on(told[switch.parameter]) for switch in switches):
             told |= {one.parameter: SWITCHED_ON[one.parameter] for one in switches if one.parameter in SWITCHED_ON}
-    for name, sensor in sensors.items():
-        told[SENSORS[name].delay_parameter] = sensor.delay_ms
+    # EKF2 holds the delays of all sensors, also of those that are not there
+    told |= {sensor.delay_parameter: 0.0 for sensor in SENSORS.values() if sensor.delay_parameter in told}
+    told |= {SENSORS[name].delay_parameter: sensor.delay_ms for name, sensor in used.items()}
     if DELAY_MAX not in parameters:
         longest_ms = max((sensor.delay_ms for sensor in used.values()), default=0.0)
         told[DELAY_MAX] = max(LEAST_DELAY_MAX_MS, HORIZON_SHARE * longest_ms + HORIZON_MS)
