@@ -7,12 +7,15 @@ from pathlib import Path
 
 import pytest
 import yaml
+from tests.made_text import UpToDate
+from tests.settings.configuration_texts import manual_text
 
 from fusetune.design.covariance.changes import changed, factor_of
 from fusetune.design.covariance.design_file import load_design
-from fusetune.design.covariance.ekf2_design import Ekf2Design
+from fusetune.design.covariance.ekf2_design import Ekf2Design, Ekf2File
 from fusetune.design.covariance.evaluation import evaluate
-from fusetune.design.covariance.linear_design import LinearDesign
+from fusetune.design.covariance.linear_design import LinearDesign, LinearFile
+from fusetune.design.covariance.marker_landing import MarkerLanding
 from fusetune.design.covariance.named_files import files_of_design
 from fusetune.errors import UserError
 
@@ -92,7 +95,11 @@ def test_a_design_tells_what_pays_and_what_a_delay_costs(tmp_path: Path) -> None
         (LINEAR, {"variations": [{"name": "a", "changes": {"sonr.sd": "×2"}}]}, "did you mean 'sonar.sd'"),
         (LINEAR, {"variations": [{"name": "a", "changes": {"sonar.sd": 2}}]}, "expected a factor such as ×2"),
         (LINEAR, {"variations": [{"name": "a", "changes": {"sonar.used": 0}}]}, "expected true or false"),
-        (LINEAR, {"variations": [{"name": "a", "changes": {"sonar.rate_hz": -1}}]}, "expected more than 0"),
+        (
+            LINEAR,
+            {"variations": [{"name": "a", "changes": {"sonar.rate_hz": -1}}]},
+            "lead to -1 Hz; expected 0.01 to 100000",
+        ),
         (LINEAR, {"sweeps": [{"name": "s", "lines": ["sonar.sd"]}]}, "expected either values or factors"),
         (LINEAR, {"model": "marker_landing"}, "states: the model marker_landing has its own"),
         (EKF2, {"log": "a.ulg"}, "mission, log: expected one of them"),
@@ -128,6 +135,9 @@ def test_a_design_without_steady_state_says_what_it_lacks(tmp_path: Path) -> Non
     document = LINEAR | {"sensors": {"tacho": {"H": [[0, 1]], "R": [[0.01]], "rate_hz": 10}}}
     with pytest.raises(UserError, match="grows without end"):
         loaded(document, tmp_path).deviations({})
+    both = {"sonar": LINEAR["sensors"]["sonar"] | {"rate_hz": 9.99}, "tacho": document["sensors"]["tacho"]}  # type: ignore[index]
+    with pytest.raises(UserError, match="repeat only after 100 s"):
+        loaded(LINEAR | {"sensors": both, "step_rate_hz": 5000}, tmp_path).deviations({})
     assert loaded(document | {"duration_s": 10}, tmp_path).deviations({})["p"].before > 0.0
 
 
@@ -137,3 +147,9 @@ def test_changes_are_values_or_factors() -> None:
     for wrong in ("2", "×", "×0", "×-1", "+1", "×1.2.3"):
         with pytest.raises(ValueError, match="expected a factor"):
             factor_of(wrong)
+
+
+def test_the_manual_says_what_is_declared(project_root: Path, up_to_date: UpToDate) -> None:
+    manual = project_root / "docs" / "covariance.md"
+    for block, kind in (("ekf2", Ekf2File), ("linear", LinearFile), ("marker_landing", MarkerLanding)):
+        up_to_date(manual, block, f"\n{manual_text(kind)}\n\n")

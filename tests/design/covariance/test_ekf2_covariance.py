@@ -73,7 +73,7 @@ def test_perfect_sensors_leave_the_filter_on_its_track(track: Track) -> None:
 def test_p_follows_from_the_timing_and_not_from_what_is_measured(track: Track, base: CovarianceAlong) -> None:
     """The same flight with noise, white, a fifth of what EKF2 is told: only where F and H are taken differs then.
 
-    With all of it the filter may distrust its accelerometer, by chance; benchmarks/covariance_check.py has such flights.
+    With all of it the filter may distrust its accelerometer, by chance (benchmarks/covariance_check.py).
     """
     told = told_parameters(SENSORS, {})
     flight = perfect_flight(track, SENSORS, told)

@@ -66,7 +66,9 @@ _UNITS = {
 
 
 @dataclass(frozen=True)
-class _Ekf2File:
+class Ekf2File:
+    """What the file of a design for EKF2 may hold."""
+
     kind: Literal["ekf2"] = required("ekf2")
     name: str = required("name of the design", pattern=NAME_PATTERN)
     sensors: Mapping[str, Ekf2Sensor] = required("sensors by name", choices=DESIGNED, at_least=1)
@@ -278,8 +280,8 @@ def ekf2_design(document: Mapping[str, Any], file: Path) -> Ekf2Design:
     UserError
         Names every key at fault with what was found and what was expected.
     """
-    validate(document, schema_of(_Ekf2File), file)
-    given = built(_Ekf2File, document)
+    validate(document, schema_of(Ekf2File), file)
+    given = built(Ekf2File, document)
     raise_problems(file, given.problems(), _REMEDY)
     design = Ekf2Design(
         file=file,

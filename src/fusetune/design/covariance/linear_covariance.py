@@ -31,7 +31,11 @@ _AT_ONCE = {"step": 0, "measure": 1, "arrive": 2}
 
 
 class NoSteadyStateError(ValueError):
-    """Some of the covariance grows without end, or the sensors' times never repeat."""
+    """Some of the covariance grows without end."""
+
+
+class NoCommonPeriodError(ValueError):
+    """The sensors' times hardly ever repeat."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,8 @@ def covariance_before_correction(model: LinearModel, sensor: str, duration_s: fl
     ------
     NoSteadyStateError
         There is none.
+    NoCommonPeriodError
+        It takes too long until the sensors' times repeat.
     """
     recursion = recursion_of(model)
     whole = recursion.whole()
@@ -130,6 +136,9 @@ def recursion_of(model: LinearModel) -> Recursion:
 
 def _events(model: LinearModel, period: Fraction) -> Iterator[_Event]:
     """What happens after 0 up to and at the end of the period, in order; the first measurements are at their phases."""
+    each_second = model.step_rate_hz + 2.0 * sum(sensor.rate_hz for sensor in model.sensors_on.values())
+    if float(period) * each_second > MOST_EVENTS:
+        raise NoCommonPeriodError(f"the sensors' times repeat only after {float(period):g} s")
     found: list[_Event] = []
     step = Fraction(1) / _rate(model.step_rate_hz)
     found += [_Event((k + 1) * step, "step") for k in range(math.ceil(period / step))]
@@ -143,8 +152,6 @@ def _events(model: LinearModel, period: Fraction) -> Iterator[_Event]:
     found = [event for event in found if event.at < period] + [_Event(period, "step")] + [
         event for event in found if event.at == period and event.kind != "step"
     ]  # fmt: skip
-    if len(found) > MOST_EVENTS:
-        raise NoSteadyStateError(f"the sensors' times repeat only after {float(period):g} s")
     yield from sorted(found, key=lambda event: (event.at, _AT_ONCE[event.kind]))
 
 

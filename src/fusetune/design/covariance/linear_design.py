@@ -22,7 +22,11 @@ from fusetune.design.covariance.evaluation import (
     Deviations,
     alternatives,
 )
-from fusetune.design.covariance.linear_covariance import NoSteadyStateError, covariance_before_correction
+from fusetune.design.covariance.linear_covariance import (
+    NoCommonPeriodError,
+    NoSteadyStateError,
+    covariance_before_correction,
+)
 from fusetune.design.covariance.linear_model import LinearModel, LinearSensor, State
 from fusetune.design.covariance.marker_landing import MarkerLanding, marker_landing
 from fusetune.design.names import NAME_PATTERN
@@ -36,6 +40,7 @@ Matrix = tuple[tuple[float, ...], ...]
 
 WORD_PATTERN = "^[A-Za-z_][A-Za-z0-9_]{0,31}$"
 _REMEDY = "Mend the named keys; config/covariance/ holds examples, docs/covariance.md says what they mean"
+LEAST_RATE_HZ, LARGEST_RATE_HZ = 0.01, 1e5
 _ON_GRID = 1e-6
 """Share of a step by which a time of a discrete model may miss it."""
 
@@ -62,14 +67,16 @@ class _NoiseEntry:
 class _SensorEntry:
     H: Matrix = required("what it measures of the states, a row each", at_least=1)
     R: Matrix = required("covariance of its noise", at_least=1)
-    rate_hz: float = required("its rate", unit="Hz", above=0, high=10000)
+    rate_hz: float = required("its rate", unit="Hz", low=LEAST_RATE_HZ, high=LARGEST_RATE_HZ)
     delay_ms: float = setting(0.0, "from the measurement to its arrival", unit="ms", low=0, high=10000)
     phase_ms: float = setting(0.0, "of its first measurement", unit="ms", low=0, high=10000)
     used: bool = setting(True, "whether it is used")
 
 
 @dataclass(frozen=True)
-class _LinearFile:
+class LinearFile:
+    """What the file of a linear design may hold."""
+
     kind: Literal["linear"] = required("linear")
     name: str = required("name of the design", pattern=NAME_PATTERN)
     description: str = setting("", "what the design asks, in a sentence")
@@ -79,7 +86,9 @@ class _LinearFile:
     A: Matrix = setting((), "dx/dt = A x, per second")
     A_d: Matrix = setting((), "or the transition over a step")
     discretisation: Literal["euler", "exact"] = setting("exact", "how a step of A is taken: I + A h, or exp(A h)")
-    step_rate_hz: float | None = setting(None, "steps of the propagation", unit="Hz", above=0, high=100000)
+    step_rate_hz: float | None = setting(
+        None, "steps of the propagation", unit="Hz", low=LEAST_RATE_HZ, high=LARGEST_RATE_HZ
+    )
     noises: Mapping[str, _NoiseEntry] = setting({}, "process noises by name", pattern=WORD_PATTERN)
     sensors: Mapping[str, _SensorEntry] = setting({}, "sensors by name", pattern=WORD_PATTERN)
     P0: Matrix = setting((), "covariance at the start; without it the unit matrix")
@@ -128,9 +137,11 @@ class LinearDesign:
         try:
             P = covariance_before_correction(model, before, self.duration_s)
         except NoSteadyStateError as error:
-            raise UserError(
-                self.file, f"{told}: {error}", "Give duration_s, or a sensor that tells of every state"
-            ) from error
+            remedy = "Give duration_s, or a sensor that tells of every state"
+            raise UserError(self.file, f"{told}: {error}", remedy) from error
+        except NoCommonPeriodError as error:
+            remedy = "Round the rates, so that they have a common period of seconds"
+            raise UserError(self.file, f"{told}: {error}", remedy) from error
         sd = np.sqrt(np.diag(P))
         return {state.name: Deviation(state.unit, float(sd[i])) for i, state in enumerate(model.states)}
 
@@ -163,7 +174,7 @@ class LinearDesign:
 
     def _with(self, model: LinearModel, path: str, change: Value) -> LinearModel:
         if path == "step_rate_hz" and not model.is_discrete:
-            return replace(model, step_rate_hz=_above_zero(changed(model.step_rate_hz, change)))
+            return replace(model, step_rate_hz=_rate(changed(model.step_rate_hz, change)))
         name, _, what = path.partition(".")
         if name in model.noises and what == "sd":
             return replace(model, noises={**model.noises, name: model.noises[name] * factor_of(change) ** 2})
@@ -176,9 +187,9 @@ class LinearDesign:
         raise UserError(self.file, f"{path!r} is nothing that can change{nearest(path, known)}", _REMEDY)
 
 
-def _above_zero(value: float) -> float:
-    if not value > 0.0:
-        raise ValueError(f"lead to {value:g}; expected more than 0")
+def _rate(value: float) -> float:
+    if not LEAST_RATE_HZ <= value <= LARGEST_RATE_HZ:
+        raise ValueError(f"lead to {value:g} Hz; expected {LEAST_RATE_HZ:g} to {LARGEST_RATE_HZ:g}")
     return value
 
 
@@ -192,7 +203,7 @@ def _seconds(time_s: float, change: Value) -> float:
 
 _SENSOR_CHANGES: Mapping[str, Callable[[LinearSensor, Value], LinearSensor]] = {
     "sd": lambda sensor, change: replace(sensor, R=sensor.R * factor_of(change) ** 2),
-    "rate_hz": lambda sensor, change: replace(sensor, rate_hz=_above_zero(changed(sensor.rate_hz, change))),
+    "rate_hz": lambda sensor, change: replace(sensor, rate_hz=_rate(changed(sensor.rate_hz, change))),
     "delay_ms": lambda sensor, change: replace(sensor, delay_s=_seconds(sensor.delay_s, change)),
     "phase_ms": lambda sensor, change: replace(sensor, phase_s=_seconds(sensor.phase_s, change)),
     "used": lambda sensor, change: replace(sensor, on=switched(change)),
@@ -207,8 +218,8 @@ def linear_design(document: Mapping[str, Any], file: Path) -> LinearDesign:
     UserError
         Names every key at fault with what was found and what was expected.
     """
-    validate(document, schema_of(_LinearFile), file)
-    given = built(_LinearFile, document)
+    validate(document, schema_of(LinearFile), file)
+    given = built(LinearFile, document)
     raise_problems(file, _contradictions(given), _REMEDY)
     named: Any = None
     build = None
@@ -255,7 +266,7 @@ def _unknown_states(asked: Mapping[str, tuple[str, ...]], known: tuple[str, ...]
                 yield f"{place}: {name!r} is no state{nearest(name, known)}; expected one of {', '.join(known)}"
 
 
-def _contradictions(given: _LinearFile) -> Iterator[str]:
+def _contradictions(given: LinearFile) -> Iterator[str]:
     for sweep in given.sweeps:
         yield from sweep.problems()
     matrices = [key for key in ("states", "A", "A_d", "noises", "sensors", "P0") if getattr(given, key)]
@@ -274,7 +285,7 @@ def _contradictions(given: _LinearFile) -> Iterator[str]:
         yield "the key 'step_rate_hz' is missing; expected the rate of the propagation"
 
 
-def _shape_problems(given: _LinearFile) -> Iterator[str]:
+def _shape_problems(given: LinearFile) -> Iterator[str]:
     n = len(given.states)
     if len({state.name for state in given.states}) < n:
         yield "states: a name stands more than once"
@@ -318,7 +329,7 @@ def _covariance_problem(place: str, matrix: Matrix, *, regular: bool = False) ->
         yield f"{place} has the eigenvalue {least:.3g}; expected {'more than 0' if regular else '0 or more'}"
 
 
-def _model_of(given: _LinearFile) -> LinearModel:
+def _model_of(given: LinearFile) -> LinearModel:
     n = len(given.states)
     noises = {}
     for name, noise in given.noises.items():

@@ -21,12 +21,14 @@ class MarkerLanding:
     height_m: float = setting(2.0, "height above the marker (the article's p_y)", unit="m", above=0)
     pixel_variance: float = setting(1.0, "variance of the marker's place in the picture", unit="px²", above=0)
     focal_length_px: float = setting(645.0, "focal length", unit="px", above=0)
-    marker_rate_hz: float = setting(5.0, "rate at which the marker is seen", unit="Hz", above=0)
+    marker_rate_hz: float = setting(5.0, "rate at which the marker is seen", unit="Hz", low=0.01, high=1e5)
     gyro_density: float = setting(0.0095, "white noise of the gyro", unit="rad/s/√Hz", low=0)
     accelerometer_density: float = setting(0.11, "white noise of the accelerometer", unit="m/s²/√Hz", low=0)
     gyro_bias_density: float = setting(1e-4, "random walk of the gyro's bias", unit="rad/s²/√Hz", low=0)
     gravity_m_s2: float = setting(9.81, "gravity", unit="m/s²", above=0)
-    step_rate_hz: float = setting(200.0, "rate of the propagation (the article's f_prop)", unit="Hz", above=0)
+    step_rate_hz: float = setting(
+        200.0, "rate of the propagation (the article's f_prop)", unit="Hz", low=0.01, high=1e5
+    )
 
 
 def marker_landing(values: MarkerLanding) -> LinearModel:
