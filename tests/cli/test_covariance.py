@@ -13,7 +13,7 @@ name: landing
 model: marker_landing
 judged: [p_x, v_x]
 variations: [{name: at 60 Hz, changes: {marker.rate_hz: 60}}]
-sweeps: [{name: camera, lines: [marker.sd], factors: [0.5, 1, 2], states: [p_x]}]
+sweeps: [{name: camera, label: for $x or $y, lines: [marker.sd], factors: [0.5, 1, 2], states: [p_x]}]
 """
 
 

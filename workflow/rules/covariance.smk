@@ -1,14 +1,4 @@
 # Made when asked for, `snakemake covariances`: no decision rests on it.
-from fusetune.design.covariance.named_files import files_of_design
-
-DESIGNS = {Path(file).stem: file for file in SETTINGS.covariance_designs}
-"""Name of a design → its file."""
-
-
-def design_files(wildcards):
-    return told_in_one_line(files_of_design, DESIGNS[wildcards.design])
-
-
 rule covariance_design:
     input:
         design=lambda wildcards: DESIGNS[wildcards.design],

@@ -101,6 +101,7 @@ def test_a_design_tells_what_pays_and_what_a_delay_costs(tmp_path: Path) -> None
             "lead to -1 Hz; expected 0.01 to 100000",
         ),
         (LINEAR, {"sweeps": [{"name": "s", "lines": ["sonar.sd"]}]}, "expected either values or factors"),
+        (LINEAR, {"sweeps": [{"name": "s", "lines": ["sonar.rate_hz"], "values": [5, 0]}]}, "lead to 0 Hz"),
         (LINEAR, {"model": "marker_landing"}, "states: the model marker_landing has its own"),
         (EKF2, {"log": "a.ulg"}, "mission, log: expected one of them"),
         (EKF2, {"vehicle": None}, "mission, vehicle: expected both or none"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Literal
 
@@ -38,4 +39,9 @@ def load_design(path: AnyPath) -> LinearDesign | Ekf2Design:
     names += [sweep.name for sweep in design.sweeps]
     twice = sorted({name for name in names if names.count(name) > 1})
     raise_problems(file, [f"{name!r} stands more than once" for name in twice], "Give each another name")
+    for variation in design.variations:
+        design.changed(variation.changes)
+    for sweep in design.sweeps:
+        for line, point in product(sweep.lines, sweep.points):
+            design.changed(sweep.changes(line, point))
     return design

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -38,6 +37,7 @@ from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.settings.checking import nearest, raise_problems, validate
 from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
+from fusetune.storage.files import AnyPath
 
 _REMEDY = "Mend the named keys; config/covariance/ holds examples, docs/covariance.md says what they mean"
 FEW_REFUSED = 0.005
@@ -135,7 +135,7 @@ class LoggedWay:
 class Ekf2Design:
     """A design for EKF2; see `fusetune.design.covariance.evaluation.Design`."""
 
-    file: Path
+    file: AnyPath
     name: str
     settings: Settings
     way: LoggedWay | MissionWay
@@ -237,7 +237,7 @@ def _with_parameters(settings: Settings, values: Mapping[str, float]) -> Setting
     return replace(settings, parameters={**settings.parameters, **values})
 
 
-def _window(track: Track, settle_s: float, file: Path) -> tuple[int, int]:
+def _window(track: Track, settle_s: float, file: AnyPath) -> tuple[int, int]:
     """From when the vehicle has been in the air for that long until it is no more, µs."""
     flown = track.timestamp_us[track.in_air]
     if not len(flown) or flown[-1] - flown[0] < settle_s * 1e6 + 2e6:
@@ -272,7 +272,7 @@ def _deviation(along: CovarianceAlong, places: list[int], unit: str, factor: flo
     )
 
 
-def ekf2_design(document: Mapping[str, Any], file: Path) -> Ekf2Design:
+def ekf2_design(document: Mapping[str, Any], file: AnyPath) -> Ekf2Design:
     """A design for EKF2 from its file's content, as yet without track.
 
     Raises
@@ -283,7 +283,7 @@ def ekf2_design(document: Mapping[str, Any], file: Path) -> Ekf2Design:
     validate(document, schema_of(Ekf2File), file)
     given = built(Ekf2File, document)
     raise_problems(file, given.problems(), _REMEDY)
-    design = Ekf2Design(
+    return Ekf2Design(
         file=file,
         name=given.name,
         settings=Settings(given.sensors, typed_values(given.parameters)),
@@ -293,9 +293,3 @@ def ekf2_design(document: Mapping[str, Any], file: Path) -> Ekf2Design:
         variations=given.variations,
         sweeps=given.sweeps,
     )
-    for variation in design.variations:
-        design.changed(variation.changes)
-    for sweep in design.sweeps:
-        for line in sweep.lines:
-            design.changed(sweep.changes(line, sweep.points[0]))
-    return design

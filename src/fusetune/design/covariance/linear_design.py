@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -34,6 +33,7 @@ from fusetune.errors import UserError
 from fusetune.settings.checking import nearest, raise_problems, validate
 from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
+from fusetune.storage.files import AnyPath
 
 Array = npt.NDArray[np.float64]
 Matrix = tuple[tuple[float, ...], ...]
@@ -105,7 +105,7 @@ class LinearFile:
 class LinearDesign:
     """A design of a linear model; see `fusetune.design.covariance.evaluation.Design`."""
 
-    file: Path
+    file: AnyPath
     name: str
     model: LinearModel
     named: Any = None
@@ -210,7 +210,7 @@ _SENSOR_CHANGES: Mapping[str, Callable[[LinearSensor, Value], LinearSensor]] = {
 }  # fmt: skip
 
 
-def linear_design(document: Mapping[str, Any], file: Path) -> LinearDesign:
+def linear_design(document: Mapping[str, Any], file: AnyPath) -> LinearDesign:
     """A linear design from its file's content.
 
     Raises
@@ -239,7 +239,7 @@ def linear_design(document: Mapping[str, Any], file: Path) -> LinearDesign:
     raise_problems(file, _unknown_states(asked, names), _REMEDY)
     if given.before is not None and given.before not in model.sensors:
         raise UserError(file, f"before is {given.before!r}; expected one of {', '.join(model.sensors)}", _REMEDY)
-    design = LinearDesign(
+    return LinearDesign(
         file=file,
         name=given.name,
         model=model,
@@ -251,12 +251,6 @@ def linear_design(document: Mapping[str, Any], file: Path) -> LinearDesign:
         variations=given.variations,
         sweeps=given.sweeps,
     )
-    for variation in design.variations:
-        design.changed(variation.changes)
-    for sweep in design.sweeps:
-        for line in sweep.lines:
-            design.changed(sweep.changes(line, sweep.points[0]))
-    return design
 
 
 def _unknown_states(asked: Mapping[str, tuple[str, ...]], known: tuple[str, ...]) -> Iterator[str]:

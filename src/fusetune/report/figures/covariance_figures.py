@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from fusetune.design.covariance.changes import Sweep
 from fusetune.design.covariance.evaluation import BETTER, WITHOUT, Evaluation
+from fusetune.design.names import one_line
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.report.figures.drawing import (
     BAD_COLOUR,
@@ -144,7 +145,12 @@ def _when(evaluation: Evaluation) -> str:
 
 
 def _unit(unit: str) -> str:
-    return {"deg": "°", "m/s^2": "m/s²", "gauss": "G"}.get(unit, unit)
+    return {"deg": "°", "m/s^2": "m/s²", "gauss": "G"}.get(unit, _as_written(unit))
+
+
+def _as_written(text: str) -> str:
+    """On one line, and with dollars that begin no formula."""
+    return one_line(text).replace("$", r"\$")
 
 
 def _draw_tornado(axes: Axes, rows: Sequence[TornadoRow], title: str) -> None:
@@ -186,7 +192,7 @@ def sweep_figure(evaluation: Evaluation, sweep: Sweep) -> Figure:
         if index < len(states):
             _draw_sweep(axes, evaluation, sweep, states[index])
             if index + columns >= len(states):
-                axes.set_xlabel(sweep.label or ("factor" if sweep.factors else sweep.lines[0]))
+                axes.set_xlabel(_as_written(sweep.label) or ("factor" if sweep.factors else sweep.lines[0]))
                 axes.tick_params(labelbottom=True)
     if len(sweep.lines) > 1:
         figure.legend(
@@ -215,7 +221,7 @@ def _draw_sweep(axes: Axes, evaluation: Evaluation, sweep: Sweep, state: str) ->
     if min(told) > 0.0 and max(told) / min(told) > _WIDE:
         axes.set_yscale("log")
     else:
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(0.0, 1.08 * max(told))
     axes.set_title(_words(state), fontsize=9, loc="left")
     axes.set_ylabel(_unit(base.unit))
 
