@@ -18,6 +18,7 @@ include: "workflow/rules/configuration.smk"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/resources.smk"
 include: "workflow/rules/design.smk"
+include: "workflow/rules/covariance.smk"
 include: "workflow/rules/execute.smk"
 include: "workflow/rules/save.smk"
 include: "workflow/rules/search.smk"
@@ -29,6 +30,7 @@ include: "workflow/rules/report.smk"
 
 wildcard_constraints:
     flight="|".join(map(re.escape, LOGS)) or NO_FLIGHT,
+    design="|".join(map(re.escape, DESIGNS)) or NO_FLIGHT,
 
 
 # What needs seconds of one core for all flights together runs beside Snakemake itself, wherever the flights are sent.
@@ -43,6 +45,7 @@ localrules:
     join_health,
     join_fleet,
     sensors,
+    covariances,
     fleet_page,
 
 

@@ -8,8 +8,9 @@ Imports only declarations, no numerics: the workflow reads the configuration whe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any, Literal
 
 from fusetune.analyze.delays.settings import DelaySettings
@@ -94,6 +95,11 @@ class Configuration:
         "what one job of a search takes: all flights of a `round`, on all cores, or one `flight` of it; the files are "
         "the same; the profile for Slurm says `flight`",
     )
+    covariance_designs: tuple[str, ...] = setting(
+        ("config/covariance/marker_landing.yaml", "config/covariance/ekf2_survey.yaml"),
+        "files of the covariance designs that `snakemake covariances` evaluates, see "
+        "[docs/covariance.md](../docs/covariance.md)",
+    )
     demonstration: Demonstration = section(Demonstration)
     reading: ReadingLimits = section(ReadingLimits)
     verdict: VerdictThresholds = section(VerdictThresholds)
@@ -112,6 +118,12 @@ class Configuration:
     def replay(self) -> ReplaySettings:
         """What is done about a flight before it is replayed."""
         return ReplaySettings(self.withheld, self.reconstruction, self.start)
+
+    def problems(self) -> Iterator[str]:
+        """Designs whose results would lie in the same folder."""
+        names = [PurePath(file).stem for file in self.covariance_designs]
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield f"covariance_designs: two files are called {name}; expected different names"
 
 
 def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None = None) -> Configuration:

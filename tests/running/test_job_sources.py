@@ -19,6 +19,7 @@ SCRIPTS = PACKAGE.parents[1] / "workflow" / "scripts"
 MADE_BY = {
     "design": ("design",),
     "mission_map": ("mission",),
+    "covariance_design": ("covariance",),
     "simulate_flight": ("execute",),
     "save_flight": ("save",),
     "list_flights": ("score", "save"),

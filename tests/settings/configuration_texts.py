@@ -81,6 +81,8 @@ def leaves(kind: type, place: str = "") -> Iterator[tuple[str, DeclaredSetting]]
             yield from leaves(kind, f"{place}{one.name}.")  # type: ignore[arg-type]
         elif is_dataclass(entry):
             yield from leaves(entry, f"{place}{one.name}[].")  # type: ignore[arg-type]
+        elif get_origin(kind) is Mapping and is_dataclass(get_args(kind)[1]):
+            yield from leaves(get_args(kind)[1], f"{place}{one.name}.NAME.")
         else:
             yield f"{place}{one.name}", one
 
@@ -146,7 +148,7 @@ def _shown(default: Any) -> str:
     if isinstance(default, Mapping):
         return ", ".join(f"`{key}`: {_shown(value)}" for key, value in default.items()) or "none"
     if isinstance(default, tuple):
-        return ", ".join(_shown(one) for one in default)
+        return ", ".join(_shown(one) for one in default) or "none"
     if default is None or default == "":
         return "empty"
     return f"`{default}`" if isinstance(default, str) else f"{default:.12g}"

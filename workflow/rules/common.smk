@@ -4,6 +4,7 @@ from dataclasses import astuple, replace
 
 from fusetune.analyze.flight_files import DIAGNOSED_FILES, FLIGHT_FILES
 from fusetune.analyze.replaying.store.parts import PARTS
+from fusetune.design.covariance.named_files import files_of_design
 from fusetune.storage.cells import as_it_was
 from fusetune.storage.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
@@ -185,3 +186,12 @@ def closing_words():
         for step in read_document("results/apply/decision.json").get("next_steps", ())[:1]:
             words += f"\nNext: {step['text']}"
     return words
+
+
+DESIGNS = {Path(file).stem: file for file in SETTINGS.covariance_designs}
+"""Covariance designs: name → file."""
+
+
+def design_files(wildcards):
+    """Input function: the file of a covariance design, and those that it names."""
+    return told_in_one_line(files_of_design, DESIGNS[wildcards.design])

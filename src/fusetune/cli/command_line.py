@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, design, diagnose, fidelity, mission, replay, save, search, simulate, study
+from fusetune.cli import cards, covariance, design, diagnose, fidelity, mission, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -18,6 +18,7 @@ COMMANDS: Mapping[str, Command] = {
     "mission": mission,
     "study": study,
     "cards": cards,
+    "covariance": covariance,
     "simulate": simulate,
     "save": save,
     "replay": replay,

@@ -49,6 +49,18 @@ JOB_SOURCES = {
         "report/figures/figures.mplstyle",
         "report/figures/mission_figure.py",
     ),
+    "covariance": (
+        *BASE,
+        "covariance_design.py",
+        "design",
+        "ekf2",
+        "execute",
+        "report/__init__.py",
+        "report/figures/__init__.py",
+        "report/figures/covariance_figures.py",
+        "report/figures/drawing.py",
+        "save",
+    ),
     "execute": (*BASE, "ekf2", "design", "execute"),
     "save": (*BASE, "design", "ekf2/feed", "save"),
     "replay": (

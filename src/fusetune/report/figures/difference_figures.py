@@ -20,14 +20,13 @@ from fusetune.report.comparison import (
     robust_reach,
     told_aims,
 )
-from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, label_sets, new_figure
+from fusetune.report.figures.drawing import GOOD_COLOUR, PRESENT_COLOUR, empty_figure, label_sets, minus, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles, status_colour
 from fusetune.report.results import OUT, Results
 
 Limits = tuple[float, float]
 
 NOTHING_TO_COMPARE = "Only the present set was scored: there is nothing to compare."
-GOOD_COLOUR = "#009E73"
 
 _ANNOTATED_CELLS = 240
 _LONGEST_NAME = 30
@@ -207,8 +206,3 @@ def flight_labels(names: list[str]) -> list[str]:
     first, last = min(names), max(names)
     shared = next((i for i, pair in enumerate(zip(first, last, strict=False)) if pair[0] != pair[1]), 0)
     return [shortened(f"…{name[shared:]}" if shared > 3 else name) for name in names]
-
-
-def minus(text: str) -> str:
-    """With the typographical sign."""
-    return text.replace("-", "−")

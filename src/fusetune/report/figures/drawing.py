@@ -20,6 +20,7 @@ PRESENT_COLOUR = "#222222"
 CHOSEN_COLOUR = "#0072B2"
 CANDIDATE_COLOUR = "#56B4E9"
 VETOED_COLOUR = "#B0B0B0"
+GOOD_COLOUR, BAD_COLOUR = "#009E73", "#D55E00"
 
 _PNG_COLOURS = 96
 _PANEL_COLUMNS = 3
@@ -125,3 +126,8 @@ def label_sets(axes: Axes, sets: Sequence[str]) -> None:
     axes.set_yticks(range(len(sets)), sets)
     axes.set_ylim(len(sets) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
+
+
+def minus(text: str) -> str:
+    """With the typographical sign."""
+    return text.replace("-", "−")

@@ -12,8 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from fusetune.apply.search.answer import unit_of
-from fusetune.report.figures.difference_figures import minus
-from fusetune.report.figures.drawing import CHOSEN_COLOUR, PRESENT_COLOUR, VETOED_COLOUR, empty_figure, new_figure
+from fusetune.report.figures.drawing import (
+    CHOSEN_COLOUR,
+    PRESENT_COLOUR,
+    VETOED_COLOUR,
+    empty_figure,
+    minus,
+    new_figure,
+)
 from fusetune.report.search_results import SearchResults
 
 _FOLD_COLOUR = "#E69F00"

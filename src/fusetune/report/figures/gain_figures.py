@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fusetune.report.figures.difference_figures import minus
-from fusetune.report.figures.drawing import CHOSEN_COLOUR, PRESENT_COLOUR, empty_figure, new_figure
+from fusetune.report.figures.drawing import CHOSEN_COLOUR, PRESENT_COLOUR, empty_figure, minus, new_figure
 from fusetune.report.search_results import SearchResults
 
 NOTHING_ASIDE = "With a single flight nothing can be kept aside: nothing shows what is luck."

@@ -12,12 +12,13 @@ from fusetune.apply.evidence import AIDED, SMOOTHED
 from fusetune.apply.pareto import pareto_front, two_aims
 from fusetune.apply.trials import Trials
 from fusetune.report.comparison import percent_change
-from fusetune.report.figures.difference_figures import GOOD_COLOUR, minus
 from fusetune.report.figures.drawing import (
     CHOSEN_COLOUR,
+    GOOD_COLOUR,
     PRESENT_COLOUR,
     VETOED_COLOUR,
     empty_figure,
+    minus,
     new_figure,
 )
 

@@ -25,8 +25,15 @@ from fusetune.apply.sensitivity.result import (
 from fusetune.apply.sensitivity.wording import NOTHING_VARIED, listed
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.report.comparison import percent_change
-from fusetune.report.figures.difference_figures import GOOD_COLOUR, minus
-from fusetune.report.figures.drawing import CHOSEN_COLOUR, PRESENT_COLOUR, VETOED_COLOUR, empty_figure, new_figure
+from fusetune.report.figures.drawing import (
+    CHOSEN_COLOUR,
+    GOOD_COLOUR,
+    PRESENT_COLOUR,
+    VETOED_COLOUR,
+    empty_figure,
+    minus,
+    new_figure,
+)
 
 Array = npt.NDArray[np.float64]
 

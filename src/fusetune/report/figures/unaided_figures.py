@@ -6,8 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fusetune.report.comparison import robust_reach
-from fusetune.report.figures.difference_figures import minus
-from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, new_figure
+from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, minus, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles
 from fusetune.report.results import Results
 from fusetune.report.withheld import POSITION, VELOCITY, Withheld, drift_summary

@@ -1,0 +1,49 @@
+"""`fusetune covariance`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fusetune.cli.command import DONE
+
+if TYPE_CHECKING:
+    from fusetune.design.covariance.evaluation import Evaluation
+
+HELP = "tell how well a sensing system knows its states, and which better sensor pays most, from covariances alone"
+
+LEAST_PERCENT = 0.05
+"""What takes less off is not told."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Design, folder."""
+    parser.add_argument("design", type=Path, metavar="DESIGN.yaml")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="takes the tables and the figures")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Evaluate the design, write tables and figures, and print the answer; always `DONE`."""
+    from fusetune.covariance_design import make_covariance_design
+
+    evaluation, figures = make_covariance_design(options.design, options.out)
+    print(*_answer(evaluation), sep="\n")
+    print(f"{options.out}: covariance.csv, pays_most.csv, sweeps.csv, {', '.join(file.name for file in figures)}")
+    return DONE
+
+
+def _answer(evaluation: Evaluation) -> Iterator[str]:
+    """For each judged state what it is known to, and what pays most of each sensor."""
+    for state in evaluation.judged:
+        told = evaluation.base[state]
+        present = "" if told.now is None else f", {told.now:.4g} at present"
+        unit = f" {told.unit}" if told.unit else ""
+        yield f"{state}: {told.before:.4g}{unit} just before a correction{present}"
+        for one in evaluation.pays_most(state):
+            change = 100.0 * one.change(evaluation.base, state)
+            if change > -LEAST_PERCENT:
+                break
+            yield f"  {change:+6.1f} %  {one.name}"
+    yield from evaluation.notes
