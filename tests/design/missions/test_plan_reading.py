@@ -171,17 +171,33 @@ def nodes(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from nodes(value[key], (*place, key))
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.data())
-def test_whatever_stands_at_a_place_ends_in_a_mission_or_in_a_message(data: st.DataObject) -> None:
-    document = copy.deepcopy(everything())
-    *way, last = data.draw(st.sampled_from(list(nodes(document))))
-    inner: Any = document
+def put(document: Any, place: tuple[Any, ...], value: Any) -> None:
+    *way, last = place
     for key in way:
-        inner = inner[key]
-    inner[last] = data.draw(JSON_VALUES)
+        document = document[key]
+    document[last] = value
+
+
+def read_or_refused(document: Any) -> None:
+    """What obeys the rules is a mission that is written as it was, or refused in words."""
     if any(plan_problems(document)):
         return
     with suppress(UserError):
         mission = mission_of_plan(followed_plan(document, "a.plan"), "a.plan")
         assert document_of(mission) == document
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_whatever_stands_at_a_place_ends_in_a_mission_or_in_a_message(data: st.DataObject) -> None:
+    document = copy.deepcopy(everything())
+    put(document, data.draw(st.sampled_from(list(nodes(document)))), data.draw(JSON_VALUES))
+    read_or_refused(document)
+
+
+@pytest.mark.parametrize("value", [None, 0, -1, 1.5, "", [], {}, True], ids=repr)
+def test_a_plain_value_at_any_place_ends_likewise(value: Any) -> None:
+    for place in nodes(everything()):
+        document = copy.deepcopy(everything())
+        put(document, place, value)
+        read_or_refused(document)

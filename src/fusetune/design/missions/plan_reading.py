@@ -156,13 +156,14 @@ class _Follower:
                 raise UserError(
                     self.path, f"{label} is a {kind}, for aircraft with wings", "Plan the landing of a multicopter"
                 )
-            if "TransectStyleComplexItem" not in item:
+            transects = item.get("TransectStyleComplexItem")
+            if transects is None:
                 raise UserError(
                     self.path,
                     f"{label} is a {kind}, whose waypoints stand in no plan: QGroundControl makes them as it sends it",
                     "Send it to a vehicle or to SITL, read it back, and save that as a plan",
                 )
-            if item["TransectStyleComplexItem"].get("FollowTerrain"):
+            if transects.get("FollowTerrain"):
                 self.notes.append(f"{label} ({kind}) has altitudes that QGroundControl took from its terrain")
 
     def _in_order(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
