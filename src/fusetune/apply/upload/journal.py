@@ -66,6 +66,10 @@ class Record:
     ended: str = ""
 
 
+class NothingPlanned(UserError):
+    """A journal that was begun, and nothing more."""
+
+
 class Journal:
     """The journal of one upload, held for this process alone.
 
@@ -133,7 +137,7 @@ def read_journal(folder: Path) -> Record:
         ) from None
     entries, _, _ = _entries(content, path)
     if not entries or entries[0].get("event") != "planned":
-        raise UserError(path, "ends before anything was written to the vehicle", "Upload anew")
+        raise NothingPlanned(path, "ends before anything was written to the vehicle", "Upload anew")
     try:
         record = _record(entries[0])
         for entry in entries[1:]:

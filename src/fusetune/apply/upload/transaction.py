@@ -175,7 +175,7 @@ class Transaction:
 
     def _write(self, change: Change, goal: Goal) -> None:
         """Write until the value is read back as it was sent."""
-        wanted, wait_s, refused, against = change.value(goal), self._talk.pace.answer_s, 0, None
+        wanted, wait_s, refused, against = change.value(goal), self._talk.pace.answer_s, 0, dict[str, None]()
         for attempt in range(self._talk.pace.attempts):
             self._talk.retries += attempt > 0
             self._talk.see_that_it_is_disarmed()
@@ -189,11 +189,12 @@ class Transaction:
             if value == wanted:
                 self._journal.write("verified", name=change.name, value=f"{value.bits:08x}")
                 return
-            against, refused = said or against, refused + (said is not None)
+            if said is not None:
+                refused, against[said] = refused + 1, None
             if refused >= _OFTEN_REFUSED:
                 break
             wait_s = min(wait_s * self._talk.pace.longer, self._talk.pace.longest_answer_s)
-        because = f" ({against})" if against else ""
+        because = f" ({', '.join(against)})" if against else ""
         raise NotTaken(f"the vehicle does not take {change.name} = {wanted}{because}; it keeps {value}")
 
     def _see_that_it_runs_on(self) -> None:

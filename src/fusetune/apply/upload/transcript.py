@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
@@ -32,8 +33,12 @@ class Transcript:
         self._file.flush()
 
     def tell(self, text: str) -> None:
-        """A line for the pilot and for the file."""
-        self._tell(text)
+        """A line for the pilot and for the file.
+
+        That nobody reads it, or that the disk is full, ends no upload.
+        """
+        with suppress(OSError):
+            self._tell(text)
         for line in text.splitlines():
             self.note(f"| {line}")
 
@@ -44,11 +49,13 @@ class Transcript:
         if self._file is None:
             self._before.append(line)
         else:
-            self._file.write(line)
-            self._file.flush()
+            with suppress(OSError):
+                self._file.write(line)
+                self._file.flush()
 
     def close(self) -> None:
         """Close the file."""
         if self._file is not None:
-            self._file.close()
+            with suppress(OSError):
+                self._file.close()
             self._file = None

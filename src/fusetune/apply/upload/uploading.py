@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import Enum
@@ -11,7 +11,17 @@ from pathlib import Path
 from fusetune.apply.upload.backup import read_backup, write_backup
 from fusetune.apply.upload.conversation import Conversation
 from fusetune.apply.upload.difference import difference_table, needs_reboot
-from fusetune.apply.upload.journal import BACKUP, JOURNAL, TRANSCRIPT, Change, Goal, Journal, Record, read_journal
+from fusetune.apply.upload.journal import (
+    BACKUP,
+    JOURNAL,
+    TRANSCRIPT,
+    Change,
+    Goal,
+    Journal,
+    NothingPlanned,
+    Record,
+    read_journal,
+)
 from fusetune.apply.upload.judged import DECISION, Judged, read_judged
 from fusetune.apply.upload.links import open_link
 from fusetune.apply.upload.pace import Pace
@@ -125,6 +135,7 @@ class Upload:
         identity, server = self._meet(talk)
         refuse_flying(talk.partner)
         refuse_foreign(judged, identity)
+        _refuse_unended(self.asked.folder, identity)
         listing = server.all()
         refuse_changed(judged, listing.values)
         return self._plan_and_write(talk, server, identity, listing, judged.wanted, "upload", judged.file)
@@ -138,7 +149,10 @@ class Upload:
             _refuse_other(wanted.of, identity)
         listing = server.all()
         refuse_missing(wanted.values, listing.values)
-        return self._plan_and_write(talk, server, identity, listing, wanted.values, "rollback", wanted.file)
+        outcome = self._plan_and_write(talk, server, identity, listing, wanted.values, "rollback", wanted.file)
+        if outcome is Outcome.WRITTEN:
+            _end_others(self.asked.folder, identity, set(wanted.values), self.folder)
+        return outcome
 
     def _plan_and_write(
         self,
@@ -224,6 +238,11 @@ class Upload:
         except Unfinished as unfinished:
             self._tell_unfinished(transaction, f"Not finished: {unfinished.why}.")
             return Outcome.UNFINISHED
+        except OSError as error:
+            self._tell_unfinished(
+                transaction, f"The journal cannot be written ({error.strerror}): nothing more is sent."
+            )
+            return Outcome.UNFINISHED
         except KeyboardInterrupt:
             self._tell_unfinished(transaction, "Interrupted.")
             raise
@@ -292,10 +311,38 @@ def _new_folder(folder: Path, identity: Identity) -> Path:
     raise UserError(folder, "is full of uploads of this second", "Wait a second")
 
 
-def _newest_unended(folder: Path) -> Path:
+def _unended(folder: Path) -> Iterator[tuple[Path, Record]]:
+    """Folders of uploads that have not ended, the newest first."""
     for one in sorted((path.parent for path in folder.glob(f"*/{JOURNAL}")), reverse=True):
-        if not read_journal(one).ended:
-            return one
+        try:
+            record = read_journal(one)
+        except NothingPlanned:
+            continue
+        if not record.ended:
+            yield one, record
+
+
+def _refuse_unended(folder: Path, identity: Identity) -> None:
+    for one, record in _unended(folder):
+        if record.uuid == identity.uuid and record.sent:
+            raise Refusal(
+                f"an upload to this vehicle is not finished: {one}",
+                f"Go on with it by --resume --folder {one}, or take it back by --rollback {one}",
+            )
+
+
+def _end_others(folder: Path, identity: Identity, names: set[str], by: Path | None) -> None:
+    """Unfinished uploads whose parameters have all been taken back by another one have ended, too."""
+    for one, record in _unended(folder):
+        if record.uuid == identity.uuid and names >= {change.name for change in record.changes}:
+            journal = Journal(one)
+            journal.write("ended", **{"with": "old", "by": str(by)})
+            journal.close()
+
+
+def _newest_unended(folder: Path) -> Path:
+    for one, _ in _unended(folder):
+        return one
     raise UserError(folder, "holds no upload that has not ended", "There is nothing to go on with")
 
 

@@ -56,12 +56,12 @@ def find_vehicles(talk: Conversation) -> list[Station]:
     Refusal
         None comes, or none that is a vehicle.
     """
-    until = time.monotonic() + talk.pace.patience_s
-    while time.monotonic() < until:
+    until, found = time.monotonic() + talk.pace.patience_s, list[Station]()
+    while not found:
         for _ in talk.listen(talk.pace.search_s):
             pass
         found = [one for one in talk.stations.values() if one.is_vehicle]
-        if found or talk.stations:
+        if not found and time.monotonic() > until:
             break
     if not talk.stations:
         raise Refusal("no heartbeat came", "Is the vehicle powered, and does it send to this address")

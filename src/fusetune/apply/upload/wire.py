@@ -87,6 +87,8 @@ def received_value(message: Any, encoding: Encoding) -> Value | None:
 
 
 def word(enumeration: str, number: int) -> str:
-    """The name that MAVLink has for a number."""
+    """The name that MAVLink has for a number, in plain letters: "value out of range"."""
     entry = common.enums[enumeration].get(number)
-    return entry.name if entry is not None else f"{enumeration} {number}"
+    if entry is None:
+        return f"{enumeration} {number}"
+    return str(entry.name).removeprefix(f"{enumeration}_").replace("_", " ").lower()
