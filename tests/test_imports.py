@@ -77,13 +77,13 @@ def test_what_is_imported_is_declared(project_root: Path, folders: list[str], ex
     declared = {Requirement(text).name.lower() for text in asked}
     suffixes = {".py", ".smk"}
     files = [file for folder in folders for file in (project_root / folder).rglob("*") if file.suffix in suffixes]
-    if folders != UPLOAD:
+    if folders is not UPLOAD:
         files = [file for file in files if not file.relative_to(project_root).as_posix().startswith(UPLOAD)]
     scripts = {file.stem for file in (project_root / "workflow" / "scripts").glob("*.py")}
     ours = {"fusetune", "benchmarks", "tests", *scripts, *sys.stdlib_module_names}
     files.append(project_root / "Snakefile")
     found = {name: file for file in files for name in imported_by(file) if name not in ours}
-    assert ("pymavlink" if folders == UPLOAD else "numpy") in found
+    assert ("pymavlink" if folders is UPLOAD else "numpy") in found
     of = packages_distributions()
     missing = {name: file for name, file in found.items() if not declared & {d.lower() for d in of.get(name, [name])}}
     assert missing == {}

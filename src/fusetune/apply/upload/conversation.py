@@ -176,14 +176,19 @@ class Conversation:
             attempts,
         )
 
-    def returned(self, station: Station, after_s: float) -> Station | None:
-        """Who was heard since a time with the ids of a vehicle that was lost; itself before others."""
-        same = [
-            one
-            for one in self.stations.values()
-            if (one.system, one.component) == (station.system, station.component) and one.heard_s > after_s
-        ]
-        return station if station in same else next(iter(same), None)
+    def wait_for_return(self) -> bool:
+        """After the link was lost: wait until the vehicle, or one with its ids, is heard again, and talk to that."""
+        began_s, lost = time.monotonic(), self.partner
+        while time.monotonic() - began_s < self.pace.patience_s:
+            for _ in self.listen(self.pace.heartbeat_s):
+                pass
+            ids = (lost.system, lost.component)
+            heard = [one for one in self.stations.values() if one.heard_s > began_s]
+            same = [one for one in heard if (one.system, one.component) == ids]
+            if same:
+                self.talk_to(lost if lost in same else same[0])
+                return True
+        return False
 
     def see_that_it_is_disarmed(self) -> None:
         """Wait for a heartbeat that is sent from now on; raises `Armed`, in a guarded talk, where it says so."""

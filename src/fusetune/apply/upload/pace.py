@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 
 @dataclass(frozen=True)
@@ -39,4 +39,4 @@ class Pace:
     def times(self, factor: float) -> Pace:
         """All times longer by a factor."""
         seconds = {one.name: getattr(self, one.name) * factor for one in fields(self) if one.name.endswith("_s")}
-        return Pace(**seconds, longer=self.longer, attempts=self.attempts, passes=self.passes)
+        return replace(self, **seconds)

@@ -16,7 +16,7 @@ from typing import Any
 
 from fusetune.apply.upload import wire
 from fusetune.apply.upload.conversation import Conversation
-from fusetune.apply.upload.stops import NoAnswer
+from fusetune.apply.upload.stops import NoAnswer, Stopped
 from fusetune.apply.upload.values import Encoding, Value
 from fusetune.apply.upload.wire import HASH_CHECK, common
 
@@ -137,7 +137,7 @@ class ParameterServer:
                 "its checksum of all parameters",
                 attempts=5,
             )
-        except NoAnswer:
+        except Stopped:
             return None
         return wire.field_bits(answer)
 

@@ -229,17 +229,10 @@ class Transaction:
         self._journal.write("link lost", why=str(lost))
         patience_s = talk.pace.patience_s
         talk.transcript.tell(f"{_sentence(str(lost))} Waiting up to {patience_s:.0f} s for it to come back.")
-        before, partner = time.monotonic(), talk.partner
-        while time.monotonic() - before < patience_s:
-            for _ in talk.listen(talk.pace.heartbeat_s):
-                pass
-            back = talk.returned(partner, before)
-            if back is not None:
-                talk.talk_to(back)
-                self._journal.write("link back")
-                talk.transcript.tell("The vehicle is back: all values are read again.")
-                return
-        raise Unfinished(str(lost))
+        if not talk.wait_for_return():
+            raise Unfinished(str(lost))
+        self._journal.write("link back")
+        talk.transcript.tell("The vehicle is back: all values are read again.")
 
     def _wait_for_ground(self) -> None:
         """Wait until the vehicle is disarmed and on the ground."""

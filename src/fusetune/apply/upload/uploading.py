@@ -27,7 +27,7 @@ from fusetune.apply.upload.links import open_link
 from fusetune.apply.upload.pace import Pace
 from fusetune.apply.upload.parameter_server import Listing, ParameterServer
 from fusetune.apply.upload.refusals import refuse_changed, refuse_flying, refuse_foreign, refuse_missing
-from fusetune.apply.upload.stops import Refusal, Stopped
+from fusetune.apply.upload.stops import LinkLost, Refusal, Stopped
 from fusetune.apply.upload.transaction import Transaction, Unfinished
 from fusetune.apply.upload.transcript import Transcript
 from fusetune.apply.upload.values import Value
@@ -116,7 +116,7 @@ class Upload:
         try:
             self.asked.transcript.tell(f"Listening at {link.name} …")
             talk.talk_to(choose_vehicle(find_vehicles(talk), self.asked.system))
-            return work(talk)
+            return self._patiently(talk, work)
         except Stopped as stop:
             # before the first write only: a transaction ends with an outcome
             raise Refusal(f"{stop}; nothing was written now", "Mend the link, and start again") from stop
@@ -124,6 +124,17 @@ class Upload:
             self.retries = talk.retries
             link.close()
             self.asked.transcript.close()
+
+    def _patiently(self, talk: Conversation, work: Callable[[Conversation], Outcome]) -> Outcome:
+        """Begin anew where the link is lost before anything was written; later a transaction minds it."""
+        for _ in range(talk.pace.passes):
+            try:
+                return work(talk)
+            except LinkLost as lost:
+                self.asked.transcript.tell(f"{lost}: waiting up to {talk.pace.patience_s:.0f} s for it to come back.")
+                if not talk.wait_for_return():
+                    raise
+        raise LinkLost("the link is lost again and again")
 
     def _meet(self, talk: Conversation) -> tuple[Identity, ParameterServer]:
         identity = identify(talk)
