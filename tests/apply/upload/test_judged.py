@@ -7,7 +7,7 @@ from benchmarks.upload_trials.made_decision import NEW, UUID, write_decision
 
 from fusetune.apply.upload.conversation import Station
 from fusetune.apply.upload.judged import Judged, read_judged
-from fusetune.apply.upload.refusals import refuse_changed, refuse_flying, refuse_foreign
+from fusetune.apply.upload.refusals import refuse_changed, refuse_flying, refuse_foreign, refuse_timeless
 from fusetune.apply.upload.stops import Refusal
 from fusetune.apply.upload.values import Value
 from fusetune.apply.upload.vehicles import Identity
@@ -87,3 +87,9 @@ def test_a_vehicle_is_written_to_on_the_ground_alone(armed: bool, landed: int | 
     with pytest.raises(Refusal, match=reason):
         refuse_flying(Station(None, 1, 1, 2, 12, armed, 0.0, landed=landed))
     refuse_flying(Station(None, 1, 1, 2, 12, False, 0.0, landed=1))
+
+
+def test_a_vehicle_whose_reboot_would_pass_unnoticed_is_not_written_to() -> None:
+    with pytest.raises(Refusal, match="a reboot would not be noticed"):
+        refuse_timeless(Station(None, 1, 1, 2, 12, False, 0.0, landed=1))
+    refuse_timeless(Station(None, 1, 1, 2, 12, False, 0.0, landed=1, booted_s=-100.0))

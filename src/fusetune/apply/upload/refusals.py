@@ -26,6 +26,15 @@ def refuse_flying(station: Station) -> None:
         )
 
 
+def refuse_timeless(station: Station) -> None:
+    """Raises `Refusal` where the vehicle does not tell for how long it runs: a reboot would pass unnoticed."""
+    if station.booted_s is None:
+        raise Refusal(
+            "the vehicle does not tell its time since boot, so that a reboot would not be noticed",
+            "See that this link carries SYSTEM_TIME",
+        )
+
+
 def refuse_foreign(judged: Judged, identity: Identity) -> None:
     """Raises `Refusal` where the vehicle, or its release, is not that of the logs, or that cannot be known."""
     if judged.simulated == "SITL" and identity.is_simulated:

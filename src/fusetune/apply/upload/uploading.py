@@ -26,7 +26,7 @@ from fusetune.apply.upload.judged import DECISION, Judged, read_judged
 from fusetune.apply.upload.links import open_link
 from fusetune.apply.upload.pace import Pace
 from fusetune.apply.upload.parameter_server import Listing, ParameterServer
-from fusetune.apply.upload.refusals import refuse_changed, refuse_flying, refuse_foreign, refuse_missing
+from fusetune.apply.upload.refusals import refuse_changed, refuse_flying, refuse_foreign, refuse_missing, refuse_timeless
 from fusetune.apply.upload.stops import LinkLost, Refusal, Stopped
 from fusetune.apply.upload.transaction import Transaction, Unfinished
 from fusetune.apply.upload.transcript import Transcript
@@ -140,6 +140,7 @@ class Upload:
         identity = identify(talk)
         learn_state(talk)
         self.asked.transcript.tell(f"Vehicle: {identity.in_words}.")
+        refuse_timeless(talk.partner)
         return identity, ParameterServer(talk, identity.encoding)
 
     def _write_new(self, talk: Conversation, judged: Judged) -> Outcome:
