@@ -195,12 +195,19 @@ def refusing(seed: int) -> Trial:
     return try_upload(seed, faults={"refused": 0.01, "refused_name": name, "error": seed % 2 == 0})
 
 
+def killed_on_the_way_back(seed: int) -> Trial:
+    """It keeps the last parameter as it is, and the upload's process dies while the others are taken back."""
+    faults = {"refused": 0.01, "refused_name": "EKF2_MAG_NOISE"}
+    return try_upload(seed, faults=faults, killed_at=random.Random(seed).randint(20, 36))
+
+
 KINDS: Mapping[str, tuple[int, Callable[[int], Trial], frozenset[str]]] = {
     "10 % loss each way": (200, lossy, frozenset({"written"})),
     "and a reboot": (20, rebooted, frozenset({"written", "taken back"})),
     "and a lost link": (20, interrupted, frozenset({"written", "taken back"})),
     "and a killed upload": (20, killed, frozenset({"written", "taken back"})),
     "a refused value": (10, refusing, frozenset({"taken back"})),
+    "killed on the way back": (10, killed_on_the_way_back, frozenset({"taken back"})),
     "armed": (25, armed, frozenset({"refused"})),
     "another vehicle": (25, foreign, frozenset({"refused"})),
     "arms at a write": (10, armed_midway, frozenset({"written", "taken back"})),
