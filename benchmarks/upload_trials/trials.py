@@ -181,7 +181,7 @@ def armed_midway(seed: int) -> Trial:
 def armed_sometime(seed: int) -> Trial:
     """It arms at any time, so that a write may be under way."""
     chance = random.Random(seed)
-    return try_upload(seed, faults={"arm_at_s": chance.uniform(6.0, 16.0), "disarm_after_s": 30.0})
+    return try_upload(seed, faults={"arm_at_s": chance.uniform(14.0, 34.0), "disarm_after_s": 30.0})
 
 
 def foreign(seed: int) -> Trial:
@@ -211,6 +211,6 @@ KINDS: Mapping[str, tuple[int, Callable[[int], Trial], frozenset[str]]] = {
     "armed": (25, armed, frozenset({"refused"})),
     "another vehicle": (25, foreign, frozenset({"refused"})),
     "arms at a write": (10, armed_midway, frozenset({"written", "taken back"})),
-    "arms at any time": (10, armed_sometime, frozenset({"written", "taken back", "refused"})),
+    "arms at any time": (20, armed_sometime, frozenset({"written", "taken back", "refused"})),
 }
 """How often each kind is tried, how, and how it may end."""

@@ -165,6 +165,7 @@ def test_saving_that_is_not_confirmed_takes_all_back(tmp_path: Path) -> None:
         assert told.upload.new(file) is Outcome.TAKEN_BACK
         [report] = running.reports()
     assert "The vehicle does not answer: that it saves its parameters." in told.text
+    assert "All values are as they were before, read back.\nIt is not confirmed that they are saved" in told.text
     assert len(report["sets"]) == 2 * len(NEW)
     assert stands(report) == {"old"}
 

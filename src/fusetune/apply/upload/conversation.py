@@ -19,8 +19,9 @@ from fusetune.apply.upload.stops import Armed, LinkLost, NoAnswer
 from fusetune.apply.upload.transcript import Transcript
 from fusetune.apply.upload.wire import common
 
-_TOLD = frozenset({"AUTOPILOT_VERSION", "COMMAND_ACK", "PARAM_ERROR", "PARAM_VALUE", "STATUSTEXT"})
-"""Messages whose arrival the transcript holds."""
+_TOLD = frozenset({"AUTOPILOT_VERSION", "COMMAND_ACK", "HEARTBEAT", "PARAM_ERROR", "PARAM_VALUE", "STATUSTEXT"})
+"""Messages of the vehicle whose arrival the transcript holds."""
+_ADDRESSES = ("target_system", "target_component", "confirmation")
 _IN_THE_AIR = {
     common.MAV_LANDED_STATE_IN_AIR: "is in the air",
     common.MAV_LANDED_STATE_TAKEOFF: "takes off",
@@ -75,6 +76,11 @@ class Conversation:
     Parameters
     ----------
     link : is closed by who opened it
+
+    Attributes
+    ----------
+    retries : how often something was asked again
+    notes_values : whether the transcript holds the values that come; not while all of them are listed
     """
 
     def __init__(self, link: Link, pace: Pace, transcript: Transcript) -> None:
@@ -82,6 +88,7 @@ class Conversation:
         self.transcript = transcript
         self.stations: dict[tuple[Source, int, int], Station] = {}
         self.retries = 0
+        self.notes_values = True
         self._link = link
         self._coder = wire.coder()
         self._parsers: dict[Source, Any] = {}
@@ -236,7 +243,8 @@ class Conversation:
             station.landed = message.landed_state
         elif kind == "SYSTEM_TIME":
             self._boot(station, message.time_boot_ms)
-        if is_ours and kind in _TOLD:
+        is_told = kind in _TOLD and (self.notes_values or kind != "PARAM_VALUE")
+        if is_ours and is_told and self._partner is not None:
             self.transcript.note(f"< {_words(message)}")
         return is_ours
 
@@ -265,9 +273,9 @@ class Conversation:
 def _words(message: Any) -> str:
     fields = []
     for name in message.get_fieldnames():
-        if name in ("target_system", "target_component"):
-            continue
         value = getattr(message, name)
+        if name in _ADDRESSES or (message.get_type() == "COMMAND_LONG" and value == 0 and name != "param1"):
+            continue
         if name == "param_value":
             value = f"0x{_bits(message):08x}"
         elif isinstance(value, list | tuple | bytes | bytearray):

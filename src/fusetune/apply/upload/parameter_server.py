@@ -174,7 +174,11 @@ class ParameterServer:
         """
         for _ in range(self._talk.pace.passes):
             before = self.checksum()
-            listed = self._list()
+            self._talk.notes_values = False
+            try:
+                listed = self._list()
+            finally:
+                self._talk.notes_values = True
             if listed is not None and self.checksum() == before:
                 return Listing(listed, before)
         raise NoAnswer("the vehicle's parameters keep changing while they are read")

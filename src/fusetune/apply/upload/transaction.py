@@ -150,8 +150,8 @@ class Transaction:
         raise NoAnswer("the values do not stay as they were written")
 
     def _pass(self, order: Sequence[Change], goal: Goal) -> bool:
-        self._see_who_it_is()
         self._reboots = self._talk.partner.reboots
+        self._see_who_it_is()
         with self._talk.guarded():
             for change in order:
                 if self._read(change, goal) != change.value(goal):

@@ -26,7 +26,13 @@ from fusetune.apply.upload.judged import DECISION, Judged, read_judged
 from fusetune.apply.upload.links import open_link
 from fusetune.apply.upload.pace import Pace
 from fusetune.apply.upload.parameter_server import Listing, ParameterServer
-from fusetune.apply.upload.refusals import refuse_changed, refuse_flying, refuse_foreign, refuse_missing, refuse_timeless
+from fusetune.apply.upload.refusals import (
+    refuse_changed,
+    refuse_flying,
+    refuse_foreign,
+    refuse_missing,
+    refuse_timeless,
+)
 from fusetune.apply.upload.stops import LinkLost, Refusal, Stopped
 from fusetune.apply.upload.transaction import Transaction, Unfinished
 from fusetune.apply.upload.transcript import Transcript
@@ -264,7 +270,10 @@ class Upload:
             transcript.tell(f"Done: {_count(record.changes)} written, saved and read back.")
             _tell_reboot(transcript, record)
             return Outcome.WRITTEN
-        transcript.tell("All values are as they were before, read back. " + transaction.unsaved)
+        transcript.tell("All values are as they were before, read back.")
+        if transaction.unsaved:
+            told = "It is not confirmed that they are saved"
+            transcript.tell(f"{told} ({transaction.unsaved}); PX4 saves by itself: look again after the next start.")
         return Outcome.TAKEN_BACK
 
     def _tell_unfinished(self, transaction: Transaction, why: str) -> None:
