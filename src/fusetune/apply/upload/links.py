@@ -119,61 +119,86 @@ class UdpLink:
         self._socket.close()
 
 
-class TcpLink:
-    """A connection, made again when it breaks."""
+class _Line:
+    """A link to one vehicle that may break, and is opened anew."""
 
     _AGAIN_S = 0.5
 
-    def __init__(self, name: str, host: str, port: int) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
         self.sources: set[Source] = {name}
-        self._address = (host, port)
-        self._socket: socket.socket | None = None
-        self._connect()
+        self._end: Any = self._open()
 
-    def _connect(self) -> None:
-        self._socket = socket.create_connection(self._address, timeout=5.0)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket.settimeout(2.0)
+    def _open(self) -> Any:
+        """Open it; raises `OSError`."""
+        raise NotImplementedError
+
+    def _read(self, timeout_s: float) -> bytes:
+        """What has come, after a while nothing; raises `OSError` where it is broken."""
+        raise NotImplementedError
+
+    def _write(self, data: bytes) -> None:
+        """Send; raises `OSError` where it is broken."""
+        raise NotImplementedError
 
     def receive(self, timeout_s: float) -> list[tuple[Source, bytes]]:
-        """What has come; while the connection is broken nothing."""
-        if self._socket is None:
-            time.sleep(min(max(timeout_s, 0.0), self._AGAIN_S))
-            with suppress(OSError):
-                self._connect()
-            return []
+        """What has come; while the line is broken nothing."""
+        data = b""
         try:
-            readable, _, _ = select.select([self._socket], [], [], max(timeout_s, 0.0))
-            data = self._socket.recv(_LARGEST) if readable else None
+            if self._end is None:
+                time.sleep(min(max(timeout_s, 0.0), self._AGAIN_S))
+                self._end = self._open()
+            else:
+                data = self._read(max(timeout_s, 0.0))
         except OSError:
-            data = b""
-        if data == b"":
-            self._broken()
+            self.close()
         return [(self.name, data)] if data else []
 
     def send(self, data: bytes, source: Source) -> None:
         """Send whole, or break."""
-        if self._socket is not None:
-            try:
-                self._socket.sendall(data)
-            except OSError:
-                self._broken()
-
-    def _broken(self) -> None:
-        if self._socket is not None:
-            self._socket.close()
-        self._socket = None
+        try:
+            if self._end is not None:
+                self._write(data)
+        except OSError:
+            self.close()
 
     def close(self) -> None:
-        """End the connection."""
-        self._broken()
+        """Leave the line."""
+        with suppress(OSError):
+            if self._end is not None:
+                self._end.close()
+        self._end = None
 
 
-class SerialLink:
-    """A serial line, by pyserial, opened again when it was unplugged."""
+class TcpLink(_Line):
+    """A connection."""
 
-    _AGAIN_S = 0.5
+    def __init__(self, name: str, host: str, port: int) -> None:
+        self._address = (host, port)
+        super().__init__(name)
+
+    def _open(self) -> socket.socket:
+        made = socket.create_connection(self._address, timeout=5.0)
+        made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        made.settimeout(2.0)
+        return made
+
+    def _read(self, timeout_s: float) -> bytes:
+        readable, _, _ = select.select([self._end], [], [], timeout_s)
+        if not readable:
+            return b""
+        data: bytes = self._end.recv(_LARGEST)
+        if not data:
+            raise ConnectionError("the other side has closed it")
+        return data
+
+    def _write(self, data: bytes) -> None:
+        self._end.sendall(data)
+
+
+class SerialLink(_Line):
+    """A serial line, by pyserial."""
+
     _LONGEST_READ_S = 0.1
 
     def __init__(self, name: str, device: str, baud: int) -> None:
@@ -183,39 +208,17 @@ class SerialLink:
             raise UserError(
                 name, "needs pyserial, which is not installed", "Install it: pip install 'fusetune[upload]'"
             ) from None
-        self.name = name
-        self.sources: set[Source] = {name}
         self._make = lambda: serial.Serial(
             device, baud, timeout=self._LONGEST_READ_S, write_timeout=2.0, exclusive=True
         )
-        self._port: Any = self._make()
+        super().__init__(name)
 
-    def receive(self, timeout_s: float) -> list[tuple[Source, bytes]]:
-        """What has come; while the line is unplugged nothing."""
-        if self._port is None:
-            time.sleep(min(max(timeout_s, 0.0), self._AGAIN_S))
-            with suppress(OSError):
-                self._port = self._make()
-            return []
-        try:
-            self._port.timeout = min(max(timeout_s, 0.0), self._LONGEST_READ_S)
-            data = self._port.read(max(self._port.in_waiting, 1))
-        except OSError:
-            self.close()
-            return []
-        return [(self.name, data)] if data else []
+    def _open(self) -> Any:
+        return self._make()
 
-    def send(self, data: bytes, source: Source) -> None:
-        """Send whole, or break."""
-        if self._port is not None:
-            try:
-                self._port.write(data)
-            except OSError:
-                self.close()
+    def _read(self, timeout_s: float) -> bytes:
+        self._end.timeout = min(timeout_s, self._LONGEST_READ_S)
+        return bytes(self._end.read(max(self._end.in_waiting, 1)))
 
-    def close(self) -> None:
-        """Leave the line."""
-        with suppress(OSError):
-            if self._port is not None:
-                self._port.close()
-        self._port = None
+    def _write(self, data: bytes) -> None:
+        self._end.write(data)
