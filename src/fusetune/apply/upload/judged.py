@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fusetune.apply.provenance import file_hash
 from fusetune.apply.upload.values import Type, Value
 from fusetune.errors import RUN_AGAIN, UserError
 from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 from fusetune.px4.parameters.params_file import ParamEntry, read_params
 from fusetune.storage.documents import read_document
+from fusetune.storage.files import sha256_of
 
 DECISION = "decision.json"
 
@@ -59,7 +59,7 @@ def read_judged(file: Path) -> Judged:
     entries = read_params(file)
     decision = read_document(decision_file)
     try:
-        if decision["parameter_files"][file.name] != file_hash(file):
+        if decision["parameter_files"][file.name] != sha256_of(file):
             raise UserError(file, "is no longer as the decision beside it wrote it", RUN_AGAIN)
         return _judged(file, entries, decision)
     except (KeyError, TypeError, AttributeError) as error:
