@@ -20,6 +20,7 @@ from fusetune.apply.upload.pace import Pace
 from fusetune.apply.upload.stops import Refusal
 from fusetune.apply.upload.transcript import Transcript
 from fusetune.apply.upload.uploading import Asked, Outcome, Upload
+from fusetune.errors import UserError
 
 VALUES = made_values(200)
 LOSSY = {"loss": 0.1, "double": 0.05, "delay_s": (0.0, 0.008)}
@@ -193,6 +194,8 @@ def test_a_link_that_is_gone_for_good_ends_with_what_is_known_and_is_gone_on_wit
             Told(running, tmp_path).upload.new(file)
         again = Told(running, tmp_path)
         assert again.upload.resume(None) is Outcome.WRITTEN
+        with pytest.raises(UserError, match="has ended, with all new values"):
+            Told(running, tmp_path).upload.resume(told.upload.folder)
         [report] = running.reports()
     assert f"{FIRST}: 0.7, the new value, as last read" in told.text
     assert f"{LAST}: 0.05, the old value: nothing was sent" in told.text
@@ -205,6 +208,24 @@ def test_a_link_that_is_gone_for_good_ends_with_what_is_known_and_is_gone_on_wit
 def test_an_upload_whose_process_dies_is_gone_on_with_or_taken_back(tmp_path: Path) -> None:
     trial = try_upload(8, killed_at=9)
     assert (trial.outcome, trial.resumed, trial.wrong) == ("written", 1, [])
+
+
+def test_what_was_not_finished_may_be_taken_back_instead(tmp_path: Path) -> None:
+    """Then it has ended, and a new upload may begin."""
+    file = write_decision(tmp_path / "apply")
+    faults = {"silent_after_sets": 2, "silent_s": 30.0}
+    with vehicle_running({"values": VALUES, "faults": faults}, pace=PACE) as running:
+        told = Told(running, tmp_path, pace=Pace(patience_s=5.0).times(PACE))
+        assert told.upload.new(file) is Outcome.UNFINISHED
+        folder = told.upload.folder
+        assert folder is not None
+        back = Told(running, tmp_path)
+        assert back.upload.rollback(folder) is Outcome.WRITTEN
+        assert read_journal(folder).ended == "old"
+        assert Told(running, tmp_path).upload.new(file) is Outcome.WRITTEN
+        [report] = running.reports()
+    assert back.questions == ["Write 2 values to the vehicle?"]
+    assert stands(report) == {"new"}
 
 
 @pytest.mark.parametrize("way", ["tcp", "pty"])

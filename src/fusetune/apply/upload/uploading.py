@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from enum import Enum
 from pathlib import Path
 
-from fusetune.apply.upload.backup import read_backup, write_backup
+from fusetune.apply.upload.backup import write_backup
 from fusetune.apply.upload.conversation import Conversation
 from fusetune.apply.upload.difference import difference_table, needs_reboot
+from fusetune.apply.upload.folders import end_others, new_folder, newest_unended, refuse_unended
 from fusetune.apply.upload.journal import (
     BACKUP,
-    JOURNAL,
     TRANSCRIPT,
     Change,
     Goal,
     Journal,
-    NothingPlanned,
     Record,
     read_journal,
 )
-from fusetune.apply.upload.judged import DECISION, Judged, read_judged
+from fusetune.apply.upload.judged import Judged, read_judged
 from fusetune.apply.upload.links import open_link
 from fusetune.apply.upload.pace import Pace
 from fusetune.apply.upload.parameter_server import Listing, ParameterServer
@@ -38,6 +36,7 @@ from fusetune.apply.upload.transaction import Transaction, Unfinished
 from fusetune.apply.upload.transcript import Transcript
 from fusetune.apply.upload.values import Value
 from fusetune.apply.upload.vehicles import Identity, choose_vehicle, find_vehicles, identify, learn_state
+from fusetune.apply.upload.way_back import WayBack, read_way_back, refuse_other
 from fusetune.errors import UserError
 
 Ask = Callable[[str, Callable[[], None]], bool]
@@ -102,7 +101,7 @@ class Upload:
 
         Of a backup that lies beside the journal of its upload only what that wrote is taken back. Raises as `new`.
         """
-        wanted = _read_rollback(file)
+        wanted = read_way_back(file)
         return self._with_vehicle(lambda talk: self._write_back(talk, wanted))
 
     def resume(self, folder: Path | None) -> Outcome:
@@ -110,7 +109,7 @@ class Upload:
 
         Raises as `new`.
         """
-        folder = folder or _newest_unended(self.asked.folder)
+        folder = folder or newest_unended(self.asked.folder)
         record = read_journal(folder)
         if record.ended:
             raise UserError(folder, f"has ended, with all {record.ended} values", "There is nothing to go on with")
@@ -153,23 +152,21 @@ class Upload:
         identity, server = self._meet(talk)
         refuse_flying(talk.partner)
         refuse_foreign(judged, identity)
-        _refuse_unended(self.asked.folder, identity)
+        refuse_unended(self.asked.folder, identity)
         listing = server.all()
         refuse_changed(judged, listing.values)
         return self._plan_and_write(talk, server, identity, listing, judged.wanted, "upload", judged.file)
 
-    def _write_back(self, talk: Conversation, wanted: _Wanted) -> Outcome:
+    def _write_back(self, talk: Conversation, wanted: WayBack) -> Outcome:
         identity, server = self._meet(talk)
         refuse_flying(talk.partner)
-        if isinstance(wanted.of, Judged):
-            refuse_foreign(wanted.of, identity)
-        else:
-            _refuse_other(wanted.of, identity)
+        refuse_other(wanted, identity)
         listing = server.all()
         refuse_missing(wanted.values, listing.values)
         outcome = self._plan_and_write(talk, server, identity, listing, wanted.values, "rollback", wanted.file)
-        if outcome is Outcome.WRITTEN:
-            _end_others(self.asked.folder, identity, set(wanted.values), self.folder)
+        stands = all(listing.values[name] == value for name, value in wanted.values.items())
+        if outcome is Outcome.WRITTEN or stands:
+            end_others(self.asked.folder, identity, set(wanted.values), self.folder)
         return outcome
 
     def _plan_and_write(
@@ -191,7 +188,7 @@ class Upload:
         if not changes:
             transcript.tell("The vehicle has these values already: there is nothing to write.")
             return Outcome.NOTHING
-        self.folder = folder = _new_folder(self.asked.folder, identity)
+        self.folder = folder = new_folder(self.asked.folder, identity)
         transcript.keep_in(folder / TRANSCRIPT)
         write_backup(folder / BACKUP, identity, listing)
         agrees = " Its own checksum agrees." if listing.agrees else ""
@@ -286,85 +283,6 @@ class Upload:
             f"To go on when it is there, disarmed: fusetune upload --to {self.asked.address} --resume "
             f"--folder {self.folder}. Do not fly before."
         )
-
-
-@dataclass(frozen=True)
-class _Wanted:
-    """Values to go back to, and of whom they are."""
-
-    file: Path
-    values: Mapping[str, Value]
-    of: Judged | tuple[str, str]
-    """The decision, or id and release of a backup."""
-
-
-def _read_rollback(file: Path) -> _Wanted:
-    if file.is_dir():
-        file = file / BACKUP
-    if file.with_name(DECISION).exists():
-        judged = read_judged(file)
-        return _Wanted(file, judged.wanted, judged)
-    backup = read_backup(file)
-    values = backup.values
-    if file.with_name(JOURNAL).exists():
-        touched = [change.name for change in read_journal(file.parent).changes]
-        values = {name: values[name] for name in touched if name in values}
-    return _Wanted(file, values, (backup.uuid, backup.release))
-
-
-def _refuse_other(of: tuple[str, str], identity: Identity) -> None:
-    if of != (identity.uuid, identity.release):
-        raise Refusal(
-            f"the backup is of board {of[0] or 'that tells no id'} with PX4 {of[1]}, and this is {identity.in_words}",
-            "Connect that vehicle, with that release",
-        )
-
-
-def _new_folder(folder: Path, identity: Identity) -> Path:
-    name = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}_{identity.uuid[-8:] or 'unknown'}"
-    for number in range(1, 1000):
-        made = folder / (name if number == 1 else f"{name}_{number}")
-        try:
-            made.mkdir(parents=True)
-        except FileExistsError:
-            continue
-        return made
-    raise UserError(folder, "is full of uploads of this second", "Wait a second")
-
-
-def _unended(folder: Path) -> Iterator[tuple[Path, Record]]:
-    """Folders of uploads that have not ended, the newest first."""
-    for one in sorted((path.parent for path in folder.glob(f"*/{JOURNAL}")), reverse=True):
-        try:
-            record = read_journal(one)
-        except NothingPlanned:
-            continue
-        if not record.ended:
-            yield one, record
-
-
-def _refuse_unended(folder: Path, identity: Identity) -> None:
-    for one, record in _unended(folder):
-        if record.uuid == identity.uuid and record.sent:
-            raise Refusal(
-                f"an upload to this vehicle is not finished: {one}",
-                f"Go on with it by --resume --folder {one}, or take it back by --rollback {one}",
-            )
-
-
-def _end_others(folder: Path, identity: Identity, names: set[str], by: Path | None) -> None:
-    """Unfinished uploads whose parameters have all been taken back by another one have ended, too."""
-    for one, record in _unended(folder):
-        if record.uuid == identity.uuid and names >= {change.name for change in record.changes}:
-            journal = Journal(one)
-            journal.write("ended", **{"with": "old", "by": str(by)})
-            journal.close()
-
-
-def _newest_unended(folder: Path) -> Path:
-    for one, _ in _unended(folder):
-        return one
-    raise UserError(folder, "holds no upload that has not ended", "There is nothing to go on with")
 
 
 def _which(change: Change, value: Value | None) -> str:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from fusetune.apply.upload import wire
 from fusetune.apply.upload.conversation import Conversation, Station
 from fusetune.apply.upload.stops import LinkLost, NoAnswer, Refusal
 from fusetune.apply.upload.values import Encoding
@@ -158,8 +159,6 @@ def _autopilot_version(talk: Conversation) -> Any:
     except LinkLost:
         raise
     except NoAnswer:
-        from fusetune.apply.upload import wire
-
         # what PX4 of before v1.12 knows
         number = common.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES
         system, component = talk.partner.system, talk.partner.component
