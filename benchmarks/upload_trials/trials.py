@@ -81,11 +81,11 @@ def try_upload(
         file = write_decision(Path(folder) / "decision")
         upload = _upload(running, Path(folder), told)
         begun_s = time.monotonic()
-        outcome, retries, resumed = _first(upload, file, killed_at), upload.retries, 0
+        outcome, retries, resumed = _first(upload, file, killed_at, told), upload.retries, 0
         while outcome == "unfinished" and again and resumed < _MOST_RESUMED:
             resumed += 1
             further = _upload(running, Path(folder), told)
-            outcome = _said(lambda further=further: further.resume(upload.folder))  # type: ignore[misc]
+            outcome = _said(lambda further=further: further.resume(upload.folder), told)  # type: ignore[misc]
             outcome = "unfinished" if outcome == "refused" else outcome
             retries += further.retries
         seconds = (time.monotonic() - begun_s) / PACE
@@ -101,9 +101,9 @@ def _upload(running: RunningVehicle, folder: Path, told: list[str]) -> Upload:
     return Upload(Asked(running.address, folder / "uploads", lambda *_: True, Transcript(told.append), pace=pace))
 
 
-def _first(upload: Upload, file: Path, killed_at: int) -> str:
+def _first(upload: Upload, file: Path, killed_at: int, told: list[str]) -> str:
     if not killed_at:
-        return _said(lambda: upload.new(file))
+        return _said(lambda: upload.new(file), told)
     write, count = Journal.write, 0
 
     def dying(journal: Journal, event: str, **details: Any) -> None:
@@ -115,17 +115,18 @@ def _first(upload: Upload, file: Path, killed_at: int) -> str:
 
     Journal.write = dying  # type: ignore[method-assign]
     try:
-        return _said(lambda: upload.new(file))
+        return _said(lambda: upload.new(file), told)
     except _Killed:
         return "unfinished"
     finally:
         Journal.write = write  # type: ignore[method-assign]
 
 
-def _said(act: Callable[[], Outcome]) -> str:
+def _said(act: Callable[[], Outcome], told: list[str]) -> str:
     try:
         return act().value
-    except Refusal:
+    except Refusal as refusal:
+        told.append(f"refused: {refusal}")
         return "refused"
 
 

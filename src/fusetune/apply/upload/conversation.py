@@ -147,7 +147,7 @@ class Conversation:
         ----------
         make : makes the message anew for each attempt
         what : was asked for, in words
-        attempts : those of the pace if 0
+        attempts : those of the pace if 0; only those count during which the vehicle is heard
 
         Raises
         ------
@@ -156,14 +156,17 @@ class Conversation:
         LinkLost
             It is not heard either.
         """
-        wait_s = self.pace.answer_s
-        for attempt in range(attempts or self.pace.attempts):
-            self.retries += attempt > 0
+        wait_s, in_vain = self.pace.answer_s, 0
+        while in_vain < (attempts or self.pace.attempts):
+            heard = self.partner.heartbeats
             self.send(make())
             for message in self.listen(wait_s):
                 if is_answer(message):
                     return message
             self.see_that_it_is_there(what)
+            self.retries += 1
+            # while nothing at all comes it is no wonder that no answer does
+            in_vain += self.partner.heartbeats > heard
             wait_s = min(wait_s * self.pace.longer, self.pace.longest_answer_s)
         raise NoAnswer(f"the vehicle does not answer: {what}")
 

@@ -188,23 +188,21 @@ class ParameterServer:
         gathered = _Gathered(self.encoding)
         self._talk.send(wire.param_request_list(*self._address))
         self._gather(gathered, self._talk.pace.quiet_s)
-        fruitless = 0
+        in_vain = 0
         while not gathered.is_whole:
             if gathered.changed:
                 return None
-            fruitless += 1
-            if fruitless > self._talk.pace.attempts:
+            if in_vain > self._talk.pace.attempts:
                 raise NoAnswer(f"{len(gathered.missing()) or 'all'} of the vehicle's parameters cannot be had")
             self._talk.see_that_it_is_there("its parameters")
             self._talk.retries += 1
-            before = len(gathered.values)
+            before, heard = len(gathered.values), self._talk.partner.heartbeats
             if gathered.count == 0:
                 self._talk.send(wire.param_request_list(*self._address))
             for index in gathered.missing()[:_MOST_ASKED_AT_ONCE]:
                 self._talk.send(wire.param_request_read(*self._address, index=index))
             self._gather(gathered, self._talk.pace.answer_s)
-            if len(gathered.values) > before:
-                fruitless = 0
+            in_vain = 0 if len(gathered.values) > before else in_vain + (self._talk.partner.heartbeats > heard)
         return None if gathered.changed else gathered.in_order()
 
     def _gather(self, gathered: _Gathered, quiet_s: float) -> None:
