@@ -22,7 +22,7 @@ def main() -> int:
     bad = 0
     print(f"times are {1 / PACE:.0f} times as fast as a vehicle's, and told by its clock")
     print(f"{'what':22} {'tries':>5}  {'how they ended':38} {'s, median (most)':>18} {'asked again':>12} "
-          f"{'resumed':>7} {'reboots':>7} {'writes':>6} {'armed':>5} {'wrong':>5}")  # fmt: skip
+          f"{'resumed':>7} {'reboots':>7} {'writes':>6} {'armed':>5} {'wrong':>5} {'since s':>7}")  # fmt: skip
     for name, (count, run, allowed) in KINDS.items():
         if options.kind not in name:
             continue
@@ -44,7 +44,8 @@ def _row(name: str, trials: list[Trial]) -> str:
         f"{name:22} {len(trials):5}  {ended:38} {f'{median(seconds):.0f} ({max(seconds):.0f})':>18} "
         f"{f'{median(retries):.0f} ({max(retries)})':>12} {sum(one.resumed for one in trials):7} "
         f"{sum(one.reboots for one in trials):7} {sum(one.sets for one in trials):6} "
-        f"{sum(one.sets_while_armed for one in trials):5} {sum(len(one.wrong) for one in trials):5}"
+        f"{sum(one.sets_while_armed for one in trials):5} {sum(len(one.wrong) for one in trials):5} "
+        f"{max(one.armed_s for one in trials):7.2f}"
     )
 
 

@@ -33,6 +33,7 @@ class Trial:
     ----------
     outcome : "written", "taken back", "refused", "unfinished"
     sets, sets_while_armed : PARAM_SETs that reached the vehicle
+    armed_s : how long it had been armed when the last of the latter came; 0 without one
     wrong : what is not as it should be; empty where all is well
     seconds : of the upload, by the vehicle's clock
     resumed : how often it was gone on with
@@ -46,6 +47,7 @@ class Trial:
     resumed: int
     seconds: float
     wrong: list[str]
+    armed_s: float = 0.0
     told: list[str] = field(repr=False, default_factory=list)
 
 
@@ -92,8 +94,9 @@ def try_upload(
         [report] = running.reports()
     sets = report["sets"]
     armed = sum(one["armed"] for one in sets)
+    armed_s = max((one["armed_s"] for one in sets), default=0.0)
     wrong = _wrong(outcome, report, vehicle["values"])
-    return Trial(outcome, len(sets), armed, report["reboots"], retries, resumed, seconds, wrong, told)
+    return Trial(outcome, len(sets), armed, report["reboots"], retries, resumed, seconds, wrong, armed_s, told)
 
 
 def _upload(running: RunningVehicle, folder: Path, told: list[str]) -> Upload:

@@ -108,6 +108,7 @@ class Vehicle:
         self._coder = common.MAVLink(None, srcSystem=traits.system, srcComponent=1)
         self._booted_s = time.monotonic() - _UP_BEFORE_S
         self._armed, self._running = traits.faults.armed, True
+        self._armed_at_s = time.monotonic()
         self._saved_s, self._saving = float("-inf"), False
         self._uid = traits.uid
         self._life = 0
@@ -210,7 +211,9 @@ class Vehicle:
         bits = field_bits
         if kind == "INT32" and self.traits.cast:
             bits = struct.unpack("<I", struct.pack("<i", int(struct.unpack("<f", struct.pack("<I", bits))[0])))[0]
-        self.sets.append({"name": name, "bits": bits, "armed": self._armed, "uid": self._uid})
+        armed_s = (time.monotonic() - self._armed_at_s) / self.pace if self._armed else 0.0
+        sent = {"name": name, "bits": bits, "armed": self._armed, "armed_s": armed_s, "uid": self._uid}
+        self.sets.append(sent)
         if name in self.values and message.param_type == TYPES[kind]:
             if self._is_refused(name, bits):
                 if faults.error:
@@ -255,7 +258,7 @@ class Vehicle:
         self._down.silent = self._up.silent = False
 
     def _arm(self) -> None:
-        self._armed = True
+        self._armed, self._armed_at_s = True, time.monotonic()
         if self.traits.faults.disarm_after_s:
             self._schedule.after(self.traits.faults.disarm_after_s * self.pace, self._disarm)
 

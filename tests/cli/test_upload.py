@@ -33,7 +33,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (["--yes"], None, 0, "Done: 8 values written", 8),
         ([], None, 1, "Give --yes if you mean it", 0),
-        ([], "y\n", 0, "Nothing was written.", 0),
+        ([], "y\n", 0, "Nothing was written now.", 0),
         ([], "yes\n", 0, "Done: 8 values written", 8),
     ],
 )

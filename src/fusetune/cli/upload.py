@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 HELP = "write the decided parameters to the vehicle, verified, or take them back"
 TAKEN_BACK = 3
-"""Exit status where it did not work and all values are again as they were; `REFUSED` where nothing was written."""
+"""Exit status where it did not work and what was written is taken back; `REFUSED` where nothing was written."""
 UNFINISHED = 4
 """Exit status where it is not known of all values which stand: `--resume` goes on."""
 

@@ -6,6 +6,9 @@ says otherwise; `benchmarks/upload_trials` tries the same many times.
 
 from __future__ import annotations
 
+import errno
+import os
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +18,7 @@ from benchmarks.upload_trials.running import RunningVehicle, vehicle_running
 from benchmarks.upload_trials.trials import PACE, try_upload
 
 from fusetune.apply.upload.backup import read_backup
-from fusetune.apply.upload.journal import read_journal
+from fusetune.apply.upload.journal import Journal, read_journal
 from fusetune.apply.upload.pace import Pace
 from fusetune.apply.upload.stops import Refusal
 from fusetune.apply.upload.transcript import Transcript
@@ -66,11 +69,14 @@ def test_values_are_shown_backed_up_written_and_read_back_and_taken_back_on_dema
         assert no.upload.new(file) is Outcome.NOTHING
         told = Told(running, tmp_path)
         assert told.upload.new(file) is Outcome.WRITTEN
+        again = Told(running, tmp_path)
+        assert again.upload.new(file) is Outcome.NOTHING
         folder = told.upload.folder
         assert folder is not None
         back = Told(running, tmp_path)
         assert back.upload.rollback(folder) is Outcome.WRITTEN
         [report] = running.reports()
+    assert "has these values already" in again.text
     assert no.questions == told.questions == ["Write 8 values to the vehicle?"]
     [row] = [line for line in told.text.splitlines() if line.startswith("  EKF2_GPS_DELAY")]
     assert row.split() == ["EKF2_GPS_DELAY", "110", "40", "ms", "0", "…", "300", "after", "a", "reboot"]
@@ -166,7 +172,10 @@ def test_saving_that_is_not_confirmed_takes_all_back(tmp_path: Path) -> None:
         assert told.upload.new(file) is Outcome.TAKEN_BACK
         [report] = running.reports()
     assert "The vehicle does not answer: that it saves its parameters." in told.text
-    assert "All values are as they were before, read back.\nIt is not confirmed that they are saved" in told.text
+    assert (
+        "All values that were written are as they were before, read back.\nIt is not confirmed that they are saved"
+        in told.text
+    )
     assert len(report["sets"]) == 2 * len(NEW)
     assert stands(report) == {"old"}
 
@@ -208,6 +217,38 @@ def test_a_link_that_is_gone_for_good_ends_with_what_is_known_and_is_gone_on_wit
 def test_an_upload_whose_process_dies_is_gone_on_with_or_taken_back(tmp_path: Path) -> None:
     trial = try_upload(8, killed_at=9)
     assert (trial.outcome, trial.resumed, trial.wrong) == ("written", 1, [])
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (KeyboardInterrupt(), "Interrupted. What is known"),
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), "The journal cannot be written (No space left on device)"),
+    ],
+)
+def test_ctrl_c_and_a_full_disk_end_with_what_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, said: str
+) -> None:
+    write, lines = Journal.write, iter(range(100))
+
+    def failing(journal: Journal, event: str, **details: Any) -> None:
+        if next(lines) == 5:
+            raise error
+        write(journal, event, **details)
+
+    monkeypatch.setattr(Journal, "write", failing)
+    file = write_decision(tmp_path / "apply")
+    with vehicle_running({"values": VALUES}, pace=PACE) as running:
+        told = Told(running, tmp_path)
+        with pytest.raises(KeyboardInterrupt) if isinstance(error, KeyboardInterrupt) else nullcontext():
+            assert told.upload.new(file) is Outcome.UNFINISHED
+        [report] = running.reports()
+    # planned, two parameters sent and verified, the third about to be sent
+    assert len(report["sets"]) == 2
+    assert said in told.text
+    assert f"{FIRST}: 0.7, the new value, as last read" in told.text
+    assert "EKF2_GPS_CHECK: 1023, the old value, as last read" in told.text
+    assert "--resume" in told.text
 
 
 def test_what_was_not_finished_may_be_taken_back_instead(tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ class ParameterServer:
         self._talk.catch_up()
         answer = self._talk.ask(
             lambda: wire.param_request_read(*self._address, name),
-            lambda message: _is_about(message, name),
+            lambda message: _is_about(message, name) and not _is_about_writing(message),
             f"the value of {name}",
         )
         if answer.get_type() == "PARAM_ERROR":
@@ -254,6 +254,11 @@ class _Gathered:
     def in_order(self) -> dict[str, Value]:
         """By name, in the order of the list."""
         return {name: value for _, (name, value) in sorted(self.values.items())}
+
+
+def _is_about_writing(message: Any) -> bool:
+    """Whether it is an error that no reading has: a late one, of a PARAM_SET before."""
+    return message.get_type() == "PARAM_ERROR" and message.error != common.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
 def _is_about(message: Any, name: str) -> bool:

@@ -26,6 +26,7 @@ class Transcript:
 
     def keep_in(self, path: Path) -> None:
         """Append to a file from now on."""
+        self.close()
         self._file = open(path, "a", encoding="utf-8", errors="backslashreplace")  # noqa: SIM115
         for line in self._before:
             self._file.write(line)

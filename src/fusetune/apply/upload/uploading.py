@@ -51,7 +51,7 @@ class Outcome(Enum):
     NOTHING = "nothing"
     """Nothing was to be done, or the pilot said no."""
     TAKEN_BACK = "taken back"
-    """It did not work, and all values are again as they were, read back."""
+    """It did not work, and all values that were written are again as they were, read back."""
     UNFINISHED = "unfinished"
     """Which values stand is not known of all; it can be gone on with."""
 
@@ -154,6 +154,8 @@ class Upload:
         refuse_foreign(judged, identity)
         refuse_unended(self.asked.folder, identity)
         listing = server.all()
+        if all(listing.values.get(name) == value for name, value in judged.wanted.items()):
+            return self._nothing_to_write()
         refuse_changed(judged, listing.values)
         return self._plan_and_write(talk, server, identity, listing, judged.wanted, "upload", judged.file)
 
@@ -186,8 +188,7 @@ class Upload:
             if listing.values[name] != value
         )
         if not changes:
-            transcript.tell("The vehicle has these values already: there is nothing to write.")
-            return Outcome.NOTHING
+            return self._nothing_to_write()
         self.folder = folder = new_folder(self.asked.folder, identity)
         transcript.keep_in(folder / TRANSCRIPT)
         write_backup(folder / BACKUP, identity, listing)
@@ -206,6 +207,10 @@ class Upload:
             if listing.is_changed_only_by(now, server.checksum()):
                 transcript.tell("The vehicle's checksum of all parameters says that nothing else has changed.")
         return outcome
+
+    def _nothing_to_write(self) -> Outcome:
+        self.asked.transcript.tell("The vehicle has these values already: there is nothing to write.")
+        return Outcome.NOTHING
 
     def _go_on(self, talk: Conversation, folder: Path, record: Record) -> Outcome:
         self.folder = folder
@@ -240,7 +245,7 @@ class Upload:
         said = self.asked.ask(question, meanwhile)
         self.asked.transcript.note("yes" if said else "no")
         if not said:
-            self.asked.transcript.tell("Nothing was written.")
+            self.asked.transcript.tell("Nothing was written now.")
         return said
 
     def _run(
@@ -267,7 +272,7 @@ class Upload:
             transcript.tell(f"Done: {_count(record.changes)} written, saved and read back.")
             _tell_reboot(transcript, record)
             return Outcome.WRITTEN
-        transcript.tell("All values are as they were before, read back.")
+        transcript.tell("All values that were written are as they were before, read back.")
         if transaction.unsaved:
             told = "It is not confirmed that they are saved"
             transcript.tell(f"{told} ({transaction.unsaved}); PX4 saves by itself: look again after the next start.")
