@@ -83,7 +83,7 @@ def test_a_missing_library_is_told_with_what_to_install(
 ) -> None:
     monkeypatch.setattr(needs, "find_spec", lambda name: None)
     assert main(["upload", "--to", "udp:14550"]) == 2
-    assert "Install it: pip install 'fusetune[upload]'" in capsys.readouterr().err
+    assert "needs pymavlink, which is not installed. Install it: pip install pymavlink" in capsys.readouterr().err
     real = builtins.__import__
 
     def without_serial(name: str, *others: Any) -> Any:

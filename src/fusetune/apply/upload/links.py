@@ -12,6 +12,7 @@ import time
 from contextlib import suppress
 from typing import Any, Protocol
 
+from fusetune.apply.upload.needs import INSTALL
 from fusetune.apply.upload.stops import Refusal
 from fusetune.errors import UserError
 
@@ -205,9 +206,7 @@ class SerialLink(_Line):
         try:
             import serial
         except ImportError:
-            raise UserError(
-                name, "needs pyserial, which is not installed", "Install it: pip install 'fusetune[upload]'"
-            ) from None
+            raise UserError(name, "needs pyserial, which is not installed", INSTALL) from None
         self._make = lambda: serial.Serial(
             device, baud, timeout=self._LONGEST_READ_S, write_timeout=2.0, exclusive=True
         )

@@ -6,10 +6,10 @@ from importlib.util import find_spec
 
 from fusetune.errors import UserError
 
+INSTALL = "Install it: pip install pymavlink pyserial"
+
 
 def require_pymavlink() -> None:
     """See that pymavlink is there; raises `UserError` where it is not."""
     if find_spec("pymavlink") is None:
-        raise UserError(
-            "upload", "needs pymavlink, which is not installed", "Install it: pip install 'fusetune[upload]'"
-        )
+        raise UserError("upload", "needs pymavlink, which is not installed", INSTALL)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -203,10 +203,15 @@ class Upload:
         journal.begin(record)
         outcome = self._run(talk, server, identity, journal, record)
         if outcome is Outcome.WRITTEN:
-            now = {change.name: change.new for change in changes}
-            if listing.is_changed_only_by(now, server.checksum()):
-                transcript.tell("The vehicle's checksum of all parameters says that nothing else has changed.")
+            self._tell_the_rest(listing, changes, server)
         return outcome
+
+    def _tell_the_rest(self, listing: Listing, changes: Sequence[Change], server: ParameterServer) -> None:
+        """Whether anything else has changed on the vehicle, where its checksum tells."""
+        alone = listing.is_changed_only_by({change.name: change.new for change in changes}, server.checksum())
+        if alone is not None:
+            what = "nothing" if alone else "something"
+            self.asked.transcript.tell(f"The vehicle's checksum of all parameters says that {what} else has changed.")
 
     def _nothing_to_write(self) -> Outcome:
         self.asked.transcript.tell("The vehicle has these values already: there is nothing to write.")
