@@ -24,6 +24,7 @@ from fusetune.storage.file_lock import LocksUnavailableError, lock
 JOURNAL, BACKUP, TRANSCRIPT = "journal.jsonl", "backup.params", "transcript.txt"
 Goal = Literal["new", "old"]
 _SEAL_DIGITS = 16
+_FROM_BACKUP = "Move the folder away, and roll back by its backup.params, copied to another folder"
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ def read_journal(folder: Path) -> Record:
         for entry in entries[1:]:
             _follow(record, entry)
     except (KeyError, TypeError, ValueError) as error:
-        raise UserError(path, f"does not tell what was done ({error})", "Roll back with --rollback") from error
+        raise UserError(path, f"does not tell what was done ({error})", _FROM_BACKUP) from error
     return record
 
 
@@ -188,7 +189,7 @@ def _entries(content: bytes, path: Path) -> tuple[Sequence[Mapping[str, Any]], s
         if not line.endswith(b"\n") or told != _seal(seal, text):
             if number == len(lines):
                 break
-            raise UserError(path, f"is damaged at line {number}", "Roll back with --rollback and the backup beside it")
+            raise UserError(path, f"is damaged at line {number}", _FROM_BACKUP)
         seal, whole = told, whole + len(line)
         entries.append(json.loads(text))
     return entries, seal, whole
