@@ -62,21 +62,28 @@ def imported_by(file: Path) -> Iterator[str]:
             yield node.module.partition(".")[0]
 
 
+UPLOAD = ("src/fusetune/apply/upload", "benchmarks/upload_trials")
+
+
 @pytest.mark.parametrize(
-    ("folders", "extra"), [(["src", "workflow", "benchmarks"], []), (["tests"], ["test"])], ids=["pipeline", "tests"]
+    ("folders", "extra"),
+    [(["src", "workflow", "benchmarks"], []), (UPLOAD, ["upload"]), (["tests"], ["test"])],
+    ids=["pipeline", "upload", "tests"],
 )
 def test_what_is_imported_is_declared(project_root: Path, folders: list[str], extra: list[str]) -> None:
-    """Pipeline and benchmarks need no more than a plain installation, the tests no more than the extra `test`."""
+    """Pipeline and benchmarks need no more than a plain installation, uploads and tests no more than their extras."""
     project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     asked = project["dependencies"] + [text for name in extra for text in project["optional-dependencies"][name]]
     declared = {Requirement(text).name.lower() for text in asked}
     suffixes = {".py", ".smk"}
     files = [file for folder in folders for file in (project_root / folder).rglob("*") if file.suffix in suffixes]
+    if folders is not UPLOAD:
+        files = [file for file in files if not file.relative_to(project_root).as_posix().startswith(UPLOAD)]
     scripts = {file.stem for file in (project_root / "workflow" / "scripts").glob("*.py")}
     ours = {"fusetune", "benchmarks", "tests", *scripts, *sys.stdlib_module_names}
     files.append(project_root / "Snakefile")
     found = {name: file for file in files for name in imported_by(file) if name not in ours}
-    assert "numpy" in found
+    assert ("pymavlink" if folders is UPLOAD else "numpy") in found
     of = packages_distributions()
     missing = {name: file for name, file in found.items() if not declared & {d.lower() for d in of.get(name, [name])}}
     assert missing == {}

@@ -13,6 +13,8 @@ from tests.apply.study import make_study
 from fusetune.apply.decide import decide
 from fusetune.apply.recommended import Recommended
 from fusetune.apply.settings import DecisionSettings
+from fusetune.apply.upload.judged import read_judged
+from fusetune.apply.upload.values import Value
 from fusetune.design.study import load_study
 from fusetune.errors import UserError
 from fusetune.px4.parameters.params_file import read_params
@@ -60,6 +62,14 @@ def test_a_clearly_better_set_is_chosen_and_written(tmp_path: Path) -> None:
     assert decision["paragraphs"][-1].startswith("Next: (1) Load best_params.params")
     (back,) = read_params(tmp_path / "apply" / "rollback.params")
     assert (back.name, back.value) == ("EKF2_ACC_NOISE", pytest.approx(0.35, abs=1e-7))
+    # what an upload asks of it
+    judged = read_judged(tmp_path / "apply" / "best_params.params")
+    old, new, same = (Value.of("FLOAT", number) for number in (0.35, 0.2, 0.015))
+    assert dict(judged.wanted) == {"EKF2_ACC_NOISE": new}
+    assert dict(judged.present) == {"EKF2_ACC_NOISE": old, "EKF2_GYR_NOISE": same}
+    assert (judged.uuid, judged.release) == ("", "v1.16.0")
+    undone = read_judged(tmp_path / "apply" / "rollback.params")
+    assert (undone.wanted["EKF2_ACC_NOISE"], undone.present["EKF2_ACC_NOISE"]) == (old, new)
 
 
 def test_identical_sets_keep_the_present_one(tmp_path: Path) -> None:

@@ -9,7 +9,20 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, covariance, design, diagnose, fidelity, mission, replay, save, search, simulate, study
+from fusetune.cli import (
+    cards,
+    covariance,
+    design,
+    diagnose,
+    fidelity,
+    mission,
+    replay,
+    save,
+    search,
+    simulate,
+    study,
+    upload,
+)
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -25,6 +38,7 @@ COMMANDS: Mapping[str, Command] = {
     "fidelity": fidelity,
     "diagnose": diagnose,
     "search": search,
+    "upload": upload,
 }
 """In the order of the pipeline."""
 
@@ -70,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="fusetune",
         description="Single steps of the pipeline; `snakemake` runs them all.",
         epilog="Exit status: 0 all is done; 1 a log was refused, diagnose warns; 2 the command or a file is unusable; "
-        "3 diagnose found a failure.",
+        "3 diagnose found a failure, upload took all back; 4 upload is not finished.",
     )
     parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fusetune.px4.releases import name_of_version
+
 TopicKey = tuple[str, int]
 """PX4 topic name and instance (``multi_id``)."""
 
@@ -143,11 +145,7 @@ class Flight:
     @property
     def release_name(self) -> str:
         """Release as PX4 writes it, with the stage: ``"v1.13.3"``, ``"v1.15.0-beta"``, ``"unknown"``."""
-        if self.release is None:
-            return "unknown"
-        stage = int(str(self.info["ver_sw_release"])) & 0xFF
-        suffix = "" if stage == 255 else "-rc" if stage >= 192 else "-beta" if stage >= 128 else "-alpha"
-        return "v{}.{}.{}".format(*self.release) + ("-dev" if stage < 64 else suffix)
+        return "unknown" if self.release is None else name_of_version(int(str(self.info["ver_sw_release"])))
 
     @property
     def duration_s(self) -> float:

@@ -59,6 +59,16 @@ def name_of(release: Release) -> str:
     return "v" + ".".join(map(str, release))
 
 
+def name_of_version(version: int) -> str:
+    """A release with its stage, of PX4's number for it: a byte each for major, minor, patch and stage.
+
+    So it stands in a log's `ver_sw_release` and in MAVLink's `flight_sw_version`: ``"v1.13.3"``, ``"v1.15.0-beta"``.
+    """
+    major, minor, patch, stage = (version >> shift & 0xFF for shift in (24, 16, 8, 0))
+    suffix = "" if stage == 255 else "-rc" if stage >= 192 else "-beta" if stage >= 128 else "-alpha"
+    return f"{name_of((major, minor, patch))}{'-dev' if stage < 64 else suffix}"
+
+
 def deviation_of(release: Release) -> str:
     """How the estimator of a release differs from the baseline's, in words; empty for the baseline itself."""
     if release[:2] == BASELINE:
