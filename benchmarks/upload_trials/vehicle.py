@@ -28,7 +28,8 @@ class Faults:
     Attributes
     ----------
     armed, in_air : from the start; the landed state is left out where `landed_unknown`
-    arm_after_sets, arm_at_s, disarm_after_s : it arms at the PARAM_SET of the n-th parameter or at a time, and disarms so much later; 0: never
+    arm_after_sets, arm_at_s, disarm_after_s : it arms at the PARAM_SET of the n-th parameter or at a time, and disarms
+        so much later; 0: never
     reboot_after_sets, reboot_at_s : likewise
     silent_after_sets, silent_s : the link is gone from a PARAM_SET on for so long
     exchanged : another vehicle comes back after the first reboot
