@@ -9,9 +9,7 @@ of the vehicle's true path, which is computed here by other means from the simul
 
 from __future__ import annotations
 
-import argparse
 import math
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,13 +17,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.conformance.conformance import Conformance, conformance
-from fusetune.analyze.conformance.flown_track import FlownTrack, flown_track
-from fusetune.analyze.conformance.settings import ConformanceSettings
 from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Turn, Waypoint
-from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import GnssError, Vehicle, load_vehicle
-from fusetune.px4.flight import Flight
 from fusetune.px4.local_map import LocalMap
 
 Array = npt.NDArray[np.float64]

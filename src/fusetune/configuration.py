@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from fusetune.analyze.conformance.settings import ConformanceSettings
 from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.analyze.effects.settings import EffectSettings
 from fusetune.analyze.health.settings import HealthSettings
@@ -67,6 +68,11 @@ class Configuration:
         "file of the mission that is planned, and flown by the demonstration",
         at_least=1,
     )
+    missions_dir: str | None = setting(
+        None,
+        "folder whose missions, every `.yaml` in it, flights are compared with beside `mission`; empty: that one alone",
+        at_least=1,
+    )
     present_flight: str | None = setting(
         None, "name of the flight whose parameters count as the vehicle's present ones; empty: the newest that counts"
     )
@@ -99,6 +105,7 @@ class Configuration:
     delays: DelaySettings = section(DelaySettings)
     effects: EffectSettings = section(EffectSettings)
     health: HealthSettings = section(HealthSettings)
+    conformance: ConformanceSettings = section(ConformanceSettings)
     decision: DecisionSettings = section(DecisionSettings)
     seed: int = setting(1, "seed of the bootstrap of the decision", low=0)
 

@@ -21,6 +21,8 @@ SENSOR_NOISE_FILE = "sensor_noise.json"
 HEALTH_FILE = "health.json"
 EFFECTS_FILE = "effects.json"
 DIAGNOSIS_FILE = "diagnosis.json"
+TRACK_FILE = "track.parquet"
+CONFORMANCE_FILE = "conformance.json"
 ONBOARD_FILE = "onboard.innovations.parquet"
 FIDELITY_FILE = "fidelity.json"
 

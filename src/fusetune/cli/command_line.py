@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, design, diagnose, fidelity, replay, save, search, simulate, study
+from fusetune.cli import cards, conformance, design, diagnose, fidelity, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -22,6 +22,7 @@ COMMANDS: Mapping[str, Command] = {
     "replay": replay,
     "fidelity": fidelity,
     "diagnose": diagnose,
+    "conformance": conformance,
     "search": search,
 }
 """In the order of the pipeline."""

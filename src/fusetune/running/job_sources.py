@@ -60,6 +60,7 @@ JOB_SOURCES = {
         "analyze/smoothing",
     ),
     "diagnose": (*BASE, "design", "ekf2", "save", "analyze"),
+    "conformance": (*BASE, "design", "save", "analyze/conformance", "analyze/flight", "analyze/flight_files.py"),
     "score": (*BASE, "ekf2", "save", *_SCORED),
     "apply": (*BASE, "analyze/delays", "analyze/effects", "analyze/trials", "design", "apply"),
     "search": (*TRIED, "analyze/effects", "apply"),

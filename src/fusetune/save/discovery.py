@@ -20,6 +20,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from fusetune.errors import UserError
 from fusetune.storage.files import DEVICES
 
 _LOG = re.compile(r"\.ulg$", re.IGNORECASE | re.DOTALL)
@@ -98,6 +99,44 @@ def discover_logs(folder: str | os.PathLike[str]) -> Discovery:
     return Discovery(
         tuple(sorted(logs, key=lambda log: log.flight)), tuple(sorted(refused, key=lambda entry: entry.flight))
     )
+
+
+@dataclass(frozen=True)
+class GivenLog:
+    """A log of a command line, or why there is none.
+
+    Attributes
+    ----------
+    path : where it is
+    shown : as it can be printed
+    error : why it cannot be one, else None
+    """
+
+    path: str
+    shown: str
+    error: UserError | None = None
+
+
+def given_logs(paths: Iterable[str | os.PathLike[str]]) -> Iterator[GivenLog]:
+    """Logs, and those in folders among them, which are searched; what is no log is given with its error."""
+    for path in map(os.fspath, paths):
+        shown = printable(path)
+        if not os.path.isdir(path):
+            yield GivenLog(path, shown)
+            continue
+        try:
+            inside = discover_logs(path)
+        except OSError as error:
+            reason = f"cannot be listed ({error.strerror or error})"
+            yield GivenLog(path, shown, UserError(path, reason, "Mend its permissions"))
+            continue
+        for entry in inside.refused:
+            name = printable(os.path.join(path, entry.shown))
+            yield GivenLog(name, name, UserError(name, entry.reason, entry.remedy))
+        for log in inside.logs:
+            yield GivenLog(log.path, printable(os.path.join(path, log.shown)))
+        if not inside.refused and not inside.logs:
+            yield GivenLog(path, shown, UserError(shown, "holds no log", "Name a folder with .ulg files in it"))
 
 
 def printable(text: str) -> str:

@@ -123,7 +123,8 @@ def _times_at_ends(
             ends.append((visit.time, visit.time))
     last = next((one.leave for one in reversed(visits) if one is not None), None)
     if route[-2].kind == "return":
-        ends.append(_above_landing(track, place, route[-2], visits[-1].time if visits[-1] is not None else None, settings))
+        passed = visits[-1].time if visits[-1] is not None else None
+        ends.append(_above_landing(track, place, route[-2], passed, settings))
     ends.append(_touchdown(track, last))
     return ends
 
@@ -150,13 +151,16 @@ def _top(track: FlownTrack, place: Array, leg: RouteLeg, first: int | None, sett
 def _above_landing(
     track: FlownTrack, place: Array, leg: RouteLeg, last: int | None, settings: ConformanceSettings
 ) -> _Times:
-    """When the flight came above the place of landing, after the last waypoint."""
+    """When the flight came above the place of landing, after the last waypoint, and when it left that height."""
     if last is None:
         return None, None
     flat = np.hypot(*(place[:, :2] - leg.end[:2]).T)
     near = np.flatnonzero((track.time > last) & track.is_airborne & (flat <= settings.crossing_m))
-    time = int(track.time[near[0]]) if near.size else None
-    return time, time
+    if not near.size:
+        return None, None
+    sunk = np.flatnonzero(place[near[0] :, 2] > place[near[0], 2] + settings.height_m)
+    left = near[0] + max(int(sunk[0]) - 1, 0) if sunk.size else near[0]
+    return int(track.time[near[0]]), int(track.time[left])
 
 
 def _touchdown(track: FlownTrack, last: int | None) -> _Times:

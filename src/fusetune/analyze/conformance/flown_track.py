@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -31,7 +32,7 @@ TRACK_TOPICS = (
 )
 """What is read of a saved flight, in the layout of its release."""
 
-TrackSource = Literal["estimate", "gnss", "smoothed"]
+TrackSource = Literal["estimate", "gnss", "smoothed", "local"]
 
 STEP_US = 50_000
 """The track is looked at so often: at 20 m/s every metre."""
@@ -40,7 +41,8 @@ LONGEST_GAP_US = 2_000_000
 _BEFORE_TAKEOFF_US = 3_000_000
 _FIX_3D = 3
 _FEWEST = 10
-_BETWEEN_RESETS_DEG = 1e-9
+_NOWHERE_DEG = 1e-9
+"""A local origin at 0, 0 is none."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +51,10 @@ class FlownTrack:
 
     Attributes
     ----------
-    source : `estimate` (vehicle_local_position, estimator_local_position), `gnss`, or `smoothed` (`smoothed_track`)
+    source : `estimate` (vehicle_local_position, estimator_local_position), `gnss`, `smoothed` (`smoothed_track`), or
+        `local`, an estimate that has no place on earth
     time : (N,) µs since boot, ascending
-    lat, lon : (N,) degrees
+    lat, lon : (N,) degrees; NaN of a local estimate
     height : (N,) m above the place of take-off, or above mean sea level where the log begins in the air
     velocity : (N, 3) NED, m/s
     heading : (N,) rad, continuous; NaN where it is not known
@@ -77,6 +80,11 @@ class FlownTrack:
         """(N,)"""
         return inside(self.time, self.airborne)
 
+    @property
+    def has_place(self) -> bool:
+        """Whether it is known where on earth it is."""
+        return self.source != "local"
+
     def about(self, lat_deg: float, lon_deg: float, alt_m: float) -> Array:
         """(N, 3) north, east, down of a home, m; `alt_m` is its altitude, for heights above mean sea level."""
         local = LocalMap(lat_deg, lon_deg)
@@ -84,8 +92,14 @@ class FlownTrack:
         return np.column_stack([places, -(self.height - (0.0 if self.is_above_takeoff else alt_m))])
 
 
+def parts_of(time: npt.NDArray[np.int64]) -> list[slice]:
+    """Rows between the gaps of times (N,), µs."""
+    edges = [0, *(np.flatnonzero(np.diff(time) > LONGEST_GAP_US) + 1).tolist(), time.size]
+    return [slice(first, stop) for first, stop in pairwise(edges)]
+
+
 def flown_track(flight: Flight) -> FlownTrack | None:
-    """The track of a flight; None where its log holds no place on earth, or never says that it flew.
+    """The track of a flight; None where its log holds no place, or never says that it flew.
 
     Parameters
     ----------
@@ -94,8 +108,8 @@ def flown_track(flight: Flight) -> FlownTrack | None:
     airborne = airborne_intervals(flight, rows_of_primary(flight, "estimator_status_flags") or {})
     if not airborne:
         return None
-    found = _estimated(flight) or _received(flight)
-    return None if found is None else _gridded(*found, airborne)
+    found = _estimated(flight) or _received(flight) or _estimated(flight, is_global=False)
+    return None if found is None else _gridded(found[0], found[1], airborne)
 
 
 @dataclass(frozen=True)
@@ -112,23 +126,26 @@ class _Samples:
     vertical_sigma: Array
 
 
-def _estimated(flight: Flight) -> tuple[Literal["estimate"], _Samples] | None:
+def _estimated(flight: Flight, *, is_global: bool = True) -> tuple[Literal["estimate", "local"], _Samples] | None:
     table = flight.topic("vehicle_local_position")
     if table is None or not table["timestamp"].size:
         table = rows_of_primary(flight, "estimator_local_position")
     if table is None or not {"x", "y", "z", "vx", "vy", "vz", "ref_lat", "ref_lon"} <= set(table):
         return None
+    name: Literal["estimate", "local"] = "estimate" if is_global else "local"
     known = np.isfinite(table["x"]) & np.isfinite(table["y"]) & np.isfinite(table["z"])
-    known &= np.abs(table["ref_lat"]) + np.abs(table["ref_lon"]) > _BETWEEN_RESETS_DEG
-    for flag in ("xy_valid", "xy_global"):
+    if is_global:
+        known &= np.abs(table["ref_lat"]) + np.abs(table["ref_lon"]) > _NOWHERE_DEG
+    for flag in ("xy_valid", "xy_global") if is_global else ():
         if flag in table:
             known &= table[flag].astype(bool)
     rows = select_rows(table, known)
     if rows["timestamp"].size < _FEWEST:
         return None
-    lat, lon = _global_places(rows)
+    nowhere = np.full(rows["timestamp"].size, np.nan)
+    lat, lon = _global_places(rows) if is_global else (nowhere, nowhere)
     altitude = rows["ref_alt"].astype(np.float64) if "ref_alt" in rows else np.zeros(lat.size)
-    return "estimate", _Samples(
+    return name, _Samples(
         sample_times(rows), lat, lon, altitude - rows["z"].astype(np.float64), _columns(rows, "vx", "vy", "vz"),
         _column(rows, "heading"), _column(rows, "eph"), _column(rows, "epv"),
     )  # fmt: skip
@@ -140,9 +157,7 @@ def _global_places(rows: TopicTable) -> tuple[Array, Array]:
     for ref_lat, ref_lon in {*zip(lat.tolist(), lon.tolist(), strict=True)}:
         one = (rows["ref_lat"] == ref_lat) & (rows["ref_lon"] == ref_lon)
         local = LocalMap(ref_lat, ref_lon)
-        places = [
-            local.to_global(x, y) for x, y in zip(rows["x"][one].tolist(), rows["y"][one].tolist(), strict=True)
-        ]
+        places = [local.to_global(x, y) for x, y in zip(rows["x"][one].tolist(), rows["y"][one].tolist(), strict=True)]
         lat[one], lon[one] = np.array(places).T
     return lat, lon
 
@@ -155,7 +170,7 @@ def _received(flight: Flight) -> tuple[Literal["gnss"], _Samples] | None:
     if rows["timestamp"].size < _FEWEST:
         return None
     return "gnss", _Samples(
-        rows["timestamp"].astype(np.int64), *(_column(rows, name) for name in ("latitude_deg", "longitude_deg")),
+        rows["timestamp"].astype(np.int64), _column(rows, "latitude_deg"), _column(rows, "longitude_deg"),
         _column(rows, "altitude_msl_m"), _columns(rows, "vel_n_m_s", "vel_e_m_s", "vel_d_m_s"),
         np.full(rows["timestamp"].size, np.nan), _column(rows, "eph"), _column(rows, "epv"),
     )  # fmt: skip
@@ -169,9 +184,7 @@ def _columns(rows: TopicTable, *names: str) -> Array:
     return np.column_stack([_column(rows, name) for name in names])
 
 
-def _gridded(
-    source: Literal["estimate", "gnss"], samples: _Samples, airborne: Sequence[Interval]
-) -> FlownTrack | None:
+def _gridded(source: TrackSource, samples: _Samples, airborne: Sequence[Interval]) -> FlownTrack | None:
     first = np.r_[True, np.diff(samples.time) > 0]
     time = samples.time[first]
     grid = np.arange(time[0], time[-1], STEP_US)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, STEP_US, FlownTrack
+from fusetune.analyze.conformance.flown_track import STEP_US, FlownTrack, parts_of
 from fusetune.analyze.conformance.manoeuvre_classes import (
     CLIMB,
     DESCENT,
@@ -47,17 +47,11 @@ class Manoeuvre:
 def manoeuvres(track: FlownTrack, settings: ConformanceSettings = DEFAULTS) -> tuple[Manoeuvre, ...]:
     """The whole of a track in stretches of one class each, in order of time; where the log has gaps there is none."""
     found: list[Manoeuvre] = []
-    for part in _parts(track.time):
+    for part in parts_of(track.time):
         time = track.time[part]
         kinds = _kinds(time, track.velocity[part], track.heading[part], track.is_airborne[part], settings)
         found += _with_ends(_merged(list(_runs(time, kinds)), settings.shortest_s), settings)
     return tuple(found)
-
-
-def _parts(time: npt.NDArray[np.int64]) -> list[slice]:
-    cuts = np.flatnonzero(np.diff(time) > LONGEST_GAP_US) + 1
-    edges = [0, *cuts.tolist(), time.size]
-    return [slice(first, stop) for first, stop in zip(edges, edges[1:], strict=False)]
 
 
 def _kinds(

@@ -1,4 +1,4 @@
-"""From where on a waypoint counts as passed, and a moment as one manoeuvre or another; argued in docs/conformance.md."""
+"""When a waypoint counts as passed, and a moment as one manoeuvre or another; argued in docs/conformance.md."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ class ConformanceSettings:
     )  # fmt: skip
     """PX4's NAV_MC_ALT_RAD."""
     unknown_sigmas: float = setting(
-        3.0, "so many standard deviations of its own position a vehicle may be off without it being told", low=0, high=10
+        3.0,
+        "so many standard deviations of its own position a vehicle may be off without it being told",
+        low=0,
+        high=10,
     )
     least_unknown_m: float = setting(
         0.5, "least standard deviation of its own position and height that is assumed", unit="m", low=0, high=10

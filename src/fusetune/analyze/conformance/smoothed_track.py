@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
+from fusetune.analyze.conformance.flown_track import FlownTrack, parts_of
 from fusetune.analyze.metrics.attitude import interpolate, interpolate_quaternion
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.smoothing.smoothed_velocity import LONGEST_STRETCH_S, SmoothedVelocity, smoothed_velocity
@@ -47,8 +47,9 @@ def smoothed_track(observed: ObservedFlight, track: FlownTrack) -> FlownTrack:
         return track
     places = track.about(local.lat_deg, local.lon_deg, 0.0)[:, :2]
     found = places.copy()
-    for part in _parts(velocity.time):
-        _lay(found, places, track.time, _way(velocity, part), *received)
+    for part in parts_of(velocity.time):
+        if velocity.time[part][-1] - velocity.time[part][0] >= _SHORTEST_US:
+            _lay(found, places, track.time, _way(velocity, part), *received)
     lat, lon = np.array([local.to_global(*place) for place in found.tolist()]).T
     return replace(track, source="smoothed", lat=lat, lon=lon)
 
@@ -69,12 +70,6 @@ def _received(observed: ObservedFlight, local: LocalMap) -> tuple[npt.NDArray[np
     arm = [parameters[f"EKF2_GPS_POS_{axis}"] - parameters[f"EKF2_IMU_POS_{axis}"] for axis in "XYZ"]
     turn = rotation_matrix(interpolate_quaternion(states.time, states.quaternion, time[known]))
     return time[known], antenna - (turn @ np.array(arm))[:, :2]
-
-
-def _parts(time: npt.NDArray[np.int64]) -> list[slice]:
-    edges = [0, *(np.flatnonzero(np.diff(time) > LONGEST_GAP_US) + 1).tolist(), time.size]
-    parts = (slice(first, stop) for first, stop in zip(edges, edges[1:], strict=False))
-    return [part for part in parts if time[part][-1] - time[part][0] >= _SHORTEST_US]
 
 
 def _way(velocity: SmoothedVelocity, part: slice) -> tuple[npt.NDArray[np.int64], Array]:

@@ -1,10 +1,11 @@
 """When a flight passed which waypoint, and whether in its turn.
 
 Of each waypoint all visits count at first: stretches of time in which the vehicle was near enough. A mission flown in
-order is a chain of visits whose waypoints and times both ascend. The longest such chain is taken, and of several the one
-that goes the least way round: so loops flown before, detours, hovers and a missing start change nothing. A waypoint was
-passed in order if no other chain as long goes without it: of two that were swapped either could be left out, so neither
-was. One that is not of the chain was passed out of order if it has a visit that is nobody else's, or else missed.
+order is a chain of visits whose waypoints and times both ascend. The longest such chain is taken, and of several the
+one that goes the least way round: so loops flown before, detours, hovers and a missing start change nothing. A waypoint
+was passed in order if no other chain as long goes without it: of two that were swapped either could be left out, so
+neither was. One that is not of the chain was passed out of order if it has a visit that is nobody else's, or else
+missed.
 """
 
 from __future__ import annotations

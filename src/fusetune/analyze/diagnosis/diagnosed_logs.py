@@ -16,7 +16,7 @@ from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
 from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.finding import Finding, of_severity
 from fusetune.px4.ulog.reader import read_ulog
-from fusetune.save.discovery import discover_logs, printable
+from fusetune.save.discovery import given_logs
 from fusetune.save.verdict import judge
 from fusetune.storage.files import AnyPath
 
@@ -61,24 +61,11 @@ def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iter
     paths : logs, and folders that are searched for logs
     experiments : as for `diagnose`
     """
-    for path in map(Path, paths):
-        if not path.is_dir():
-            yield _diagnosed(path, printable(str(path)), experiments)
-            continue
-        try:
-            inside = discover_logs(path)
-        except OSError as error:
-            reason = f"cannot be listed ({error.strerror or error})"
-            yield DiagnosedLog(printable(str(path)), error=UserError(path, reason, "Mend its permissions"))
-            continue
-        for entry in inside.refused:
-            shown = printable(str(path / entry.shown))
-            yield DiagnosedLog(shown, error=UserError(shown, entry.reason, entry.remedy))
-        for log in inside.logs:
-            yield _diagnosed(Path(log.path), printable(str(path / log.shown)), experiments)
-        if not inside.refused and not inside.logs:
-            shown = printable(str(path))
-            yield DiagnosedLog(shown, error=UserError(shown, "holds no log", "Name a folder with .ulg files in it"))
+    for given in given_logs(paths):
+        if given.error is not None:
+            yield DiagnosedLog(given.shown, error=given.error)
+        else:
+            yield _diagnosed(Path(given.path), given.shown, experiments)
 
 
 def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
