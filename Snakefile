@@ -41,6 +41,7 @@ localrules:
     build_report,
     join_health,
     join_fleet,
+    join_conformance,
     sensors,
     fleet_page,
 

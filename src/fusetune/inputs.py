@@ -66,6 +66,9 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
         if study.needs_flights:
             reason = f"demonstration.study is {study_file!r}, whose sets follow from flights"
             raise UserError(file, reason, "Name a study with sets of its own")
+    if study.search is not None and settings.decision.only_classes:
+        reason = f"decision.only_classes is set, and {study_file!r} is a search, which compares whole flights"
+        raise UserError(file, reason, "Leave one of them out")
     mission = load_mission(settings.mission)
     simulated = dict(_simulated_flights(study, settings.demonstration.flights_per_set))
     for flight in settings.demonstration.faults:

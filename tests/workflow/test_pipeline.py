@@ -16,7 +16,7 @@ from tests.workflow.conftest import STUDY, Workspace
 from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
 SUMMARIES = dict.fromkeys(
-    ("list_flights", "join_delays", "join_health", "join_fleet", "decide", "plot_summary", "fleet_page", "build_report",
+    ("list_flights", "join_delays", "join_health", "join_fleet", "join_conformance", "decide", "plot_summary", "fleet_page", "build_report",
      "all"), 1
 )  # fmt: skip
 DECISION = "results/apply/decision.json"
@@ -36,7 +36,9 @@ def read_flights(workspace: Workspace) -> dict[str, dict[str, str]]:
 def test_an_empty_folder_plans_one_simulated_flight_per_set(workspace: Workspace) -> None:
     planned = workspace.planned_jobs()
     planned.pop("compile_kernels", None)
-    of_flights = dict.fromkeys(("simulate_flight", "save_flight", "diagnose_flight", "flight_page"), 2)
+    of_flights = dict.fromkeys(
+        ("simulate_flight", "save_flight", "diagnose_flight", "conform_flight", "flight_page"), 2
+    )
     assert planned == {"design": 1, **of_flights, **SUMMARIES}
 
 

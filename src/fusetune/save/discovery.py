@@ -27,7 +27,7 @@ _LOG = re.compile(r"\.ulg$", re.IGNORECASE | re.DOTALL)
 _PACKED = re.compile(r"\.ulg\.(gz|xz|bz2|zst|lz4|zip|7z)$", re.IGNORECASE | re.DOTALL)
 
 SD_CARD_FOLDER = "log"
-TABLE_NAMES = ("flights.parquet", "flights.csv", "present.json", "delays.json")
+TABLE_NAMES = ("flights.parquet", "flights.csv", "present.json", "delays.json", "legs.parquet")
 """Files that lie beside the folders of flights, of the save and of the analyze room."""
 LONGEST_NAME_BYTES = 120
 """File systems end names at 255 bytes; jobs append parts of their own."""
@@ -119,7 +119,7 @@ class GivenLog:
 
 def given_logs(paths: Iterable[str | os.PathLike[str]]) -> Iterator[GivenLog]:
     """Logs, and those in folders among them, which are searched; what is no log is given with its error."""
-    for path in map(os.fspath, paths):
+    for path in (os.fspath(one) for one in paths):
         shown = printable(path)
         if not os.path.isdir(path):
             yield GivenLog(path, shown)

@@ -63,10 +63,8 @@ def conformance_document(
     `flown` names the mission that explains the flight best, None where it is none of them; `missions` holds how it
     compares with each, `manoeuvres` the class of every moment.
     """
-    has_place = track is not None and track.has_place
-    compared = (
-        [conformance(flight, track, one, settings) for one in missions] if track is not None and has_place else []
-    )
+    placed = track if track is not None and track.has_place else None
+    compared = [] if placed is None else [conformance(flight, placed, one, settings) for one in missions]
     best = best_of(compared)
     moments = () if track is None else manoeuvres(track, settings)
     return {

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.conformance.flown_track import STEP_US, FlownTrack, parts_of
-from fusetune.analyze.conformance.manoeuvre_classes import (
+from fusetune.analyze.conformance.settings import DEFAULTS, ConformanceSettings
+from fusetune.analyze.flight.manoeuvre_classes import (
     CLIMB,
     DESCENT,
     GROUND,
@@ -19,7 +20,6 @@ from fusetune.analyze.conformance.manoeuvre_classes import (
     TAKEOFF,
     TURN,
 )
-from fusetune.analyze.conformance.settings import DEFAULTS, ConformanceSettings
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
