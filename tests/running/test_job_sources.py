@@ -41,7 +41,7 @@ MADE_BY = {
     "fleet_page": ("report", "apply", "diagnose", "save"),
     "plot_flight": ("report", "apply", "score", "replay", "save"),
     "plot_summary": ("report", "apply", "score", "replay", "save"),
-    "build_report": ("report", "apply", "score", "replay", "save"),
+    "build_report": ("report", "apply", "conformance", "diagnose", "score", "replay", "save"),
 }
 """Script → kind of job, and the kinds before it, of whose outcome it is made."""
 

@@ -47,6 +47,8 @@ rule flight_page:
         flight="results/save/{flight}",
         diagnosis="results/analyze/{flight}/diagnosis.json",
         told=expand("results/analyze/{{flight}}/{file}", file=DIAGNOSED_FILES),
+        track="results/analyze/{flight}/track.parquet",
+        conformance="results/analyze/{flight}/conformance.json",
     output:
         report(
             "results/report/flights/{flight}.html",
@@ -189,6 +191,7 @@ rule build_report:
         diagnoses=expand("results/analyze/{flight}/diagnosis.json", flight=LOGS),
         pages=expand("results/report/flights/{flight}.html", flight=LOGS),
         fleet="results/fleet.html",
+        missions="results/analyze/missions.json",
     output:
         report(
             "results/report.html",

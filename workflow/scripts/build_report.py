@@ -21,4 +21,5 @@ with logged_job(snakemake.log[0]):
         list(snakemake.input.diagnoses),
         list(snakemake.input.pages),
         snakemake.input.fleet,
+        snakemake.input.missions,
     )

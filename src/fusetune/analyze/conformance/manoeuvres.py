@@ -26,9 +26,10 @@ Flags = npt.NDArray[np.bool_]
 
 _AVERAGED_STEPS = 1_000_000 // STEP_US + 1
 """About a second: longer than gusts turn a vehicle, shorter than a turn."""
-_NEAR_GROUND_US = 3_000_000
-"""A climb that begins so soon after the vehicle left the ground is its take-off; PX4's land detector takes a second to
-notice, and it spools up over MPC_TKO_RAMP_T = 3 s."""
+_NEAR_GROUND_US = 5_000_000
+"""A climb that begins so soon after the vehicle left the ground is its take-off, a descent that ends so shortly before
+it has landed its landing: PX4's land detector takes three times LNDMC_TRIG_TIME, 1 s, from ground contact to landed,
+and the vehicle spools up over MPC_TKO_RAMP_T, 3 s."""
 
 
 @dataclass(frozen=True)

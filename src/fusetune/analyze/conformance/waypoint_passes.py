@@ -50,7 +50,7 @@ class WaypointPass:
     planned : how it was to be passed
     visit : when it was; None where it was not
     in_order : whether in its turn
-    nearest_m, nearest_height_m : how near it came on the whole flight, in place and height, for those that were missed
+    nearest_m, nearest_height_m : how near it came, in place and height, between the passes before and after it
     allowed_m : horizontal distance within which it would have been passed there
     """
 
@@ -86,8 +86,17 @@ def waypoint_passes(
         if visit is None:
             own = [other for other in visits if other.number == number]
             visit = next((other for other in own if not _is_taken(other, chain, planned)), None)
-        found.append(WaypointPass(planned_one, visit, number in sure, one.nearest_m, one.nearest_height_m, one.allowed))
+        row = one.nearest_between(*_turn_of(number, chain, track.time))
+        flat, height = float(one.flat[row]), float(one.height[row])
+        found.append(WaypointPass(planned_one, visit, number in sure, flat, height, one.allowed))
     return tuple(found)
+
+
+def _turn_of(number: int, chain: Sequence[Visit], time: npt.NDArray[np.int64]) -> tuple[int, int]:
+    """When a waypoint would have had its turn: between those before and after it in the chain, µs."""
+    before = [visit.time for visit in chain if visit.number < number]
+    after = [visit.time for visit in chain if visit.number > number]
+    return (max(before) if before else int(time[0])), (min(after) if after else int(time[-1]))
 
 
 @dataclass(frozen=True)
@@ -99,15 +108,11 @@ class _Near:
     height: Array
     inside: npt.NDArray[np.bool_]
     allowed: float
-    nearest: int
 
-    @property
-    def nearest_m(self) -> float:
-        return float(self.flat[self.nearest])
-
-    @property
-    def nearest_height_m(self) -> float:
-        return float(self.height[self.nearest])
+    def nearest_between(self, start: int, stop: int) -> int:
+        """Row of the nearest sample from one time to another, µs."""
+        away = np.hypot(self.flat, self.height)
+        return int(np.argmin(np.where((self.time >= start) & (self.time <= stop), away, np.inf)))
 
     def visits(self, number: int) -> list[Visit]:
         gaps = np.r_[False, np.diff(self.time) > LONGEST_GAP_US]
@@ -142,7 +147,7 @@ def _near(
     )
     radius = planned.radius_m(sigma, acceptance_m, settings)
     inside = track.is_airborne & (flat <= radius) & (np.abs(height) <= planned.height_m(height_sigma, settings))
-    return _Near(track.time, flat, height, inside, radius, row)
+    return _Near(track.time, flat, height, inside, radius)
 
 
 def _is_taken(visit: Visit, chain: Sequence[Visit], planned: Sequence[PlannedPass]) -> bool:
