@@ -3,12 +3,14 @@
 python -m benchmarks.conformance [--flights N] [--receiver rtk|consumer|both]
 
 Simulated flights of five shapes in gusts, two of them flown otherwise than they are asked about: of one a waypoint is
-left out, of another two are swapped. Each waypoint must be decided right, and the cross-track error of each leg be that
-of the vehicle's true path, which is computed here by other means from the simulator's ground truth.
+left out, of another two are swapped. Each waypoint must be decided right, and the distance beside each leg be that of
+the vehicle's true path, which is computed here by other means from the simulator's ground truth: once with the
+vehicle's own estimate, once with the smoothed track.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +19,19 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.conformance.conformance import Conformance, conformance
+from fusetune.analyze.conformance.flown_legs import FlownLeg, bends_of
+from fusetune.analyze.conformance.flown_track import flown_track
+from fusetune.analyze.conformance.settings import DEFAULTS
+from fusetune.analyze.conformance.smoothed_track import smoothed_track
+from fusetune.analyze.conformance.waypoint_passes import WaypointPass
+from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.design.missions.mission import Home, Landing, Mission, Takeoff, Turn, Waypoint
+from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
+from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import GnssError, Vehicle, load_vehicle
+from fusetune.execute.world.flight_plan import plan_flight
+from fusetune.px4.flight import Flight
 from fusetune.px4.local_map import LocalMap
 
 Array = npt.NDArray[np.float64]
@@ -155,3 +168,166 @@ def vehicle_with(receiver: str) -> Vehicle:
             reported=replace(gnss.reported, eph_m=0.02, epv_m=0.03),
         ),
     )
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A flight beside what is known of it.
+
+    Attributes
+    ----------
+    wrong : waypoints that were decided wrong, by index
+    errors : (L, 3) of each leg the error of the distance beside it, its mean, 95 % and maximum, m
+    receiver : (L,) what of the mean, with its sign, the receiver's own error explains; NaN of vertical legs
+    signed : (L,) error of the mean with its sign
+    """
+
+    verdict: str
+    wrong: tuple[int, ...]
+    waypoints: int
+    errors: Array
+    receiver: Array
+    signed: Array
+
+
+def judge(flown: Flown, vehicle: Vehicle, flight: Flight, found: Conformance) -> Judged:
+    """Hold what was found against the order that was flown, and against the true path."""
+    wrong = tuple(
+        index
+        for index, one in enumerate(found.passes)
+        if one.is_passed != (index in flown.order) or one.in_order != flown.in_order[index]
+    )
+    rows = []
+    for index, leg in enumerate(found.legs):
+        if leg.figures is None or leg.planned.kind != "travel":
+            continue
+        window = _window(flown, vehicle, leg, found.passes)
+        bends = bends_of(index, found.passes)
+        truth, right = _beside(flight, leg, window, bends)
+        told = (leg.figures.cross_track_mean, leg.figures.cross_track_95, leg.figures.cross_track_max)
+        rows.append((*(abs(one - true) for one, true in zip(told, truth, strict=True)),
+                     leg.figures.cross_track_bias - right, _receiver_error(flight, leg, window)))  # fmt: skip
+    table = np.array(rows)
+    return Judged(found.verdict, wrong, len(found.passes), table[:, :3], table[:, 4], table[:, 3])
+
+
+def _window(flown: Flown, vehicle: Vehicle, leg: FlownLeg, passes: Sequence[WaypointPass]) -> tuple[float, float]:
+    """When the plan of the simulator flies a leg that ends at a waypoint, s since boot."""
+    path = plan_flight(flown.mission, vehicle.limits).path
+    waypoint = leg.planned.waypoint
+    assert waypoint is not None, "a leg of travel ends at a waypoint"
+    place = flown.order.index(waypoint)
+    ends = _knots(flown, path.knots)
+    start_s = float(path.times_s[ends[place - 1][1] if place else 2])
+    stop_s = float(path.times_s[ends[place][0]])
+    # a stop is reached, and left, half of the filter's window later and earlier than its knots say
+    stopped = place > 0 and passes[flown.order[place - 1]].planned.is_stop
+    return (
+        start_s - path.half_window_s * (stopped or not place),
+        stop_s + path.half_window_s * passes[waypoint].planned.is_stop,
+    )
+
+
+def _knots(flown: Flown, knots: Array) -> list[tuple[int, int]]:
+    """First and last knot at each waypoint, in the order in which they were flown."""
+    local, found, row = LocalMap(HOME.lat, HOME.lon), [], 2
+    for one in flown.mission.waypoints:
+        target = np.array([*local.to_local(one.lat, one.lon), -one.alt])
+        # the simulator's map is that of the ellipsoid: 0.4 % longer
+        near = np.linalg.norm(knots - target, axis=1) < 1.0
+        first = row + int(np.argmax(near[row:]))
+        last = first + (1 if first + 1 < len(knots) and near[first + 1] else 0)
+        found.append((first, last))
+        row = last + 1
+    return found
+
+
+def _beside(
+    flight: Flight, leg: FlownLeg, window: tuple[float, float], bends: tuple[float, float]
+) -> tuple[tuple[float, float, float], float]:
+    """Mean, 95 % and maximum of the true distance beside a leg, and the mean with its sign, by complex numbers."""
+    table = flight.topics["vehicle_local_position_groundtruth", 0]
+    rows = (table["timestamp"] >= window[0] * 1e6) & (table["timestamp"] <= window[1] * 1e6)
+    north, east, down = (table[name][rows].astype(np.float64) for name in "xyz")
+    start, end = leg.planned.start, leg.planned.end
+    way = complex(end[0] - start[0], end[1] - start[1])
+    if abs(way) > 1.0:
+        turned = (north - start[0] + 1j * (east - start[1])) / (way / abs(way))
+        along, across, length = turned.real, turned.imag, abs(way)
+    else:
+        along, length = np.abs(down - start[2]), abs(end[2] - start[2])
+        across, bends = np.abs(north - start[0] + 1j * (east - start[1])), (DEFAULTS.height_m, DEFAULTS.height_m)
+    first, last = (min(one, 0.4 * length) for one in bends)
+    across = across[(along >= first) & (along <= length - last)]
+    beside = np.abs(across)
+    return (float(beside.mean()), float(np.quantile(beside, 0.95)), float(beside.max())), float(across.mean())
+
+
+def _receiver_error(flight: Flight, leg: FlownLeg, window: tuple[float, float]) -> float:
+    """Mean error of the receiver's positions across a leg, right of it above 0, m."""
+    way = np.subtract(leg.planned.end, leg.planned.start)[:2]
+    length = float(np.hypot(*way))
+    if length <= 1.0:
+        return math.nan
+    table, truth = flight.topics["vehicle_gps_position", 0], flight.topics["vehicle_local_position_groundtruth", 0]
+    time = table["timestamp"] - round(1e3 * flight.parameters.initial["EKF2_GPS_DELAY"])
+    rows = (time >= window[0] * 1e6) & (time <= window[1] * 1e6)
+    local = LocalMap(HOME.lat, HOME.lon)
+    columns = (table[name][rows].tolist() for name in ("latitude_deg", "longitude_deg"))
+    received = np.array([local.to_local(*place) for place in zip(*columns, strict=True)])
+    true = np.column_stack([np.interp(time[rows], truth["timestamp"], truth[name]) for name in "xy"])
+    return float(np.mean((received - true) @ np.array([-way[1], way[0]]) / length))
+
+
+def flown_and_judged(flown: Flown, receiver: str, *, smoothed: bool = True) -> dict[str, Judged]:
+    """Fly, and judge what is found by the vehicle's own estimate and, if asked for, by the smoothed track."""
+    vehicle = vehicle_with(receiver)
+    observed = ObservedFlight(fly(flown.mission, vehicle, {}, flown.seed, name=flown.name))
+    track = flown_track(observed.flight)
+    assert track is not None, "a simulated flight has a place on earth"
+    tracks = {"estimate": track} | ({"smoothed": smoothed_track(observed, track)} if smoothed else {})
+    return {
+        name: judge(flown, vehicle, observed.flight, conformance(observed.flight, one, flown.asked))
+        for name, one in tracks.items()
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Fly all, print a line for each, and the worst."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--flights", type=int, default=20)
+    parser.add_argument("--receiver", choices=(*RECEIVERS, "both"), default="both")
+    options = parser.parse_args(arguments)
+    use_kernel_cache()
+    for receiver in RECEIVERS if options.receiver == "both" else (options.receiver,):
+        judged: dict[str, list[Judged]] = {}
+        print(f"\nreceiver: {receiver}; errors of the distance beside a leg in m: mean / 95 % / maximum, worst leg")
+        print("| flight | verdict | waypoints right | by the estimate | smoothed |\n|---|---|---|---|---|")
+        for flown in flights(options.flights):
+            found = flown_and_judged(flown, receiver)
+            for name, one in found.items():
+                judged.setdefault(name, []).append(one)
+            right = " and ".join(
+                dict.fromkeys(f"{one.waypoints - len(one.wrong)} of {one.waypoints}" for one in found.values())
+            )
+            errors = [" / ".join(f"{worst:.3f}" for worst in one.errors.max(axis=0)) for one in found.values()]
+            print(f"| {flown.name} | {found['smoothed'].verdict} | {right} | {' | '.join(errors)} |", flush=True)
+        for name, each in judged.items():
+            errors = np.concatenate([one.errors for one in each])
+            signed, own = (np.concatenate([getattr(one, what) for one in each]) for what in ("signed", "receiver"))
+            level = np.isfinite(own)
+            wrong, total = sum(len(one.wrong) for one in each), sum(one.waypoints for one in each)
+            worst, usual = (list(one.round(3).tolist()) for one in (errors.max(axis=0), np.median(errors, axis=0)))
+            print(f"{name}: {wrong} of {total} waypoints wrong; {len(errors)} legs, worst {worst}, median {usual}")
+            print(
+                f"  mean beside {np.count_nonzero(level)} level legs, RMS: error {_rms(signed[level]):.3f}, "
+                f"receiver's own {_rms(own[level]):.3f}, what that leaves {_rms(signed[level] - own[level]):.3f}"
+            )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+if __name__ == "__main__":
+    main()

@@ -77,7 +77,7 @@ def conformance(
     place = track.about(mission.home.lat, mission.home.lon, mission.home.alt)
     parameters = {name: float(value) for name, value in flight.parameters.initial.items()}
     acceptance = parameters.get("NAV_ACC_RAD", settings.crossing_m)
-    passes = waypoint_passes(track, place, planned_passes(route, parameters), acceptance, settings)
+    passes = waypoint_passes(track, place, planned_passes(route, parameters, settings), acceptance, settings)
     legs = flown_legs(track, place, route, passes, settings)
     share = _on_route_share(track, place, legs)
     evidence = own_evidence(flight, track, mission)

@@ -29,7 +29,7 @@ class PlannedPass:
     leg : index of the leg of the route that ends there
     place : (3,) north, east, down of home, m
     cut_m : by how much the corner is cut, at most
-    bends_m : how far before and after the waypoint the path is bent
+    bends_m : how far before and after the waypoint the path is bent, or the vehicle comes and goes
     is_crossed : fly-over, or a stop
     is_stop : the vehicle holds there, or goes on straight down or to where it lands
     farthest_m : half-way to the waypoint before or after, whichever is nearer: beyond it would be that one's
@@ -62,7 +62,9 @@ class PlannedPass:
         return min(max(settings.height_m, settings.unknown_sigmas * sigma_m), self.farthest_m)
 
 
-def planned_passes(route: Sequence[RouteLeg], parameters: Mapping[str, float]) -> tuple[PlannedPass, ...]:
+def planned_passes(
+    route: Sequence[RouteLeg], parameters: Mapping[str, float], settings: ConformanceSettings
+) -> tuple[PlannedPass, ...]:
     """Of the legs of a mission, and of the parameters that the vehicle flew."""
     found = []
     for index, leg in enumerate(route):
@@ -73,7 +75,7 @@ def planned_passes(route: Sequence[RouteLeg], parameters: Mapping[str, float]) -
         crossed = stops or leg.turn == "fly_over"
         cut, bend = corner(leg, after, parameters)
         # the turn at a fly-over waypoint begins there
-        bends = (0.0, 0.0) if stops else (0.0, 2.0 * bend) if crossed else (bend, bend)
+        bends = (settings.crossing_m, settings.crossing_m) if stops else (0.0, 2.0 * bend) if crossed else (bend, bend)
         near = min((one.length_m for one in (leg, after) if one.length_m > NEAREST_WAYPOINTS_M), default=math.inf)
         found.append(
             PlannedPass(
