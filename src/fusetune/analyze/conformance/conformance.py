@@ -77,7 +77,8 @@ def conformance(
     place = track.about(mission.home.lat, mission.home.lon, mission.home.alt)
     parameters = {name: float(value) for name, value in flight.parameters.initial.items()}
     acceptance = parameters.get("NAV_ACC_RAD", settings.crossing_m)
-    passes = waypoint_passes(track, place, planned_passes(route, parameters, settings), acceptance, settings)
+    planned = planned_passes(route, parameters, settings)
+    passes = waypoint_passes(track, place, planned, (route[0].end, route[-1].start), acceptance, settings)
     legs = flown_legs(track, place, route, passes, settings)
     share = _on_route_share(track, place, legs)
     evidence = own_evidence(flight, track, mission)

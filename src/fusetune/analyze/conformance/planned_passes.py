@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,9 @@ class PlannedPass:
     waypoint : its index in the mission
     leg : index of the leg of the route that ends there
     place : (3,) north, east, down of home, m
+    hold_s : how long the vehicle is to wait there
     cut_m : by how much the corner is cut, at most
+    reversal_cut_m : by how much one is cut that turns back, the sharpest that another order can ask for
     bends_m : how far before and after the waypoint the path is bent, or the vehicle comes and goes
     is_crossed : fly-over, or a stop
     is_stop : the vehicle holds there, or goes on straight down or to where it lands
@@ -38,23 +40,28 @@ class PlannedPass:
     waypoint: int
     leg: int
     place: Array
+    hold_s: float
     cut_m: float
+    reversal_cut_m: float
     bends_m: tuple[float, float]
     is_crossed: bool
     is_stop: bool
     farthest_m: float
 
-    def radius_m(self, sigma_m: float, acceptance_m: float, settings: ConformanceSettings) -> float:
+    def radius_m(
+        self, sigma_m: float, acceptance_m: float, settings: ConformanceSettings, *, any_corner: bool = False
+    ) -> float:
         """Horizontal distance within which it is passed.
 
         Parameters
         ----------
         sigma_m : standard deviation of the vehicle's own place
         acceptance_m : its NAV_ACC_RAD, at which it turns to the next waypoint of those that it cuts
+        any_corner : whatever the corner, as where the order is another
         """
         near = max(settings.crossing_m, settings.unknown_sigmas * sigma_m)
         if not self.is_crossed:
-            near = max(near + self.cut_m, acceptance_m)
+            near = max(near + (self.reversal_cut_m if any_corner else self.cut_m), acceptance_m)
         return min(near, self.farthest_m)
 
     def height_m(self, sigma_m: float, settings: ConformanceSettings) -> float:
@@ -79,10 +86,24 @@ def planned_passes(
         near = min((one.length_m for one in (leg, after) if one.length_m > NEAREST_WAYPOINTS_M), default=math.inf)
         found.append(
             PlannedPass(
-                leg.waypoint, index, np.array(leg.end), 0.0 if crossed else cut, bends, crossed, stops, 0.5 * near
+                leg.waypoint,
+                index,
+                np.array(leg.end),
+                leg.hold_s,
+                0.0 if crossed else cut,
+                0.0 if crossed else corner(leg, turned_back(leg), parameters)[0],
+                bends,
+                crossed,
+                stops,
+                0.5 * near,
             )
         )
     return tuple(found)
+
+
+def turned_back(leg: RouteLeg) -> RouteLeg:
+    """The leg flown back."""
+    return replace(leg, start=leg.end, end=leg.start)
 
 
 def corner(leg: RouteLeg, after: RouteLeg, parameters: Mapping[str, float]) -> tuple[float, float]:
