@@ -29,7 +29,7 @@ def track_of(place: Array, airborne: Sequence[tuple[int, int]] | None = None) ->
     lat, lon = np.array([local.to_global(*one) for one in place[:, :2].tolist()]).T
     unknown = np.full(len(place), np.nan)
     velocity = np.gradient(place, STEP_US * 1e-6, axis=0)
-    flown = tuple(airborne) if airborne is not None else ((int(time[0]), int(time[-1]) + 1),)
+    flown = tuple(airborne) if airborne is not None else ((int(time[0]), int(time[-1])),)
     return FlownTrack("estimate", time, lat, lon, -place[:, 2], velocity, unknown, unknown, unknown, True, flown)
 
 

@@ -43,7 +43,7 @@ class Conformance:
     mission : what it is compared with
     passes : of each waypoint
     legs : of its route
-    on_route_share : of the way that was flown over ground, that of the legs that were flown, 0 … 1
+    on_route_share : of the way that was flown, what the legs that were flown ask for, 0 … 1
     evidence : what the log tells itself
     verdict, why : in words
     """
@@ -93,11 +93,14 @@ def best_of(compared: Sequence[Conformance]) -> Conformance | None:
 
 
 def _on_route_share(track: FlownTrack, place: Array, legs: Sequence[FlownLeg]) -> float:
-    """Share of the way in the air, hovers and vertical parts left out by their little way, that is of flown legs."""
+    """Of the way that was flown in the air the share that the legs flown ask for; what is more is detour."""
     step = np.r_[0.0, np.linalg.norm(np.diff(place, axis=0), axis=1)] * track.is_airborne
     total = float(step.sum())
-    flown = [(one.start, one.stop) for one in legs if one.start is not None and one.stop is not None]
-    on = sum(float(step[(track.time >= start) & (track.time < stop)].sum()) for start, stop in flown)
+    on = 0.0
+    for one in legs:
+        if one.start is not None and one.stop is not None:
+            way = float(step[(track.time >= one.start) & (track.time < one.stop)].sum())
+            on += min(way, one.planned.length_m)
     return min(on / total, 1.0) if total > 0.0 else 0.0
 
 
