@@ -139,6 +139,15 @@ def given_logs(paths: Iterable[str | os.PathLike[str]]) -> Iterator[GivenLog]:
             yield GivenLog(path, shown, UserError(shown, "holds no log", "Name a folder with .ulg files in it"))
 
 
+def log_error(shown: str, error: Exception) -> UserError:
+    """What to tell of a log that the system does not give, or that lacks what every log has."""
+    if isinstance(error, OSError):
+        reason = f"cannot be read ({error.strerror or error})"
+        return UserError(shown, reason, "Mend its permissions, or copy it again")
+    reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
+    return UserError(shown, reason, "Copy the log from the vehicle again")
+
+
 def printable(text: str) -> str:
     r"""A name as it can be written as UTF-8 into one line: what cannot is escaped, as in `\x0a` and `\xff`."""
     escaped = "".join(

@@ -12,16 +12,13 @@ from fusetune.analyze.conformance.flown_track import flown_track
 from fusetune.analyze.conformance.settings import DEFAULTS, ConformanceSettings
 from fusetune.analyze.conformance.smoothed_track import smoothed_track
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.analyze.reconstruction.settings import ReconstructionSettings
-from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
+from fusetune.analyze.replaying.settings import WITHOUT_GAPS
 from fusetune.design.missions.mission import Mission
 from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.px4.ulog.reader import read_ulog
-from fusetune.save.discovery import given_logs
+from fusetune.save.discovery import given_logs, log_error
 from fusetune.save.verdict import judge
 from fusetune.storage.files import AnyPath
-
-_AS_FLOWN = ReplaySettings(None, ReconstructionSettings(), StartSettings())
 
 
 @dataclass(frozen=True)
@@ -51,17 +48,13 @@ def conformed_logs(
 
 def _conformed(path: Path, shown: str, missions: Sequence[Mission], settings: ConformanceSettings) -> ConformedLog:
     try:
-        observed = ObservedFlight(read_ulog(path), _AS_FLOWN)
+        observed = ObservedFlight(read_ulog(path), WITHOUT_GAPS)
         track = flown_track(observed.flight)
         if track is not None and not judge(observed.flight).reasons:
             track = smoothed_track(observed, track)
         found = conformance_document(observed.flight, track, missions, settings)
     except UserError as error:
         return ConformedLog(shown, error=error)
-    except OSError as error:
-        reason = f"cannot be read ({error.strerror or error})"
-        return ConformedLog(shown, error=UserError(shown, reason, "Mend its permissions, or copy it again"))
-    except OF_DAMAGE as error:
-        reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
-        return ConformedLog(shown, error=UserError(shown, reason, "Copy the log from the vehicle again"))
+    except (OSError, *OF_DAMAGE) as error:
+        return ConformedLog(shown, error=log_error(shown, error))
     return ConformedLog(shown, rounded_figures(found))

@@ -16,16 +16,19 @@ class ConformanceSettings:
 
     crossing_m: float = setting(
         2.0,
-        "a waypoint that is crossed, or held at, is passed within this, or what the vehicle does not know if that is more",
+        "a waypoint that is crossed, or held at, is passed within this, or what the vehicle does not know if more",
         unit="m",
         above=0,
         high=100,
     )
     """NAV_ACC_RAD of PX4's multicopters: nearer it does not ask to come."""
     height_m: float = setting(
-        0.8, "a waypoint is passed within this height, or what the vehicle does not know of it if that is more", unit="m", above=0,
+        0.8,
+        "a waypoint is passed within this height, or what the vehicle does not know of it if more",
+        unit="m",
+        above=0,
         high=100,
-    )  # fmt: skip
+    )
     """PX4's NAV_MC_ALT_RAD."""
     unknown_sigmas: float = setting(
         3.0,

@@ -143,42 +143,32 @@ def _groups(table: pa.Table, *names: str) -> Iterator[tuple[tuple[Any, ...], npt
 
 def _add_aided(sums: _Sums, table: pa.Table, pieces: FlightPieces, compared: set[tuple[str, int]]) -> None:
     piece = pieces.at(table["time_us"].to_numpy())
-    column = {
-        name: table[name].to_numpy().astype(np.float64)
-        for name in ("innovation", "innovation_variance", "winsor_limit")
-    }
+    error, variance, limit = (
+        table[name].to_numpy().astype(np.float64) for name in ("innovation", "innovation_variance", "winsor_limit")
+    )
     for (name, source, axis), rows in _groups(table, "set", "source", "axis"):
         if (source, axis) in compared:
-            error, variance, limit = (one[rows] for one in column.values())
-            squares = np.square(winsorised(error, float(limit[0])))
-            sums.add(
-                (name, AIDED, source, int(axis), 0.0),
-                piece[rows],
-                np.ones(error.size),
-                squares,
-                squares / variance,
-                np.log(variance),
-                gaussian_nll(error, variance),
-            )
+            key = (name, AIDED, source, int(axis), 0.0)
+            clipped = winsorised(error[rows], float(limit[rows][0]))
+            _add_errors(sums, key, piece[rows], error[rows], clipped, variance[rows])
 
 
 def _add_unaided(sums: _Sums, table: pa.Table, pieces: FlightPieces) -> None:
     """A prediction belongs to the piece in which it is compared, its last second."""
     horizon = table["horizon_s"].to_numpy()
     piece = pieces.at(table["start_us"].to_numpy() + np.rint(1e6 * (horizon - 0.5)).astype(np.int64))
-    column = {name: table[name].to_numpy() for name in ("error", "error_winsorised", "variance")}
+    error, clipped, variance = (table[name].to_numpy() for name in ("error", "error_winsorised", "variance"))
     for (name, source, axis, seconds), rows in _groups(table, "set", "source", "axis", "horizon_s"):
-        error, clipped, variance = (one[rows] for one in column.values())
-        squares = np.square(clipped)
-        sums.add(
-            (name, UNAIDED, source, int(axis), float(seconds)),
-            piece[rows],
-            np.ones(error.size),
-            squares,
-            squares / variance,
-            np.log(variance),
-            gaussian_nll(error, variance),
-        )
+        key = (name, UNAIDED, source, int(axis), float(seconds))
+        _add_errors(sums, key, piece[rows], error[rows], clipped[rows], variance[rows])
+
+
+def _add_errors(
+    sums: _Sums, key: Key, piece: npt.NDArray[np.int64], error: Array, clipped: Array, variance: Array
+) -> None:
+    squares = np.square(clipped)
+    nll = gaussian_nll(error, variance)
+    sums.add(key, piece, np.ones(error.size), squares, squares / variance, np.log(variance), nll)
 
 
 def _add_smoothed(sums: _Sums, table: pa.Table, pieces: FlightPieces) -> None:

@@ -11,17 +11,13 @@ from fusetune.analyze.diagnosis.diagnose import diagnose
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.diagnosis.experiments import AT_MOST
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.analyze.reconstruction.settings import ReconstructionSettings
-from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
+from fusetune.analyze.replaying.settings import WITHOUT_GAPS as AS_FLOWN
 from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.finding import Finding, of_severity
 from fusetune.px4.ulog.reader import read_ulog
-from fusetune.save.discovery import given_logs
+from fusetune.save.discovery import given_logs, log_error
 from fusetune.save.verdict import judge
 from fusetune.storage.files import AnyPath
-
-AS_FLOWN = ReplaySettings(None, ReconstructionSettings(), StartSettings())
-"""The log is repaired and started as the pipeline does it; what a filter predicts without a sensor is not asked."""
 
 
 @dataclass(frozen=True)
@@ -79,13 +75,11 @@ def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
     except UserError as error:
         return DiagnosedLog(shown, error=error)
     except OSError as error:
-        reason = f"cannot be read ({error.strerror or error})"
-        return DiagnosedLog(shown, error=UserError(shown, reason, "Mend its permissions, or copy it again"))
+        return DiagnosedLog(shown, error=log_error(shown, error))
     except OF_DAMAGE as error:
         if refused:
             return DiagnosedLog(shown, error=_untold(shown, refused))
-        reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
-        return DiagnosedLog(shown, error=UserError(shown, reason, "Copy the log from the vehicle again"))
+        return DiagnosedLog(shown, error=log_error(shown, error))
     return DiagnosedLog(shown, found, flight.start_timestamp, flight.last_timestamp, why_not)
 
 
