@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fusetune.analyze.conformance.flown_legs import FlownLeg, flown_legs
 from fusetune.analyze.conformance.flown_track import TRACK_TOPICS, FlownTrack
 from fusetune.analyze.conformance.own_evidence import EVIDENCE_TOPICS, OwnEvidence, own_evidence
-from fusetune.analyze.conformance.planned_passes import planned_passes
+from fusetune.analyze.conformance.planned_passes import planned_passes, sound_value
 from fusetune.analyze.conformance.settings import DEFAULTS, ConformanceSettings
 from fusetune.analyze.conformance.waypoint_passes import WaypointPass, waypoint_passes
 from fusetune.design.missions.mission import Mission
@@ -76,7 +76,7 @@ def conformance(
     route = route_of(mission)
     place = track.about(mission.home.lat, mission.home.lon, mission.home.alt)
     parameters = {name: float(value) for name, value in flight.parameters.initial.items()}
-    acceptance = parameters.get("NAV_ACC_RAD", settings.crossing_m)
+    acceptance = sound_value(parameters, "NAV_ACC_RAD", settings.crossing_m)
     planned = planned_passes(route, parameters, settings)
     passes = waypoint_passes(track, place, planned, (route[0].end, route[-1].start), acceptance, settings)
     legs = flown_legs(track, place, route, passes, settings)

@@ -70,7 +70,7 @@ def _asked(flight: Flight, mission: Mission) -> tuple[int, ...] | None:
     table = flight.topic("position_setpoint_triplet")
     if table is None or not {"current.lat", "current.lon", "current.valid"} <= set(table):
         return None
-    valid = table["current.valid"].astype(bool)
+    valid = table["current.valid"].astype(bool) & np.isfinite(table["current.lat"]) & np.isfinite(table["current.lon"])
     places = {*zip(table["current.lat"][valid].tolist(), table["current.lon"][valid].tolist(), strict=True)}
     return tuple(
         index

@@ -101,6 +101,12 @@ def planned_passes(
     return tuple(found)
 
 
+def sound_value(parameters: Mapping[str, float], name: str, default: float) -> float:
+    """A parameter that is above 0; the default where a log lacks it, or holds what cannot be."""
+    value = float(parameters.get(name, default))
+    return value if math.isfinite(value) and value > 0.0 else default
+
+
 def turned_back(leg: RouteLeg) -> RouteLeg:
     """The leg flown back."""
     return replace(leg, start=leg.end, end=leg.start)
@@ -112,8 +118,8 @@ def corner(leg: RouteLeg, after: RouteLeg, parameters: Mapping[str, float]) -> t
     The velocity changes by Δv at the acceleration a, which itself comes and goes at the jerk j: within Δv/a + a/j. Over
     a corner that is passed so evenly the path leaves its waypoint by Δv T / 8 and the legs by v T / 2.
     """
-    acceleration = float(parameters.get("MPC_ACC_HOR", MPC_ACC_HOR))
-    jerk = float(parameters.get("MPC_JERK_AUTO", MPC_JERK_AUTO))
+    acceleration = sound_value(parameters, "MPC_ACC_HOR", MPC_ACC_HOR)
+    jerk = sound_value(parameters, "MPC_JERK_AUTO", MPC_JERK_AUTO)
     before_m_s, after_m_s = _velocity(leg), _velocity(after)
     change = float(np.linalg.norm(after_m_s - before_m_s))
     lasts_s = change / acceleration + acceleration / jerk

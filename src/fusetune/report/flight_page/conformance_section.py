@@ -32,7 +32,9 @@ def conformance_section(document: Document, picture: Path) -> str:
     parts.append(_manoeuvre_table(document))
     flown = next((one for one in missions if one["mission"] == document["flown"]), None)
     if flown is not None:
-        parts.append(paragraph(f"Places are those of {TRACK_WORDS[document['track']]}.", "note"))
+        track = TRACK_WORDS[document["track"]]
+        text = f"Places are those of {track}, and off by what the GNSS receiver is off by for minutes."
+        parts.append(paragraph(text, "note"))
         parts.append(details("Its legs", _leg_table(flown)))
         parts.append(details("Its waypoints", _waypoint_table(flown, document["start_us"])))
     return section("What was flown", *parts)
