@@ -85,7 +85,8 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     message = struct.pack("<HBB", len(note) + 1, ord("I"), len("char[5] note")) + note
     log = (flown.folder / "flights" / "first.ulg").read_bytes()
     (flown.folder / "flights" / "second.ulg").write_bytes(log + message)
-    assert flown.planned_jobs() == {"save_flight": 1, "diagnose_flight": 1, "flight_page": 1, **SUMMARIES}
+    of_flight = dict.fromkeys(("save_flight", "diagnose_flight", "conform_flight", "flight_page"), 1)
+    assert flown.planned_jobs() == {**of_flight, **SUMMARIES}
     flown.run_ok("--cores", "2", DECISION)
     assert read_flights(flown)["second"]["status"] == "replayable"
     assert replay_times(flown, "first/*.json") == before

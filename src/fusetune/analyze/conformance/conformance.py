@@ -29,6 +29,7 @@ VERDICTS: tuple[Verdict, ...] = ("flew", "flew in part", "flew otherwise", "not 
 """Those that fit best first."""
 
 _FEWEST_PASSED = 2
+"""A single waypoint is soon passed by a flight that means something else."""
 _PART_PASSED = 0.5
 _PART_ON_ROUTE = 0.5
 _FAR_M = 1000.0
@@ -119,7 +120,7 @@ def _judged(
     told = _asked_words(evidence, total)
     if len(passed) == total and not astray:
         return "flew", f"it passed all {total} waypoints in order{_beside(share)}"
-    is_part = len(passed) >= _PART_PASSED * total or (len(passed) >= _FEWEST_PASSED and share >= _PART_ON_ROUTE)
+    is_part = len(passed) >= _FEWEST_PASSED and (len(passed) >= _PART_PASSED * total or share >= _PART_ON_ROUTE)
     if is_part and astray:
         missing = f"; it missed {_listed(missed)}" if missed else ""
         return "flew otherwise", f"it passed {_listed(astray)} out of order{missing}{told}"
