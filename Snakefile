@@ -44,6 +44,7 @@ localrules:
     build_report,
     join_health,
     join_fleet,
+    join_conformance,
     sensors,
     covariances,
     fleet_page,

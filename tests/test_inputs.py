@@ -90,3 +90,36 @@ def test_a_search_waits_for_logs_too(settings: Configuration, project_root: Path
     assert [one.name for one in read_inputs(searching, "config.yaml").study.sets] == PAPER_SETS
     (tmp_path / "a.ulg").write_bytes(b"")
     assert read_inputs(searching, "config.yaml").study.search is not None
+
+
+def test_flights_are_compared_with_the_mission_and_those_of_a_folder(
+    settings: Configuration, project_root: Path, tmp_path: Path
+) -> None:
+    alone = read_inputs(settings, "config.yaml")
+    assert alone.mission_files == (settings.mission,)
+    folder = tmp_path / "missions"
+    folder.mkdir()
+    survey = (project_root / "config/missions/survey.yaml").read_text(encoding="utf-8")
+    (folder / "survey.yaml").write_text(survey, encoding="utf-8")
+    (folder / "notes.txt").write_text("no mission", encoding="utf-8")
+    several = replace(settings, missions_dir=str(folder))
+    assert read_inputs(several, "config.yaml").mission_files == (settings.mission, str(folder / "survey.yaml"))
+    (folder / "twin.yaml").write_text(survey, encoding="utf-8")
+    with pytest.raises(UserError, match=r"twin\.yaml: has the name 'survey', as .*survey\.yaml has"):
+        read_inputs(several, "config.yaml")
+    (folder / "twin.yaml").write_text("name: twin\n", encoding="utf-8")
+    with pytest.raises(UserError, match=r"twin\.yaml"):
+        read_inputs(several, "config.yaml")
+    with pytest.raises(UserError, match=r"config\.yaml: missions_dir is '.*nowhere', which is no folder"):
+        read_inputs(replace(settings, missions_dir=str(tmp_path / "nowhere")), "config.yaml")
+
+
+def test_a_search_compares_whole_flights(settings: Configuration, tmp_path: Path) -> None:
+    (tmp_path / "a.ulg").touch()
+    study = tmp_path / "search.yaml"
+    study.write_text("name: found\nkind: search\n", encoding="utf-8")
+    searching = replace(settings, study=str(study))
+    read_inputs(searching, "config.yaml")
+    hovering = replace(searching, decision=replace(settings.decision, only_classes=("hover",)))
+    with pytest.raises(UserError, match=r"decision\.only_classes is set, and .*search\.yaml' is a search"):
+        read_inputs(hovering, "config.yaml")

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any, Literal
 
+from fusetune.analyze.conformance.settings import ConformanceSettings
 from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.analyze.effects.settings import EffectSettings
 from fusetune.analyze.health.settings import HealthSettings
@@ -74,6 +75,12 @@ class Configuration:
         "while it is flown, else one with PX4's defaults",
         at_least=1,
     )
+    missions_dir: str | None = setting(
+        None,
+        "folder whose missions, every `.yaml` and `.plan` in it, flights are compared with beside `mission`; empty: "
+        "that one alone",
+        at_least=1,
+    )
     present_flight: str | None = setting(
         None, "name of the flight whose parameters count as the vehicle's present ones; empty: the newest that counts"
     )
@@ -111,6 +118,7 @@ class Configuration:
     delays: DelaySettings = section(DelaySettings)
     effects: EffectSettings = section(EffectSettings)
     health: HealthSettings = section(HealthSettings)
+    conformance: ConformanceSettings = section(ConformanceSettings)
     decision: DecisionSettings = section(DecisionSettings)
     seed: int = setting(1, "seed of the bootstrap of the decision", low=0)
 

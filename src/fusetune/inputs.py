@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from fusetune.configuration import Configuration
 from fusetune.design.missions.mission import Mission, load_mission
@@ -25,6 +27,8 @@ class Inputs:
     mission: Mission
     found: Discovery
     """Logs in the folder of flights and in folders below it, and what looks like one and cannot be flown."""
+    mission_files: tuple[str, ...]
+    """Missions that flights are compared with, the configuration's own first."""
     simulated: dict[str, str]
     """Flights of the demonstration, name → set flown: every set of the study in turn, as in the paper's experiment."""
 
@@ -62,6 +66,9 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
         if study.needs_flights:
             reason = f"demonstration.study is {study_file!r}, whose sets follow from flights"
             raise UserError(file, reason, "Name a study with sets of its own")
+    if study.search is not None and settings.decision.only_classes:
+        reason = f"decision.only_classes is set, and {study_file!r} is a search, which compares whole flights"
+        raise UserError(file, reason, "Leave one of them out")
     mission = load_mission(settings.mission)
     if settings.mission_vehicle is not None:
         load_vehicle(settings.mission_vehicle)
@@ -71,7 +78,7 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
         if flight not in simulated and not study.needs_flights:
             reason = f"demonstration.faults names the flight {flight!r}; expected one of {', '.join(simulated)}"
             raise UserError(file, reason, "Mend the name")
-    inputs = Inputs(study, study_file, mission, found, simulated)
+    inputs = Inputs(study, study_file, mission, found, _mission_files(settings, mission, file), simulated)
     if settings.present_flight not in (None, *inputs.flights):
         reason = f"present_flight is {settings.present_flight!r}, which is no flight in {settings.flights_dir!r}"
         raise UserError(file, reason, "Name one of its logs without .ulg, or leave it empty for the newest")
@@ -96,6 +103,30 @@ def _simulated_flights(study: Study, flights_per_set: int) -> Iterator[tuple[str
     digits = len(str(len(turns)))
     for number, name in enumerate(turns, 1):
         yield f"flight_{number:0{digits}}_{name}", name
+
+
+def _mission_files(settings: Configuration, mission: Mission, file: AnyPath) -> tuple[str, ...]:
+    """Files of the missions, each read once so that no job has to fail of it."""
+    if settings.missions_dir is None:
+        return (settings.mission,)
+    folder = Path(settings.missions_dir)
+    try:
+        entries = sorted(
+            one for one in os.listdir(folder) if one.endswith((".yaml", ".plan")) and not one.startswith(".")
+        )
+    except OSError as error:
+        reason = f"missions_dir is {settings.missions_dir!r}, which is no folder that can be read ({error.strerror})"
+        raise UserError(file, reason, "Make it, mend its permissions, or name another") from error
+    others = [folder / one for one in entries if (folder / one).resolve() != Path(settings.mission).resolve()]
+    names = {mission.name: settings.mission}
+    for other in others:
+        name = load_mission(other).name
+        if name in names:
+            raise UserError(
+                other, f"has the name {name!r}, as {names[name]} has", "Give each mission a name of its own"
+            )
+        names[name] = str(other)
+    return tuple(names.values())
 
 
 def _discovered(folder: str, file: AnyPath) -> Discovery:

@@ -31,7 +31,7 @@ EFFECT_SETS = {
 
 RESERVED_SET_NAMES = (
     *(PRESENT, AS_FLOWN, ONBOARD, DELAY_MENDED, FOUND, *EFFECT_SETS),
-    *("sets", "scoring", "fidelity", "delays", "health", "effects", "diagnosis", "sensor_noise"),
+    *("sets", "scoring", "fidelity", "delays", "health", "effects", "diagnosis", "sensor_noise", "conformance"),
 )
 """With the names of `sets.parquet`, `scoring.json` and the like, which a set so called would overwrite."""
 

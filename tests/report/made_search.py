@@ -75,7 +75,11 @@ def made_search(status: str = "change", **other: Any) -> SearchResults:
         "status": status,
         "cautions": ["Mind its <attitude>."],
         "changes": [change] if status == "change" else [],
-        "ranking": [{"is_present": False, "reasons": []}, {"is_present": True, "reasons": []}],
+        "chosen": "found" if status == "change" else "present",
+        "ranking": [
+            {"name": "found", "is_present": False, "reasons": []},
+            {"name": "present", "is_present": True, "reasons": []},
+        ],
         "next_steps": [{"kind": "load", "text": "Load it.", "command": ""}],
         "paragraphs": ["Fly it.", "Mind its <attitude>.", "Next: Load it."],
         "vehicle": {"in_words": "quadrotor X"},

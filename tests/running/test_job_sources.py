@@ -28,12 +28,14 @@ MADE_BY = {
     "join_delays": ("delays", "diagnose", "replay", "save"),
     "diagnose_flight": ("diagnose", "save"),
     "join_health": ("diagnose", "save"),
+    "conform_flight": ("conformance", "diagnose", "save"),
+    "join_conformance": ("conformance", "score", "diagnose", "save"),
     "analyze_flight": ("replay", "score", "save"),
     "search_flights": ("search",),
     "search_ask": ("search",),
     "search_try": ("search",),
     "search_found": ("search",),
-    "decide": ("apply", "score", "replay", "save"),
+    "decide": ("apply", "conformance", "score", "replay", "save"),
     "join_fleet": ("apply", "diagnose", "save"),
     "flight_page": ("report", "apply", "diagnose", "save"),
     "all_sensors_page": ("report", "apply", "diagnose", "save"),
@@ -41,7 +43,7 @@ MADE_BY = {
     "fleet_page": ("report", "apply", "diagnose", "save"),
     "plot_flight": ("report", "apply", "score", "replay", "save"),
     "plot_summary": ("report", "apply", "score", "replay", "save"),
-    "build_report": ("report", "apply", "score", "replay", "save"),
+    "build_report": ("report", "apply", "conformance", "diagnose", "score", "replay", "save"),
 }
 """Script → kind of job, and the kinds before it, of whose outcome it is made."""
 

@@ -17,8 +17,8 @@ from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
 SUMMARIES = dict.fromkeys(
     ("mission_map",
-     "list_flights", "join_delays", "join_health", "join_fleet", "decide", "plot_summary", "fleet_page", "build_report",
-     "all"), 1
+     "list_flights", "join_delays", "join_health", "join_fleet", "join_conformance", "decide", "plot_summary",
+     "fleet_page", "build_report", "all"), 1
 )  # fmt: skip
 DECISION = "results/apply/decision.json"
 PATIENCE_S = 300.0
@@ -37,7 +37,9 @@ def read_flights(workspace: Workspace) -> dict[str, dict[str, str]]:
 def test_an_empty_folder_plans_one_simulated_flight_per_set(workspace: Workspace) -> None:
     planned = workspace.planned_jobs()
     planned.pop("compile_kernels", None)
-    of_flights = dict.fromkeys(("simulate_flight", "save_flight", "diagnose_flight", "flight_page"), 2)
+    of_flights = dict.fromkeys(
+        ("simulate_flight", "save_flight", "diagnose_flight", "conform_flight", "flight_page"), 2
+    )
     assert planned == {"design": 1, **of_flights, **SUMMARIES}
 
 
@@ -84,7 +86,8 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     message = struct.pack("<HBB", len(note) + 1, ord("I"), len("char[5] note")) + note
     log = (flown.folder / "flights" / "first.ulg").read_bytes()
     (flown.folder / "flights" / "second.ulg").write_bytes(log + message)
-    assert flown.planned_jobs() == {"save_flight": 1, "diagnose_flight": 1, "flight_page": 1, **SUMMARIES}
+    of_flight = dict.fromkeys(("save_flight", "diagnose_flight", "conform_flight", "flight_page"), 1)
+    assert flown.planned_jobs() == {**of_flight, **SUMMARIES}
     flown.run_ok("--cores", "2", DECISION)
     assert read_flights(flown)["second"]["status"] == "replayable"
     assert replay_times(flown, "first/*.json") == before

@@ -154,3 +154,28 @@ rule analyze_flight:
         "Analyze: replay and score {wildcards.flight}"
     script:
         "../scripts/analyze_flight.py"
+
+
+rule join_conformance:
+    input:
+        conformance=expand("results/analyze/{flight}/conformance.json", flight=LOGS),
+        listed="results/save/flights.csv",
+        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        # asked for so that a set that is new is scored before flights are split
+        replays=of_replayable_flights(ANALYZED_FILES),
+    output:
+        legs="results/analyze/legs.parquet",
+        missions="results/analyze/missions.json",
+    log:
+        "results/logs/join_conformance.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
+        runtime=of_its_logs(10, 0.02),
+    params:
+        code=DIGEST["conformance"],
+    message:
+        "Analyze: the scores by manoeuvre and leg, and what all flights made of each mission"
+    script:
+        "../scripts/join_conformance.py"

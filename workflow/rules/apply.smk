@@ -11,6 +11,7 @@ rule decide:
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
         effects="results/analyze/effects.json" if MENDS_DELAYS else [],
         diagnoses=of_replayable_flights("results/analyze/{flight}/diagnosis.json"),
+        legs="results/analyze/legs.parquet",
         found="results/search/found.json" if SEARCH else [],
         matters="results/search/sensitivity.json" if SEARCH else [],
         configuration=CONFIGURATION_FILES,

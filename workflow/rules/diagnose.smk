@@ -7,6 +7,7 @@ rule diagnose_flight:
         kernels=KERNELS_READY,
     output:
         expand("results/analyze/{{flight}}/{file}", file=DIAGNOSED_FILES),
+        track="results/analyze/{flight}/track.parquet",
     log:
         "results/logs/diagnose/{flight}.log",
     benchmark:
@@ -25,6 +26,30 @@ rule diagnose_flight:
         "Analyze: what is wrong on {wildcards.flight}"
     script:
         "../scripts/diagnose_flight.py"
+
+
+rule conform_flight:
+    input:
+        flight="results/save/{flight}",
+        track="results/analyze/{flight}/track.parquet",
+        missions=list(INPUTS.mission_files),
+    output:
+        "results/analyze/{flight}/conformance.json",
+    log:
+        "results/logs/conformance/{flight}.log",
+    conda:
+        "../envs/fusetune.yaml"
+    resources:
+        mem_mb=of_its_logs(LIBRARIES_MB, 0.3),
+        runtime=of_its_logs(5, 0.01),
+    params:
+        settings=asdict(SETTINGS.conformance),
+        contents=contents(*INPUTS.mission_files),
+        code=DIGEST["conformance"],
+    message:
+        "Analyze: which mission {wildcards.flight} flew"
+    script:
+        "../scripts/conform_flight.py"
 
 
 rule join_health:

@@ -47,6 +47,8 @@ rule flight_page:
         flight="results/save/{flight}",
         diagnosis="results/analyze/{flight}/diagnosis.json",
         told=expand("results/analyze/{{flight}}/{file}", file=DIAGNOSED_FILES),
+        track="results/analyze/{flight}/track.parquet",
+        conformance="results/analyze/{flight}/conformance.json",
     output:
         report(
             "results/report/flights/{flight}.html",
@@ -191,6 +193,7 @@ rule build_report:
         fleet="results/fleet.html",
         mission=rules.mission_map.output.outlook,
         map=rules.mission_map.output.map,
+        missions="results/analyze/missions.json",
     output:
         report(
             "results/report.html",

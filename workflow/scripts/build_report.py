@@ -23,6 +23,7 @@ with logged_job(snakemake.log[0]):
         list(snakemake.input.pages),
         snakemake.input.fleet,
         snakemake.input.mission,
+        snakemake.input.missions,
     )
     flights = {Path(page).stem for page in snakemake.input.pages}
     report = Path(snakemake.input.summary[0]).parent

@@ -46,6 +46,7 @@ with logged_job(snakemake.log[0]):
         delays=Path(snakemake.input.delays) if snakemake.input.delays else None,
         effects=snakemake.input.effects or None,
         diagnoses=list(snakemake.input.diagnoses),
+        legs=snakemake.input.legs,
         recommended=found.recommended if found is not None else None,
         settings=settings,
     )

@@ -11,11 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from fusetune.analyze.conformance.flown_track import FlownTrack, flown_track
+from fusetune.analyze.conformance.smoothed_track import smoothed_track
+from fusetune.analyze.conformance.track_file import write_track
 from fusetune.analyze.diagnosis.diagnose import diagnose
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.effects.all_effects import FlightEffects
 from fusetune.analyze.effects.joined_effects import effects_document
-from fusetune.analyze.flight_files import DIAGNOSIS_FILE, EFFECTS_FILE, HEALTH_FILE, SENSOR_NOISE_FILE
+from fusetune.analyze.flight_files import DIAGNOSIS_FILE, EFFECTS_FILE, HEALTH_FILE, SENSOR_NOISE_FILE, TRACK_FILE
 from fusetune.analyze.health.health_files import health_document
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.health_table import DEFAULTS, health_rows
@@ -43,7 +46,7 @@ def diagnose_flight(
     replay: ReplaySettings = IN_USE,
     health: HealthSettings = DEFAULTS,
 ) -> tuple[Diagnosis, ...]:
-    """Write `health.json`, `effects.json`, `sensor_noise.json` and `diagnosis.json` of a saved flight.
+    """Write `health.json`, `effects.json`, `sensor_noise.json`, `diagnosis.json` and `track.parquet` of a saved flight.
 
     Parameters
     ----------
@@ -76,6 +79,7 @@ def diagnose_flight(
     noise = asked.about("sensor noise", untold, lambda: sensor_noise(observed.flight, observed.airborne))
     nothing: tuple[Diagnosis, ...] = ()
     found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=tuned))
+    track = asked.about("track", None, lambda: _track(observed, is_replayable))
     start_us = int(logged.start_timestamp)
     documents = {
         HEALTH_FILE: health_document(logged, rows),
@@ -93,7 +97,14 @@ def diagnose_flight(
         },
     }
     _write(Path(output_folder), documents)
+    write_track(Path(output_folder) / TRACK_FILE, track)
     return found
+
+
+def _track(observed: ObservedFlight, is_replayable: bool) -> FlownTrack | None:
+    """Where it was; smoothed where it can be replayed."""
+    track = flown_track(observed.flight)
+    return smoothed_track(observed, track) if track is not None and is_replayable else track
 
 
 def _refusals(verdict: Mapping[str, Any]) -> list[dict[str, str]]:

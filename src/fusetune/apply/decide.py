@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 
 from fusetune.analyze.delays.wrong_delays import read_joined
 from fusetune.analyze.effects.joined_effects import read_joined_effects
+from fusetune.apply.by_manoeuvre import by_manoeuvre, only_classes_sentences
 from fusetune.apply.candidates import (
     Candidate,
     between_vetoed_and_present,
@@ -38,6 +39,7 @@ from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsur
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
 from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
+from fusetune.apply.pieces_evidence import in_classes, read_flight_pieces
 from fusetune.apply.power.power import Power, power_of
 from fusetune.apply.power.spread import spread_of
 from fusetune.apply.provenance import file_hash, flight_rows, provenance
@@ -74,6 +76,7 @@ def decide(
     delays: AnyPath | None = None,
     effects: AnyPath | None = None,
     diagnoses: Sequence[AnyPath] = (),
+    legs: AnyPath | None = None,
     recommended: Recommended | None = None,
     settings: DecisionSettings | None = None,
 ) -> None:
@@ -97,6 +100,7 @@ def decide(
     delays : `results/analyze/delays.json`, what the sensors' delays are; None where they were not estimated
     effects : `results/analyze/effects.json`, what flights tell of single effects; None where they were not estimated
     diagnoses : `results/analyze/<flight>/diagnosis.json` of the flights
+    legs : `results/analyze/legs.parquet`, the scores by manoeuvre and leg; None where flights were not split
     recommended : what one of the sets stands for, where that is a search's
 
     Raises
@@ -111,6 +115,10 @@ def decide(
     vehicle = decided_vehicle(flights_table, [folder.name for folder in folders], newest_flight)
     seen_by = DELAY_MENDED if recommended is None else recommended.name
     flights = read_flights([one for one in folders if one.name not in vehicle.others], settings, present, seen_by)
+    pieces = read_flight_pieces(legs) if legs is not None else {}
+    parts = by_manoeuvre([one.evidence for one in flights if one.evidence], pieces, sets, present, settings)
+    if settings.only_classes:
+        flights = [in_classes(one, pieces, present, settings) for one in flights]
     others = [read_left_out(one, why) for one in folders if (why := vehicle.without(one.name))]
     newest = source_of_present(flights, _newest(flights, newest_flight, flights_table), same_present)
     metrics = metrics_of(flights)
@@ -154,6 +162,7 @@ def decide(
         problem_sentence(problems),
         delay_sentences(late),
         paragraph(choice, ranked, flights, settings),
+        *only_classes_sentences(settings),
         *minded,
         sentence_of_largest(findings),
         candidates_sentence(proposed, _gains(better)),
@@ -168,6 +177,7 @@ def decide(
     decision["missing_motion"] = [asdict(one) for one in missing]
     decision["power"] = None if power is None else power.document()
     decision["cautions"] = list(minded)
+    decision["by_manoeuvre"] = [asdict(one) for one in parts]
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
     decision["findings"] = documents((*problems, *late, *measured, *findings))

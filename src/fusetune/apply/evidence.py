@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.metrics.likelihood import profile_nll
+from fusetune.analyze.scoring.aims import AIDED, AIMS, SMOOTHED, UNAIDED
 from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.aid_sources import AXES
@@ -25,9 +26,6 @@ from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
 
 Array = npt.NDArray[np.float64]
-
-AIDED, UNAIDED, SMOOTHED = "aided", "unaided", "smoothed"
-AIMS = (AIDED, UNAIDED, SMOOTHED)
 
 
 @dataclass(frozen=True)

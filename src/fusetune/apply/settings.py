@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from fusetune.analyze.flight.manoeuvre_classes import FLOWN_CLASSES
 from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES, WITHHOLDABLE
 from fusetune.settings.declaration import setting
 
@@ -62,6 +63,11 @@ class DecisionSettings:
         0.6, "a source whose error is less white has no say in the predictions one step ahead", low=0, high=1
     )
     trust_white_share: float = setting(0.9, "a source whose error is whiter has its full weight there", low=0, high=1)
+    only_classes: tuple[str, ...] = setting(
+        (),
+        "manoeuvre classes that alone count, of each flight; empty: the whole flight",
+        choices=FLOWN_CLASSES,
+    )
     multiplicity: Literal["sign_flips", "holm", "none"] = setting(
         "sign_flips",
         "allowance for the best of many sets being lucky: a test that flips the signs of flights, or Holm's correction",

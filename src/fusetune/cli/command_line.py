@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from fusetune import __version__
 from fusetune.cli import (
     cards,
+    conformance,
     covariance,
     design,
     diagnose,
@@ -37,6 +38,7 @@ COMMANDS: Mapping[str, Command] = {
     "replay": replay,
     "fidelity": fidelity,
     "diagnose": diagnose,
+    "conformance": conformance,
     "search": search,
     "upload": upload,
 }

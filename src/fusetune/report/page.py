@@ -7,6 +7,7 @@ from typing import Any
 from fusetune.apply.flight_problems import OF_ALL_FLIGHTS
 from fusetune.report.html_page import PageHead, page_links, write_page
 from fusetune.report.results import read_results
+from fusetune.report.sections.conformance_section import conformance_section
 from fusetune.report.sections.decision_sections import decision_section, sets_section
 from fusetune.report.sections.evidence_sections import (
     evidence_section,
@@ -45,6 +46,7 @@ def build_report(
     flight_pages: Sequence[AnyPath] = (),
     fleet_page: AnyPath | None = None,
     mission: AnyPath | None = None,
+    missions: AnyPath | None = None,
 ) -> None:
     """Write the report as one HTML file with its figures inside.
 
@@ -60,6 +62,7 @@ def build_report(
     flight_pages : `results/report/flights/<flight>.html`
     fleet_page : `results/fleet.html`
     mission : `results/design/<mission>.json`
+    missions : `results/analyze/missions.json`; None where flights were compared with none
     """
     results = read_results(analyze_folders, apply_folder)
     figures = Path(figure_folder)
@@ -72,6 +75,7 @@ def build_report(
         findings_section(results),
         evidence_section(results, figures),
         withheld_section(results, figures),
+        conformance_section(results, [] if missions is None else read_document(missions)["missions"]),
         holds_section(results),
         sensitivity_section(results, figures),
         weights_section(results),

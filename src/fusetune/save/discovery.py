@@ -20,13 +20,14 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from fusetune.errors import UserError
 from fusetune.storage.files import DEVICES
 
 _LOG = re.compile(r"\.ulg$", re.IGNORECASE | re.DOTALL)
 _PACKED = re.compile(r"\.ulg\.(gz|xz|bz2|zst|lz4|zip|7z)$", re.IGNORECASE | re.DOTALL)
 
 SD_CARD_FOLDER = "log"
-TABLE_NAMES = ("flights.parquet", "flights.csv", "present.json", "delays.json")
+TABLE_NAMES = ("flights.parquet", "flights.csv", "present.json", "delays.json", "legs.parquet")
 """Files that lie beside the folders of flights, of the save and of the analyze room."""
 LONGEST_NAME_BYTES = 120
 """File systems end names at 255 bytes; jobs append parts of their own."""
@@ -98,6 +99,53 @@ def discover_logs(folder: str | os.PathLike[str]) -> Discovery:
     return Discovery(
         tuple(sorted(logs, key=lambda log: log.flight)), tuple(sorted(refused, key=lambda entry: entry.flight))
     )
+
+
+@dataclass(frozen=True)
+class GivenLog:
+    """A log of a command line, or why there is none.
+
+    Attributes
+    ----------
+    path : where it is
+    shown : as it can be printed
+    error : why it cannot be one, else None
+    """
+
+    path: str
+    shown: str
+    error: UserError | None = None
+
+
+def given_logs(paths: Iterable[str | os.PathLike[str]]) -> Iterator[GivenLog]:
+    """Logs, and those in folders among them, which are searched; what is no log is given with its error."""
+    for path in (os.fspath(one) for one in paths):
+        shown = printable(path)
+        if not os.path.isdir(path):
+            yield GivenLog(path, shown)
+            continue
+        try:
+            inside = discover_logs(path)
+        except OSError as error:
+            reason = f"cannot be listed ({error.strerror or error})"
+            yield GivenLog(path, shown, UserError(path, reason, "Mend its permissions"))
+            continue
+        for entry in inside.refused:
+            name = printable(os.path.join(path, entry.shown))
+            yield GivenLog(name, name, UserError(name, entry.reason, entry.remedy))
+        for log in inside.logs:
+            yield GivenLog(log.path, printable(os.path.join(path, log.shown)))
+        if not inside.refused and not inside.logs:
+            yield GivenLog(path, shown, UserError(shown, "holds no log", "Name a folder with .ulg files in it"))
+
+
+def log_error(shown: str, error: Exception) -> UserError:
+    """What to tell of a log that the system does not give, or that lacks what every log has."""
+    if isinstance(error, OSError):
+        reason = f"cannot be read ({error.strerror or error})"
+        return UserError(shown, reason, "Mend its permissions, or copy it again")
+    reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
+    return UserError(shown, reason, "Copy the log from the vehicle again")
 
 
 def printable(text: str) -> str:

@@ -11,16 +11,12 @@ from fusetune.analyze.diagnosis.diagnose import diagnose
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.diagnosis.experiments import AT_MOST
 from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.analyze.reconstruction.settings import ReconstructionSettings
-from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
+from fusetune.analyze.replaying.settings import WITHOUT_GAPS as AS_FLOWN
 from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.finding import Finding, of_severity
 from fusetune.px4.ulog.reader import read_ulog
-from fusetune.save.discovery import discover_logs, printable
+from fusetune.save.discovery import given_logs, log_error
 from fusetune.storage.files import AnyPath
-
-AS_FLOWN = ReplaySettings(None, ReconstructionSettings(), StartSettings())
-"""The log is repaired and started as the pipeline does it; what a filter predicts without a sensor is not asked."""
 
 
 @dataclass(frozen=True)
@@ -60,24 +56,11 @@ def diagnosed_logs(paths: Sequence[AnyPath], experiments: int = AT_MOST) -> Iter
     paths : logs, and folders that are searched for logs
     experiments : as for `diagnose`
     """
-    for path in map(Path, paths):
-        if not path.is_dir():
-            yield _diagnosed(path, printable(str(path)), experiments)
-            continue
-        try:
-            inside = discover_logs(path)
-        except OSError as error:
-            reason = f"cannot be listed ({error.strerror or error})"
-            yield DiagnosedLog(printable(str(path)), error=UserError(path, reason, "Mend its permissions"))
-            continue
-        for entry in inside.refused:
-            shown = printable(str(path / entry.shown))
-            yield DiagnosedLog(shown, error=UserError(shown, entry.reason, entry.remedy))
-        for log in inside.logs:
-            yield _diagnosed(Path(log.path), printable(str(path / log.shown)), experiments)
-        if not inside.refused and not inside.logs:
-            shown = printable(str(path))
-            yield DiagnosedLog(shown, error=UserError(shown, "holds no log", "Name a folder with .ulg files in it"))
+    for given in given_logs(paths):
+        if given.error is not None:
+            yield DiagnosedLog(given.shown, error=given.error)
+        else:
+            yield _diagnosed(Path(given.path), given.shown, experiments)
 
 
 def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
@@ -91,13 +74,11 @@ def _diagnosed(path: Path, shown: str, experiments: int) -> DiagnosedLog:
     except UserError as error:
         return DiagnosedLog(shown, error=error)
     except OSError as error:
-        reason = f"cannot be read ({error.strerror or error})"
-        return DiagnosedLog(shown, error=UserError(shown, reason, "Mend its permissions, or copy it again"))
+        return DiagnosedLog(shown, error=log_error(shown, error))
     except OF_DAMAGE as error:
         if refused:
             return DiagnosedLog(shown, error=_untold(shown, refused))
-        reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
-        return DiagnosedLog(shown, error=UserError(shown, reason, "Copy the log from the vehicle again"))
+        return DiagnosedLog(shown, error=log_error(shown, error))
     return DiagnosedLog(shown, found, flight.start_timestamp, flight.last_timestamp, why_not)
 
 

@@ -80,3 +80,6 @@ class ReplaySettings:
 
 IN_USE = ReplaySettings(WithholdingSettings(), ReconstructionSettings(), StartSettings())
 """The default configuration."""
+
+WITHOUT_GAPS = ReplaySettings(None, ReconstructionSettings(), StartSettings())
+"""The log is repaired and started as the pipeline does it; what a filter predicts without a sensor is not asked."""

@@ -43,8 +43,10 @@ SAMPLES_SCHEMA = pa.schema(
         pa.field("innovation", pa.float32()),
         pa.field("innovation_variance", pa.float32()),
         pa.field("test_ratio", pa.float32()),
+        pa.field("winsor_limit", pa.float64()),
     ]
 )
+"""One row per set and measurement; `winsor_limit` is the limit beyond which the innovations of all sets count as it."""
 
 
 class SampleScores(NamedTuple):
@@ -96,7 +98,7 @@ def score_samples(
             # of what is sampled at every update the samples would fill the disk, and no plot shows them
             if take_samples is not None and not source.every_update:
                 for of_set in one.each():
-                    take_samples(_sample_rows(of_set))
+                    take_samples(_sample_rows(of_set, one.winsor_limit))
         if pairs:
             add_group_metrics(table, pairs, settings)
         single = [(AXES[axis], [one]) for axis, one in pairs.items() if one.time.size >= FEWEST_SAMPLES]
@@ -112,7 +114,7 @@ def score_samples(
     )
 
 
-def _sample_rows(pairs: SamplesOfSet) -> pa.Table:
+def _sample_rows(pairs: SamplesOfSet, winsor_limit: float) -> pa.Table:
     """Rows of `samples.parquet` of one set."""
     n = pairs.time.size
 
@@ -127,6 +129,7 @@ def _sample_rows(pairs: SamplesOfSet) -> pa.Table:
     }
     for name in ("innovation", "innovation_variance", "test_ratio"):
         columns[name] = pa.array(getattr(pairs, name)[0].astype(np.float32))
+    columns["winsor_limit"] = pa.array(np.full(n, winsor_limit))
     return pa.table(columns, schema=SAMPLES_SCHEMA)
 
 

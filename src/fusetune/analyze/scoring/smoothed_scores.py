@@ -19,15 +19,18 @@ SMOOTHED_SCHEMA = pa.schema(
         *FLIGHT_AND_SET,
         *SOURCE_AND_AXIS,
         pa.field("block", pa.int32()),
+        *columns_of(pa.int64(), "start_us", "stop_us"),
         pa.field("n", pa.int64()),
         *columns_of(pa.float64(), "sum_squares", "sum_squares_winsorised"),
     ]
 )
-"""One row per set, axis (north, east, down) and block: sums of squared differences of velocity, m²/s², at `n` times.
+"""One row per set, axis (north, east, down), block and about a second in it: sums of squared differences of velocity,
+m²/s², at `n` times from `start_us` to `stop_us`.
 
 These are the same for all sets; `source` is the one that the reference was made of."""
 
 STEP_US = 50_000
+_TOGETHER_US = 1_000_000
 
 
 class SmoothedScores:
@@ -51,7 +54,7 @@ class SmoothedScores:
             return SMOOTHED_SCHEMA.empty_table()
         time = self._reference.time
         block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, edges.size - 2)
-        starts = np.flatnonzero(np.r_[True, np.diff(block) != 0])
+        starts = np.flatnonzero(np.r_[True, (np.diff(block) != 0) | (np.diff(time // _TOGETHER_US) != 0)])
         counts = np.diff(np.r_[starts, block.size])
         tables = [self._axis_rows(flight, axis, block[starts], starts, counts) for axis in range(3)]
         return pa.concat_tables(tables)
@@ -74,6 +77,8 @@ class SmoothedScores:
             "source": pa.array([self._reference.source] * rows, pa.string()),
             "axis": pa.array(np.full(rows, axis, np.int32)),
             "block": pa.array(np.tile(blocks.astype(np.int32), sets)),
+            "start_us": pa.array(np.tile(self._reference.time[starts], sets)),
+            "stop_us": pa.array(np.tile(self._reference.time[starts + counts - 1], sets)),
             "n": pa.array(np.tile(counts.astype(np.int64), sets)),
             "sum_squares": pa.array(_sums(difference, starts)),
             "sum_squares_winsorised": pa.array(_sums(clipped, starts)),

@@ -15,6 +15,8 @@ _USED_TOPICS = frozenset(
         "actuator_motors",
         "actuator_outputs",
         "ekf2_innovations",
+        "mission_result",
+        "position_setpoint_triplet",
         "sensor_accel",
         "sensor_accel_fifo",
         "sensor_gps",

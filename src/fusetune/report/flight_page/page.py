@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from fusetune.analyze.flight_files import SENSOR_NOISE_FILE
+from fusetune.analyze.conformance.track_file import read_track
+from fusetune.analyze.flight_files import CONFORMANCE_FILE, SENSOR_NOISE_FILE, TRACK_FILE
 from fusetune.report.figure_words import figure_words
+from fusetune.report.figures.conformance_figure import draw_conformance
 from fusetune.report.figures.drawing import figure_style, save_png
 from fusetune.report.figures.timeline_figure import TIMELINE_TOPICS, Bar, draw_timeline
 from fusetune.report.flight_page.answer import answer_section, causes_section
+from fusetune.report.flight_page.conformance_section import conformance_section
 from fusetune.report.flight_page.effects_section import effects_section
 from fusetune.report.flight_page.flight_results import FlightResults, read_flight_results
 from fusetune.report.flight_page.health_table import health_table_section
@@ -22,6 +25,7 @@ from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
 TIMELINE_FILE = "timeline.png"
+MAP_FILE = "map.png"
 
 _MOST_ROWS_DRAWN = 8
 _LONGEST_LABEL = 46
@@ -50,6 +54,28 @@ def plot_flight_timeline(flight_folder: AnyPath, analyze_folder: AnyPath, output
     Path(output).parent.mkdir(parents=True, exist_ok=True)
     with figure_style():
         save_png(draw_timeline(logged, tuple(_bars(results))), output)
+
+
+def plot_flight_map(analyze_folder: AnyPath, output: AnyPath) -> None:
+    """Draw where it was flown, over its mission; nothing where no place on earth is known.
+
+    Parameters
+    ----------
+    analyze_folder : `results/analyze/<flight>` with `track.parquet` and `conformance.json`
+    output : the picture, `MAP_FILE` in the folder of the flight's figures
+
+    Raises
+    ------
+    UserError
+        A file is missing or damaged.
+    """
+    track = read_track(Path(analyze_folder) / TRACK_FILE)
+    if track is None or not track.has_place:
+        return
+    document = read_document(Path(analyze_folder) / CONFORMANCE_FILE)
+    Path(output).parent.mkdir(parents=True, exist_ok=True)
+    with figure_style():
+        save_png(draw_conformance(track, document), output)
 
 
 def _bars(results: FlightResults) -> Iterator[Bar]:
@@ -81,6 +107,7 @@ def build_drawn_flight_page(
     """
     if "topics" in read_flight_document(Path(flight_folder) / METADATA_FILE):
         plot_flight_timeline(flight_folder, analyze_folder, Path(figure_folder) / TIMELINE_FILE)
+        plot_flight_map(analyze_folder, Path(figure_folder) / MAP_FILE)
     build_flight_page(analyze_folder, figure_folder, output, pages)
 
 
@@ -92,7 +119,7 @@ def build_flight_page(
     Parameters
     ----------
     analyze_folder : `results/analyze/<flight>` with `health.json`, `diagnosis.json` and `effects.json`, and
-        `sensor_noise.json` where the sensors are characterised
+        `conformance.json` and `sensor_noise.json` where it was compared and its sensors are characterised
     figure_folder : with `TIMELINE_FILE` and what `plot_sensor_noise` drew; a picture that is missing is left out
     output : `results/report/flights/<flight>.html`
     pages : words → other pages that it leads to, as `{"All flights": "results/fleet.html"}`
@@ -104,12 +131,13 @@ def build_flight_page(
     """
     results = read_flight_results(analyze_folder)
     figures, noise = Path(figure_folder), Path(analyze_folder) / SENSOR_NOISE_FILE
-    timeline = figures / TIMELINE_FILE
+    timeline, conformance = figures / TIMELINE_FILE, Path(analyze_folder) / CONFORMANCE_FILE
     sections = (
         page_links(pages or {}, output),
         answer_section(results),
         section("The flight", figure(timeline, _TIMELINE)) if timeline.exists() else "",
         causes_section(results),
+        conformance_section(read_document(conformance), figures / MAP_FILE) if conformance.exists() else "",
         effects_section(results),
         health_table_section(results),
         sensors_section(read_document(noise), figures) if noise.exists() else "",
