@@ -1,6 +1,7 @@
 """The decision on made studies of which the right answer is known."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
 
 from fusetune.apply.decide import decide
+from fusetune.apply.parameter_files.names import PARAMETER_FILES
 from fusetune.apply.recommended import Recommended
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.study import load_study
@@ -24,8 +26,7 @@ OUTPUTS = (
     "ranking.csv",
     "per_flight.parquet",
     "decision.json",
-    "best_params.params",
-    "rollback.params",
+    *PARAMETER_FILES,
     "candidates.yaml",
     "sensitivity.json",
 )
@@ -56,6 +57,7 @@ def test_a_clearly_better_set_is_chosen_and_written(tmp_path: Path) -> None:
     assert entry.value == pytest.approx(0.2, abs=1e-7)
     assert "previous value 0.35 m/s^2, new value 0.2 m/s^2" in entry.comments[0]
     assert "better on 6 of 6 flights" in entry.comments[1]
+    assert re.search(r"smaller \(95 % interval \d", entry.comments[1])
     assert [one["kind"] for one in decision["next_steps"]] == ["load", "confirm", "load"]
     assert decision["paragraphs"][-1].startswith("Next: (1) Load best_params.params")
     (back,) = read_params(tmp_path / "apply" / "rollback.params")

@@ -75,6 +75,7 @@ def made_search(status: str = "change", **other: Any) -> SearchResults:
         "status": status,
         "cautions": ["Mind its <attitude>."],
         "changes": [change] if status == "change" else [],
+        "on_vehicle": {"parameters": [change] if status == "change" else [], "refused": []},
         "ranking": [{"is_present": False, "reasons": []}, {"is_present": True, "reasons": []}],
         "next_steps": [{"kind": "load", "text": "Load it.", "command": ""}],
         "paragraphs": ["Fly it.", "Mind its <attitude>.", "Next: Load it."],

@@ -47,6 +47,7 @@ with logged_job(snakemake.log[0]):
         effects=snakemake.input.effects or None,
         diagnoses=list(snakemake.input.diagnoses),
         recommended=found.recommended if found is not None else None,
+        saved=Path(snakemake.input.flights).parent,
         settings=settings,
     )
     if found is not None:
