@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, design, diagnose, fidelity, replay, save, search, simulate, study
+from fusetune.cli import cards, confirm, design, diagnose, fidelity, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -23,6 +23,7 @@ COMMANDS: Mapping[str, Command] = {
     "fidelity": fidelity,
     "diagnose": diagnose,
     "search": search,
+    "confirm": confirm,
 }
 """In the order of the pipeline."""
 
