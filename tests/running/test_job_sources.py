@@ -32,6 +32,8 @@ MADE_BY = {
     "search_try": ("search",),
     "search_found": ("search",),
     "decide": ("apply", "score", "replay", "save"),
+    "measure_change": ("apply", "score", "replay", "save"),
+    "keep_history": ("apply", "score", "replay", "save"),
     "join_fleet": ("apply", "diagnose", "save"),
     "flight_page": ("report", "apply", "diagnose", "save"),
     "all_sensors_page": ("report", "apply", "diagnose", "save"),

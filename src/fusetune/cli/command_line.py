@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from fusetune import __version__
-from fusetune.cli import cards, confirm, design, diagnose, fidelity, replay, save, search, simulate, study
+from fusetune.cli import cards, confirm, design, diagnose, fidelity, history, replay, save, search, simulate, study
 from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
@@ -24,6 +24,7 @@ COMMANDS: Mapping[str, Command] = {
     "diagnose": diagnose,
     "search": search,
     "confirm": confirm,
+    "history": history,
 }
 """In the order of the pipeline."""
 
