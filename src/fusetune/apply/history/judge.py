@@ -87,7 +87,7 @@ def unpaired_gain(before: Sequence[EvidenceFlight], after: Sequence[EvidenceFlig
         for group in (before, after)
     )
     difference = float(second.mean() - first.mean())
-    if min(first.size, second.size, confidence) < 2:
+    if min(first.size, second.size) < 2:
         return _gain(difference, None, None, second.size, confidence)
     shares = np.array([first.var(ddof=1) / first.size, second.var(ddof=1) / second.size])
     if shares.sum() == 0.0:

@@ -49,7 +49,8 @@ def changes_words(changes: Mapping[str, float], before: Mapping[str, float]) -> 
 
 
 def _decision_lines(entry: DecisionEntry, outcome: OutcomeEntry | None) -> Iterator[str]:
-    behind = f"{counted(len(entry.evidence), 'flight')} up to {entry.decided_after[:10] or 'an unknown day'}"
+    flights = max((one["flights"] for one in entry.sets), default=0)
+    behind = f"{counted(flights, 'flight')} up to {entry.decided_after[:10] or 'an unknown day'}"
     note = " (exploratory)" if entry.exploratory else ""
     if not entry.changes:
         yield f"{entry.written[:10]}  kept what flies, from {behind}{note}"
@@ -61,8 +62,8 @@ def _decision_lines(entry: DecisionEntry, outcome: OutcomeEntry | None) -> Itera
         yield f"{_INDENT}the vehicle could not be given it"
         return
     if outcome is not None:
-        flights = counted(outcome.paired.flights, "flight")
-        yield f"{_INDENT}measured on {flights} after it, old and new replayed on each: {gain_words(outcome.paired)}"
+        after = counted(outcome.paired.flights, "flight")
+        yield f"{_INDENT}measured on {after} after it, old and new replayed on each: {gain_words(outcome.paired)}"
         yield f"{_INDENT}on board, from the flights before to those after: {gain_words(outcome.unpaired)}"
         yield f"{_INDENT}flights after it: {named(outcome.names)}"
     yield f"{_INDENT}{outcome_words(outcome)}"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 
 from fusetune.px4.parameters.ekf2_parameters import as_float32
 
 _DIGITS = range(1, 10)
 """Nine digits tell any two float32 apart."""
+_PLAIN = (1e-6, 1e10)
 
 
 def float32_text(value: float) -> str:
@@ -22,7 +24,9 @@ def float32_text(value: float) -> str:
         raise ValueError(f"{value} is no value of a parameter")
     stored = as_float32(value)
     texts = (f"{stored:.{digits}g}" for digits in _DIGITS)
-    return next(text for text in texts if _is_stored_as(text, stored))
+    shortest = next(text for text in texts if _is_stored_as(text, stored))
+    # as people write it, but for what would be a row of zeros
+    return f"{Decimal(shortest):f}" if _PLAIN[0] <= abs(stored) < _PLAIN[1] else shortest
 
 
 def _is_stored_as(text: str, stored: float) -> bool:
