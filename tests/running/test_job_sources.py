@@ -32,7 +32,7 @@ MADE_BY = {
     "search_try": ("search",),
     "search_found": ("search",),
     "decide": ("apply", "score", "replay", "save"),
-    "measure_change": ("apply", "score", "replay", "save"),
+    "measure_change": ("change", "apply", "replay", "save"),
     "keep_history": ("apply", "score", "replay", "save"),
     "join_fleet": ("apply", "diagnose", "save"),
     "flight_page": ("report", "apply", "diagnose", "save"),

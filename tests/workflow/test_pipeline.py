@@ -16,8 +16,8 @@ from tests.workflow.conftest import STUDY, Workspace
 from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
 SUMMARIES = dict.fromkeys(
-    ("list_flights", "join_delays", "join_health", "join_fleet", "decide", "plot_summary", "fleet_page", "build_report",
-     "all"), 1
+    ("list_flights", "join_delays", "join_health", "join_fleet", "decide", "keep_history", "plot_summary", "fleet_page",
+     "build_report", "all"), 1
 )  # fmt: skip
 DECISION = "results/apply/decision.json"
 PATIENCE_S = 300.0

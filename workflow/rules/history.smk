@@ -39,8 +39,7 @@ rule measure_change:
         change=lambda wildcards: changes_flown().get(wildcards.flight),
         replay=asdict(SETTINGS.replay),
         scoring=asdict(SETTINGS.scoring),
-        code=DIGEST["score"],
-        replay_code=DIGEST["replay"],
+        code=DIGEST["change"],
     message:
         "Apply: what the change that {wildcards.flight} flew does on it"
     script:

@@ -61,6 +61,7 @@ JOB_SOURCES = {
     ),
     "diagnose": (*BASE, "design", "ekf2", "save", "analyze"),
     "score": (*BASE, "ekf2", "save", *_SCORED),
+    "change": (*BASE, "ekf2", "save", *_SCORED, "analyze/evaluate.py", "apply/history"),
     "apply": (*BASE, "analyze/delays", "analyze/effects", "analyze/trials", "design", "apply"),
     "search": (*TRIED, "analyze/effects", "apply"),
     "report": (*BASE, "analyze/diagnosis", "design", "apply", "report"),

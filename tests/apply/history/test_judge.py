@@ -14,9 +14,8 @@ from tests.apply.history.test_flights_after import ENTRY
 
 from fusetune.analyze.scoring.score_flight import score_saved_flight
 from fusetune.apply.evidence import AnalyzedFlight, read_flights
-from fusetune.apply.history.entries import EvidenceFlight, Gain
+from fusetune.apply.history.entries import AFTER, BEFORE, EvidenceFlight, Gain
 from fusetune.apply.history.judge import CONFIRMED, REFUTED, UNKNOWN, judge_change, unpaired_gain
-from fusetune.apply.history.measure import AFTER, BEFORE
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.vehicle_identity import VehicleIdentity
 

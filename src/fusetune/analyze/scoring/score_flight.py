@@ -73,8 +73,9 @@ def write_scores(
     write_flight_scores(folder, scores)
 
 
-def write_flight_scores(folder: Path, scores: FlightScores) -> None:
+def write_flight_scores(folder: AnyPath, scores: FlightScores) -> None:
     """Write the figures of a flight to a folder, which must exist: all of `SCORE_TABLES`, and the summary."""
+    folder = Path(folder)
     for table, name in SCORE_TABLES.items():
         with atomic_path(folder / name) as temporary:
             write_table(getattr(scores, table), temporary)

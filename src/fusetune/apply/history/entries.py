@@ -14,6 +14,8 @@ from fusetune.storage.append_only import Line, append, read_lines
 from fusetune.storage.files import AnyPath
 
 DECISION, OUTCOME = "decision", "outcome"
+BEFORE, AFTER = "before", "after"
+"""Names of the two sets that a flight after a change is replayed with."""
 SUFFIX = ".jsonl"
 HISTORY_FILE = "history.json"
 """In the folder of a decision: the history of its vehicle as the page tells it."""

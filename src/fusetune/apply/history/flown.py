@@ -30,7 +30,7 @@ def flown_flight(row: Mapping[str, Any], folder: AnyPath) -> FlownFlight:
         row["flight"],
         metadata["checksum"],
         VehicleIdentity.from_row(row),
-        row["recorded"] or "",
+        row.get("recorded") or "",
         metadata["ekf2_parameters"],
         any(one["name"] in read and one["value"] != initial[one["name"]] for one in changes),
     )

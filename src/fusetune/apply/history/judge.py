@@ -18,8 +18,7 @@ from scipy.special import stdtrit
 
 from fusetune.apply.criteria import metrics_of
 from fusetune.apply.evidence import AIMS, AnalyzedFlight, FlightEvidence
-from fusetune.apply.history.entries import DecisionEntry, EvidenceFlight, Gain, OutcomeEntry
-from fusetune.apply.history.measure import AFTER, BEFORE
+from fusetune.apply.history.entries import AFTER, BEFORE, DecisionEntry, EvidenceFlight, Gain, OutcomeEntry
 from fusetune.apply.ranking import improvement_percent
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.mean_difference import mean_differences

@@ -9,6 +9,7 @@ from typing import Any
 
 from fusetune.apply.evidence import read_flights
 from fusetune.apply.history.entries import (
+    BEFORE,
     DecisionEntry,
     History,
     history_file,
@@ -19,7 +20,6 @@ from fusetune.apply.history.entries import (
 from fusetune.apply.history.flown import flown_flight
 from fusetune.apply.history.judge import judge_change
 from fusetune.apply.history.made_decision import decision_entry
-from fusetune.apply.history.measure import BEFORE
 from fusetune.apply.rounded import rounded
 from fusetune.apply.settings import DecisionSettings
 from fusetune.storage.documents import read_document, write_document

@@ -16,10 +16,9 @@ from fusetune.analyze.replaying.prepared_flight import prepare_flight
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.score_flight import write_flight_scores
 from fusetune.analyze.scoring.settings import ScoringSettings
+from fusetune.apply.history.entries import AFTER, BEFORE
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
-
-BEFORE, AFTER = "before", "after"
 
 
 def measure_change(
@@ -46,5 +45,5 @@ def measure_change(
     prepared = prepare_flight(load_flight(flight_folder), replay)
     scores = evaluate(prepared, {BEFORE: before, AFTER: after}, present=BEFORE, settings=scoring)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    write_flight_scores(Path(folder), scores)
+    write_flight_scores(folder, scores)
     shutil.copyfile(fidelity, Path(folder) / FIDELITY_FILE)

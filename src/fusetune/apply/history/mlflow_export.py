@@ -44,7 +44,7 @@ def _client(folder: AnyPath) -> Any:
         from mlflow import MlflowClient
     except ImportError as error:
         raise UserError(
-            "MLflow", "is not installed", "Install the extra: pip install -r requirements-mlflow.lock"
+            "MLflow", "is not installed", "Install the extra: pip install --require-hashes -r requirements-mlflow.lock"
         ) from error
     Path(folder).mkdir(parents=True, exist_ok=True)
     return MlflowClient(tracking_uri=store_of(folder), registry_uri=store_of(folder))

@@ -28,6 +28,15 @@ def gain_words(gain: Gain) -> str:
     return f"{text} ({gain.confidence:.0%} interval {gain.lower:.1f} to {gain.upper:.1f} % smaller)"
 
 
+def gain_in_short(gain: Gain) -> str:
+    """By how much errors shrank, with the interval, for a table that says so."""
+    if gain.percent is None:
+        return "–"
+    if gain.lower is None or gain.upper is None:
+        return f"{gain.percent:.1f} %"
+    return f"{gain.percent:.1f} % ({gain.lower:.1f} to {gain.upper:.1f})".replace("-", "−")
+
+
 def outcome_words(outcome: OutcomeEntry | None) -> str:
     """The last word on a change."""
     if outcome is None:

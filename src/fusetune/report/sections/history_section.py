@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fusetune.apply.history.entries import Gain, OutcomeEntry
-from fusetune.apply.history.words import changes_words, gain_words, outcome_words
+from fusetune.apply.history.words import changes_words, gain_in_short, outcome_words
 from fusetune.report.markup import Cell, paragraph, section, table
 
 _KINDS = {"confirmed": "good", "refuted": "bad"}
@@ -24,16 +24,17 @@ def history_section(history: Mapping[str, Any] | None) -> str:
     if not changes:
         return ""
     kept = len(decisions) - len(changes)
-    head = ("decided after", "change", "errors predicted", "measured, paired", "on board, unpaired", "")
+    head = ("decided after", "change", "predicted", "paired", "on board", "")
     return section(
         "What was changed when, and what it brought",
         table(head, [_row(one) for one in reversed(changes)]),
         paragraph(
-            f"Decisions kept: {len(decisions)}, of which {kept} left what flies. Paired: on the flights after a change "
-            "the old and the new values are replayed on each, so wind and route are the same for both; by this a "
-            "change is confirmed (its interval above 0) or refuted (its interval below the smallest gain that counts, "
-            "or the new values ruled out). On board: the flights before against those after, each with what it flew; "
-            "other days and routes are in it. None of these flights was there when the change was decided.",
+            f"Decisions kept: {len(decisions)}, of which {kept} left what flies. Figures: by how much prediction "
+            "errors became smaller, with the interval. Paired: on the flights after a change the old and the new "
+            "values are replayed on each, so wind and route are the same for both; by this a change is confirmed (its "
+            "interval above 0) or refuted (its interval below the smallest gain that counts, or the new values ruled "
+            "out). On board: the flights before against those after, each with what it flew; other days and routes are "
+            "in it. No flight after a change had a part in deciding it.",
             "note",
         ),
     )
@@ -47,9 +48,9 @@ def _row(one: Mapping[str, Any]) -> tuple[Cell, ...]:
     word = "could not be loaded" if not one["is_loadable"] else outcome_words(outcome)
     return (
         Cell(one["decided_after"][:10] or "–"),
-        Cell(changes_words(one["changes"], one["previous"]), "mono"),
-        Cell(gain_words(Gain(**one["predicted"]))),
-        Cell(gain_words(outcome.paired) if outcome is not None else "–"),
-        Cell(gain_words(outcome.unpaired) if outcome is not None else "–"),
+        Cell(changes_words(one["changes"], one["previous"]).replace("^2", "²")),
+        Cell(gain_in_short(Gain(**one["predicted"]))),
+        Cell(gain_in_short(outcome.paired) if outcome is not None else "–"),
+        Cell(gain_in_short(outcome.unpaired) if outcome is not None else "–"),
         Cell(word, _KINDS.get(outcome.status, "") if outcome is not None else "quiet"),
     )
