@@ -1,6 +1,3 @@
-from fusetune.apply.parameter_files.names import PARAMETER_FILES
-
-
 rule decide:
     input:
         flights="results/save/flights.parquet",

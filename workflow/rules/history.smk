@@ -1,25 +1,4 @@
-# What was decided is kept for good, below results/history, which is no output: nothing of Snakemake's removes it.
-from functools import cache
-
-HISTORY = "results/history"
-
-
-@cache
-def changes_flown():
-    """Of every flight that flew a change decided before: which, and the values before and after it."""
-    rows = read_csv(checkpoints.list_flights.get().output.csv)
-    if not os.path.isdir(HISTORY):
-        return {}
-    # it reads saved flights
-    from fusetune.apply.history.flown import flights_of_changes
-
-    own = [row for row in rows if row["flight"] in LOGS]
-    return told_in_one_line(flights_of_changes, HISTORY, own, "results/save")
-
-
-def of_flights_after(pattern):
-    """Input function: files of the flights that came after a change."""
-    return lambda wildcards: expand(pattern, flight=changes_flown())
+# What was decided, kept for good, and what flights that came after it show.
 
 
 rule measure_change:
