@@ -73,10 +73,9 @@ def _date(text: str) -> datetime.date:
 def _loaded(file: Path) -> dict[str, float]:
     """Parameters of the estimator that a file sets; the simulated vehicle has no others."""
     from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_value
-    from fusetune.px4.parameters.line_files import read_parm
-    from fusetune.px4.parameters.params_file import read_params
+    from fusetune.px4.parameters.line_files import read_parameter_file
 
-    entries = read_params(file) if file.suffix == ".params" else read_parm(file)
+    entries = read_parameter_file(file)
     found: dict[str, float] = {}
     for entry in entries:
         if entry.name in PARAMETERS:

@@ -10,12 +10,11 @@ from dataclasses import dataclass, field
 from fusetune.px4.flight import Flight, ParameterValue
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.px4.parameters.logged_parameters import is_read, typed_value
-from fusetune.px4.parameters.params_file import ParamsHeader, VehicleAddress
+from fusetune.px4.parameters.params_file import PARAMETER_NAME, ParamsHeader, VehicleAddress
 from fusetune.px4.releases import BASELINE, Release, name_of
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
 
-_NAME = re.compile(r"[A-Z0-9_]{1,16}")
 _QGC_VEHICLES: Mapping[int, str] = {1: "Fixed Wing", 10: "Rover", 11: "Boat", 12: "Sub"} | dict.fromkeys(
     range(19, 26), "VTOL"
 )
@@ -91,7 +90,7 @@ def of_replayed(parameters: Mapping[str, float]) -> VehicleParameters:
 
 def _is_sound(name: str, value: ParameterValue) -> bool:
     """Whether a vehicle can have had it; of parameters that no room reads, whether it is a name and a number."""
-    if not _NAME.fullmatch(name) or not math.isfinite(value):
+    if not PARAMETER_NAME.fullmatch(name) or not math.isfinite(value):
         return False
     return not is_read(name) or typed_value(name, value) is not None
 

@@ -20,9 +20,8 @@ from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight, ParameterValue
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.ekf2_parameters import migrate
-from fusetune.px4.parameters.line_files import read_parm
+from fusetune.px4.parameters.line_files import read_parameter_file
 from fusetune.px4.parameters.logged_parameters import is_read
-from fusetune.px4.parameters.params_file import read_params
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.log_facts import is_airborne
 from fusetune.set_names import AS_FLOWN
@@ -152,8 +151,7 @@ def compare_replayed(original: AnyPath, replayed: AnyPath, asked: AnyPath | None
 
 
 def _asked(file: AnyPath) -> dict[str, ParameterValue]:
-    entries = read_params(file) if Path(file).suffix == ".params" else read_parm(file)
-    return {one.name: one.value for one in entries}
+    return {one.name: one.value for one in read_parameter_file(file)}
 
 
 def _parameters(flown: Flight, again: Flight, asked: Mapping[str, ParameterValue]) -> Iterator[ParameterBetween]:

@@ -23,10 +23,9 @@ from pathlib import Path
 from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import as_float32
 from fusetune.px4.parameters.float_text import float32_text
-from fusetune.px4.parameters.params_file import ParamEntry
+from fusetune.px4.parameters.params_file import PARAMETER_NAME, ParamEntry, read_params
 from fusetune.storage.files import AnyPath, atomic_path
 
-_NAME = re.compile(r"[A-Z0-9_]{1,16}")
 _WHOLE = re.compile(r"[+-]?\d+")
 _SHELL_WIDTH = 72
 """NuttX cuts lines of a script at CONFIG_NSH_LINELEN, of which PX4's smallest boards have 80, and runs the rest."""
@@ -95,6 +94,11 @@ def read_parm(path: AnyPath) -> list[ParamEntry]:
     return [_entry(path, number, words, comments) for number, words, comments in _lines(path, 2)]
 
 
+def read_parameter_file(path: AnyPath) -> list[ParamEntry]:
+    """Read a ``.params`` of QGroundControl, or any file of ``NAME value`` lines; `UserError` as of their readers."""
+    return read_params(path) if Path(path).suffix == ".params" else read_parm(path)
+
+
 def read_shell_script(path: AnyPath) -> list[ParamEntry]:
     """Read the values that a script sets; `UserError` as of `read_parm`, and where a command is none of ours."""
     found = []
@@ -122,7 +126,7 @@ def _demand_names(entries: Sequence[ParamEntry]) -> None:
     if len(set(names)) != len(names):
         raise ValueError("a parameter appears twice")
     for name in names:
-        if not _NAME.fullmatch(name):
+        if not PARAMETER_NAME.fullmatch(name):
             raise ValueError(f"{name!r} is no name of a parameter")
 
 
@@ -189,7 +193,7 @@ def _lines(path: AnyPath, words: int | None) -> list[tuple[int, list[str], tuple
 def _entry(path: AnyPath, number: int, words: Sequence[str], comments: tuple[str, ...]) -> ParamEntry:
     name, text = words
     try:
-        if not _NAME.fullmatch(name):
+        if not PARAMETER_NAME.fullmatch(name):
             raise ValueError(name)
         if _WHOLE.fullmatch(text):
             return ParamEntry(name, int(text), "INT32", comments)

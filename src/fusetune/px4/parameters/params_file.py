@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,8 @@ from fusetune.storage.files import atomic_path
 _MAV_PARAM_TYPE = {"INT32": 6, "FLOAT": 9}
 _TYPE_OF_CODE = {code: name for name, code in _MAV_PARAM_TYPE.items()}
 _LONGEST_NAME = 16
+PARAMETER_NAME = re.compile(f"[A-Z0-9_]{{1,{_LONGEST_NAME}}}")
+"""Names that PX4's parameters have."""
 _DECIMALS = 18
 _COLUMNS = "# Vehicle-Id Component-Id Name Value Type"
 
