@@ -39,6 +39,7 @@ STUDY = {
     ],
 }
 CONFIG = {"study": "config/imu_noise.yaml", "mission": str(MISSION), "effects": {"try_measured": False}}
+HISTORY = "results/apply/history.json"
 MARK = ".closed_loop"
 
 
@@ -53,7 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     tell(started, f"designed: {MISSION.name}, {len(STUDY['sets'])} sets beside what flies")
     fly(folder, "first", FLIGHTS_BEFORE, DAYS[0], options.cores, seed=1)
     tell(started, f"flown: {FLIGHTS_BEFORE} flights with the parameters that the vehicle has")
-    run_pipeline(folder, options.cores)
+    # the pages wait for the second run, which draws them all
+    run_pipeline(folder, options.cores, HISTORY)
     loaded = folder / "results" / "apply" / "best_params.params"
     changes = ", ".join(f"{one.name} {one.value:.6g}" for one in read_params(loaded))
     tell(started, f"studied: to load, {changes or 'nothing'}")
@@ -112,10 +114,10 @@ def fly(
                 raise SystemExit(done.stdout)
 
 
-def run_pipeline(folder: Path, cores: int) -> None:
-    """Run Snakemake as a user does."""
+def run_pipeline(folder: Path, cores: int, *targets: str) -> None:
+    """Run Snakemake as a user does, for some files or for all."""
     snakefile = ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
-    done = run([sys.executable, "-m", "snakemake", "--cores", str(cores), *snakefile])
+    done = run([sys.executable, "-m", "snakemake", "--cores", str(cores), *snakefile, *targets])
     if done.returncode:
         raise SystemExit(done.stdout)
 

@@ -69,8 +69,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fusetune",
         description="Single steps of the pipeline; `snakemake` runs them all.",
-        epilog="Exit status: 0 all is done; 1 a log was refused, diagnose warns, confirm does not confirm; 2 the command or "
-        "a file is unusable; 3 diagnose found a failure.",
+        epilog="Exit status: 0 all is done; 1 a log was refused, diagnose warns, confirm does not confirm; 2 the "
+        "command or a file is unusable; 3 diagnose found a failure.",
     )
     parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
