@@ -1,26 +1,33 @@
 """The log of a replay, read back.
 
-PX4's replay is no package, so the logs are those of a simulated vehicle: the same flight once more, sample by sample,
-with another parameter set in the estimator on board, which is what PX4's replay logs.
+PX4's replay is no package, so its logs are made: of a simulated flight, flown once more sample by sample with another
+set in the estimator on board; and of a golden flight, with what PX4's own estimator computed on it.
 """
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from fusetune.apply.replayed_log.comparison import compare_replayed
 from fusetune.cli import main
 from fusetune.design.missions.mission import load_mission
 from fusetune.errors import UserError
+from fusetune.execute.onboard_estimator import estimator_topics
 from fusetune.execute.simulation import simulate
 from fusetune.execute.vehicle import load_vehicle
+from fusetune.px4.aid_sources import MEASURED_SOURCES
+from fusetune.px4.flight import TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.line_files import write_replay_params
 from fusetune.px4.parameters.params_file import ParamEntry
 from fusetune.px4.ulog.reader import read_ulog
+from fusetune.px4.ulog.writer import write_ulog
 
 NEW = {"EKF2_ACC_NOISE": 0.8, "EKF2_GPS_DELAY": 40.0}
 
@@ -57,6 +64,44 @@ def test_a_replay_that_ran_as_asked_bears_the_prediction_out(logs: Path, capsys:
     assert errors["gnss_vel", 0].before == pytest.approx(
         np.sqrt(np.mean(np.square(table["innovation[0]"][late].astype(float)))), rel=0.1
     )
+
+
+def test_px4s_own_figures_bear_our_prediction_out(golden_logs: Path, golden_reference: Path, tmp_path: Path) -> None:
+    flown = read_ulog(golden_logs / "mc_drag.ulg")
+    reference = golden_reference / "mc_drag"
+    overrides = json.loads((reference / "aid.json").read_text())["overrides"]
+    initial = flown.parameters.initial | {name: float(value) for name, value in overrides.items()}
+    others = {key: table for key, table in flown.topics.items() if not key[0].startswith("estimator_")}
+    before = replace(flown, topics=others | estimator_topics(canonical(flown)))
+    again = replace(flown, topics=others | px4s_topics(reference / "aid.innovations.parquet"))
+    again = replace(again, parameters=replace(flown.parameters, initial=initial))
+    for name, flight in (("before", before), ("again", again)):
+        write_ulog(tmp_path / f"{name}.ulg", flight)
+    found = compare_replayed(tmp_path / "before.ulg", tmp_path / "again.ulg")
+    assert {one.name for one in found.parameters} == set(overrides)
+    assert found.agrees
+    # docs/fidelity.md: a part in a thousand of PX4's own innovations
+    assert {one.source for one in found.errors} >= {"gnss_vel", "baro_hgt", "mag"}
+    assert max(one.difference for one in found.errors) < 0.002
+
+
+def px4s_topics(file: Path) -> dict[tuple[str, int], TopicTable]:
+    """Innovations that PX4's own estimator computed, as its log has them."""
+    rows = pq.read_table(file).to_pandas()
+    found: dict[tuple[str, int], TopicTable] = {}
+    for source in MEASURED_SOURCES.values():
+        axes = [rows[(rows["source"] == source.name) & (rows["axis"] == axis)] for axis in range(source.axes)]
+        if not all(len(axis) for axis in axes):
+            continue
+        times = axes[0]["timestamp_sample"].to_numpy(np.int64)
+        table = {"timestamp": times, "timestamp_sample": times}
+        for number, axis in enumerate(axes):
+            column = f"[{number}]" if source.axes > 1 else ""
+            for name in ("innovation", "innovation_variance"):
+                table[f"{name}{column}"] = axis[name].to_numpy(np.float32)
+        table |= {name: axes[0][name].to_numpy() for name in ("innovation_rejected", "fused")}
+        found[source.topic, 0] = table
+    return found
 
 
 def test_a_replay_with_other_parameters_or_of_another_flight_confirms_nothing(

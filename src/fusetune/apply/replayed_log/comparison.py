@@ -8,20 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
-from fusetune.analyze.replaying.settings import StartSettings
 from fusetune.analyze.trust.onboard_fidelity import JUDGED_SOURCES, MIN_SAMPLES, partners, usable, warm_from
 from fusetune.errors import UserError
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight, ParameterValue
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.px4.parameters.ekf2_parameters import migrate
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, PARAMETERS, migrate
 from fusetune.px4.parameters.line_files import read_parameter_file
 from fusetune.px4.parameters.logged_parameters import is_read
+from fusetune.px4.releases import BASELINE, Release
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.log_facts import is_airborne
 from fusetune.set_names import AS_FLOWN
@@ -29,6 +28,8 @@ from fusetune.storage.files import AnyPath
 
 AGREES_WITHIN = 0.05
 """Errors that PX4's replay made so much smaller or larger are as predicted within this share of those before."""
+_SAME_SAMPLE_US = 5_000
+"""How far times of one measurement may differ between replays: less than an update of the filter, 8 to 10 ms."""
 _SAME_IMU_SHARE = 0.5
 """Of the samples of a replayed log at least so many are those of its original; PX4's logger drops some."""
 
@@ -141,7 +142,8 @@ def compare_replayed(original: AnyPath, replayed: AnyPath, asked: AnyPath | None
     parameters = tuple(_parameters(flown, again, wanted))
     canonical_flown, canonical_again = canonical(flown), canonical(again)
     _demand_same_flight(canonical_flown, canonical_again, replayed, original)
-    prepared = prepare(canonical_flown, ReconstructionSettings(), StartSettings())
+    # PX4's replay has what was logged and nothing else, and starts from nothing
+    prepared = prepare(canonical_flown)
     changed = _changed(flown, again)
     errors = tuple(_errors(prepared, canonical_again, changed))
     if not errors:
@@ -158,17 +160,22 @@ def _parameters(flown: Flight, again: Flight, asked: Mapping[str, ParameterValue
     before, after = flown.parameters.at_end(), again.parameters.at_end()
     for name in sorted({*asked, *(one for one in {**before, **after} if is_read(one))}):
         one = ParameterBetween(name, before.get(name), after.get(name), asked.get(name))
-        # what only one of the logs names was not in use in the other
-        differs = one.original is not None and one.replayed is not None and one.original != one.replayed
-        if differs or one.asked is not None:
+        # what a log does not name was not in use, or is what the release has by default
+        held = before.get(name, _default(name, again.release))
+        if (one.replayed is not None and held is not None and one.replayed != held) or one.asked is not None:
             yield one
+
+
+def _default(name: str, release: Release | None) -> float | None:
+    metadata = ALL_PARAMETERS.get(name)
+    return metadata.default_in(release or BASELINE) if metadata is not None else None
 
 
 def _changed(flown: Flight, again: Flight) -> dict[str, float]:
     """Parameters of the baseline in which the replay differs from the flight."""
     before = migrate(flown.parameters.at_end(), flown.release)
     after = migrate(again.parameters.at_end(), again.release)
-    return {name: value for name, value in after.items() if name in before and value != before[name]}
+    return {name: value for name, value in after.items() if value != before.get(name, PARAMETERS[name].default)}
 
 
 def _demand_same_flight(flown: Flight, again: Flight, replayed: AnyPath, original: AnyPath) -> None:
@@ -224,7 +231,9 @@ def _axis(
     if not all(one.timestamp_sample.size for one in (before, *sound)):
         return None
     matches = [partners(one.timestamp_sample, before.timestamp_sample) for one in sound]
-    common = np.all([near for _, near in matches], axis=0)
+    times = np.array([one.timestamp_sample[partner] for one, (partner, _) in zip(sound, matches, strict=True)])
+    # a neighbour is no partner: where a log has lost the sample, none of the four is compared
+    common = np.all([near for _, near in matches], axis=0) & (np.ptp(times, axis=0) <= _SAME_SAMPLE_US)
     if common.sum() < MIN_SAMPLES:
         return None
     before = before.rows(common)
