@@ -57,7 +57,7 @@ def test_a_clearly_better_set_is_chosen_and_written(tmp_path: Path) -> None:
     assert entry.value == pytest.approx(0.2, abs=1e-7)
     assert "previous value 0.35 m/s^2, new value 0.2 m/s^2" in entry.comments[0]
     assert "better on 6 of 6 flights" in entry.comments[1]
-    assert re.search(r"smaller \(95 % interval \d", entry.comments[1])
+    assert re.search(r"smaller \(95% interval \+\d", entry.comments[1])
     assert [one["kind"] for one in decision["next_steps"]] == ["load", "confirm", "load"]
     assert decision["paragraphs"][-1].startswith("Next: (1) Load best_params.params")
     (back,) = read_params(tmp_path / "apply" / "rollback.params")
