@@ -4,6 +4,7 @@
 # make types          … then checks the types
 # make demonstration  … then runs the pipeline and looks whether it made all, found what is wrong with its vehicle, and would
 #                     do nothing twice
+# make demo-loop      … then closes the loop once on a simulated vehicle: design, fly, study, apply, fly again, confirmed
 # These are the checks of a change; .ci/run and .github/workflows/checks.yml call them.
 CORES ?= 2
 LOCKS ?= requirements.lock
@@ -24,7 +25,7 @@ export UV_COMPILE_BYTECODE := 1
 # What the demonstration is for; with real logs the same files come.
 MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
 
-.PHONY: all setup test lint types demonstration lock clean
+.PHONY: all setup test lint types demonstration demo-loop lock clean
 
 all: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -53,6 +54,9 @@ demonstration: all
 	done
 	@$(BIN)/snakemake --cores 1 --dry-run | grep -q "Nothing to be done" || { echo "a second run would not be idle" >&2; exit 1; }
 
+demo-loop: $(READY)
+	$(BIN)/python -m benchmarks.closed_loop --cores $(CORES)
+
 # The stamp goes first and comes last: a set-up that was interrupted is done again from nothing.
 $(READY): $(LOCKS) pyproject.toml
 	@if [ ! -e $@ ]; then rm -rf .venv; fi; rm -f $@
@@ -75,7 +79,9 @@ $(READY): $(LOCKS) pyproject.toml
 lock:
 	$(LOCK) $(UPGRADE) --extra test --extra dev --output-file requirements.lock
 	$(LOCK) $(UPGRADE) --extra slurm --constraint requirements.lock --output-file requirements-slurm.lock
+	$(LOCK) $(UPGRADE) --extra mlflow --constraint requirements.lock --output-file requirements-mlflow.lock
 
-# Removes what the pipeline has made; logs in flights/ and the environment stay.
+# Removes what the pipeline has made; logs in flights/, the environment and the history of the decisions stay.
 clean:
-	rm -rf results .snakemake .cache
+	rm -rf .snakemake .cache demo-loop
+	@[ ! -d results ] || find results -mindepth 1 -maxdepth 1 ! -name history -exec rm -rf {} +

@@ -25,6 +25,7 @@ include: "workflow/rules/search.smk"
 include: "workflow/rules/diagnose.smk"
 include: "workflow/rules/analyze.smk"
 include: "workflow/rules/apply.smk"
+include: "workflow/rules/history.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -40,6 +41,7 @@ localrules:
     mission_map,
     list_flights,
     decide,
+    keep_history,
     plot_summary,
     build_report,
     join_health,

@@ -9,10 +9,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from fusetune.apply.parameter_changes import parameter_changes, write_parameter_files
+from fusetune.apply.parameter_changes import parameter_changes
+from fusetune.apply.parameter_files.vehicle_changes import vehicle_changes
+from fusetune.apply.parameter_files.vehicle_parameters import VehicleParameters
+from fusetune.apply.parameter_files.write_files import FilesOrigin, write_parameter_files
 from fusetune.apply.provenance import file_hash
 from fusetune.apply.rounded import rounded
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.releases import BASELINE
 from fusetune.storage.documents import write_document
 
 UUID = "00010000000020343457544e5015003a0043"
@@ -40,7 +44,10 @@ def write_decision(folder: Path, *, uuid: str = UUID, release: str = RELEASE, **
     folder.mkdir(parents=True, exist_ok=True)
     previous = {name: PARAMETERS[name].default for name in NEW}
     changes = parameter_changes(NEW, previous)
-    written = write_parameter_files(folder, changes, "made for a trial", release, ("a trial",))
+    values = {name: int(one.default) if one.type == "INT32" else one.default for name, one in PARAMETERS.items()}
+    has = VehicleParameters(values, release=BASELINE, firmware=release)
+    told = vehicle_changes(changes, has)
+    written = write_parameter_files(folder, told, has, FilesOrigin(("a trial",), "made for a trial", "flight_1"))
     who = {"name": "trial", "in_words": "quadrotor trial", "uuid": uuid, "hardware": "PX4_FMU_V4", "airframe": "4011"}
     decision: dict[str, Any] = {
         "status": "change",
@@ -48,8 +55,8 @@ def write_decision(folder: Path, *, uuid: str = UUID, release: str = RELEASE, **
         "present": "present",
         "changes": [asdict(one) for one in changes],
         "vehicle": {**who, "type": "quadrotor", "kind": "real", "present_flight": "flight_1", **vehicle},
+        "on_vehicle": told.document() | {"judged": has.judged},
         "flights": [{"flight": "flight_1", "firmware": release}],
-        "sets": [{"set": "present", "overrides": {**previous, "EKF2_HEAD_NOISE": 0.3}}],
         "parameter_files": {file.name: file_hash(file) for file in written},
     }
     write_document(folder / "decision.json", rounded(decision))

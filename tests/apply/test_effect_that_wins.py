@@ -15,7 +15,7 @@ from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
-from fusetune.design.mission import load_mission
+from fusetune.design.missions.mission import load_mission
 from fusetune.execute import simulate
 from fusetune.execute.vehicle import load_vehicle
 from fusetune.save import save_log

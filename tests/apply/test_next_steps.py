@@ -31,6 +31,7 @@ from fusetune.apply.next_steps import (
     steps_sentence,
 )
 from fusetune.apply.parameter_changes import ParameterChange
+from fusetune.apply.parameter_files.vehicle_changes import RefusedChange
 from fusetune.apply.power.power import Power, PowerCurve
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
@@ -58,6 +59,7 @@ def curves(needed: dict[float, int | None]) -> Power:
     return Power(7, 3.0, 0.5, tuple(found))
 
 
+NOT_HAD = RefusedChange("EKF2_GRAV_NOISE", "v1.13.3, which the vehicle flies, has no such parameter", "Leave it out")
 POWER = curves({5.0: None, 10.0: 12, 20.0: 6})
 
 
@@ -97,6 +99,7 @@ SITUATIONS = {
     "keep, too few flights": (keep(WIDE, number=3), [FLY]),
     "keep, too few flights, a noise told wrong": (keep(WIDE, number=3, candidates=[MAGNETOMETER]), [FLY, STUDY]),
     "change": (change(), [LOAD, CONFIRM, LOAD]),
+    "change that the vehicle cannot be given": (change(not_loadable=[NOT_HAD]), [STUDY]),
     "change, too few flights": (change(exploratory=True), [LOAD, CONFIRM, LOAD]),
     "no flight at all": (NO_FLIGHT, [FLY]),
     "no evidence, logs refused": (replace(NO_FLIGHT, refused=["log more", "fly GNSS", "log more"]), [LOG, FLY]),

@@ -75,6 +75,7 @@ def made_search(status: str = "change", **other: Any) -> SearchResults:
         "status": status,
         "cautions": ["Mind its <attitude>."],
         "changes": [change] if status == "change" else [],
+        "on_vehicle": {"parameters": [change] if status == "change" else [], "refused": []},
         "chosen": "found" if status == "change" else "present",
         "ranking": [
             {"name": "found", "is_present": False, "reasons": []},

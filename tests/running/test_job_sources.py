@@ -36,6 +36,8 @@ MADE_BY = {
     "search_try": ("search",),
     "search_found": ("search",),
     "decide": ("apply", "conformance", "score", "replay", "save"),
+    "measure_change": ("change", "apply", "replay", "save"),
+    "keep_history": ("apply", "score", "replay", "save"),
     "join_fleet": ("apply", "diagnose", "save"),
     "flight_page": ("report", "apply", "diagnose", "save"),
     "all_sensors_page": ("report", "apply", "diagnose", "save"),

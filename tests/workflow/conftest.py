@@ -87,7 +87,8 @@ class Workspace:
     def results(self) -> dict[str, bytes]:
         """Contents of all results that have to be the same in every run."""
         root = self.folder / "results"
-        unstable = {"logs", "benchmarks"}
+        # the history says when it was written
+        unstable = {"logs", "benchmarks", "history"}
         return {
             str(file.relative_to(root)): file.read_bytes()
             for file in sorted(root.rglob("*"))

@@ -1,6 +1,8 @@
 rule decide:
     input:
         flights="results/save/flights.parquet",
+        # all that the vehicle has, for its parameter files
+        saved=of_replayable_flights("results/save/{flight}"),
         present="results/save/present.json",
         # what the input functions read: where it is missing, the checkpoint has to run again
         listed="results/save/flights.csv",
@@ -36,7 +38,7 @@ rule decide:
             category="Decision",
             labels={"table": "parameters to load"},
         ),
-        "results/apply/rollback.params",
+        [f"results/apply/{name}" for name in PARAMETER_FILES[1:]],
         "results/apply/candidates.yaml",
         "results/apply/sensitivity.json",
         search="results/search/search.json" if SEARCH else [],

@@ -1,9 +1,11 @@
 # Input and params functions that several rules use; those that ask for verdicts wait for the checkpoint.
 import csv
 from dataclasses import astuple, replace
+from functools import cache
 
 from fusetune.analyze.flight_files import DIAGNOSED_FILES, FLIGHT_FILES
 from fusetune.analyze.replaying.store.parts import PARTS
+from fusetune.apply.parameter_files.names import PARAMETER_FILES
 from fusetune.design.covariance.named_files import files_of_design
 from fusetune.storage.cells import as_it_was
 from fusetune.storage.checksum_file import check_checksum
@@ -166,6 +168,28 @@ def tried_before(number):
     if not FLIGHT_BY_FLIGHT:
         return folders
     return lambda wildcards: [f"{folder}/{flight}.json" for folder in folders for flight in searched_flights_found()]
+
+
+# What was decided is kept for good, and is no output: nothing of Snakemake's removes it.
+HISTORY = "results/history"
+
+
+@cache
+def changes_flown():
+    """Of every flight that flew a change decided before: which, and the values before and after it."""
+    rows = read_csv(checkpoints.list_flights.get().output.csv)
+    if not os.path.isdir(HISTORY):
+        return {}
+    # it reads saved flights
+    from fusetune.apply.history.flown import flights_of_changes
+
+    own = [row for row in rows if row["flight"] in LOGS]
+    return told_in_one_line(flights_of_changes, HISTORY, own, "results/save")
+
+
+def of_flights_after(pattern):
+    """Input function: files of the flights that came after a change."""
+    return lambda wildcards: expand(pattern, flight=changes_flown())
 
 
 def closing_words():

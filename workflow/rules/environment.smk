@@ -155,4 +155,6 @@ KERNELS_READY = os.path.join(use_kernel_cache(inherit=not workflow.is_main_proce
 # What this workflow makes; and of that, what Snakemake takes for up to date when it has no memory of it. Replays are not
 # among it, nor is what a search tried: they are made from a saved flight, and keep a record of their own.
 PRODUCTS = [RESULTS, Path(KERNELS_READY)]
-BELIEVED = [RESULTS / part for part in ("design", "execute", "save", "search", "apply", "report", "report.html")]
+BELIEVED = [
+    RESULTS / part for part in ("design", "execute", "save", "search", "apply", "change", "report", "report.html")
+]

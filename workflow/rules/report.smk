@@ -188,6 +188,7 @@ rule build_report:
         summary=rules.plot_summary.output,
         decision="results/apply/decision.json",
         sensitivity="results/apply/sensitivity.json",
+        history="results/apply/history.json",
         diagnoses=expand("results/analyze/{flight}/diagnosis.json", flight=LOGS),
         pages=expand("results/report/flights/{flight}.html", flight=LOGS),
         fleet="results/fleet.html",

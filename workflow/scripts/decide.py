@@ -48,6 +48,7 @@ with logged_job(snakemake.log[0]):
         diagnoses=list(snakemake.input.diagnoses),
         legs=snakemake.input.legs,
         recommended=found.recommended if found is not None else None,
+        saved=Path(snakemake.input.flights).parent,
         settings=settings,
     )
     if found is not None:

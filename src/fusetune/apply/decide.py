@@ -38,7 +38,10 @@ from fusetune.apply.next_steps import Situation, next_steps, refused_remedies, s
 from fusetune.apply.one_vehicle import decided_vehicle, source_of_present, unsure_of_present
 from fusetune.apply.paper_disagreement import is_same_set, why
 from fusetune.apply.paper_mode import PaperEntry, paper_ranking
-from fusetune.apply.parameter_changes import ParameterChange, parameter_changes, write_parameter_files
+from fusetune.apply.parameter_changes import ParameterChange, parameter_changes
+from fusetune.apply.parameter_files.vehicle_changes import vehicle_changes
+from fusetune.apply.parameter_files.vehicle_parameters import VehicleParameters, of_replayed, vehicle_parameters
+from fusetune.apply.parameter_files.write_files import FilesOrigin, write_parameter_files
 from fusetune.apply.pieces_evidence import in_classes, read_flight_pieces
 from fusetune.apply.power.power import Power, power_of
 from fusetune.apply.power.spread import spread_of
@@ -52,7 +55,7 @@ from fusetune.apply.sensitivity.sensitivity import sensitivity
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.study_trials import trials_of_study
 from fusetune.apply.vetoes import vetoes
-from fusetune.apply.wording import paragraph
+from fusetune.apply.wording import named, paragraph, smaller
 from fusetune.errors import UserError
 from fusetune.finding import documents
 from fusetune.set_names import DELAY_MENDED, PRESENT, is_mended
@@ -78,10 +81,11 @@ def decide(
     diagnoses: Sequence[AnyPath] = (),
     legs: AnyPath | None = None,
     recommended: Recommended | None = None,
+    saved: AnyPath | None = None,
     settings: DecisionSettings | None = None,
 ) -> None:
     """Rank all sets over all flights, decide, and write `ranking.parquet`, `ranking.csv`, `per_flight.parquet`,
-    `decision.json`, `best_params.params`, `rollback.params`, `candidates.yaml` and `sensitivity.json` to
+    `decision.json`, `candidates.yaml`, `sensitivity.json` and the parameter files (`parameter_files.names`) to
     `output_folder`.
 
     Parameters
@@ -102,6 +106,8 @@ def decide(
     diagnoses : `results/analyze/<flight>/diagnosis.json` of the flights
     legs : `results/analyze/legs.parquet`, the scores by manoeuvre and leg; None where flights were not split
     recommended : what one of the sets stands for, where that is a search's
+    saved : folder of the saved flights, `results/save`, for all that the vehicle has; None where there are only the
+        parameters that were replayed
 
     Raises
     ------
@@ -130,6 +136,8 @@ def decide(
         choice = choose_after_mending(choice, ranked, among_mended)
     values = criteria(sets, settings.main_source, flights, metrics)
     changes = _changes(choice, newest, present, recommended)
+    has = _vehicle_parameters(newest, present, saved)
+    on_vehicle = vehicle_changes(changes, has)
     noises = _noises(flights, metrics, newest, present, settings)
     findings = consistency_findings(noises, settings)
     better = _vetoed_but_better(ranked)
@@ -140,6 +148,8 @@ def decide(
     late = confirmed(delay_findings(read_joined(delays) if delays is not None else ()), choice, ranked)
     proposed = _candidates(better, newest, present, consistency_candidates(noises, settings))
     minded = cautions(choice.pick, changes, _whiteness(metrics, flights, present), settings) if choice.pick else ()
+    told_of_vehicle = on_vehicle.sentence()
+    minded = (*minded, told_of_vehicle) if told_of_vehicle else minded
     power = _power(ranked, present, flights, settings)
     missing = missing_motion(flights, present, read_joined(delays) if delays is not None else (), told)
     steps = next_steps(
@@ -154,6 +164,7 @@ def decide(
             power,
             _changed_parameters(newest, present),
             refused_remedies(read_table(flights_table).to_pylist()),
+            on_vehicle.refused,
             is_simulated=vehicle.identity is not None and not vehicle.identity.is_real,
         ),
         settings,
@@ -195,8 +206,9 @@ def decide(
     _write_per_flight(output, flights)
     write_candidates(output / "candidates.yaml", proposed)
     write_sensitivity(output / SENSITIVITY_FILE, _sensitivity(flights, newest, present, choice, ranked, settings))
-    firmware = newest.summary["firmware"] if newest else "unknown"
-    written = write_parameter_files(output, changes, _reason(choice), firmware, _file_origin(choice, decision, newest))
+    decision["on_vehicle"] = on_vehicle.document() | {"judged": has.judged}
+    origin = _files_origin(choice, decision, newest, has, settings)
+    written = write_parameter_files(output, on_vehicle, has, origin)
     decision["parameter_files"] = {file.name: file_hash(file) for file in written}
     with atomic_path(output / "decision.json") as temporary:
         write_document(temporary, rounded(decision), allow_nan=False)
@@ -445,23 +457,45 @@ def _write_per_flight(folder: Path, flights: Sequence[AnalyzedFlight]) -> None:
         write_table(pa.Table.from_pylist(rows, schema=schema), temporary)
 
 
-def _reason(choice: Choice) -> str:
+def _vehicle_parameters(newest: AnalyzedFlight | None, present: str, saved: AnyPath | None) -> VehicleParameters:
+    if newest is not None and saved is not None:
+        return vehicle_parameters(Path(saved) / newest.name)
+    return of_replayed(newest.summary["sets"].get(present, {}).get("parameters", {}) if newest is not None else {})
+
+
+def _reason(choice: Choice, settings: DecisionSettings) -> str:
+    """What is expected of the change, with its interval."""
     if choice.pick is None:
         return ""
     best = choice.pick
+    span = smaller(best.lower, best.upper, settings.confidence)
     note = ", exploratory" if choice.exploratory else ""
     return (
-        f"set {best.name}: prediction errors {best.improvement_percent:.1f} % smaller, "
+        f"set {best.name}: prediction errors {best.improvement_percent:.1f} % smaller ({span}), "
         f"better on {best.flights_better} of {best.flights} flights{note}"
     )
 
 
-def _file_origin(choice: Choice, decision: dict[str, Any], newest: AnalyzedFlight | None) -> tuple[str, ...]:
+def _files_origin(
+    choice: Choice,
+    decision: dict[str, Any],
+    newest: AnalyzedFlight | None,
+    vehicle: VehicleParameters,
+    settings: DecisionSettings,
+) -> FilesOrigin:
     lines = [f"written by {decision['provenance']['product']}, decision: {choice.status} ({choice.chosen})"]
     if decision["vehicle"] is not None:
         lines.append(f"for the {decision['vehicle']['in_words']}")
     if newest is not None:
         lines.append(f"previous values from flight {newest.name}, firmware {newest.summary['firmware']}")
+    if choice.pick is not None:
+        lines.append(
+            f"flights of the decision: {named([one['flight'] for one in decision['flights'] if one['scored']])}"
+        )
     if choice.exploratory:
         lines.append(f"exploratory: flights in the decision: {decision['flights_scored']}")
-    return tuple(lines)
+    intervals = newest.summary["intervals_us"] if newest is not None else []
+    start_us = vehicle.log_start_us
+    scored_from_s = 1e-6 * (intervals[0][0] - start_us) if intervals and start_us is not None else None
+    log = newest.name if newest is not None else ""
+    return FilesOrigin(tuple(lines), _reason(choice, settings), log, scored_from_s)

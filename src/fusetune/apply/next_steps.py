@@ -14,6 +14,7 @@ from fusetune.apply.delays import UNCONFIRMED
 from fusetune.apply.evidence import DISTRUSTED, AnalyzedFlight
 from fusetune.apply.missing_motion import DELAYS, LEVER_ARMS, LOG_PROFILE, NOISES, THINNED, MissingMotion
 from fusetune.apply.parameter_changes import ParameterChange
+from fusetune.apply.parameter_files.vehicle_changes import RefusedChange
 from fusetune.apply.power.power import ENOUGH, GAINS_PERCENT, LONGER_MINUTES, Power
 from fusetune.apply.ranking import RankedSet
 from fusetune.apply.settings import DecisionSettings
@@ -64,6 +65,7 @@ class Situation:
     missing : what the flights cannot tell by how they moved
     overrides : name of each set → parameters to which it gives other values than the present ones
     refused : remedies for the logs that were refused, one for each finding, in any order
+    not_loadable : changes that the vehicle cannot be given
     """
 
     choice: Choice
@@ -76,6 +78,7 @@ class Situation:
     power: Power | None
     overrides: Mapping[str, Sequence[str]]
     refused: Sequence[str] = ()
+    not_loadable: Sequence[RefusedChange] = ()
     is_simulated: bool = False
 
     @property
@@ -141,6 +144,10 @@ def _first_flights(settings: DecisionSettings) -> NextStep:
 
 def _after_a_change(now: Situation, settings: DecisionSettings) -> list[NextStep]:
     reboot = ", reboot" if any(one.reboot_required for one in now.changes) else ""
+    if now.not_loadable:
+        first = now.not_loadable[0]
+        text = f"{first.remedy} ({first.name}: {first.reason}), and run again: nothing can be loaded as it is."
+        return [NextStep(STUDY, text)]
     few = now.choice.exploratory
     careful = f"it rests on {counted(now.deciding, 'flight')} only, so " if few else ""
     load = NextStep(LOAD, f"Load best_params.params{reboot}, and fly a short, safe flight first.")

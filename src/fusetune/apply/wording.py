@@ -113,7 +113,7 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
     found = f"The best candidate, “{best.name}”, had errors {best.improvement_percent:.1f} % smaller "
     if best.upper is None:
         return f"{found}({wins}), but {UNKNOWN_INTERVAL}: nothing in these flights shows how it varies."
-    found += f"({_smaller(best.lower, best.upper, settings.confidence)}; {wins}), "
+    found += f"({smaller(best.lower, best.upper, settings.confidence)}; {wins}), "
     if best.upper >= 0.0:
         return (
             f"{found}but that interval includes no difference at all, so these flights do not show that a change "
@@ -136,12 +136,12 @@ def _comparison(choice: Choice, ranked: Sequence[RankedSet], settings: DecisionS
 def _for_the_mended(choice: Choice, pick: RankedSet, settings: DecisionSettings) -> str:
     """Why a set with mended delays is chosen: what is measured is proof enough if the predictions do not contradict."""
     wins = f"better on {pick.flights_better} of {counted(pick.flights, 'flight')}"
-    span = _smaller(pick.lower, pick.upper, settings.confidence)
+    span = smaller(pick.lower, pick.upper, settings.confidence)
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
     beyond = choice.beyond_mending
     if beyond is None:
         return f"{text} With the delay mended, no other set is proved better still."
-    span = _smaller(beyond.lower, beyond.upper, settings.confidence)
+    span = smaller(beyond.lower, beyond.upper, settings.confidence)
     return (
         f"{text} They are {beyond.improvement_percent:.1f} % smaller than with nothing but the delay mended ({span}; "
         f"better on {beyond.flights_better} of {counted(beyond.flights, 'flight')})."
@@ -149,7 +149,7 @@ def _for_the_mended(choice: Choice, pick: RankedSet, settings: DecisionSettings)
 
 
 def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) -> str:
-    span = _smaller(pick.lower, pick.upper, settings.confidence)
+    span = smaller(pick.lower, pick.upper, settings.confidence)
     wins = f"better on {pick.flights_better} of {counted(pick.flights, 'flight')}"
     text = f"Its prediction errors are {pick.improvement_percent:.1f} % smaller than now ({span}; {wins})."
     if not gains_enough(pick, settings):
@@ -157,7 +157,7 @@ def _for_the_pick(pick: RankedSet, best: RankedSet, settings: DecisionSettings) 
         text += (
             " That alone would not be enough for a change; but its velocity is "
             f"{improvement_percent(nearer.difference):.1f} % nearer to the one that the whole flight, before and "
-            f"after, makes likely ({_smaller(nearer.lower, nearer.upper, settings.confidence)})."
+            f"after, makes likely ({smaller(nearer.lower, nearer.upper, settings.confidence)})."
         )
     if pick.name != best.name and gains_enough(best, settings):
         text += (
@@ -186,7 +186,7 @@ def _left_out(choice: Choice) -> str:
 UNKNOWN_INTERVAL = "how far chance could do that is not known"
 
 
-def _smaller(lower: float | None, upper: float | None, confidence: float) -> str:
+def smaller(lower: float | None, upper: float | None, confidence: float) -> str:
     """Interval of a difference of scores as a reduction of the errors."""
     if lower is None or upper is None:
         return UNKNOWN_INTERVAL

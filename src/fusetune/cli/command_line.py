@@ -11,11 +11,13 @@ from collections.abc import Mapping, Sequence
 from fusetune import __version__
 from fusetune.cli import (
     cards,
+    confirm,
     conformance,
     covariance,
     design,
     diagnose,
     fidelity,
+    history,
     mission,
     replay,
     save,
@@ -40,6 +42,8 @@ COMMANDS: Mapping[str, Command] = {
     "diagnose": diagnose,
     "conformance": conformance,
     "search": search,
+    "confirm": confirm,
+    "history": history,
     "upload": upload,
 }
 """In the order of the pipeline."""
@@ -85,8 +89,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fusetune",
         description="Single steps of the pipeline; `snakemake` runs them all.",
-        epilog="Exit status: 0 all is done; 1 a log was refused, diagnose warns; 2 the command or a file is unusable; "
-        "3 diagnose found a failure, upload took all back; 4 upload is not finished.",
+        epilog="Exit status: 0 all is done; 1 a log was refused, diagnose warns, confirm does not confirm; 2 the "
+        "command or a file is unusable; 3 diagnose found a failure, upload took all back; 4 upload is not finished.",
     )
     parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")

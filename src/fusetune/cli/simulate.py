@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import datetime
+from dataclasses import replace
 from pathlib import Path
 
 from fusetune.cli.command import DONE
@@ -21,6 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", metavar="NAME", help="set of the study to fly; without it the vehicle's own parameters"
     )
+    parser.add_argument(
+        "--parameters", type=Path, metavar="FILE", help="parameter file that the vehicle has loaded (.params or .parm)"
+    )
+    parser.add_argument("--date", type=_date, metavar="YYYY-MM-DD", help="day of the flight; else that of the vehicle")
     parser.add_argument("--faults", type=Path, metavar="FILE", help="YAML file with a list `faults`")
     parser.add_argument("--seed", type=_seed, default=1, metavar="NUMBER", help="whole number from 0 (1)")
     parser.add_argument("--out", type=Path, required=True, metavar="LOG.ulg")
@@ -33,10 +39,14 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.execute.sensors.faults import load_faults
     from fusetune.execute.vehicle import load_vehicle
 
+    vehicle = load_vehicle(options.vehicle)
+    if options.date is not None:
+        vehicle = replace(vehicle, environment=replace(vehicle.environment, date=options.date))
+    loaded = _loaded(options.parameters) if options.parameters is not None else {}
     flight = simulate(
         load_mission(options.mission),
-        load_vehicle(options.vehicle),
-        _flown_set(options.study, options.set),
+        vehicle,
+        {**loaded, **_flown_set(options.study, options.set)},
         options.seed,
         load_faults(options.faults) if options.faults else (),
         options.out,
@@ -50,6 +60,33 @@ def _seed(text: str) -> int:
     if not text.isascii() or not text.isdigit() or int(text) > LARGEST_SEED:
         raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0 to {LARGEST_SEED}")
     return int(text)
+
+
+def _date(text: str) -> datetime.date:
+    """A day of the calendar."""
+    try:
+        return datetime.date.fromisoformat(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no day, as 2025-06-15 is") from None
+
+
+def _loaded(file: Path) -> dict[str, float]:
+    """Parameters of the estimator that a file sets; the simulated vehicle has no others."""
+    from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_value
+    from fusetune.px4.parameters.line_files import read_parameter_file
+
+    entries = read_parameter_file(file)
+    found: dict[str, float] = {}
+    for entry in entries:
+        if entry.name in PARAMETERS:
+            try:
+                check_value(entry.name, entry.value)
+            except ParameterError as error:
+                raise UserError(file, f"{error.name}: {error.reason}", error.remedy) from error
+            found[entry.name] = entry.value
+    if len(found) < len(entries):
+        print(f"{file}: {len(entries) - len(found)} parameters are none of the estimator's and are left out")
+    return found
 
 
 def _flown_set(study_file: Path | None, name: str | None) -> dict[str, float]:

@@ -26,6 +26,7 @@ from fusetune.report.sections.flight_sections import (
     single_flights_section,
 )
 from fusetune.report.sections.health_section import health_section
+from fusetune.report.sections.history_section import history_section
 from fusetune.report.sections.mission_section import mission_section
 from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.sensitivity_section import sensitivity_section
@@ -72,6 +73,7 @@ def build_report(
         decision_section(results),
         health_section(_of_single_flights(diagnoses), {Path(one).stem: one for one in flight_pages}, output),
         next_steps_section(results, figures),
+        history_section(results.history),
         findings_section(results),
         evidence_section(results, figures),
         withheld_section(results, figures),

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from fusetune.apply.history.entries import HISTORY_FILE
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.apply.sensitivity.files import NOTHING_TOLD, SENSITIVITY_FILE, ToldSensitivity, read_sensitivity
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
@@ -36,6 +37,7 @@ class Results:
     shown : sets that plots show, in order of the ranking, the present one first
     scoring : summary of each analysed flight, by name
     sensitivity : what the sets tell of the parameters
+    history : what was decided for the vehicle before, and what it brought; None where no history is kept
     """
 
     decision: dict[str, Any]
@@ -47,6 +49,7 @@ class Results:
     shown: tuple[str, ...]
     present: str
     sensitivity: ToldSensitivity = NOTHING_TOLD
+    history: dict[str, Any] | None = None
 
     @property
     def scored(self) -> tuple[str, ...]:
@@ -102,6 +105,7 @@ def read_results(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath) -> R
         scoring=scoring,
         folders=folders,
         sensitivity=read_sensitivity(apply_folder / SENSITIVITY_FILE),
+        history=read_document(history) if (history := apply_folder / HISTORY_FILE).is_file() else None,
         shown=_shown(ranking, present),
         present=present,
     )

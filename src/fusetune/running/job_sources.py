@@ -94,6 +94,7 @@ JOB_SOURCES = {
         "analyze/scoring/aims.py",
     ),
     "score": (*BASE, "ekf2", "save", *_SCORED),
+    "change": (*BASE, "ekf2", "save", *_SCORED, "analyze/evaluate.py", "apply/history"),
     "apply": (*BASE, "analyze/delays", "analyze/effects", "analyze/trials", "design", "apply"),
     "search": (*TRIED, "analyze/effects", "apply"),
     "report": (*BASE, "analyze/diagnosis", "design", "apply", "report"),

@@ -45,9 +45,8 @@ def test_where_nothing_is_known_there_is_no_section() -> None:
 
 
 def decided(vehicle: dict[str, Any] | None) -> str:
-    return decision_section(
-        results(status="keep", chosen="present", exploratory=False, paragraphs=["Keep."], changes=[], vehicle=vehicle)
-    )
+    kept = {"status": "keep", "chosen": "present", "changes": [], "on_vehicle": {"parameters": [], "refused": []}}
+    return decision_section(results(**kept, exploratory=False, paragraphs=["Keep."], vehicle=vehicle))
 
 
 def test_the_box_of_the_decision_names_vehicle_and_flight() -> None:

@@ -60,8 +60,9 @@ def write_legs(analyze_folders: Sequence[AnyPath], output: AnyPath) -> None:
             writer.write_table(split_scores(folder))
 
 
-def split_scores(folder: Path) -> pa.Table:
+def split_scores(folder: AnyPath) -> pa.Table:
     """Rows of one flight."""
+    folder = Path(folder)
     name, pieces = read_as(
         folder / CONFORMANCE_FILE, lambda one: (str(one["flight"]), flight_pieces(one)), "which mission a flight flew"
     )

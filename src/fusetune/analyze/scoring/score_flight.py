@@ -70,10 +70,12 @@ def write_scores(
         scores = score_sets(
             scored, replays, present=present, settings=settings, take_samples=take_samples, spool_folder=folder
         )
-    _write(folder, scores)
+    write_flight_scores(folder, scores)
 
 
-def _write(folder: Path, scores: FlightScores) -> None:
+def write_flight_scores(folder: AnyPath, scores: FlightScores) -> None:
+    """Write the figures of a flight to a folder, which must exist: all of `SCORE_TABLES`, and the summary."""
+    folder = Path(folder)
     for table, name in SCORE_TABLES.items():
         with atomic_path(folder / name) as temporary:
             write_table(getattr(scores, table), temporary)

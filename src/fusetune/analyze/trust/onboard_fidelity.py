@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from fusetune.analyze.flight_files import FIDELITY_FILE
 from fusetune.analyze.replaying.onboard import onboard_samples
@@ -95,7 +96,7 @@ def judge_onboard_fidelity(
     flight : canonical, for the reasons
     ours, theirs : innovations of the replay and of the vehicle, by source and axis
     """
-    since = _warm(ours)
+    since = warm_from(ours)
     axes = tuple(
         axis
         for source in JUDGED_SOURCES
@@ -108,7 +109,7 @@ def judge_onboard_fidelity(
     return OnboardFidelity(flight.name, median, axes, log_lacks(flight))
 
 
-def _warm(ours: Mapping[SourceAxis, AxisSamples]) -> int:
+def warm_from(ours: Mapping[SourceAxis, AxisSamples]) -> int:
     """Time (µs) from which the replay has settled: ten seconds after it first fuses an aid."""
     first, last = [], [0]
     for source, axis in ours:
@@ -119,24 +120,34 @@ def _warm(ours: Mapping[SourceAxis, AxisSamples]) -> int:
     return min(first) + WARM_UP_US if first else max(last) + 1
 
 
-def _usable(samples: AxisSamples, since: int = 0) -> AxisSamples:
-    usable = (samples.innovation_variance > 0) & np.isfinite(samples.innovation)
-    return samples.rows(usable & (samples.timestamp_sample >= since))
+def usable(samples: AxisSamples, since: int = 0) -> AxisSamples:
+    """Samples with an innovation and its variance, from a time (µs) on, in order of time."""
+    sound = (samples.innovation_variance > 0) & np.isfinite(samples.innovation)
+    samples = samples.rows(sound & (samples.timestamp_sample >= since))
+    return samples.rows(np.argsort(samples.timestamp_sample, kind="stable"))
+
+
+def partners(
+    times: npt.NDArray[np.int64], wanted: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
+    """The nearest of some ordered times (N,), one at least, to each wanted one (M,), and whether it is near enough.
+
+    Returns
+    -------
+    (M,) index of the nearest, (M,) whether it is within `MATCH_TOLERANCE_US`
+    """
+    after = np.minimum(np.searchsorted(times, wanted), len(times) - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.abs(times[before] - wanted) <= np.abs(times[after] - wanted)
+    partner = np.where(nearer, before, after)
+    return partner, np.abs(times[partner] - wanted) <= MATCH_TOLERANCE_US
 
 
 def _compare_axis(source: str, axis: int, ours: AxisSamples, theirs: AxisSamples, since: int) -> OnboardAxis | None:
-    left, right = _usable(ours), _usable(theirs, since)
-    left_time, right_time = left.timestamp_sample, right.timestamp_sample
-    if not len(left_time) or not len(right_time):
+    left, right = usable(ours), usable(theirs, since)
+    if not left.timestamp_sample.size or not right.timestamp_sample.size:
         return None
-    left = left.rows(np.argsort(left_time, kind="stable"))
-    left_time = left.timestamp_sample
-    after = np.clip(np.searchsorted(left_time, right_time), 1, max(len(left_time) - 1, 1))
-    after = np.minimum(after, len(left_time) - 1)
-    before = np.maximum(after - 1, 0)
-    nearer = np.abs(left_time[before] - right_time) <= np.abs(left_time[after] - right_time)
-    partner = np.where(nearer, before, after)
-    matched = np.abs(left_time[partner] - right_time) <= MATCH_TOLERANCE_US
+    partner, matched = partners(left.timestamp_sample, right.timestamp_sample)
     if matched.sum() < MIN_SAMPLES:
         return None
     left, right = left.rows(partner[matched]), right.rows(matched)

@@ -152,5 +152,6 @@ def _decide(given: FlightSearch, found: FoundSets, target: Path) -> None:
         same_present=given.same_present,
         descriptions={FOUND: DESCRIPTION},
         recommended=found.recommended,
+        saved=given.flights_table.parent,
         settings=search_decision(given.decision),
     )

@@ -24,6 +24,7 @@ from fusetune.px4.parameters.params_file import (
     read_params,
     write_params,
 )
+from fusetune.storage.files import AnyPath
 
 _BITS = re.compile(r"bits 0x([0-9a-f]{8})")
 _NO_NUMBER = re.compile(r"# no number: (\S+) 0x([0-9a-f]{8})")
@@ -47,8 +48,9 @@ class Backup:
     values: Mapping[str, Value]
 
 
-def write_backup(path: Path, identity: Identity, listing: Listing) -> None:
+def write_backup(path: AnyPath, identity: Identity, listing: Listing) -> None:
     """Write all parameters of a vehicle; when this returns, the file is on the disk under its name."""
+    path = Path(path)
     version, _, stage = identity.release.removeprefix("v").partition("-")
     odd = [(name, value) for name, value in listing.values.items() if not math.isfinite(value.number)]
     agrees = {True: "which is that of these values", None: "which was not compared"}[listing.agrees]
@@ -65,8 +67,9 @@ def write_backup(path: Path, identity: Identity, listing: Listing) -> None:
     sync_folder(path.parent)
 
 
-def read_backup(path: Path) -> Backup:
+def read_backup(path: AnyPath) -> Backup:
     """Read what `write_backup` wrote; raises `UserError` where it is no such file."""
+    path = Path(path)
     values = {entry.name: _value(entry) for entry in read_params(path)}
     text = path.read_text(encoding="utf-8")
     board = _BOARD.search(text)
@@ -76,8 +79,9 @@ def read_backup(path: Path) -> Backup:
     return Backup(board[1], board[2], values)
 
 
-def sync_folder(folder: Path) -> None:
+def sync_folder(folder: AnyPath) -> None:
     """See that the names in a folder are on the disk, where the system can."""
+    folder = Path(folder)
     if os.name == "posix":
         descriptor = os.open(folder, os.O_RDONLY)
         try:

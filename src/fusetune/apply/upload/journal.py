@@ -20,6 +20,7 @@ from fusetune.apply.upload.backup import sync_folder
 from fusetune.apply.upload.values import Type, Value
 from fusetune.errors import UserError
 from fusetune.storage.file_lock import LocksUnavailableError, lock
+from fusetune.storage.files import AnyPath
 
 JOURNAL, BACKUP, TRANSCRIPT = "journal.jsonl", "backup.params", "transcript.txt"
 Goal = Literal["new", "old"]
@@ -80,7 +81,8 @@ class Journal:
         Another process holds it.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: AnyPath) -> None:
+        folder = Path(folder)
         self._path = folder / JOURNAL
         self._file: IO[bytes] = open(self._path, "ab+")  # noqa: SIM115
         try:
@@ -121,7 +123,7 @@ class Journal:
         self._file.close()
 
 
-def read_journal(folder: Path) -> Record:
+def read_journal(folder: AnyPath) -> Record:
     """What the journal of a folder tells.
 
     Raises
@@ -129,6 +131,7 @@ def read_journal(folder: Path) -> Record:
     UserError
         There is none, it is damaged, or it ends before anything was planned.
     """
+    folder = Path(folder)
     path = folder / JOURNAL
     try:
         content = path.read_bytes()

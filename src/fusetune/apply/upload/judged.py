@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fusetune.apply.parameter_files.names import ROLLBACK
 from fusetune.apply.upload.values import Type, Value
 from fusetune.errors import RUN_AGAIN, UserError
-from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 from fusetune.px4.parameters.params_file import ParamEntry, read_params
 from fusetune.storage.documents import read_document
-from fusetune.storage.files import sha256_of
+from fusetune.storage.files import AnyPath, sha256_of
 
 DECISION = "decision.json"
+ROLLBACK_FILE = f"{ROLLBACK}.params"
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Judged:
     release: str
 
 
-def read_judged(file: Path) -> Judged:
+def read_judged(file: AnyPath) -> Judged:
     """Read a parameter file with the decision beside it that it belongs to.
 
     Raises
@@ -49,6 +50,7 @@ def read_judged(file: Path) -> Judged:
         One cannot be read, they do not belong together, nothing is to be written, or the decision is of no vehicle
         that something can be written to.
     """
+    file = Path(file)
     decision_file = file.with_name(DECISION)
     if not decision_file.exists():
         raise UserError(
@@ -74,13 +76,12 @@ def _judged(file: Path, entries: Sequence[ParamEntry], decision: dict[str, Any])
         raise UserError(file, "is for a vehicle that only fusetune simulated", "Upload what real flights decided")
     flown = vehicle["present_flight"]
     release = next(one["firmware"] for one in decision["flights"] if one["flight"] == flown)
-    present = next(one["overrides"] for one in decision["sets"] if one["set"] == decision["present"])
-    was = {**present, **{one["name"]: one["previous"] for one in decision["changes"]}}
+    on_vehicle = decision["on_vehicle"]
     wanted = {entry.name: Value.of(entry.type, entry.value) for entry in entries}
-    known = {name: Value.of(_type(name), number) for name, number in was.items() if name in ALL_PARAMETERS}
-    if file.name == "rollback.params":
-        # it undoes the change, so what flies now is what the change wrote
-        known |= {one["name"]: Value.of(one["type"], one["value"]) for one in decision["changes"]}
+    known = {name: Value.of(_type(number), number) for name, number in on_vehicle["judged"].items()}
+    # what a rollback undoes is what the change wrote
+    now = "value" if file.name == ROLLBACK_FILE else "previous"
+    known |= {one["name"]: Value.of(one["type"], one[now]) for one in on_vehicle["parameters"]}
     return Judged(
         file,
         wanted,
@@ -92,5 +93,5 @@ def _judged(file: Path, entries: Sequence[ParamEntry], decision: dict[str, Any])
     )
 
 
-def _type(name: str) -> Type:
-    return ALL_PARAMETERS[name].type
+def _type(number: float) -> Type:
+    return "INT32" if isinstance(number, int) else "FLOAT"

@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
 
+from fusetune.storage.files import AnyPath
+
 Tell = Callable[[str], None]
 
 
@@ -24,8 +26,9 @@ class Transcript:
         self._file: IO[str] | None = None
         self._before: list[str] = []
 
-    def keep_in(self, path: Path) -> None:
+    def keep_in(self, path: AnyPath) -> None:
         """Append to a file from now on."""
+        path = Path(path)
         self.close()
         self._file = open(path, "a", encoding="utf-8", errors="backslashreplace")  # noqa: SIM115
         for line in self._before:

@@ -38,6 +38,7 @@ from fusetune.apply.upload.values import Value
 from fusetune.apply.upload.vehicles import Identity, choose_vehicle, find_vehicles, identify, learn_state
 from fusetune.apply.upload.way_back import WayBack, read_way_back, refuse_other
 from fusetune.errors import UserError
+from fusetune.storage.files import AnyPath
 
 Ask = Callable[[str, Callable[[], None]], bool]
 """Asks the pilot a question, and calls again and again what it is given until the answer is there."""
@@ -83,7 +84,7 @@ class Upload:
         self.retries = 0
         self.folder: Path | None = None
 
-    def new(self, file: Path) -> Outcome:
+    def new(self, file: AnyPath) -> Outcome:
         """Write the values of a parameter file with its decision beside it.
 
         Raises
@@ -96,7 +97,7 @@ class Upload:
         judged = read_judged(file)
         return self._with_vehicle(lambda talk: self._write_new(talk, judged))
 
-    def rollback(self, file: Path) -> Outcome:
+    def rollback(self, file: AnyPath) -> Outcome:
         """Write the values of a backup, or of `rollback.params` with its decision beside it.
 
         Of a backup that lies beside the journal of its upload only what that wrote is taken back. Raises as `new`.
@@ -104,11 +105,12 @@ class Upload:
         wanted = read_way_back(file)
         return self._with_vehicle(lambda talk: self._write_back(talk, wanted))
 
-    def resume(self, folder: Path | None) -> Outcome:
+    def resume(self, folder: AnyPath | None) -> Outcome:
         """Go on with the upload of a folder, or with the newest one that has not ended.
 
         Raises as `new`.
         """
+        folder = Path(folder) if folder is not None else None
         folder = folder or newest_unended(self.asked.folder)
         record = read_journal(folder)
         if record.ended:

@@ -13,6 +13,7 @@ from fusetune.apply.upload.refusals import refuse_foreign
 from fusetune.apply.upload.stops import Refusal
 from fusetune.apply.upload.values import Value
 from fusetune.apply.upload.vehicles import Identity
+from fusetune.storage.files import AnyPath
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class WayBack:
     """The decision, or id and release of a backup."""
 
 
-def read_way_back(file: Path) -> WayBack:
+def read_way_back(file: AnyPath) -> WayBack:
     """Read the values of a backup, of the folder of an upload, or of `rollback.params` with its decision beside it.
 
     Of a backup that lies beside the journal of its upload they are those that the upload was to change, of a backup
@@ -36,6 +37,7 @@ def read_way_back(file: Path) -> WayBack:
     UserError
         A file cannot be used.
     """
+    file = Path(file)
     if file.is_dir():
         file = file / BACKUP
     if file.with_name(DECISION).exists():

@@ -95,13 +95,17 @@ def check_value(name: str, value: object) -> None:
     ParameterError
         With the reason and the remedy in words.
     """
-    metadata = metadata_of(name)
+    check_by(metadata_of(name), value)
+
+
+def check_by(metadata: ParameterMetadata, value: object) -> None:
+    """Refuse a value that the metadata of its parameter, of any release, does not allow; raises `ParameterError`."""
     number = number_of(metadata, value)
     if metadata.kind == "bitmask":
         _check_bits(metadata, int(number))
     elif metadata.values and int(number) not in metadata.values:
         choices = ", ".join(f"{key} ({meaning})" for key, meaning in metadata.values.items())
-        raise ParameterError(name, f"{value} is none of its values", f"Choose one of {choices}")
+        raise ParameterError(metadata.name, f"{value} is none of its values", f"Choose one of {choices}")
     _check_range(metadata, number)
 
 
@@ -141,9 +145,9 @@ def migrate(logged: Mapping[str, float | int], release: Release | None = None) -
     dict
         Only parameters that the log determines; values rounded to float32. Values that are no numbers count as missing.
     """
-    known = (name for name in logged if name in PARAMETERS or name in _BECAME)
+    known = (name for name in logged if name in PARAMETERS or name in BECAME)
     sound = {name: logged[name] for name in known if math.isfinite(logged[name])}
-    migrated = migrate_names(sound, _BECAME)
+    migrated = migrate_names(sound, BECAME)
     return {name: as_float32(float(value)) for name, value in migrated.items() if name in PARAMETERS}
 
 
@@ -255,10 +259,10 @@ PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
 )
 """EKF2 parameters of the baseline release, by name in alphabetical order."""
 
-_BECAME: Mapping[str, tuple[str, ...]] = {
+BECAME: Mapping[str, tuple[str, ...]] = {
     **{name: metadata.became for name, metadata in ALL_PARAMETERS.items() if metadata.became},
     **SENSOR_PARAMETERS,
 }
-"""Parameters of other releases that tell those of the baseline."""
+"""Parameters of other releases → those of the baseline that they tell."""
 
 _DEFAULTS = {name: metadata.default for name, metadata in PARAMETERS.items()}

@@ -29,6 +29,9 @@ SENSOR_PARAMETERS: Mapping[str, tuple[str, ...]] = {
 CHANGED = frozenset({"EKF2_WIND_NOISE", "EKF2_AID_MASK"})
 """Parameters that became others with another meaning, which `migrate_names` knows."""
 
+_STEPS_TO_DENSITY = 10.0
+"""From a standard deviation per step at 100 Hz to a noise density: the square root of the rate."""
+
 _MAG_TYPE_AUTOMATIC, _MAG_TYPES_REMOVED = 0, (2, 3, 4)
 
 
@@ -46,8 +49,7 @@ def migrate_names(logged: Mapping[str, float | int], became: Mapping[str, Sequen
         if old in logged and old not in CHANGED:
             derived.update(dict.fromkeys(new_names, logged[old]))
     if "EKF2_WIND_NOISE" in logged:
-        # a standard deviation per step at 100 Hz became a noise density: smaller by the square root of the rate
-        derived["EKF2_WIND_NSD"] = float(logged["EKF2_WIND_NOISE"]) / 10.0
+        derived["EKF2_WIND_NSD"] = float(logged["EKF2_WIND_NOISE"]) / _STEPS_TO_DENSITY
     if "EKF2_HGT_MODE" in logged and int(logged["EKF2_HGT_MODE"]) == _HEIGHT_RANGE:
         derived["EKF2_RNG_CTRL"] = 2
     if "EKF2_AID_MASK" in logged:
@@ -56,6 +58,34 @@ def migrate_names(logged: Mapping[str, float | int], became: Mapping[str, Sequen
     if migrated.get("EKF2_MAG_TYPE") in _MAG_TYPES_REMOVED:
         migrated["EKF2_MAG_TYPE"] = _MAG_TYPE_AUTOMATIC
     return migrated
+
+
+def value_before(old: str, wanted: Mapping[str, float], logged: Mapping[str, float | int]) -> float | int | None:
+    """The value of a parameter of another release by which those of v1.16 come out as wanted.
+
+    Parameters
+    ----------
+    old : parameter of the other release
+    wanted : some of the parameters that it tells, and their values
+    logged : what the vehicle has, in its own names
+
+    Returns
+    -------
+    None where no value of it does; whether others come out as they were is for the caller to see.
+    """
+    values = {float(value) for value in wanted.values()}
+    if old == "EKF2_AID_MASK":
+        return _aid_mask_of(wanted, int(logged.get(old, 0)), int(logged.get("EKF2_HGT_MODE", 0)))
+    if len(values) > 1:
+        return None
+    return values.pop() * (_STEPS_TO_DENSITY if old == "EKF2_WIND_NOISE" else 1.0)
+
+
+def _aid_mask_of(wanted: Mapping[str, float], mask: int, height_mode: int) -> int | None:
+    """The mask nearest to the one that is set whose controls are as wanted, the others as they were."""
+    asked = _controls_of_aid_mask(mask, height_mode) | {name: int(value) for name, value in wanted.items()}
+    masks = sorted(range(2 * _VISION_VELOCITY), key=lambda other: ((other ^ mask).bit_count(), other))
+    return next((other for other in masks if _controls_of_aid_mask(other, height_mode) == asked), None)
 
 
 def _controls_of_aid_mask(mask: int, height_mode: int) -> dict[str, int]:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 import os
-import struct
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from fusetune.errors import UserError
+from fusetune.px4.parameters.ekf2_parameters import as_float32
 from fusetune.storage.files import atomic_path
 
 _MAV_PARAM_TYPE = {"INT32": 6, "FLOAT": 9}
 _TYPE_OF_CODE = {code: name for name, code in _MAV_PARAM_TYPE.items()}
 _LONGEST_NAME = 16
+PARAMETER_NAME = re.compile(f"[A-Z0-9_]{{1,{_LONGEST_NAME}}}")
+"""Names that PX4's parameters have."""
 _DECIMALS = 18
-_FLOAT = struct.Struct("<f")
 _COLUMNS = "# Vehicle-Id Component-Id Name Value Type"
 
 
@@ -94,7 +96,8 @@ def read_params(path: str | os.PathLike[str]) -> list[ParamEntry]:
         raise UserError(file, f"cannot be read ({error})", "Save the parameters from QGroundControl again") from error
     entries: list[ParamEntry] = []
     comments: list[str] = []
-    for number, line in enumerate(text.splitlines(), start=1):
+    # only what ends lines for QGroundControl does: comments may hold what else Python takes for an end
+    for number, line in enumerate(text.replace("\r\n", "\n").split("\n"), start=1):
         if line.startswith("#"):
             comments.append(line[1:].strip())
         elif line.strip():
@@ -146,7 +149,13 @@ def _value_text(entry: ParamEntry) -> str:
         if entry.value != int(entry.value):
             raise ValueError(f"parameter {entry.name} is an INT32 but has the value {entry.value}")
         return str(int(entry.value))
-    return f"{_FLOAT.unpack(_FLOAT.pack(entry.value))[0]:.{_DECIMALS}f}"
+    stored, decimals = as_float32(entry.value), _DECIMALS
+    text = f"{stored:.{decimals}f}"
+    while as_float32(float(text)) != stored:
+        # below a billionth QGroundControl's own files lose digits; its reader takes any number of them
+        decimals += _DECIMALS
+        text = f"{stored:.{decimals}f}"
+    return text
 
 
 def _entry(file: Path, number: int, line: str, comments: tuple[str, ...]) -> ParamEntry:
@@ -154,8 +163,8 @@ def _entry(file: Path, number: int, line: str, comments: tuple[str, ...]) -> Par
     try:
         _, _, name, value, code = fields
         type_name = _TYPE_OF_CODE[int(code)]
-        number_value: float | int = int(value) if type_name == "INT32" else float(value)
-    except (ValueError, KeyError) as error:
+        number_value: float | int = int(value) if type_name == "INT32" else as_float32(float(value))
+    except (ValueError, KeyError, OverflowError) as error:
         raise UserError(
             file,
             f"line {number} is not a parameter: {line[:60]!r}",

@@ -8,13 +8,14 @@ from fusetune.analyze.conformance.words import TRACK_WORDS, leg_name
 from fusetune.analyze.flight.manoeuvre_classes import FLOWN_CLASSES
 from fusetune.report.flight_page.flight_results import Document
 from fusetune.report.markup import Cell, details, figure, number, paragraph, section, signed, table
+from fusetune.storage.files import AnyPath
 
 _CAPTION = (
     "From above, and the height over time. Colours: manoeuvres. Dashed: the mission, with its waypoints by number."
 )
 
 
-def conformance_section(document: Document, picture: Path) -> str:
+def conformance_section(document: Document, picture: AnyPath) -> str:
     """The verdict of each mission, the map, waypoints and legs in tables behind a click.
 
     Parameters
@@ -22,6 +23,7 @@ def conformance_section(document: Document, picture: Path) -> str:
     document : `conformance.json`
     picture : the map; left out where it does not exist
     """
+    picture = Path(picture)
     missions = document["missions"]
     if document["why_not_compared"]:
         parts = [paragraph(f"It was compared with no mission: {document['why_not_compared']}.")]

@@ -27,10 +27,13 @@ def decision_section(results: Results) -> str:
     if decision["changes"]:
         rows = [_change_row(change) for change in decision["changes"]]
         parts.append(table(("parameter", "now", "new", "unit", ""), rows))
+    if decision["on_vehicle"]["parameters"]:
         parts.append(
             paragraph(
                 "Load results/apply/best_params.params in QGroundControl (Parameters → Tools → Load from file), "
-                "reboot, and fly a short, safe flight first. results/apply/rollback.params brings the old values back.",
+                "reboot, and fly a short, safe flight first. results/apply/rollback.params brings the old values back. "
+                "The same for other tools lies beside them: .parm for MAVProxy, .sh for PX4's shell, replay_params.txt "
+                "for PX4's own replay.",
                 "note",
             )
         )

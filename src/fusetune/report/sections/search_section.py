@@ -68,7 +68,7 @@ def search_answer(results: SearchResults) -> str:
 
 def _found(results: SearchResults, figures: Path) -> list[str]:
     parts = [_parameters(results)]
-    if results.is_change:
+    if results.is_change and results.decision["on_vehicle"]["parameters"]:
         parts.append(
             paragraph(
                 "best_params.params holds what changes. Load it in QGroundControl (Parameters → Tools → Load from "
