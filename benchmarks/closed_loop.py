@@ -1,4 +1,4 @@
-"""The loop closed once, on a simulated vehicle: design, fly, study, apply, fly again with what was found, confirmed.
+"""The loop closed once, on a simulated vehicle: design, fly, search, apply, fly again with what was found, confirmed.
 
 ``make demo-loop`` runs it. The vehicle of ``config/vehicles/mistuned_quadrotor.yaml`` is told three things wrong; its
 truth stays, and its second flights load ``best_params.params`` of the first run, as a pilot would. Both runs are the
@@ -17,6 +17,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -29,16 +30,24 @@ ROOT = Path(__file__).resolve().parents[1]
 MISSION, VEHICLE = Path("config/missions/short_survey.yaml"), Path("config/vehicles/mistuned_quadrotor.yaml")
 FLIGHTS_BEFORE, FLIGHTS_AFTER = 5, 5
 DAYS = ("2025-06-15", "2025-06-16")
-STUDY = {
-    "name": "imu_noise",
-    "description": "How much the inertial sensors shake; a delay that is told wrong is measured beside.",
-    "kind": "list",
-    "sets": [
-        {"name": "calmer", "parameters": {"EKF2_ACC_NOISE": 0.2, "EKF2_GYR_NOISE": 0.01}},
-        {"name": "shakes", "parameters": {"EKF2_ACC_NOISE": 0.8, "EKF2_GYR_NOISE": 0.06}},
-    ],
+SEARCH: dict[str, Any] = {
+    "name": "what_shakes",
+    "description": "How much the inertial sensors shake, and how late GNSS is.",
+    "kind": "search",
+    "search": {
+        "parameters": ["EKF2_ACC_NOISE", "EKF2_GYR_NOISE", "EKF2_GPS_DELAY"],
+        "evaluations": 90,
+        "folds": 2,
+    },
 }
-CONFIG = {"study": "config/imu_noise.yaml", "mission": str(MISSION), "effects": {"try_measured": False}}
+NEXT: dict[str, Any] = {
+    "name": "next",
+    "description": "Whether what flies now is best, seen from both sides.",
+    "kind": "around_present",
+    "parameters": ["EKF2_ACC_NOISE"],
+}
+"""The study after the change: it starts from what flies then."""
+CONFIG = {"mission": str(MISSION), "effects": {"try_measured": False}}
 HISTORY = "results/apply/history.json"
 MARK = ".closed_loop"
 
@@ -51,20 +60,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     started = time.monotonic()
     folder = prepare(options.folder)
-    tell(started, f"designed: {MISSION.name}, {len(STUDY['sets'])} sets beside what flies")
+    tell(started, f"designed: {MISSION.name}, a search of {', '.join(SEARCH['search']['parameters'])}")
     fly(folder, "first", FLIGHTS_BEFORE, DAYS[0], options.cores, seed=1)
     tell(started, f"flown: {FLIGHTS_BEFORE} flights with the parameters that the vehicle has")
     # the pages wait for the second run, which draws them all
+    configure(folder, SEARCH)
     run_pipeline(folder, options.cores, HISTORY)
     loaded = folder / "results" / "apply" / "best_params.params"
     changes = ", ".join(f"{one.name} {one.value:.6g}" for one in read_params(loaded))
-    tell(started, f"studied: to load, {changes or 'nothing'}")
+    tell(started, f"searched: to load, {changes or 'nothing'}")
     if not changes:
         return 1
     # what a pilot takes along: the next run writes the file anew
     shutil.copyfile(loaded, folder / loaded.name)
     fly(folder, "second", FLIGHTS_AFTER, DAYS[1], options.cores, seed=101, parameters=folder / loaded.name)
     tell(started, f"applied, and flown again: {FLIGHTS_AFTER} flights")
+    configure(folder, NEXT)
     run_pipeline(folder, options.cores)
     tell(started, "what it brought:")
     confirmed = False
@@ -90,9 +101,14 @@ def prepare(folder: Path) -> Path:
     (folder / MARK).touch()
     for file in (MISSION, VEHICLE):
         shutil.copyfile(ROOT / file, folder / file)
-    for name, document in (("config.yaml", CONFIG), ("imu_noise.yaml", STUDY)):
-        (folder / "config" / name).write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     return folder
+
+
+def configure(folder: Path, study: dict[str, Any]) -> None:
+    """Have the next run ask a study."""
+    name = f"config/{study['name']}.yaml"
+    for file, document in ((name, study), ("config/config.yaml", CONFIG | {"study": name})):
+        (folder / file).write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
 
 
 def fly(
