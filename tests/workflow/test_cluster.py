@@ -70,11 +70,11 @@ def test_a_changed_present_replays_only_the_present_set_and_jobs_elsewhere_find_
     # of the first run
     assert replayed["replay/first.1.log"] == "replayed: low, high; up to date: 0"
     # two flights measure what the vehicle is told otherwise: config/vehicles/quadrotor.yaml has less ground effect than
-    # PX4's default of 4 m, and more drag
-    assert replayed["analyze/first.log"] == "replayed: ground_effect_mended, drag_mended; up to date: 1"
+    # PX4's default of 4 m
+    assert replayed["analyze/first.log"] == "replayed: ground_effect_mended; up to date: 1"
     decision = json.loads((results / "apply" / "decision.json").read_text(encoding="utf-8"))
-    assert {"ground_effect_mended", "drag_mended"} <= {one["set"] for one in decision["sets"]}
-    assert {"effect.ground_effect", "effect.drag"} <= {one["id"] for one in decision["findings"]}
+    assert "ground_effect_mended" in {one["set"] for one in decision["sets"]}
+    assert "effect.ground_effect" in {one["id"] for one in decision["findings"]}
     summary = json.loads((results / "analyze" / "first" / "present.json").read_text(encoding="utf-8"))
     assert summary["overrides"] == present["parameters"]
 

@@ -16,8 +16,7 @@ from tests.workflow.conftest import STUDY, Workspace
 from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
 SUMMARIES = dict.fromkeys(
-    ("mission_map",
-     "list_flights", "join_delays", "join_health", "join_fleet", "join_conformance", "decide", "keep_history",
+    ("list_flights", "join_delays", "join_health", "join_fleet", "join_conformance", "decide", "keep_history",
      "plot_summary", "fleet_page", "build_report", "all"), 1
 )  # fmt: skip
 DECISION = "results/apply/decision.json"
@@ -40,7 +39,7 @@ def test_an_empty_folder_plans_one_simulated_flight_per_set(workspace: Workspace
     of_flights = dict.fromkeys(
         ("simulate_flight", "save_flight", "diagnose_flight", "conform_flight", "flight_page"), 2
     )
-    assert planned == {"design": 1, **of_flights, **SUMMARIES}
+    assert planned == {"design": 1, "mission_map": 1, **of_flights, **SUMMARIES}
 
 
 def test_the_demonstration_ends_with_parameters_decision_and_report(demonstration: Workspace) -> None:

@@ -98,7 +98,9 @@ def flights_by_sets(results: Results) -> Figure:
     labels = flight_labels([str(name) for name in changes.index])
     numbered = [f"{label}  {i}" for i, label in enumerate(labels, start=1)]
     label_inches = 0.3 + 0.066 * max(map(len, numbered))
-    figure = new_figure(label_inches + 1.2 + 0.6 * len(changes.columns), max(1.3 + 0.25 * len(numbered), 2.3))
+    # no narrower than its title
+    width = max(label_inches + 1.2 + 0.6 * len(changes.columns), 3.8)
+    figure = new_figure(width, max(1.3 + 0.25 * len(numbered), 2.3))
     axes = figure.add_subplot()
     limit = _colour_limit(values)
     image = axes.imshow(values, cmap="PuOr_r", vmin=-limit, vmax=limit, aspect="auto")
