@@ -38,6 +38,7 @@ from fusetune.analyze.diagnosis.causes import (
     gnss_loss,
     magnetic_disturbance,
     magnetometer_scale,
+    parameter_at_limit,
     static_pressure,
     vision_scale,
     vision_yaw,
@@ -124,6 +125,20 @@ def test_its_signs_show_the_cause_with_evidence_and_remedy(id: str) -> None:
     assert found.stop_us > found.start_us
     first = found.signs[0]
     assert first.figure > first.usual
+
+
+def test_a_noise_that_a_comparison_chose_is_not_called_back_to_its_default() -> None:
+    """What shakes as much as EKF2 can be told is mended at the frame; any other bound is left."""
+    shaken, gate = AtLimit("EKF2_ACC_NOISE", 1.0, False, 0.35), AtLimit("EKF2_BARO_GATE", 1.0, True, 5.0)
+    found = parameter_at_limit.diagnose(signs(at_limits=(shaken,)))
+    assert found is not None
+    assert found.values == {}
+    assert "balance the propellers" in found.remedy
+    found = parameter_at_limit.diagnose(signs(at_limits=(shaken, gate)))
+    assert found is not None
+    assert found.values == {"EKF2_BARO_GATE": 5.0}
+    assert "EKF2_ACC_NOISE and EKF2_BARO_GATE stand at bounds" in found.cause
+    assert "Start again from the default" in found.remedy
 
 
 def test_every_cause_is_tried() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fusetune.analyze.diagnosis.causes.claim import diagnosed
@@ -10,6 +12,8 @@ from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.flight.intervals import inside
 
 AT_LIMIT, SHARE_FROM = 0.98, 0.1
+SHAKEN = ("EKF2_ACC_NOISE", "EKF2_GYR_NOISE")
+"""At the most that PX4 takes these are what a comparison of sets chooses for a frame that shakes."""
 
 
 def diagnose(signs: Signs) -> Diagnosis | None:
@@ -24,7 +28,9 @@ def diagnose(signs: Signs) -> Diagnosis | None:
         )
         for one in signs.at_limits
     ]
-    values = {one.parameter: one.default for one in signs.at_limits}
+    names = [one.parameter for one in signs.at_limits]
+    shaken = [one.parameter for one in signs.at_limits if one.parameter in SHAKEN and not one.is_low]
+    values = {one.parameter: one.default for one in signs.at_limits if one.parameter not in shaken}
     share = _bias_at_limit(signs)
     if share > SHARE_FROM:
         found.append(
@@ -41,15 +47,36 @@ def diagnose(signs: Signs) -> Diagnosis | None:
     return diagnosed(
         signs,
         "parameter_at_limit",
-        "A parameter stands at a bound of its range" if values else "A state stands at its limit",
+        _title(names),
         "warning",
-        0.9 if values else 0.7,
+        0.9 if names else 0.7,
         found,
         values=values,
-        remedy="Find out why it was set there: what it was to hide is seldom cured by it. Start again from the default"
-        if values
-        else "Calibrate the accelerometer; if it comes back, look for vibration. Do not raise EKF2_ABL_LIM",
+        remedy=_remedy(names, shaken),
     )
+
+
+def _title(names: Sequence[str]) -> str:
+    if not names:
+        return "A state stands at its limit"
+    several = len(names) > 1
+    return f"{' and '.join(names)} stand{'' if several else 's'} at {'bounds' if several else 'a bound'} of the range"
+
+
+def _remedy(names: Sequence[str], shaken: Sequence[str]) -> str:
+    if not names:
+        return "Calibrate the accelerometer; if it comes back, look for vibration. Do not raise EKF2_ABL_LIM"
+    told = []
+    if shaken:
+        told.append(
+            f"Where a comparison of sets chose {' and '.join(shaken)}, the frame shakes as much as EKF2 can be told or "
+            "more: balance the propellers and look at how the autopilot is mounted"
+        )
+    if len(shaken) < len(names):
+        told.append(
+            "Find out why it was set there: what it was to hide is seldom cured by it. Start again from the default"
+        )
+    return ". ".join(told)
 
 
 def _bias_at_limit(signs: Signs) -> float:
