@@ -36,7 +36,7 @@ SEARCH: dict[str, Any] = {
     "kind": "search",
     "search": {
         "parameters": ["EKF2_ACC_NOISE", "EKF2_GYR_NOISE", "EKF2_GPS_DELAY"],
-        "evaluations": 90,
+        "evaluations": 60,
         "folds": 2,
     },
 }

@@ -69,6 +69,9 @@ def _silent(signs: Signs) -> Diagnosis | None:
         return None
     table = signs.table("vehicle_gps_position")
     reported = table is not None and "fix_type" in table and bool(has_fix(table).any())
+    if not reported and not signs.is_replayed:
+        # of a log that is refused, as for records that are lost, it may be these that are missing
+        return None
     words = "no message of a receiver in the air, though it had a fix on the ground" if reported else NEVER
     return diagnosed(
         signs,
