@@ -146,11 +146,14 @@ def test_what_is_usual_has_the_form_of_the_words(tmp_path: Path) -> None:
     signs = (
         Sign("readings scatter by 92% of the field", 0.919, 0.25, "1"),
         Sign("the field is 2.09 times as strong as there", 1.09, 0.25, "1"),
+        Sign("EKF2_GYR_NOISE is 0.1, the most that PX4 takes", 2.0, 1.0, ""),
     )
     told_page = told(page_of(write_documents(tmp_path / "analyze" / "field", (replace(SHAKEN, signs=signs),))))
     assert "readings scatter by 92 % of the field (usual: up to 25 %)" in told_page
     # of a figure that the words do not tell the usual one would only confuse
     assert "2.09 times as strong as there (usual" not in told_page
+    # nor is the 2 of a name a figure
+    assert "the most that PX4 takes (usual" not in told_page
 
 
 def test_measured_values_have_words_and_units(tmp_path: Path) -> None:

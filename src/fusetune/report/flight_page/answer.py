@@ -154,7 +154,8 @@ def _is_figure(value: object) -> bool:
 
 def _is_named(value: float, words: str) -> bool:
     """Whether words tell a value already, as rounded as it may be."""
-    told = [one for one in re.findall(r"-?\d+(?:\.\d+)?", words) if float(one)]
+    # the 2 of EKF2_GYR_NOISE is no figure
+    told = [one for one in re.findall(r"(?<![A-Za-z_\d.])-?\d+(?:\.\d+)?", words) if float(one)]
     return any(round(value, len(one.partition(".")[2])) == float(one) for one in told)
 
 
