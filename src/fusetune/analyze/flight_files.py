@@ -23,8 +23,6 @@ EFFECTS_FILE = "effects.json"
 DIAGNOSIS_FILE = "diagnosis.json"
 TRACK_FILE = "track.parquet"
 CONFORMANCE_FILE = "conformance.json"
-LEGS_FILE = "legs.parquet"
-"""Of all flights, beside their folders."""
 ONBOARD_FILE = "onboard.innovations.parquet"
 FIDELITY_FILE = "fidelity.json"
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.conformance.flown_track import STEP_US, FlownTrack, parts_of
 from fusetune.analyze.conformance.settings import DEFAULTS, ConformanceSettings
+from fusetune.analyze.flight.intervals import stretches
 from fusetune.analyze.flight.manoeuvre_classes import (
     CLIMB,
     DESCENT,
@@ -90,7 +91,7 @@ def _turns(
     turning = np.zeros(time.size, bool)
     for rate in (course_rate, np.nan_to_num(heading_rate)):
         begin, end = settings.turn_deg_s
-        for start, stop in _stretches(_held(np.abs(rate) > begin, np.abs(rate) > end)):
+        for start, stop in stretches(_held(np.abs(rate) > begin, np.abs(rate) > end)):
             if abs(float(rate[start:stop].sum())) * STEP_US * 1e-6 >= settings.turn_least_deg:
                 turning[start:stop] = True
     return turning
@@ -105,14 +106,9 @@ def _averaged(values: Array) -> Array:
 def _held(begins: Flags, goes_on: Flags) -> Flags:
     """From where `begins` holds until `goes_on` no longer does, whichever way one looks along time."""
     found = begins.copy()
-    for start, stop in _stretches(goes_on | begins):
+    for start, stop in stretches(goes_on | begins):
         found[start:stop] = begins[start:stop].any()
     return found
-
-
-def _stretches(flags: Flags) -> Iterator[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
-    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
 def _runs(time: npt.NDArray[np.int64], kinds: Sequence[str]) -> Iterator[Manoeuvre]:

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
 from fusetune.analyze.conformance.planned_passes import PlannedPass
 from fusetune.analyze.conformance.settings import ConformanceSettings
+from fusetune.analyze.flight.intervals import stretches
 from fusetune.design.missions.route import Place
 
 Array = npt.NDArray[np.float64]
@@ -173,9 +174,8 @@ class _Near:
     def visits(self, number: int, hold_s: float, *, any_corner: bool = False) -> list[Visit]:
         inside = self.inside_anyhow if any_corner else self.inside
         cuts = np.flatnonzero(np.diff(self.time) > LONGEST_GAP_US) + 1
-        edges = np.flatnonzero(np.diff(np.r_[False, inside, False].astype(np.int8)))
         found = []
-        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for start, stop in stretches(inside):
             parts = [start, *cuts[(cuts > start) & (cuts < stop)].tolist(), stop]
             found += [self._visit(number, first, last) for first, last in pairwise(parts)]
         return [one for one in found if (one.leave - one.enter) * 1e-6 >= _HELD_SHARE * hold_s]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fusetune.analyze.diagnosis.field_fits import FieldFit, FieldReadings, field_fits
 from fusetune.analyze.diagnosis.gnss_signs import has_fix
 from fusetune.analyze.diagnosis.motion import Motion
-from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.flight.intervals import Interval, inside, stretches
 from fusetune.ekf2.feed.message_samples import mag_samples
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
 from fusetune.px4.flight import Flight, TopicTable
@@ -188,11 +188,9 @@ def _disturbed(readings: FieldReadings, left: Array, noise: float) -> tuple[Inte
     on = smooth > least
     if not 3 <= np.count_nonzero(on) <= MOST_OF_FLIGHT * on.size:
         return None, 0.0, float(np.sqrt(np.mean(np.square(left))))
-    edges = np.flatnonzero(np.diff(np.r_[0, on.astype(np.int8), 0]))
-    begins, ends = edges[::2], edges[1::2]
     # what lies seconds apart is one disturbance
-    longest = int(np.argmax(ends - begins))
-    first, last = int(begins[longest]), int(ends[longest]) - 1
+    first, end = max(stretches(on), key=lambda one: one[1] - one[0])
+    last = end - 1
     if last - first < FEWEST_DISTURBED:
         return None, 0.0, float(np.sqrt(np.mean(np.square(left))))
     margin = np.zeros(on.size, bool)

@@ -29,6 +29,12 @@ class Cut:
         )
 
 
+def stretches(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one past the last index of each stretch in which flags (N,) are true."""
+    edges = np.flatnonzero(np.diff(np.r_[False, flags, False].astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
 def inside(time: npt.NDArray[np.int64], intervals: Iterable[Interval]) -> npt.NDArray[np.bool_]:
     """True for the times (N,), µs, that lie in one of the intervals."""
     found = np.zeros(time.shape, dtype=bool)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.flight.intervals import Interval, stretches
 from fusetune.px4.flight import Flight
 
 IMU_TOPICS = ("sensor_combined", "vehicle_imu")
@@ -24,9 +24,8 @@ def intervals_where(time: npt.NDArray[np.int64], active: npt.NDArray[np.bool_], 
     """
     if time.size == 0:
         return ()
-    edges = np.flatnonzero(np.diff(np.r_[False, active, False].astype(np.int8)))
     times = np.r_[time, max(last_time, int(time[-1]))]
-    return tuple((int(times[a]), int(times[b])) for a, b in zip(edges[::2], edges[1::2], strict=True))
+    return tuple((int(times[a]), int(times[b])) for a, b in stretches(active))
 
 
 def airborne_intervals(flight: Flight, flags: Mapping[str, npt.NDArray[Any]]) -> tuple[Interval, ...]:

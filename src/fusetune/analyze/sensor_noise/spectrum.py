@@ -12,7 +12,7 @@ from scipy.ndimage import binary_closing, percentile_filter, uniform_filter1d
 from scipy.signal import welch
 from scipy.stats import chi2
 
-from fusetune.analyze.flight.intervals import Interval
+from fusetune.analyze.flight.intervals import Interval, stretches
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
 
 Array = npt.NDArray[np.float64]
@@ -136,11 +136,8 @@ def tones(found: Spectrum) -> tuple[Tone, ...]:
     closed = binary_closing(np.pad(high, width), np.ones(max(int(_ONE_TONE_HZ / found.resolution_hz), 1), np.bool_))[
         width:-width
     ]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], closed, [False]])))
-    runs = zip(edges[::2], edges[1::2], strict=True)
-    listed = [
-        _tone(found, level - base, ratio, run) for run in (slice(*run) for run in runs) if ratio[run].max() >= least
-    ]
+    runs = (slice(*run) for run in stretches(closed))
+    listed = [_tone(found, level - base, ratio, run) for run in runs if ratio[run].max() >= least]
     return tuple(sorted(listed, key=lambda one: -one.amplitude))
 
 
