@@ -5,6 +5,7 @@ and position at every update; flags when they change, and once a second.
 """
 
 from collections.abc import Sequence
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +54,19 @@ STATE_ROW = np.dtype(
 )
 """`delta_angle` (rad, body) to `delta_velocity_dt` are the down-sampled IMU interval, dt in s, over which the state was
 predicted before it was corrected to what stands here."""
+
+SCORED_STATE_ROW = np.dtype(
+    [
+        ("timestamp_sample", "i8"),
+        ("quaternion", "f4", (4,)),
+        ("velocity", "f4", (3,)),
+        ("attitude_variance", "f4", (3,)),
+        ("velocity_variance", "f4", (3,)),
+        ("position_variance", "f4", (3,)),
+    ],
+    align=True,
+)
+"""What scores read of a STATE_ROW."""
 
 LOCAL_POSITION_ROW = np.dtype(
     [
@@ -105,8 +119,22 @@ RECORDER_MEMORY = np.dtype(
 )
 
 
+class Recording(Enum):
+    """How much is kept of a replay."""
+
+    FULL = "full"
+    """Everything."""
+    SCORING = "scoring"
+    """What scores are made of, the same figures: innovations and flags; of the states SCORED_STATE_ROW; of the local
+    position the first and the last row, and around every step of a reset counter the row of the step and the two
+    before it."""
+
+
+FULL, SCORING = Recording
+
+
 class RecordArrays(NamedTuple):
-    """Preallocated rows of one stretch of a replay."""
+    """Rows of one stretch of a replay."""
 
     innovations: np.ndarray
     states: np.ndarray

@@ -21,11 +21,14 @@ from fusetune.ekf2.replay.handover import handover_runs, without_resets_at
 from fusetune.ekf2.replay.kept_rows import KeptRows
 from fusetune.ekf2.replay.recording import (
     FLAG_COLUMNS,
+    FULL,
     LOCAL_POSITION_ROW,
     RecordArrays,
+    Recording,
     joined,
 )
 from fusetune.ekf2.replay.results import Gap, GapResult, ReplayResult, ReplaySummary
+from fusetune.ekf2.replay.scored_rows import ScoredRows
 from fusetune.ekf2.replay.warm_start import without_first_resets
 from fusetune.px4.aid_sources import WITHHOLDABLE
 from fusetune.px4.layouts.logged_state import Handover, LoggedState
@@ -39,6 +42,7 @@ def replay(
     gaps: Sequence[Gap] = (),
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
+    recording: Recording = FULL,
     keep: Callable[[RecordArrays], RecordArrays] | None = None,
 ) -> ReplayResult:
     """Run the estimator over one flight and keep what it published.
@@ -64,6 +68,7 @@ def replay(
         gaps=gaps,
         start=start,
         handovers=handovers,
+        recording=recording,
     )
     return result_of(summary, kept.rows())
 
@@ -83,6 +88,7 @@ def replay_into(
     gaps: Sequence[Gap] = (),
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
+    recording: Recording = FULL,
 ) -> ReplaySummary:
     """Run the estimator over one flight and hand on what it publishes, a stretch of the flight at a time.
 
@@ -104,18 +110,21 @@ def replay_into(
         where the samples end before that time, the filter starts from nothing, as when the vehicle boots.
     handovers : sequence of Handover
         Another estimator instance became primary: the filter takes over what that knew of its sensors.
+    recording : Recording
+        How much of the rows is handed on; what is, has the same figures either way.
     """
     ranges = [_runs_of(inputs, gap) for gap in gaps]
     course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers)
     tally = _Tally()
     found: list[GapResult | None] = [None] * len(gaps)
-    for begin, end in course.stretches(first_run, len(inputs.arrays.imu), [first for first, _ in ranges]):
+    runs, scored = len(inputs.arrays.imu), ScoredRows()
+    for begin, end in course.stretches(first_run, runs, [first for first, _ in ranges]):
         for number, (first, last) in enumerate(ranges):
             if first == begin:
                 found[number] = _continue_into_gap(course, gaps[number], first, last)
         rows = course.run(begin, end)
         tally.add(rows)
-        take(rows)
+        take(rows if recording is FULL else scored.cut(rows, is_last=end == runs))
     return tally.summary(course, warm_start_us, found)
 
 
