@@ -63,7 +63,7 @@ class KeptScores:
         row = self._database.execute(
             f"SELECT digest, {', '.join(_COLUMNS)} FROM scores WHERE key = ?", (key,)
         ).fetchone()
-        if row is None or row[0] != _digest(key, row[1:]):
+        if row is None or not all(isinstance(part, bytes) for part in row) or row[0] != _digest(key, row[1:]):
             return None
         return list(row[1:])
 
