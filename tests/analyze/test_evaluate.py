@@ -146,7 +146,7 @@ def test_one_more_set_costs_only_its_own(survey_flight: Flight, tmp_path: Path) 
         assert flown == present, table
     # a damaged piece, or file, is made again
     with sqlite3.connect(grown / KEPT_SCORES_FILE) as database:
-        database.execute("UPDATE scores SET metrics = 'spoiled' WHERE key = ?", (keys_of(grown)["narrow"],))
+        database.execute("UPDATE scores SET tables = 'spoiled' WHERE key = ?", (keys_of(grown)["narrow"],))
     assert analyze(grown, list(SETS)) == ("narrow",)
     (grown / KEPT_SCORES_FILE).write_bytes(b"no database at all, but long enough to look like one" * 100)
     assert analyze(grown, list(SETS)) == ("present", "delayed", "narrow")

@@ -15,11 +15,8 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from fusetune.analyze.scoring.set_scores import SetScores
+from fusetune.analyze.scoring.set_scores import TABLES, SetScores
 from fusetune.storage.files import AnyPath
-
-TABLES = ("metrics", "blocks", "windows", "withheld", "smoothed", "samples")
-_COLUMNS = ("summary", *TABLES)
 
 
 class KeptScores:
@@ -43,15 +40,14 @@ class KeptScores:
         content = self._sound(key)
         if content is None:
             raise KeyError(key)
-        summary, *tables = content
-        return SetScores(**dict(zip(TABLES, map(_table_of, tables), strict=True)), summary=json.loads(summary))
+        summary, tables = content
+        return SetScores(**_tables_of(tables), summary=json.loads(summary))
 
     def keep(self, key: str, scores: SetScores) -> None:
         """Add or replace the scores of a set."""
-        content = [json.dumps(scores.summary).encode(), *(_bytes_of(getattr(scores, name)) for name in TABLES)]
-        marks = ", ".join("?" * (len(content) + 2))
+        content = json.dumps(scores.summary).encode(), _bytes_of(scores)
         self._database.execute(
-            f"INSERT OR REPLACE INTO scores VALUES ({marks})", (key, _digest(key, content), *content)
+            "INSERT OR REPLACE INTO scores VALUES (?, ?, ?, ?)", (key, _digest(key, *content), *content)
         )
 
     def drop_others(self, keys: Collection[str]) -> None:
@@ -59,13 +55,12 @@ class KeptScores:
         known = [key for (key,) in self._database.execute("SELECT key FROM scores")]
         self._database.executemany("DELETE FROM scores WHERE key = ?", [(key,) for key in known if key not in keys])
 
-    def _sound(self, key: str) -> list[bytes] | None:
-        row = self._database.execute(
-            f"SELECT digest, {', '.join(_COLUMNS)} FROM scores WHERE key = ?", (key,)
-        ).fetchone()
-        if row is None or not all(isinstance(part, bytes) for part in row) or row[0] != _digest(key, row[1:]):
+    def _sound(self, key: str) -> tuple[bytes, bytes] | None:
+        row = self._database.execute("SELECT digest, summary, tables FROM scores WHERE key = ?", (key,)).fetchone()
+        if row is None or not all(isinstance(part, bytes) for part in row):
             return None
-        return list(row[1:])
+        digest, summary, tables = row
+        return (summary, tables) if digest == _digest(key, summary, tables) else None
 
 
 @contextmanager
@@ -96,7 +91,7 @@ def _with_table(name: str) -> sqlite3.Connection:
         database.execute("PRAGMA synchronous = OFF")
         database.execute("PRAGMA auto_vacuum = FULL")
         database.execute(
-            f"CREATE TABLE IF NOT EXISTS scores (key TEXT PRIMARY KEY, digest BLOB, {', '.join(_COLUMNS)})"
+            "CREATE TABLE IF NOT EXISTS scores (key TEXT PRIMARY KEY, digest BLOB, summary BLOB, tables BLOB)"
         )
         if database.execute("PRAGMA quick_check").fetchone() != ("ok",):
             raise sqlite3.DatabaseError(name)
@@ -106,22 +101,35 @@ def _with_table(name: str) -> sqlite3.Connection:
     return database
 
 
-def _digest(key: str, content: Collection[bytes]) -> bytes:
+def _digest(key: str, summary: bytes, tables: bytes) -> bytes:
     digest = hashlib.blake2b(key.encode())
-    for part in content:
-        digest.update(len(part).to_bytes(8, "little"))
-        digest.update(part)
+    digest.update(len(summary).to_bytes(8, "little"))
+    digest.update(summary)
+    digest.update(tables)
     return digest.digest()
 
 
-def _bytes_of(table: pa.Table) -> bytes:
+def _bytes_of(scores: SetScores) -> bytes:
+    """All tables, one after the other, as one compressed stream; names as dictionaries, which take least."""
     sink = pa.BufferOutputStream()
-    options = pa.ipc.IpcWriteOptions(compression="zstd", use_threads=False)
-    with pa.ipc.new_stream(sink, table.schema, options=options) as writer:
-        writer.write_table(table.combine_chunks())
-    return sink.getvalue().to_pybytes()
+    with pa.CompressedOutputStream(sink, "zstd") as stream:
+        for name in TABLES:
+            table = _with_dictionaries(getattr(scores, name))
+            with pa.ipc.new_stream(stream, table.schema) as writer:
+                writer.write_table(table)
+    return bytes(sink.getvalue().to_pybytes())
 
 
-def _table_of(content: bytes) -> pa.Table:
-    with pa.ipc.open_stream(content) as reader:
-        return reader.read_all()
+def _tables_of(content: bytes) -> dict[str, pa.Table]:
+    with pa.CompressedInputStream(pa.BufferReader(content), "zstd") as stream:
+        found = {}
+        for name, schema in TABLES.items():
+            with pa.ipc.open_stream(stream) as reader:
+                found[name] = reader.read_all().cast(schema)
+        return found
+
+
+def _with_dictionaries(table: pa.Table) -> pa.Table:
+    columns = (column.combine_chunks() for column in table.columns)
+    encoded = [one.dictionary_encode() if pa.types.is_string(one.type) else one for one in columns]
+    return pa.table(dict(zip(table.column_names, encoded, strict=True)))

@@ -12,15 +12,9 @@ from fusetune.analyze.replaying.onboard import onboard_samples, write_onboard
 from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis
 from fusetune.analyze.replaying.store.reader import read_innovations, read_set
 from fusetune.analyze.replaying.store.row_groups import tables_in_groups
-from fusetune.analyze.scoring.block_scores import BLOCK_SCHEMA
-from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
-from fusetune.analyze.scoring.sample_scores import SAMPLES_SCHEMA
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, FlightScores, joined_summary, scored_flight
-from fusetune.analyze.scoring.set_scores import SetScores, score_flight, score_set
+from fusetune.analyze.scoring.set_scores import TABLES, SetScores, score_flight, score_set
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.smoothed_scores import SMOOTHED_SCHEMA
-from fusetune.analyze.scoring.window_scores import WINDOW_SCHEMA
-from fusetune.analyze.scoring.withheld_scores import WITHHELD_SCHEMA
 from fusetune.analyze.scoring.yardstick import WITH_MEASURED_ANTENNA, Yardstick
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.save.flight_folder import load_flight
@@ -29,14 +23,6 @@ from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
 from fusetune.storage.freed_memory import give_back_freed_memory
 
-_SCHEMAS = {
-    "metrics": METRICS_SCHEMA,
-    "blocks": BLOCK_SCHEMA,
-    "windows": WINDOW_SCHEMA,
-    "withheld": WITHHELD_SCHEMA,
-    "smoothed": SMOOTHED_SCHEMA,
-    "samples": SAMPLES_SCHEMA,
-}
 _FILES = {**SCORE_TABLES, "samples": SAMPLES_FILE}
 
 
@@ -107,7 +93,7 @@ def scores_writer(folder: AnyPath) -> Iterator[ScoresWriter]:
     whole."""
     with ExitStack() as stack:
         takers = {
-            table: stack.enter_context(tables_in_groups(Path(folder) / file, _SCHEMAS[table]))
+            table: stack.enter_context(tables_in_groups(Path(folder) / file, TABLES[table]))
             for table, file in _FILES.items()
         }
         yield ScoresWriter(Path(folder), takers)
@@ -117,7 +103,7 @@ def write_flight_scores(folder: AnyPath, scores: FlightScores) -> None:
     """Write the figures of a flight to a folder, which must exist: all of `SCORE_TABLES`, and the summary."""
     folder = Path(folder)
     for table, name in SCORE_TABLES.items():
-        with tables_in_groups(folder / name, _SCHEMAS[table]) as take:
+        with tables_in_groups(folder / name, TABLES[table]) as take:
             take(getattr(scores, table))
     _write_summary(folder, scores.summary)
 

@@ -15,6 +15,7 @@ from fusetune.analyze.scoring.block_scores import BLOCK_SCHEMA
 from fusetune.analyze.scoring.charges import EvidenceCost
 from fusetune.analyze.scoring.filter_events import filter_events
 from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_ground_metrics
+from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.analyze.scoring.metrics_table import (
     MetricsTable,
     add_events,
@@ -49,6 +50,16 @@ from fusetune.analyze.scoring.yardstick import Yardstick
 from fusetune.analyze.sensors.source_whiteness import source_whiteness
 from fusetune.analyze.sensors.told_noise import told_noises
 from fusetune.set_names import DELAY_MENDED
+
+TABLES = {
+    "metrics": METRICS_SCHEMA,
+    "blocks": BLOCK_SCHEMA,
+    "windows": WINDOW_SCHEMA,
+    "withheld": WITHHELD_SCHEMA,
+    "smoothed": SMOOTHED_SCHEMA,
+    "samples": SAMPLES_SCHEMA,
+}
+"""The tables that the scores of a set have rows of, by the names that they have in `SetScores`."""
 
 
 @dataclass(frozen=True)
@@ -121,10 +132,8 @@ def score_set(yardstick: Yardstick, record: ReplayedSet) -> SetScores:
 
 def _figures_alone(table: MetricsTable, summary: dict[str, Any]) -> SetScores:
     """Of a set that is left out, or on a flight of which nothing is scored."""
-    blocks, windows, withheld, smoothed, samples = (
-        one.empty_table() for one in (BLOCK_SCHEMA, WINDOW_SCHEMA, WITHHELD_SCHEMA, SMOOTHED_SCHEMA, SAMPLES_SCHEMA)
-    )
-    return SetScores(table.finished(), blocks, windows, withheld, smoothed, samples, summary)
+    nothing = {name: schema.empty_table() for name, schema in TABLES.items()}
+    return SetScores(**(nothing | {"metrics": table.finished()}), summary=summary)
 
 
 def _evidence(
