@@ -52,6 +52,12 @@ class PreparedFlight:
         """A complete set: the log's own parameters, but for some."""
         return complete(self.flight.parameters.initial, overrides, self.flight.release)
 
+    def is_as_flown(self, overrides: Mapping[str, float]) -> bool:
+        """Whether a set with these values is replayed as the parameters that flew are: it changes none, nor keeps one
+        from changing in flight."""
+        changed = {change.name for _, change in self.inputs.parameter_changes}
+        return changed.isdisjoint(overrides) and self.parameters(overrides) == self.parameters({})
+
     def replay(
         self,
         params: Mapping[str, float],
