@@ -17,7 +17,7 @@ from fusetune.analyze.conformance.track_file import write_track
 from fusetune.analyze.diagnosis.diagnose import diagnose
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.effects.all_effects import FlightEffects
-from fusetune.analyze.effects.joined_effects import effects_document
+from fusetune.analyze.effects.effect_files import effects_document
 from fusetune.analyze.flight_files import (
     DELAYS_FILE,
     DIAGNOSIS_FILE,
