@@ -99,8 +99,6 @@ for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
             update(replay_files(chunk)),
         log:
             f"results/logs/replay/{{flight}}.{number}.log",
-        benchmark:
-            f"results/benchmarks/replay/{{flight}}.{number}.tsv"
         conda:
             "../envs/fusetune.yaml"
         resources:
@@ -132,8 +130,6 @@ rule analyze_flight:
         expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
     log:
         "results/logs/analyze/{flight}.log",
-    benchmark:
-        "results/benchmarks/analyze/{flight}.tsv"
     # so that pictures are drawn while the decision, which needs all scores, is on its way
     priority: 1
     conda:
