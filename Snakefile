@@ -73,5 +73,9 @@ for each in workflow.rules:
     each.set_input(before_any_job)
 
 
+onstart:
+    let_jobs_be_served()
+
+
 onsuccess:
     print(closing_words())

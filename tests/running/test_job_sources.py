@@ -23,7 +23,6 @@ MADE_BY = {
     "simulate_flight": ("execute",),
     "save_flight": ("save",),
     "list_flights": ("score", "save"),
-    "replay_flight": ("replay", "save"),
     "estimate_delays": ("replay", "delays", "save"),
     "join_delays": ("delays", "diagnose", "replay", "save"),
     "diagnose_flight": ("diagnose", "save"),

@@ -10,8 +10,6 @@ rule diagnose_flight:
         track="results/analyze/{flight}/track.parquet",
     log:
         "results/logs/diagnose/{flight}.log",
-    benchmark:
-        "results/benchmarks/diagnose/{flight}.tsv"
     conda:
         "../envs/fusetune.yaml"
     # it holds log and replay at once, and a thinned log is the smaller one of a flight as long
