@@ -13,18 +13,17 @@ UV_PYTHON := $(if $(filter environment command,$(firstword $(origin PYTHON))),$(
 BIN := .venv/bin
 READY := .venv/.ready
 DEVELOPMENT := .venv/.with-dev
-# A lock is complete, so nothing is left to be resolved. pip would make byte code of all that it installs, tests of the
-# libraries included, on one core: that is done below. Without it each job would compile its imports again.
-LOCKED := --quiet --no-deps --no-compile --require-hashes
+# A lock is complete, so nothing is left to be resolved. They would make byte code of all that it installs, tests of the
+# libraries included, pip on one core: that is done below. Without it each job would compile its imports again.
+LOCKED := --quiet --no-deps --require-hashes
 # The package has no hash, so it is installed by itself, built with the locked setuptools.
 ITSELF := --quiet --no-deps --no-build-isolation -e .
-WITH_UV := uv pip install --python $(BIN)/python
-WITH_PIP := $(BIN)/python -m pip --disable-pip-version-check install
+WITH_UV := UV_COMPILE_BYTECODE=0 uv pip install --python $(BIN)/python
+WITH_PIP := $(BIN)/python -m pip --disable-pip-version-check install --no-compile
 BYTE_CODE := $(BIN)/python -m compileall -qq -j0 -x '/tests?/' .venv/lib
 LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet
 
 export PYTHONDONTWRITEBYTECODE :=
-export UV_COMPILE_BYTECODE := 0
 
 # What the demonstration is for; with real logs the same files come.
 MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
