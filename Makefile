@@ -18,12 +18,13 @@ DEVELOPMENT := .venv/.with-dev
 LOCKED := --quiet --no-deps --require-hashes
 # The package has no hash, so it is installed by itself, built with the locked setuptools.
 ITSELF := --quiet --no-deps --no-build-isolation -e .
-WITH_UV := UV_COMPILE_BYTECODE=0 uv pip install --python $(BIN)/python
+WITH_UV := uv pip install --no-compile --python $(BIN)/python
 WITH_PIP := $(BIN)/python -m pip --disable-pip-version-check install --no-compile
 BYTE_CODE := $(BIN)/python -m compileall -qq -j0 -x '/tests?/' .venv/lib
 LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet
 
 export PYTHONDONTWRITEBYTECODE :=
+unexport UV_COMPILE_BYTECODE
 
 # What the demonstration is for; with real logs the same files come.
 MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
