@@ -1,26 +1,30 @@
 # make                sets up .venv where that is needed, then runs the pipeline
-# make test           … then runs the tests
+# make demonstration  … then looks whether it made all, found what is wrong with its vehicle, and would do nothing twice
+# make demo-loop      … then closes the loop once on a simulated vehicle: design, fly, study, apply, fly again, confirmed
+# make test           adds to .venv what development needs, where that is missing, then runs the tests
 # make lint           … then looks for slips, form, and imports that the house forbids
 # make types          … then checks the types
-# make demonstration  … then runs the pipeline and looks whether it made all, found what is wrong with its vehicle, and would
-#                     do nothing twice
-# make demo-loop      … then closes the loop once on a simulated vehicle: design, fly, study, apply, fly again, confirmed
+# make with-upload    adds to .venv what requirements-upload.lock holds; likewise with-slurm, with-mlflow, with-dev
 # These are the checks of a change; .ci/run and .github/workflows/checks.yml call them.
 CORES ?= 2
-LOCKS ?= requirements.lock
 PYTHON ?= $(shell command -v python3.11 || command -v python3 || command -v python)
 # A Python that is asked for is the one of .venv; otherwise uv may choose, and fetch, any that serves.
 UV_PYTHON := $(if $(filter environment command,$(firstword $(origin PYTHON))),$(PYTHON),>=3.11)
 BIN := .venv/bin
 READY := .venv/.ready
+DEVELOPMENT := .venv/.with-dev
+# A lock is complete, so nothing is left to be resolved. They would make byte code of all that it installs, tests of the
+# libraries included, pip on one core: that is done below. Without it each job would compile its imports again.
+LOCKED := --quiet --no-deps --require-hashes
 # The package has no hash, so it is installed by itself, built with the locked setuptools.
-ITSELF := --no-deps --no-build-isolation -e .
-QUIET := --quiet --disable-pip-version-check
+ITSELF := --quiet --no-deps --no-build-isolation -e .
+WITH_UV := uv pip install --no-compile --python $(BIN)/python
+WITH_PIP := $(BIN)/python -m pip --disable-pip-version-check install --no-compile
+BYTE_CODE := $(BIN)/python -m compileall -qq -j0 -x '/tests?/' .venv/lib
 LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet
 
-# Every job is a process of its own: without byte code each of them would compile its imports again.
 export PYTHONDONTWRITEBYTECODE :=
-export UV_COMPILE_BYTECODE := 1
+unexport UV_COMPILE_BYTECODE
 
 # What the demonstration is for; with real logs the same files come.
 MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
@@ -32,17 +36,19 @@ all: $(READY)
 
 setup: $(READY)
 
-test: $(READY)
+with-%: .venv/.with-% ;
+
+test: $(DEVELOPMENT)
 	$(BIN)/pytest -n $(CORES) --no-loadscope-reorder
 
-lint: $(READY)
+lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 	$(BIN)/lint-imports
 
-types: $(READY)
+types: $(DEVELOPMENT)
 	$(BIN)/mypy
 
 demonstration: all
@@ -57,29 +63,40 @@ demonstration: all
 demo-loop: $(READY)
 	$(BIN)/python -m benchmarks.closed_loop --cores $(CORES)
 
-# The stamp goes first and comes last: a set-up that was interrupted is done again from nothing.
-$(READY): $(LOCKS) pyproject.toml
+# The stamp goes first and comes last: a set-up that was interrupted is done again from nothing. Libraries in which Python
+# finds no byte code are as good.
+$(READY): requirements.lock pyproject.toml
 	@if [ ! -e $@ ]; then rm -rf .venv; fi; rm -f $@
 	@if command -v uv >/dev/null 2>&1; then \
 		echo "Setting up .venv with uv ..." && \
 		{ [ -d .venv ] || uv venv --quiet --python '$(UV_PYTHON)' .venv; } && \
-		for lock in $(LOCKS); do uv pip install --quiet --python $(BIN)/python --require-hashes -r $$lock || exit 1; done && \
-		uv pip install --quiet --python $(BIN)/python $(ITSELF); \
+		$(WITH_UV) $(LOCKED) -r requirements.lock && $(WITH_UV) $(ITSELF); \
 	elif [ -n "$(PYTHON)" ] && "$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then \
 		echo "Setting up .venv with pip ..." && \
 		{ [ -d .venv ] || "$(PYTHON)" -m venv .venv; } && \
-		for lock in $(LOCKS); do $(BIN)/python -m pip install $(QUIET) --require-hashes -r $$lock || exit 1; done && \
-		$(BIN)/python -m pip install $(QUIET) $(ITSELF); \
+		$(WITH_PIP) $(LOCKED) -r requirements.lock && $(WITH_PIP) $(ITSELF); \
 	else \
 		echo "fusetune needs Python 3.11 or newer, or uv: install one of them and run make again." >&2; exit 1; \
 	fi
+	@$(BYTE_CODE) || true
 	@touch $@
+
+# Here the stamp of .venv steps aside, so that it keeps its time; where nothing can be fetched .venv stays as it was.
+.PRECIOUS: .venv/.with-%
+.venv/.with-%: requirements-%.lock $(READY)
+	@echo "Adding $< to .venv ..."; mv $(READY) .venv/.changing
+	@if command -v uv >/dev/null 2>&1; then $(WITH_UV) $(LOCKED) -r $<; else $(WITH_PIP) $(LOCKED) -r $<; fi || \
+		{ mv .venv/.changing $(READY); exit 1; }
+	@$(BYTE_CODE) || true
+	@mv .venv/.changing $(READY); touch $@
 
 # Writes the lock files anew, keeping their versions where they still fit; `make lock UPGRADE=--upgrade` takes the newest.
 lock:
-	$(LOCK) $(UPGRADE) --extra test --extra dev --output-file requirements.lock
-	$(LOCK) $(UPGRADE) --extra slurm --constraint requirements.lock --output-file requirements-slurm.lock
-	$(LOCK) $(UPGRADE) --extra mlflow --constraint requirements.lock --output-file requirements-mlflow.lock
+	$(LOCK) $(UPGRADE) --extra build --extra test --extra dev --output-file requirements-dev.lock
+	$(LOCK) $(UPGRADE) --extra build --constraint requirements-dev.lock --output-file requirements.lock
+	for extra in upload slurm mlflow; do \
+		$(LOCK) $(UPGRADE) --extra $$extra --constraint requirements-dev.lock --output-file requirements-$$extra.lock || exit 1; \
+	done
 
 # Removes what the pipeline has made; logs in flights/, the environment and the history of the decisions stay.
 clean:

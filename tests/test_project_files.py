@@ -100,7 +100,7 @@ def test_what_others_wrote_is_pinned_to_commits(project_root: Path) -> None:
 def test_hooks_take_the_tools_that_are_locked_from_the_environment(project_root: Path) -> None:
     """So there is no second version of them to agree with."""
     locked = set(
-        re.findall(r"^([\w.-]+)==", (project_root / "requirements.lock").read_text(encoding="utf-8"), re.MULTILINE)
+        re.findall(r"^([\w.-]+)==", (project_root / "requirements-dev.lock").read_text(encoding="utf-8"), re.MULTILINE)
     )
     config = document(project_root / ".pre-commit-config.yaml")
     for repo in config["repos"]:

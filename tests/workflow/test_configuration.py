@@ -130,7 +130,9 @@ def test_the_configuration_is_read_without_the_numerics() -> None:
 
 
 LOCK_FILES = {
-    "requirements.lock": ("test", "dev"),
+    "requirements-dev.lock": ("build", "test", "dev"),
+    "requirements.lock": ("build",),
+    "requirements-upload.lock": ("upload",),
     "requirements-slurm.lock": ("slurm",),
     "requirements-mlflow.lock": ("mlflow",),
 }
@@ -165,6 +167,9 @@ def test_the_lock_files_agree(project_root: Path) -> None:
     pins, *others = (locked(project_root / name) for name in LOCK_FILES)
     for beside in others:
         assert {name for name in pins.keys() & beside.keys() if pins[name] != beside[name]} == set()
+    alone = others[0].keys()
+    assert alone < pins.keys(), "the pipeline's packages are among those of development"
+    assert not alone & {"mypy", "pymavlink", "pytest", "ruff"}, "what the pipeline runs with, no more"
 
 
 def test_the_conda_environment_has_the_locked_versions(project_root: Path) -> None:

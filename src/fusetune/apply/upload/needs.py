@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 from fusetune.errors import UserError
 
-INSTALL = "Install it: pip install pymavlink pyserial"
+INSTALL = "Install it: pip install pymavlink pyserial (in a checkout: make with-upload)"
 
 
 def require_pymavlink() -> None:
