@@ -2,25 +2,28 @@
 
 Numba optimises and translates every function by itself, each time together with everything it calls: the estimator's
 few hundred nested functions would pass through the optimiser some thirty times. Here the inner functions are only
-joined, and the optimiser sees the whole once, at the entry. The inner functions cannot be called from Python in a
-process that compiled this way, so it is a child that does it; everybody else loads the result.
+translated to LLVM's language, without the wrappers by which Python and C would call them; at the entry all are linked,
+as functions that nobody else calls, and optimised once. They cannot be called from Python in a process that compiled
+this way, so it is a child that does it; everybody else loads the result.
 """
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import numba
-from numba.core import codegen, compiler, config, types
+from numba.core import codegen, compiler, config, event, types
 
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
 from fusetune.ekf2.compiled.kernel_locator import KernelLocator
@@ -34,6 +37,8 @@ ENTRY_SOURCE = Path(__file__).parents[1] / "replay" / "loop.py"
 COMPILES = "fusetune.ekf2.replay.warm_up"
 """The module that, when it is run, calls the entry once and so compiles all."""
 CHILD_MARK = "FUSETUNE_COMPILING"
+LINKED_TOGETHER = 25
+"""As many modules are linked before the result is linked to the entry: LLVM looks through all of that each time."""
 PLAIN = "--plain"
 NOT_IN_ONE_PIECE = (
     f"Numba {numba.__version__} does not compile the estimator in one piece: it is done function by function, "
@@ -125,25 +130,34 @@ def joined_without_optimising() -> Iterator[None]:
     """
     library, native = codegen.JITCodeLibrary, codegen.JITCPUCodegen
     finalize, pointer, set_env = library.finalize, library.get_pointer_to_function, native.set_env
-    compile_function = compiler.CompilerBase.compile_extra
+    add_module, compile_function = library.add_llvm_module, compiler.CompilerBase.compile_extra
     depth = 0
 
-    def count_depth(self, function):  # type: ignore[no-untyped-def]
+    def compile_without_wrappers(self, function):  # type: ignore[no-untyped-def]
         nonlocal depth
         depth += 1
+        if depth > 1:
+            self.state.flags.no_cpython_wrapper = self.state.flags.no_cfunc_wrapper = True
         try:
             return compile_function(self, function)
         finally:
             depth -= 1
 
+    def add_unoptimised(self, module):  # type: ignore[no-untyped-def]
+        if depth <= 1:
+            return add_module(self, module)
+        module.data_layout = self._codegen._data_layout
+        return self._final_module.link_in(module)
+
     def join(self):  # type: ignore[no-untyped-def]
         if depth <= 1:
+            _link_all_called(self)
             return finalize(self)
         self._raise_if_finalized()
-        for linked in dict.fromkeys(self._linking_libraries):
-            self._reload_init.update(linked._reload_init)
-            self._final_module.link_in(linked._get_module_for_linking(), preserve=True)
+        for called in self._linking_libraries:
+            self._reload_init.update(called._reload_init)
         self._finalize_dynamic_globals()
+        self._shared_module = self._final_module
         self._finalized = True
         self._only_joined = True
         return None
@@ -156,11 +170,13 @@ def joined_without_optimising() -> Iterator[None]:
         if self._engine.is_symbol_defined(name):
             set_env(self, name, env)
 
-    patches: tuple[tuple[type, str, Any], ...] = (
+    patches: tuple[tuple[Any, str, Any], ...] = (
         (library, "finalize", join),
+        (library, "add_llvm_module", add_unoptimised),
         (library, "get_pointer_to_function", pointer_if_translated),
         (native, "set_env", set_env_if_translated),
-        (compiler.CompilerBase, "compile_extra", count_depth),
+        (compiler.CompilerBase, "compile_extra", compile_without_wrappers),
+        (event, "broadcast", _tell_nobody),
         (types.Record, "__repr__", _short_repr),
     )
     originals = [getattr(owner, name) for owner, name, _ in patches]
@@ -171,6 +187,39 @@ def joined_without_optimising() -> Iterator[None]:
     finally:
         for (owner, name, _), original in zip(patches, originals, strict=True):
             setattr(owner, name, original)
+
+
+def _link_all_called(entry: Any) -> None:
+    """Link what the entry calls, at any depth, into its module, as functions that nothing outside it can call.
+
+    That they cannot be called otherwise lets the optimiser change what they take and return.
+    """
+    every = _with_all_they_call(entry._linking_libraries)
+    joined = [library._final_module for library in every if getattr(library, "_only_joined", False)]
+    entry._linking_libraries = [library for library in every if not getattr(library, "_only_joined", False)]
+    called = []
+    for first in range(0, len(joined), LINKED_TOGETHER):
+        part = llvm.parse_assembly(str(entry._codegen._create_empty_module("part")))
+        for module in joined[first : first + LINKED_TOGETHER]:
+            called += [f.name for f in module.functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
+            part.link_in(module, preserve=True)
+        entry._final_module.link_in(part)
+    for name in called:
+        entry._final_module.get_function(name).linkage = llvm.Linkage.internal
+
+
+def _with_all_they_call(libraries: Iterable[Any], found: dict[Any, None] | None = None) -> dict[Any, None]:
+    """Libraries and those that they link, and so on, each once."""
+    found = {} if found is None else found
+    for library in libraries:
+        if library not in found:
+            _with_all_they_call(library._linking_libraries, found)
+            found[library] = None
+    return found
+
+
+def _tell_nobody(_: object) -> None:
+    """Numba times itself by some hundred thousand events, each told to every function that is being compiled."""
 
 
 def _short_repr(record: types.Record) -> str:
@@ -186,6 +235,7 @@ def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = 
     options : of the command line; with `PLAIN` Numba compiles its own way
     """
     os.environ[CHILD_MARK] = "1"
+    gc.disable()  # what compiling leaves is gone with the process
     with nullcontext() if PLAIN in options else joined_without_optimising():
         call_entry()
     folder = kernel_folder()
