@@ -6,13 +6,14 @@ Built once per flight, since no parameter of the estimator enters: parameter set
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from fusetune.ekf2.feed import message_samples as convert
 from fusetune.ekf2.feed.arrival_order import RunSchedule, schedule_runs
+from fusetune.ekf2.feed.memo import Memo
 from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE, SYSTEM_FLAGS_SAMPLE
 from fusetune.ekf2.feed.taken_samples import AIDING, only_usable
 from fusetune.px4.flight import Flight, ParameterChange, TopicTable, select_rows
@@ -48,7 +49,7 @@ IMU_ROW = np.dtype(
         ("delta_vel", "f4", (3,)),
         ("delta_ang_dt", "f4"),
         ("delta_vel_dt", "f4"),
-        ("delta_vel_clipping", "?", (3,)),
+        ("delta_vel_clipping", "u1", (3,)),
     ],
     align=True,
 )
@@ -60,8 +61,7 @@ COMMAND = np.dtype([("timestamp", "i8"), ("command", "i8"), ("param", "f8", (7,)
 
 
 class SampleArrays(NamedTuple):
-    """The arrays that the compiled replay reads; of a whole flight `imu` are IMU_ROW and `arrivals` ARRIVAL in order of
-    their runs, see `of_runs`."""
+    """The arrays that the compiled replay reads; `arrivals` stand in the order of their runs."""
 
     imu: np.ndarray
     arrivals: np.ndarray
@@ -78,10 +78,6 @@ class SampleArrays(NamedTuple):
     auxvel: np.ndarray
     system_flags: np.ndarray
     command: np.ndarray
-
-    def of_runs(self, start: int, stop: int) -> SampleArrays:
-        """The same for the estimator's runs from `start` to before `stop` alone, as IMU_SAMPLE and ARRIVALS."""
-        return self._replace(imu=imu_samples(self.imu[start:stop]), arrivals=arrivals_of(self.arrivals, start, stop))
 
 
 def imu_samples(rows: np.ndarray) -> np.ndarray:
@@ -130,6 +126,8 @@ class EstimatorInputs:
     arrays: SampleArrays
     parameter_changes: tuple[tuple[int, ParameterChange], ...]
     """(run, change): changes that the log records in flight, and the run before which each takes effect."""
+    memo: Memo = field(default_factory=Memo, init=False, repr=False, compare=False)
+    """What replays of these samples have in common; inputs made of others by `dataclasses.replace` have their own."""
 
 
 def build_inputs(flight: Flight) -> EstimatorInputs:
