@@ -36,11 +36,12 @@ ARRIVAL_TOPICS = (*sorted(AIDING), "system_flags", "command")
 
 BIAS_RESETS = ("reset_accel_bias", "reset_gyro_bias")
 
-ARRIVALS = np.dtype([(name, "i4") for name in ARRIVAL_TOPICS] + [(name, "?") for name in BIAS_RESETS], align=True)
-"""What arrives with one IMU sample: a position in each sample array, -1 for nothing."""
+ARRIVAL_FIELDS = (*ARRIVAL_TOPICS, *BIAS_RESETS)
+"""What can arrive with an IMU sample, by number: samples, system flags, a command, the news of another sensor."""
 
 ARRIVAL = np.dtype([("run", "i4"), ("field", "i4"), ("position", "i4")])
-"""One entry of ARRIVALS, by the number of its field, for most IMU samples come alone; of a reset the position is 1."""
+"""What arrives at a run: the number of its field in ARRIVAL_FIELDS, and its position in the array of its samples; of a
+reset that is 1."""
 
 IMU_ROW = np.dtype(
     [
@@ -88,31 +89,18 @@ def imu_samples(rows: np.ndarray) -> np.ndarray:
     return samples
 
 
-def arrivals_of(arrivals: np.ndarray, start: int, stop: int) -> np.ndarray:
-    """ARRIVAL of a flight → ARRIVALS of the runs from `start` to before `stop`."""
-    first, last = np.searchsorted(arrivals["run"], (start, stop))
-    part = arrivals[first:last]
-    wide = np.zeros(max(stop - start, 0), ARRIVALS)
-    for number, name in enumerate(ARRIVALS.names or ()):
-        if name in ARRIVAL_TOPICS:
-            wide[name] = -1
-        here = part[part["field"] == number]
-        wide[name][here["run"] - start] = here["position"]
-    return wide
-
-
 def without_arrivals(arrivals: np.ndarray, names: Collection[str], runs: np.ndarray) -> np.ndarray:
     """ARRIVAL of a flight without those of some fields at some runs; `runs` (N,) is true for these."""
-    fields = [number for number, name in enumerate(ARRIVALS.names or ()) if name in names]
+    fields = [number for number, name in enumerate(ARRIVAL_FIELDS) if name in names]
     return arrivals[~(np.isin(arrivals["field"], fields) & runs[arrivals["run"]])]
 
 
 def _arrivals(name: str, position: np.ndarray) -> np.ndarray:
-    """One field of ARRIVALS, given for every run, as ARRIVAL."""
+    """What arrives in one field, given for every run, as ARRIVAL."""
     run = np.flatnonzero(position >= 0 if name in ARRIVAL_TOPICS else position)
     found = np.zeros(len(run), ARRIVAL)
     found["run"], found["position"] = run, position[run]
-    found["field"] = (ARRIVALS.names or ()).index(name)
+    found["field"] = ARRIVAL_FIELDS.index(name)
     return found
 
 

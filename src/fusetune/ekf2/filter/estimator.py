@@ -71,6 +71,7 @@ EKF = np.dtype(
 )
 """The record `ekf`."""
 
+
 @kernel
 def initialise_estimator(ekf, params):
     """Give an `EKF` record of zeros the values it has when the vehicle boots."""

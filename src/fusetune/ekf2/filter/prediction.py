@@ -13,8 +13,6 @@ written out and not generated.
 
 import math
 
-import numpy as np
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, refresh_ellipsoid

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fusetune.ekf2.feed.buffers import BUFFER_LENGTHS, RING
-from fusetune.ekf2.feed.inputs import ARRIVALS, BIAS_RESETS, EstimatorInputs
+from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, BIAS_RESETS, EstimatorInputs
 from fusetune.ekf2.feed.sample_arrival import NOTE, NOTED
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_ACCUMULATOR
@@ -155,6 +155,10 @@ def notes_of(params: np.void, changes: Changes) -> Rows:
     return np.array(rows, NOTE)
 
 
+def _size(rows: Rows) -> int:
+    return rows.nbytes
+
+
 def _bytes(arrays: Sequence[Rows]) -> int:
     return sum(array.nbytes for array in arrays)
 
@@ -166,7 +170,7 @@ class _Builder:
         self.inputs, self.imu, self.clock = inputs, inputs.arrays.imu, clock
         predict_us, _, _ = clock
         self.predict_us = timeline(predict_us)
-        self.intervals = inputs.memo.get(("intervals", predict_us), self._intervals, lambda rows: rows.nbytes)
+        self.intervals = inputs.memo.get(("intervals", predict_us), self._intervals, _size)
         self.updates, self.lengths, self.levelling = inputs.memo.get(("updates", clock), self._updates, _bytes)
 
     def _intervals(self) -> Rows:
@@ -188,11 +192,9 @@ class _Builder:
         for number, (name, values) in enumerate(told.items()):
             key = (name, self.clock, values)
             if number == DRAG:
-                drag, actions = memo.get(key, lambda values=values: self._drag(values[1]), _bytes)
+                drag, actions = memo.get(key, partial(self._drag, values[1]), _bytes)
             else:
-                actions = memo.get(
-                    key, lambda number=number, values=values: self._actions(number, *values), lambda rows: rows.nbytes
-                )
+                actions = memo.get(key, partial(self._actions, number, *values), _size)
             parts.append(actions)
         end = np.zeros(1, ACTION)
         end["update"] = _NONE_FOLLOWS
@@ -229,11 +231,9 @@ class _Builder:
         return _shortened(samples, made), _shortened(actions, count)
 
     def _events(self) -> Rows:
-        arrivals, names = self.inputs.arrays.arrivals, ARRIVALS.names or ()
-        fields = {names.index("command"): COMMAND}
-        fields |= {
-            names.index(name): what for name, what in zip(BIAS_RESETS, (RESET_ACCEL_BIAS, RESET_GYRO_BIAS), strict=True)
-        }
+        arrivals = self.inputs.arrays.arrivals
+        what = ("command", COMMAND), *zip(BIAS_RESETS, (RESET_ACCEL_BIAS, RESET_GYRO_BIAS), strict=True)
+        fields = {ARRIVAL_FIELDS.index(name): number for name, number in what}
         here = arrivals[np.isin(arrivals["field"], list(fields))]
         events = np.zeros(len(here) + 1, EVENT)
         events["run"][:-1], events["position"][:-1] = here["run"], here["position"]
@@ -244,7 +244,7 @@ class _Builder:
 
 def _arrived(inputs: EstimatorInputs, name: str) -> Rows:
     arrivals = inputs.arrays.arrivals
-    here = arrivals[arrivals["field"] == (ARRIVALS.names or ()).index(name)]
+    here = arrivals[arrivals["field"] == ARRIVAL_FIELDS.index(name)]
     arrived = np.zeros(len(here), ARRIVED)
     arrived["run"], arrived["slot"] = here["run"], here["position"]
     return arrived

@@ -87,9 +87,7 @@ def run_estimator(ekf, params, inputs, schedule, notes, views, recorder, records
         ekf.time_latest_us = imu[run].time_us
         ekf.dt_ekf_avg = updates[update_number].average_dt
         nothing_is_due(ekf.sensors)
-        place = take_actions(
-            ekf, inputs, schedule.drag, actions, place, update_number, from_run, NO_STOP, True, notes
-        )
+        place = take_actions(ekf, inputs, schedule.drag, actions, place, update_number, from_run, NO_STOP, True, notes)
         from_run = 0
         pretend_fused(ekf)
         if not ekf.filter_initialised:

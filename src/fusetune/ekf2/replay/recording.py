@@ -128,7 +128,7 @@ PUBLISHED = np.dtype(
     ],
     align=True,
 )
-"""What a LOCAL_POSITION_ROW is made of, before the projection; positions are metres from a global reference (rad, m)."""
+"""What a LOCAL_POSITION_ROW is made of, before the projection; positions are m from a global reference (rad, m)."""
 
 PROJECTION = np.dtype(
     [*fields("f8", "ref_lat", "ref_alt", "metres_north", "metres_east", "origin_lat", "sin_origin", "cos_origin")],

@@ -15,7 +15,9 @@ from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.timeline import value_at
 from fusetune.ekf2.schedule.updates import INITIAL_INTERVAL_S
 
-ACTION = np.dtype([("time_us", "i8"), *fields("i4", "update", "run", "slot"), *fields("i1", "sensor", "what")], align=True)
+ACTION = np.dtype(
+    [("time_us", "i8"), *fields("i4", "update", "run", "slot"), *fields("i1", "sensor", "what")], align=True
+)
 """Before which update something happens to a sensor: the sample at `slot` of its array arrives at a run, or is due.
 
 Of a sample that is due, `time_us` is the time of its measurement, `run` that at which it arrived.

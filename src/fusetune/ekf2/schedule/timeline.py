@@ -14,9 +14,7 @@ Steps = tuple[tuple[int, float], ...]
 TIMELINE = np.dtype([("run", "i8"), ("value", "f8")], align=True)
 
 
-def steps_of(
-    initial: float, changes: Iterable[tuple[int, float]], meaning: Callable[[float], float] = float
-) -> Steps:
+def steps_of(initial: float, changes: Iterable[tuple[int, float]], meaning: Callable[[float], float] = float) -> Steps:
     """What follows from a parameter and its changes in flight.
 
     Parameters

@@ -29,7 +29,7 @@ UPDATE = np.dtype([*fields("i4", "run", "delayed"), ("average_dt", "f8")], align
 """The run of an update, the index of its interval, and the mean interval (s) when it is over."""
 
 LEVELLING = np.dtype([*fields("f8", "accel", "gyro", shape=(3,)), ("begun", "?"), ("started_run", "i8")], align=True)
-"""Filtered specific force (m/s²) and rate (rad/s), body; and the run from which a given state is the filter's, or -1."""
+"""Filtered specific force (m/s²) and rate (rad/s), body; the run from which a given state is the filter's, or -1."""
 
 
 @kernel
