@@ -14,6 +14,7 @@ from fusetune.ekf2.filter.measurement_update import (
     fuse_direct_state,
     measurement_update,
 )
+from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, compute_kalman_gain
 
 GYRO_Z, ACCEL_X = 11, 12
 
@@ -59,7 +60,40 @@ def test_update_with_a_full_jacobian_is_the_dense_joseph_form():
     P, R = ekf["P"].copy(), 0.2
     H = np.where(rng.random(24) < 0.4, rng.normal(size=24), 0.0)
     K = P @ H / (H @ P @ H + R)
-    measurement_update(ekf, make_parameters(), K.copy(), H, R, 0.01)
+    compute_kalman_gain(ekf, H, H @ P @ H + R)
+    measurement_update(ekf, make_parameters(), R, 0.01)
+    np.testing.assert_allclose(ekf["P"], joseph(P, K, H, R), rtol=1e-9, atol=1e-13)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    seen=st.lists(st.integers(0, 23), min_size=1, max_size=8),
+    still=st.sets(st.integers(0, 23)),
+    inhibited=st.tuples(*4 * (st.booleans(),)),
+)
+@settings(max_examples=80, deadline=None)
+def test_update_is_the_multiplied_out_form_bit_by_bit(seed, seen, still, inhibited):
+    """P - (K PHᵀ + PH Kᵀ - S K Kᵀ) of whole matrices, where some states are correlated with no other."""
+    ekf = estimator_with_covariance(seed)
+    rng = np.random.default_rng(seed)
+    for state in still:
+        ekf["P"][state, np.arange(24) != state] = 0.0
+        ekf["P"][np.arange(24) != state, state] = 0.0
+    ekf["gyro_bias_inhibit"][1], ekf["accel_bias_inhibit"][2] = inhibited[:2]
+    ekf["cs"]["mag"], ekf["cs"]["wind"] = inhibited[2:]
+    P, H, R = ekf["P"].copy(), np.zeros(24), 0.3
+    H[seen] = rng.normal(size=len(seen))
+    S = compute_innovation_variance(ekf, H, R)
+    assert pytest.approx(H @ P @ H + R, rel=1e-12) == S
+    compute_kalman_gain(ekf, H, S)
+    measurement_update(ekf, make_parameters(), R, 0.0)
+    K, PH = ekf["scratch"]["K"].copy(), ekf["scratch"]["PH"].copy()
+    np.testing.assert_allclose(PH, P @ H, rtol=1e-12, atol=1e-16)
+    assert not K[[10] * inhibited[0] + [14] * inhibited[1]].any()
+    assert inhibited[2] or not K[15:21].any()
+    assert inhibited[3] or not K[21:23].any()
+    expected = P - ((np.outer(K, PH) + np.outer(PH, K)) - np.outer(K, K) * S)
+    np.testing.assert_array_equal(ekf["P"], expected)
     np.testing.assert_allclose(ekf["P"], joseph(P, K, H, R), rtol=1e-9, atol=1e-13)
 
 
@@ -71,7 +105,8 @@ def test_state_moves_by_gain_times_innovation():
     before = {name: ekf[name].copy() for name in ("vel", "gyro_bias", "accel_bias", "mag_I", "mag_B", "wind_vel")}
     terrain, altitude = ekf["terrain"], ekf["gpos_alt"]
     innovation = 0.5
-    fuse(ekf, params, K, innovation)
+    ekf["scratch"]["K"][:] = K
+    fuse(ekf, params, innovation)
     np.testing.assert_allclose(ekf["q"], rotated_by_error(q, -K[:3] * innovation), atol=1e-15)
     for name, index in (("vel", 3), ("gyro_bias", 9), ("accel_bias", 12), ("mag_I", 15), ("mag_B", 18)):
         np.testing.assert_allclose(ekf[name], before[name] - K[index : index + 3] * innovation, rtol=1e-14)
@@ -84,7 +119,8 @@ def test_state_moves_by_gain_times_innovation():
 def test_biases_stay_within_their_limits():
     ekf = estimator_with_covariance(5)
     params = make_parameters(EKF2_GYR_B_LIM=0.1, EKF2_ABL_LIM=0.2)
-    fuse(ekf, params, np.full(24, 10.0), 1.0)
+    ekf["scratch"]["K"][:] = 10.0
+    fuse(ekf, params, 1.0)
     np.testing.assert_array_equal(ekf["gyro_bias"], -params["EKF2_GYR_B_LIM"])
     np.testing.assert_array_equal(ekf["accel_bias"], -params["EKF2_ABL_LIM"])
     np.testing.assert_array_equal(ekf["mag_B"], -0.5)
@@ -95,7 +131,8 @@ def test_field_and_wind_stay_put_while_not_estimated():
     ekf = estimator_with_covariance(6)
     ekf["cs"]["mag"] = False
     ekf["cs"]["wind"] = False
-    fuse(ekf, make_parameters(), np.full(24, 0.1), 1.0)
+    ekf["scratch"]["K"][:] = 0.1
+    fuse(ekf, make_parameters(), 1.0)
     for name in ("mag_I", "mag_B", "wind_vel"):
         np.testing.assert_array_equal(ekf[name], 0.0)
 
@@ -123,7 +160,7 @@ def test_excessive_variance_is_fused_down_rather_than_clipped():
     ekf["P"][...] = np.diag(np.full(24, 0.1))
     ekf["P"][2, 2] = 1.05
     ekf["P"][2, 3] = ekf["P"][3, 2] = 0.2
-    constrain_state_variances(ekf, make_parameters())
+    constrain_state_variances(ekf)
     assert ekf["P"][2, 2] == pytest.approx(1.05 * 10 / 11)
     assert ekf["P"][2, 3] == pytest.approx(0.2 * 10 / 11)
 
@@ -134,7 +171,46 @@ def test_small_variances_are_raised_and_group_ratio_is_kept():
     ekf["P"][0, 0] = 1e-12
     ekf["P"][4, 4] = 0.0
     ekf["P"][13, 13] = 1e-12
-    constrain_state_variances(ekf, make_parameters())
+    constrain_state_variances(ekf)
     assert ekf["P"][0, 0] == 1e-9
     assert ekf["P"][4, 4] == 1e-6
     assert ekf["P"][13, 13] == pytest.approx(0.1 / 1e6)
+
+
+GROUPS = (
+    # states, least and largest variance, largest ratio within the group; PX4 v1.16, constrainStateVariances
+    (range(0, 3), 1e-9, 1.0, None),
+    (range(3, 9), 1e-6, 1e6, None),
+    (range(9, 12), 1e-9, 1.0, 1e6),
+    (range(12, 15), 1e-9, 1.0, 1e6),
+    (range(15, 18), 1e-6, 1.0, 1e6),
+    (range(18, 21), 1e-6, 1.0, 1e6),
+    (range(21, 23), 1e-6, 1e6, 1e6),
+    (range(23, 24), 0.0, 1e4, None),
+)
+
+
+@given(
+    exponents=st.lists(st.floats(-14, 7), min_size=24, max_size=24),
+    mag=st.booleans(),
+    wind=st.booleans(),
+)
+@settings(max_examples=80, deadline=None)
+def test_limits_of_variances_are_those_of_each_group(exponents, mag, wind):
+    """Uncorrelated states: too large ones go down by 10/11 until they fit, then too small ones are raised."""
+    ekf = make_estimator()
+    ekf["cs"]["mag"], ekf["cs"]["wind"] = mag, wind
+    expected = 10.0 ** np.array(exponents)
+    ekf["P"][...] = np.diag(expected)
+    constrain_state_variances(ekf)
+    for states, low, high, ratio in GROUPS:
+        if (states[0] in (15, 18) and not mag) or (states[0] == 21 and not wind):
+            continue
+        for state in states:
+            while expected[state] > high:
+                expected[state] *= 10.0 / 11.0
+        largest = max(expected[state] for state in states)
+        for state in states:
+            expected[state] = max(expected[state], low, largest / ratio if ratio else 0.0)
+    np.testing.assert_allclose(np.diag(ekf["P"]), expected, rtol=1e-9)
+    assert np.count_nonzero(ekf["P"]) == 24

@@ -16,7 +16,7 @@ of `EKF/covariance.cpp`; in double precision.
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, single_precision
-from fusetune.ekf2.filter.observation_gain import dot, multiply_covariance
+from fusetune.ekf2.filter.observation_gain import scale_kalman_gain
 from fusetune.ekf2.numerics.rotations import quat_to_dcm, rotate_by_earth_increment
 
 MAG_BIAS_LIMIT = 0.5
@@ -25,16 +25,20 @@ VELOCITY_LIMIT = 1e3
 WIND_LIMIT = 1e2
 TERRAIN_LIMIT = 1e4
 
-BIAS_VARIANCE_MIN = 1e-9
-MAG_VARIANCE_MIN = 1e-6
+ATTITUDE_VARIANCE_MIN, ATTITUDE_VARIANCE_MAX = 1e-9, 1.0
+MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX = 1e-6, 1e6
+BIAS_VARIANCE_MIN, BIAS_VARIANCE_MAX = 1e-9, 1.0
+MAG_VARIANCE_MIN, MAG_VARIANCE_MAX = 1e-6, 1.0
+TERRAIN_VARIANCE_MAX = 1e4
 VARIANCE_MAX_RATIO = 1e6
 
 MAX_VARIANCE_REDUCTIONS = 1000
 
 
 @kernel
-def clear_inhibited_state_kalman_gains(ekf, params, K):
+def clear_inhibited_state_kalman_gains(ekf):
     """Zero the gains of the states that are not being estimated now."""
+    K = ekf.scratch.K
     for i in range(3):
         if ekf.gyro_bias_inhibit[i]:
             K[state.GYRO_BIAS + i] = 0.0
@@ -49,87 +53,133 @@ def clear_inhibited_state_kalman_gains(ekf, params, K):
 
 
 @kernel
-def joseph_update(P, K, PH, S):
-    """P ← P - K PHᵀ - PH Kᵀ + S K Kᵀ, with PH = P Hᵀ and S = H P Hᵀ + R."""
+def _update_covariance(ekf, R):
+    """P ← P - K PHᵀ - PH Kᵀ + S K Kᵀ, with PH = P Hᵀ and S = H P Hᵀ + R of `ekf.scratch`.
+
+    Rows of states that neither the gain moves nor the observation depends on stay, and so do their columns.
+    """
+    clear_inhibited_state_kalman_gains(ekf)
+    P, K, PH = ekf.P, ekf.scratch.K, ekf.scratch.PH
+    S = ekf.scratch.HPH + R
     for i in range(state.ERROR_STATE_SIZE):
-        k_i = K[i]
-        ph_i = PH[i]
-        for j in range(state.ERROR_STATE_SIZE):
-            P[i, j] -= (k_i * PH[j] + ph_i * K[j]) - (k_i * K[j]) * S
+        k_i, ph_i = K[i], PH[i]
+        if k_i != 0.0 or ph_i != 0.0:
+            for j in range(state.ERROR_STATE_SIZE):
+                P[i, j] -= (k_i * PH[j] + ph_i * K[j]) - (k_i * K[j]) * S
 
 
 @kernel
-def reduce_variance(ekf, params, state_index):
+def _observe_state(ekf, state_index):
+    """Set `PH` and `HPH` of an observation of a single state: H is one there."""
+    P, PH = ekf.P, ekf.scratch.PH
+    for i in range(state.ERROR_STATE_SIZE):
+        PH[i] = P[state_index, i]
+    ekf.scratch.HPH = P[state_index, state_index]
+
+
+@kernel
+def reduce_variance(ekf, state_index):
     """Fuse a zero innovation of ten times the state's variance, which takes about 10 % off that variance.
 
     Clipping would strengthen the correlations with other states; this does not.
     """
-    P = ekf.P
-    K = ekf.scratch.K_reduce
-    PH = ekf.scratch.PH_reduce
-    R = 10.0 * P[state_index, state_index]
-    S = P[state_index, state_index] + R
+    K, PH = ekf.scratch.K, ekf.scratch.PH
+    _observe_state(ekf, state_index)
+    R = 10.0 * ekf.scratch.HPH
+    S = ekf.scratch.HPH + R
     for i in range(state.ERROR_STATE_SIZE):
-        PH[i] = P[state_index, i]
         K[i] = PH[i] / S
-    clear_inhibited_state_kalman_gains(ekf, params, K)
-    joseph_update(P, K, PH, S)
+    _update_covariance(ekf, R)
 
 
 @kernel
-def _limit_variances(ekf, index, dof, low, high):
-    """Raise too small variances; return the first state whose variance exceeds `high`, or -1."""
-    P = ekf.P
-    for i in range(index, index + dof):
-        if P[i, i] < low:
-            P[i, i] = low
-        elif P[i, i] > high:
-            return i
+def _first_above(P, index, high):
+    """The first of three states whose variance exceeds `high`, or -1."""
+    if P[index, index] > high:
+        return index
+    if P[index + 1, index + 1] > high:
+        return index + 1
+    if P[index + 2, index + 2] > high:
+        return index + 2
     return -1
 
 
 @kernel
-def _limit_variance_ratio(ekf, index, dof, low, high):
-    """As `_limit_variances`, and no variance of the group less than 10⁻⁶ of its largest."""
-    P = ekf.P
-    largest = 0.0
-    for i in range(index, index + dof):
-        if P[i, i] > largest:
-            largest = P[i, i]
-    limited_max = min(max(largest, low), high)
-    limited_min = min(max(limited_max / VARIANCE_MAX_RATIO, low), high)
-    return _limit_variances(ekf, index, dof, limited_min, limited_max)
-
-
-@kernel
 def _first_excessive_variance(ekf):
-    """Raise all too small variances up to the first state whose variance is too large; return it, or -1."""
-    i = _limit_variances(ekf, state.ATTITUDE, 3, 1e-9, 1.0)
+    """The first state whose variance is too large, or -1."""
+    P = ekf.P
+    i = _first_above(P, state.ATTITUDE, ATTITUDE_VARIANCE_MAX)
     if i < 0:
-        i = _limit_variances(ekf, state.VELOCITY, 6, 1e-6, 1e6)
+        i = _first_above(P, state.VELOCITY, MOTION_VARIANCE_MAX)
     if i < 0:
-        i = _limit_variance_ratio(ekf, state.GYRO_BIAS, 3, BIAS_VARIANCE_MIN, 1.0)
+        i = _first_above(P, state.POSITION, MOTION_VARIANCE_MAX)
     if i < 0:
-        i = _limit_variance_ratio(ekf, state.ACCEL_BIAS, 3, BIAS_VARIANCE_MIN, 1.0)
+        i = _first_above(P, state.GYRO_BIAS, BIAS_VARIANCE_MAX)
+    if i < 0:
+        i = _first_above(P, state.ACCEL_BIAS, BIAS_VARIANCE_MAX)
     if i < 0 and ekf.cs.mag:
-        i = _limit_variance_ratio(ekf, state.MAG_EARTH, 3, MAG_VARIANCE_MIN, 1.0)
+        i = _first_above(P, state.MAG_EARTH, MAG_VARIANCE_MAX)
         if i < 0:
-            i = _limit_variance_ratio(ekf, state.MAG_BODY, 3, MAG_VARIANCE_MIN, 1.0)
+            i = _first_above(P, state.MAG_BODY, MAG_VARIANCE_MAX)
     if i < 0 and ekf.cs.wind:
-        i = _limit_variance_ratio(ekf, state.WIND, 2, 1e-6, 1e6)
-    if i < 0:
-        i = _limit_variance_ratio(ekf, state.TERRAIN, 1, 0.0, 1e4)
+        if P[state.WIND, state.WIND] > MOTION_VARIANCE_MAX:
+            i = state.WIND
+        elif P[state.WIND + 1, state.WIND + 1] > MOTION_VARIANCE_MAX:
+            i = state.WIND + 1
+    if i < 0 and P[state.TERRAIN, state.TERRAIN] > TERRAIN_VARIANCE_MAX:
+        i = state.TERRAIN
     return i
 
 
 @kernel
-def constrain_state_variances(ekf, params):
-    """Keep every variance within the limits of its group of states."""
+def _raise_variance(P, index, low):
+    if P[index, index] < low:
+        P[index, index] = low
+
+
+@kernel
+def _raise_variances(P, index, low):
+    """No variance of three states less than `low`."""
+    _raise_variance(P, index, low)
+    _raise_variance(P, index + 1, low)
+    _raise_variance(P, index + 2, low)
+
+
+@kernel
+def _raise_variances_of_group(P, index, low):
+    """No variance of three states less than `low`, nor than 10⁻⁶ of the largest of them."""
+    largest = max(P[index, index], P[index + 1, index + 1], P[index + 2, index + 2])
+    _raise_variances(P, index, max(largest / VARIANCE_MAX_RATIO, low))
+
+
+@kernel
+def _raise_small_variances(ekf):
+    P = ekf.P
+    _raise_variances(P, state.ATTITUDE, ATTITUDE_VARIANCE_MIN)
+    _raise_variances(P, state.VELOCITY, MOTION_VARIANCE_MIN)
+    _raise_variances(P, state.POSITION, MOTION_VARIANCE_MIN)
+    _raise_variances_of_group(P, state.GYRO_BIAS, BIAS_VARIANCE_MIN)
+    _raise_variances_of_group(P, state.ACCEL_BIAS, BIAS_VARIANCE_MIN)
+    if ekf.cs.mag:
+        _raise_variances_of_group(P, state.MAG_EARTH, MAG_VARIANCE_MIN)
+        _raise_variances_of_group(P, state.MAG_BODY, MAG_VARIANCE_MIN)
+    if ekf.cs.wind:
+        largest = max(P[state.WIND, state.WIND], P[state.WIND + 1, state.WIND + 1])
+        low = max(largest / VARIANCE_MAX_RATIO, MOTION_VARIANCE_MIN)
+        _raise_variance(P, state.WIND, low)
+        _raise_variance(P, state.WIND + 1, low)
+    _raise_variance(P, state.TERRAIN, 0.0)
+
+
+@kernel
+def constrain_state_variances(ekf):
+    """Keep every variance within the limits of its group of states; `ekf.scratch.K` and `PH` are not kept."""
     for _ in range(MAX_VARIANCE_REDUCTIONS):
         i = _first_excessive_variance(ekf)
         if i < 0:
-            return
-        reduce_variance(ekf, params, i)
+            break
+        reduce_variance(ekf, i)
+    _raise_small_variances(ekf)
 
 
 @kernel
@@ -138,8 +188,9 @@ def _limited(value, limit):
 
 
 @kernel
-def fuse(ekf, params, K, innovation):
-    """Correct the state by -K·innovation, each part within its limits."""
+def fuse(ekf, params, innovation):
+    """Correct the state by -K·innovation, K of `ekf.scratch`, each part within its limits."""
+    K = ekf.scratch.K
     north, east, down = K[state.ATTITUDE], K[state.ATTITUDE + 1], K[state.ATTITUDE + 2]
     rotate_by_earth_increment(ekf.q, -north * innovation, -east * innovation, -down * innovation)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
@@ -161,13 +212,13 @@ def fuse(ekf, params, K, innovation):
 
 
 @kernel
-def measurement_update(ekf, params, K, H, R, innovation):
-    """Fuse a scalar observation.
+def measurement_update(ekf, params, R, innovation):
+    """Fuse a scalar observation whose `PH` and `K` stand in `ekf.scratch`, as `compute_kalman_gain` left them.
+
+    Entries of K that were set to zero stay zero; those of states that are not estimated are zeroed here.
 
     Parameters
     ----------
-    K : (24,) Kalman gain; the entries of states that are not estimated are zeroed in place
-    H : (24,) derivative of the predicted observation by the error state
     R : observation variance
     innovation : prediction less observation
 
@@ -175,12 +226,9 @@ def measurement_update(ekf, params, K, H, R, innovation):
     -------
     bool : True, as in v1.16 an update cannot fail
     """
-    clear_inhibited_state_kalman_gains(ekf, params, K)
-    PH = ekf.scratch.PH
-    multiply_covariance(ekf.P, H, PH)
-    joseph_update(ekf.P, K, PH, dot(H, PH) + R)
-    constrain_state_variances(ekf, params)
-    fuse(ekf, params, K, innovation)
+    _update_covariance(ekf, R)
+    fuse(ekf, params, innovation)
+    constrain_state_variances(ekf)
     return True
 
 
@@ -190,15 +238,6 @@ def fuse_direct_state(ekf, params, innovation, innovation_var, R, state_index):
 
     `innovation_var` sets the gain; sources that clip or inflate it pass a value other than P + R.
     """
-    P = ekf.P
-    K = ekf.scratch.K
-    PH = ekf.scratch.PH
-    inverse = 1.0 / innovation_var
-    for i in range(state.ERROR_STATE_SIZE):
-        PH[i] = P[state_index, i]
-        K[i] = PH[i] * inverse
-    clear_inhibited_state_kalman_gains(ekf, params, K)
-    joseph_update(P, K, PH, P[state_index, state_index] + R)
-    constrain_state_variances(ekf, params)
-    fuse(ekf, params, K, innovation)
-    return True
+    _observe_state(ekf, state_index)
+    scale_kalman_gain(ekf, innovation_var)
+    return measurement_update(ekf, params, R, innovation)

@@ -1,6 +1,7 @@
 """Innovation variance and Kalman gain of a scalar observation, from its Jacobian by the error state.
 
-PX4 has these products in its generated equations; here one kernel serves every observation.
+PX4 has these products in its generated equations; here one kernel serves every observation. What it finds stands in
+`ekf.scratch` (`PH`, `HPH`, `K`), where the update takes it from.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
@@ -8,19 +9,24 @@ from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
 
 
 @kernel
-def multiply_covariance(P, H, PH):
-    """Write P Hᵀ into `PH` (24,), row by row of the symmetric P where H is not zero."""
+def multiply_covariance(ekf, H):
+    """Write P Hᵀ into `ekf.scratch.PH` (24,) and H P Hᵀ into `ekf.scratch.HPH`.
+
+    The states come in threes (attitude, velocity, …), so P is read three rows at a time, where H (24,) is not zero.
+    """
+    P, PH = ekf.P, ekf.scratch.PH
     for i in range(ERROR_STATE_SIZE):
         PH[i] = 0.0
-    for j in range(ERROR_STATE_SIZE):
-        h = H[j]
-        if h != 0.0:
+    for j in range(0, ERROR_STATE_SIZE, 3):
+        h0, h1, h2 = H[j], H[j + 1], H[j + 2]
+        if h0 != 0.0 or h1 != 0.0 or h2 != 0.0:
             for i in range(ERROR_STATE_SIZE):
-                PH[i] += h * P[j, i]
+                PH[i] = PH[i] + h0 * P[j, i] + h1 * P[j + 1, i] + h2 * P[j + 2, i]
+    ekf.scratch.HPH = _dot(H, PH)
 
 
 @kernel
-def dot(a, b):
+def _dot(a, b):
     """Inner product of two vectors of 24 elements, in four sums that the processor can run side by side."""
     s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
     for i in range(0, ERROR_STATE_SIZE, 4):
@@ -34,18 +40,24 @@ def dot(a, b):
 @kernel
 def compute_innovation_variance(ekf, H, R):
     """H P Hᵀ + R for a Jacobian `H` (24,) that is mostly zero."""
-    PH = ekf.scratch.PH
-    multiply_covariance(ekf.P, H, PH)
-    return dot(H, PH) + R
+    multiply_covariance(ekf, H)
+    return ekf.scratch.HPH + R
 
 
 @kernel
-def compute_kalman_gain(ekf, H, innovation_variance, K):
-    """Write P Hᵀ / innovation_variance into `K` (24,)."""
-    multiply_covariance(ekf.P, H, K)
+def compute_kalman_gain(ekf, H, innovation_variance):
+    """Write the gain P Hᵀ / innovation_variance into `ekf.scratch.K` (24,)."""
+    multiply_covariance(ekf, H)
+    scale_kalman_gain(ekf, innovation_variance)
+
+
+@kernel
+def scale_kalman_gain(ekf, innovation_variance):
+    """Write the gain of the Jacobian that `ekf.scratch.PH` was last computed for into `ekf.scratch.K` (24,)."""
+    K, PH = ekf.scratch.K, ekf.scratch.PH
     inverse = 1.0 / innovation_variance
     for i in range(ERROR_STATE_SIZE):
-        K[i] *= inverse
+        K[i] = PH[i] * inverse
 
 
 @kernel

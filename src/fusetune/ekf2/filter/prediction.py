@@ -66,68 +66,82 @@ def predict_covariance(ekf, params):
     _add_field_noise(ekf, params, dt)
     _add_wind_noise(ekf, params, dt)
     _add_terrain_noise(ekf, params)
-    constrain_state_variances(ekf, params)
-
-
-@kernel
-def _minus_row_of_cross_product_matrix(u, row):
-    """A row of -[u]×."""
-    if row == 0:
-        return -0.0, u[2], -u[1]
-    if row == 1:
-        return -u[2], -0.0, u[0]
-    return u[1], -u[0], -0.0
+    constrain_state_variances(ekf)
 
 
 @kernel
 def _propagate(ekf, dt):
-    """P ← F P Fᵀ; only attitude, velocity and position have dynamics.
+    """P ← F P Fᵀ in place; only attitude, velocity and position have dynamics.
 
-    `FP` holds their rows of F P, of which the columns of the other states are final already; their own still need Fᵀ
-    from the right.
+    First F from the left, which takes every column by itself; the columns of the other states are final then. Those of
+    the dynamic states still need Fᵀ from the right, which takes every row by itself.
     """
-    P = ekf.P
-    R = ekf.R_to_earth
-    A = ekf.scratch.FP
     imu = ekf.imu_delayed
-    bx = (imu.delta_vel[0] / imu.delta_vel_dt - ekf.accel_bias[0]) * dt
-    by = (imu.delta_vel[1] / imu.delta_vel_dt - ekf.accel_bias[1]) * dt
-    bz = (imu.delta_vel[2] / imu.delta_vel_dt - ekf.accel_bias[2]) * dt
-    u = rotate_to_earth(R, bx, by, bz)
+    ax = (imu.delta_vel[0] / imu.delta_vel_dt - ekf.accel_bias[0]) * dt
+    ay = (imu.delta_vel[1] / imu.delta_vel_dt - ekf.accel_bias[1]) * dt
+    az = (imu.delta_vel[2] / imu.delta_vel_dt - ekf.accel_bias[2]) * dt
+    u = rotate_to_earth(ekf.R_to_earth, ax, ay, az)
+    _multiply_from_left(ekf, dt, u)
+    _mirror_cross_covariances(ekf.P)
+    _multiply_from_right(ekf, dt, u)
 
-    for i in range(3):
-        r0, r1, r2 = R[i, 0] * dt, R[i, 1] * dt, R[i, 2] * dt
-        m0, m1, m2 = _minus_row_of_cross_product_matrix(u, i)
-        for j in range(state.ERROR_STATE_SIZE):
-            A[THETA + i, j] = P[THETA + i, j] - (r0 * P[GB, j] + r1 * P[GB + 1, j] + r2 * P[GB + 2, j])
-            A[VEL + i, j] = (
-                P[VEL + i, j]
-                + (m0 * P[THETA, j] + m1 * P[THETA + 1, j] + m2 * P[THETA + 2, j])
-                - (r0 * P[AB, j] + r1 * P[AB + 1, j] + r2 * P[AB + 2, j])
-            )
-            A[POS + i, j] = P[POS + i, j] + dt * P[VEL + i, j]
 
-    for i in range(DYNAMIC_STATES):
-        for j in range(DYNAMIC_STATES, state.ERROR_STATE_SIZE):
-            P[i, j] = A[i, j]
-            P[j, i] = A[i, j]
+@kernel
+def _multiply_from_left(ekf, dt, u):
+    """P ← F P, with u = R a dt."""
+    P, R = ekf.P, ekf.R_to_earth
+    rxx, rxy, rxz = R[0, 0] * dt, R[0, 1] * dt, R[0, 2] * dt
+    ryx, ryy, ryz = R[1, 0] * dt, R[1, 1] * dt, R[1, 2] * dt
+    rzx, rzy, rzz = R[2, 0] * dt, R[2, 1] * dt, R[2, 2] * dt
+    un, ue, ud = u
+    for j in range(state.ERROR_STATE_SIZE):
+        tn, te, td = P[THETA, j], P[THETA + 1, j], P[THETA + 2, j]
+        vn, ve, vd = P[VEL, j], P[VEL + 1, j], P[VEL + 2, j]
+        gx, gy, gz = P[GB, j], P[GB + 1, j], P[GB + 2, j]
+        ax, ay, az = P[AB, j], P[AB + 1, j], P[AB + 2, j]
+        P[THETA, j] = tn - (rxx * gx + rxy * gy + rxz * gz)
+        P[THETA + 1, j] = te - (ryx * gx + ryy * gy + ryz * gz)
+        P[THETA + 2, j] = td - (rzx * gx + rzy * gy + rzz * gz)
+        P[VEL, j] = vn + (ud * te - ue * td) - (rxx * ax + rxy * ay + rxz * az)
+        P[VEL + 1, j] = ve + (un * td - ud * tn) - (ryx * ax + ryy * ay + ryz * az)
+        P[VEL + 2, j] = vd + (ue * tn - un * te) - (rzx * ax + rzy * ay + rzz * az)
+        P[POS, j] += dt * vn
+        P[POS + 1, j] += dt * ve
+        P[POS + 2, j] += dt * vd
 
-    for j in range(3):
-        r0, r1, r2 = R[j, 0] * dt, R[j, 1] * dt, R[j, 2] * dt
-        m0, m1, m2 = _minus_row_of_cross_product_matrix(u, j)
-        for i in range(THETA + j + 1):
-            P[i, THETA + j] = A[i, THETA + j] - (r0 * A[i, GB] + r1 * A[i, GB + 1] + r2 * A[i, GB + 2])
-            P[THETA + j, i] = P[i, THETA + j]
-        for i in range(VEL + j + 1):
-            P[i, VEL + j] = (
-                A[i, VEL + j]
-                + (m0 * A[i, THETA] + m1 * A[i, THETA + 1] + m2 * A[i, THETA + 2])
-                - (r0 * A[i, AB] + r1 * A[i, AB + 1] + r2 * A[i, AB + 2])
-            )
-            P[VEL + j, i] = P[i, VEL + j]
-        for i in range(POS + j + 1):
-            P[i, POS + j] = A[i, POS + j] + dt * A[i, VEL + j]
-            P[POS + j, i] = P[i, POS + j]
+
+@kernel
+def _mirror_cross_covariances(P):
+    """Copy the covariances of dynamic states with others to below the diagonal."""
+    for j in range(DYNAMIC_STATES, state.ERROR_STATE_SIZE):
+        for i in range(DYNAMIC_STATES):
+            P[j, i] = P[i, j]
+
+
+@kernel
+def _multiply_from_right(ekf, dt, u):
+    """The block of the dynamic states times Fᵀ: position before velocity before attitude, which it is formed of.
+
+    Rows from the last to the first, so that what is mirrored below the diagonal falls into rows that are done.
+    """
+    P, R = ekf.P, ekf.R_to_earth
+    un, ue, ud = u
+    for i in range(DYNAMIC_STATES - 1, -1, -1):
+        for j in range(max(i, POS), DYNAMIC_STATES):
+            P[i, j] += dt * P[i, j - 3]
+        if i < POS:
+            tn, te, td = P[i, THETA], P[i, THETA + 1], P[i, THETA + 2]
+            cross = (ud * te - ue * td, un * td - ud * tn, ue * tn - un * te)
+            for j in range(3):
+                if i <= VEL + j:
+                    r0, r1, r2 = R[j, 0] * dt, R[j, 1] * dt, R[j, 2] * dt
+                    P[i, VEL + j] = P[i, VEL + j] + cross[j] - (r0 * P[i, AB] + r1 * P[i, AB + 1] + r2 * P[i, AB + 2])
+        if i < VEL:
+            for j in range(i, 3):
+                r0, r1, r2 = R[j, 0] * dt, R[j, 1] * dt, R[j, 2] * dt
+                P[i, THETA + j] -= r0 * P[i, GB] + r1 * P[i, GB + 1] + r2 * P[i, GB + 2]
+        for j in range(i + 1, DYNAMIC_STATES):
+            P[j, i] = P[i, j]
 
 
 @kernel

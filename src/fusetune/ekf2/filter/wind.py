@@ -66,10 +66,10 @@ def reset_wind_to_external_observation(ekf, speed, direction, speed_accuracy, di
 def fuse_into_wind(ekf, params, aid, H, update_wind_only):
     """Fuse a judged observation of the air's velocity: into the wind alone, or into every state."""
     K = ekf.scratch.K
-    compute_kalman_gain(ekf, H, aid.innovation_variance[0], K)
+    compute_kalman_gain(ekf, H, aid.innovation_variance[0])
     if update_wind_only:
         keep_only_wind_gains(K)
-    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
+    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
     aid.fused = True
     aid.time_last_fuse = ekf.time_delayed_us
 

@@ -13,6 +13,7 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.observation_gain import compute_kalman_gain, multiply_covariance
 
 LANDED_TIME_BEFORE_FORCED_YAW_US = 5_000_000
 FORCED_YAW_INTERVAL_US = 1_000_000
@@ -40,11 +41,7 @@ def fuse_yaw(ekf, params, aid, H_yaw):
         return False
     ekf.fs.bad_hdg = False
 
-    K = ekf.scratch.K
-    inverse = 1.0 / aid.innovation_variance[0]
-    for i in range(ERROR_STATE_SIZE):
-        K[i] = (ekf.P[i, 0] * H_yaw[0] + ekf.P[i, 1] * H_yaw[1] + ekf.P[i, 2] * H_yaw[2]) * inverse
-
+    compute_kalman_gain(ekf, H_yaw, aid.innovation_variance[0])
     ekf.reject.yaw = aid.innovation_rejected
     if aid.innovation_rejected:
         if not _may_force_yaw(ekf, aid):
@@ -52,8 +49,9 @@ def fuse_yaw(ekf, params, aid, H_yaw):
         limit = max(params.EKF2_HDG_GATE, 1.0) * math.sqrt(aid.innovation_variance[0])
         aid.innovation[0] = min(max(aid.innovation[0], -limit), limit)
         reset_gyro_bias_z_cov(ekf, params)
+        multiply_covariance(ekf, H_yaw)
 
-    measurement_update(ekf, params, K, H_yaw, aid.observation_variance[0], aid.innovation[0])
+    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
     ekf.time_last_heading_fuse = ekf.time_delayed_us
     aid.time_last_fuse = ekf.time_delayed_us
     aid.fused = True

@@ -27,19 +27,23 @@ def wrap_pi(angle):
 
 
 @kernel
+def rotation_matrix(w, x, y, z):
+    """Rows of the rotation matrix of a unit quaternion, as three triples."""
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    return (
+        (ww + xx - yy - zz, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), ww - xx + yy - zz, 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), ww - xx - yy + zz),
+    )
+
+
+@kernel
 def quat_to_dcm(q, R):
     """Write the rotation matrix of the unit quaternion `q` into `R`, shape (3, 3)."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    ww, xx, yy, zz = w * w, x * x, y * y, z * z
-    R[0, 0] = ww + xx - yy - zz
-    R[0, 1] = 2.0 * (x * y - w * z)
-    R[0, 2] = 2.0 * (x * z + w * y)
-    R[1, 0] = 2.0 * (x * y + w * z)
-    R[1, 1] = ww - xx + yy - zz
-    R[1, 2] = 2.0 * (y * z - w * x)
-    R[2, 0] = 2.0 * (x * z - w * y)
-    R[2, 1] = 2.0 * (y * z + w * x)
-    R[2, 2] = ww - xx - yy + zz
+    first, second, third = rotation_matrix(q[0], q[1], q[2], q[3])
+    R[0, 0], R[0, 1], R[0, 2] = first
+    R[1, 0], R[1, 1], R[1, 2] = second
+    R[2, 0], R[2, 1], R[2, 2] = third
 
 
 @kernel
@@ -110,10 +114,7 @@ def variance_in_earth(R, axis, variance):
 @kernel
 def quat_multiply(a, b, out):
     """Write the Hamilton product a ⊗ b into `out`, which may be `a` or `b` itself."""
-    w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
-    x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
-    y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
-    z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
+    w, x, y, z = quat_product((a[0], a[1], a[2], a[3]), (b[0], b[1], b[2], b[3]))
     out[0], out[1], out[2], out[3] = w, x, y, z
 
 
@@ -128,17 +129,29 @@ def quat_multiply_inverse(a, b, out):
 
 
 @kernel
-def quat_normalise(q):
-    """Scale `q` to unit length, by the first terms of a series where it is close to that already."""
-    excess = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0
+def unit_length(w, x, y, z):
+    """A quaternion scaled to unit length, by the first terms of a series where it is close to that already."""
+    excess = w * w + x * x + y * y + z * z - 1.0
     if abs(excess) < SMALL_LENGTH_EXCESS:
         scale = 1.0 - excess * (0.5 - 0.375 * excess)
     else:
         scale = 1.0 / math.sqrt(1.0 + excess)
-    q[0] *= scale
-    q[1] *= scale
-    q[2] *= scale
-    q[3] *= scale
+    return w * scale, x * scale, y * scale, z * scale
+
+
+@kernel
+def quat_normalise(q):
+    """Scale `q` to unit length."""
+    q[0], q[1], q[2], q[3] = unit_length(q[0], q[1], q[2], q[3])
+
+
+@kernel
+def small_rotation_to_quat(x, y, z, squared):
+    """Unit quaternion of a rotation vector (rad) whose squared length is given and below `SMALL_ANGLE_SQUARED`."""
+    h = 0.25 * squared
+    scale = 0.5 + h * (-1.0 / 12.0 + h * (1.0 / 240.0 + h * (-1.0 / 10080.0 + h * (1.0 / 725760.0))))
+    w = 1.0 + h * (-1.0 / 2.0 + h * (1.0 / 24.0 + h * (-1.0 / 720.0 + h * (1.0 / 40320.0))))
+    return w, x * scale, y * scale, z * scale
 
 
 @kernel
@@ -146,37 +159,37 @@ def rotation_vector_to_quat(x, y, z):
     """Unit quaternion (w, x, y, z) of a rotation vector (rad)."""
     squared = x * x + y * y + z * z
     if squared < SMALL_ANGLE_SQUARED:
-        h = 0.25 * squared
-        scale = 0.5 + h * (-1.0 / 12.0 + h * (1.0 / 240.0 + h * (-1.0 / 10080.0 + h * (1.0 / 725760.0))))
-        w = 1.0 + h * (-1.0 / 2.0 + h * (1.0 / 24.0 + h * (-1.0 / 720.0 + h * (1.0 / 40320.0))))
-        return w, x * scale, y * scale, z * scale
+        return small_rotation_to_quat(x, y, z, squared)
     angle = math.sqrt(squared)
     scale = math.sin(0.5 * angle) / angle
     return math.cos(0.5 * angle), x * scale, y * scale, z * scale
 
 
 @kernel
+def quat_product(a, b):
+    """Hamilton product a ⊗ b of two quaternions that are given and returned as tuples (w, x, y, z)."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+@kernel
 def rotate_by_body_increment(q, x, y, z):
     """q ← q ⊗ dq(x, y, z), normalised: a rotation vector measured in the body frame."""
-    bw, bx, by, bz = rotation_vector_to_quat(x, y, z)
-    w = q[0] * bw - q[1] * bx - q[2] * by - q[3] * bz
-    i = q[0] * bx + q[1] * bw + q[2] * bz - q[3] * by
-    j = q[0] * by - q[1] * bz + q[2] * bw + q[3] * bx
-    k = q[0] * bz + q[1] * by - q[2] * bx + q[3] * bw
-    q[0], q[1], q[2], q[3] = w, i, j, k
-    quat_normalise(q)
+    w, i, j, k = quat_product((q[0], q[1], q[2], q[3]), rotation_vector_to_quat(x, y, z))
+    q[0], q[1], q[2], q[3] = unit_length(w, i, j, k)
 
 
 @kernel
 def rotate_by_earth_increment(q, x, y, z):
     """q ← dq(x, y, z) ⊗ q, normalised: a rotation vector given in the earth frame."""
-    aw, ax, ay, az = rotation_vector_to_quat(x, y, z)
-    w = aw * q[0] - ax * q[1] - ay * q[2] - az * q[3]
-    i = aw * q[1] + ax * q[0] + ay * q[3] - az * q[2]
-    j = aw * q[2] - ax * q[3] + ay * q[0] + az * q[1]
-    k = aw * q[3] + ax * q[2] - ay * q[1] + az * q[0]
-    q[0], q[1], q[2], q[3] = w, i, j, k
-    quat_normalise(q)
+    w, i, j, k = quat_product(rotation_vector_to_quat(x, y, z), (q[0], q[1], q[2], q[3]))
+    q[0], q[1], q[2], q[3] = unit_length(w, i, j, k)
 
 
 @kernel

@@ -158,6 +158,5 @@ def test_gain_and_innovation_variance_are_the_kalman_filters() -> None:
     jacobian = np.where(rng.uniform(size=ERROR_STATE_SIZE) < 0.3, rng.normal(size=ERROR_STATE_SIZE), 0.0)
     variance = compute_innovation_variance(memory[0], jacobian, 0.7)
     assert variance == pytest.approx(jacobian @ memory[0]["P"] @ jacobian + 0.7, rel=1e-12)
-    gain = np.zeros(ERROR_STATE_SIZE)
-    compute_kalman_gain(memory[0], jacobian, variance, gain)
-    np.testing.assert_allclose(gain, memory[0]["P"] @ jacobian / variance, rtol=1e-12)
+    compute_kalman_gain(memory[0], jacobian, variance)
+    np.testing.assert_allclose(memory[0]["scratch"]["K"], memory[0]["P"] @ jacobian / variance, rtol=1e-12)

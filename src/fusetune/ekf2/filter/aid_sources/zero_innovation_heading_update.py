@@ -8,6 +8,7 @@ from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.observation_gain import multiply_covariance
 from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h
 
 UPDATE_INTERVAL_US = 200_000
@@ -30,9 +31,10 @@ def control_zero_innovation_heading_update(ekf, params):
         ekf.fs.bad_hdg = True
         initialise_covariance(ekf, params)
         return
+    multiply_covariance(ekf, H)
     for i in range(ERROR_STATE_SIZE):
-        K[i] = ekf.P[i, 2] / innovation_variance
+        K[i] = ekf.scratch.PH[i] / innovation_variance
     ekf.fs.bad_hdg = False
     ekf.reject.yaw = False
-    measurement_update(ekf, params, K, H, variance, 0.0)
+    measurement_update(ekf, params, variance, 0.0)
     ekf.time_last_heading_fuse = ekf.time_delayed_us

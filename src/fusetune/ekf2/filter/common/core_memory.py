@@ -39,14 +39,16 @@ STATE_RESET_COUNTERS = np.dtype(
 
 SCRATCH = np.dtype(
     [
-        *fields("f8", "H", "K", "PH", "K_reduce", "PH_reduce", shape=(ERROR_STATE_SIZE,)),
-        ("FP", "f8", (9, ERROR_STATE_SIZE)),
+        *fields("f8", "H", "K", "PH", shape=(ERROR_STATE_SIZE,)),
+        ("HPH", "f8"),
         *fields("f8", "quat_before", "quat_error", shape=(4,)),
         ("R", "f8", (3, 3)),
     ],
     align=True,
 )
-"""Work space, so that kernels allocate nothing. `H` and `K` are free for any aid source to fill before an update."""
+"""Work space, so that kernels allocate nothing. Of an observation: `H` its Jacobian, free for any aid source to fill,
+`PH` P Hᵀ, `HPH` H P Hᵀ, `K` the gain; an update takes the last three from here.
+"""
 
 CORE_FIELDS = [
     *fields("i8", "time_delayed_us", "time_latest_us"),

@@ -1,4 +1,4 @@
-"""Complementary filter that keeps the attitude of one model: gyro integration, tilt held by the accelerometer.
+"""Complementary filter that keeps the attitude of each model: gyro integration, tilt held by the accelerometer.
 
 Method of Mahony, Hamel, Pflimlin, Nonlinear Complementary Filters on the Special Orthogonal Group, IEEE TAC 53 (2008),
 with the gain faded out away from 1 g and, with a known airspeed, the centripetal acceleration of a coordinated turn
@@ -10,13 +10,17 @@ Mirrors the attitude part of PX4 v1.16 `EKF/yaw_estimator/EKFGSF_yaw.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.yaw_estimator.gsf_memory import N_MODELS
+from fusetune.ekf2.filter.yaw_estimator.gsf_memory import LANES, N_MODELS
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.rotations import (
+    SMALL_ANGLE_SQUARED,
     dcm_to_quat,
     quat_aligning_with_up,
+    quat_product,
     quat_to_dcm,
-    rotate_by_body_increment,
+    rotation_vector_to_quat,
+    small_rotation_to_quat,
+    unit_length,
     update_yaw_in_rot_mat,
     wrap_pi,
 )
@@ -48,19 +52,35 @@ def try_align_tilt(gsf, imu):
     filtered = _norm(gsf.accel_lpf)
     if not (ALIGNMENT_LOW < now < ALIGNMENT_HIGH and ALIGNMENT_LOW < filtered < ALIGNMENT_HIGH):
         return False
-    for model in range(N_MODELS):
-        quat_aligning_with_up(imu.delta_vel[0], imu.delta_vel[1], imu.delta_vel[2], gsf.q[model])
+    quat_aligning_with_up(imu.delta_vel[0], imu.delta_vel[1], imu.delta_vel[2], gsf.q_aligned)
+    for i in range(4):
+        gsf.q[i, :] = gsf.q_aligned[i]
     gsf.tilt_aligned = True
     return True
 
 
 @kernel
+def attitude(gsf, model):
+    """Quaternion of one model."""
+    return gsf.q[0, model], gsf.q[1, model], gsf.q[2, model], gsf.q[3, model]
+
+
+@kernel
+def set_attitude(gsf, model, q):
+    """Give one model an attitude, a tuple of four."""
+    gsf.q[0, model], gsf.q[1, model], gsf.q[2, model], gsf.q[3, model] = q
+
+
+@kernel
 def align_yaw_of_attitudes(gsf):
     """Turn each model's attitude to the yaw of its velocity-and-yaw filter."""
+    q = gsf.q_aligned
     for model in range(N_MODELS):
-        quat_to_dcm(gsf.q[model], gsf.R)
-        update_yaw_in_rot_mat(wrap_pi(gsf.x[model, 2]), gsf.R, gsf.R_aligned)
-        dcm_to_quat(gsf.R_aligned, gsf.q[model])
+        q[0], q[1], q[2], q[3] = attitude(gsf, model)
+        quat_to_dcm(q, gsf.R)
+        update_yaw_in_rot_mat(wrap_pi(gsf.x[2, model]), gsf.R, gsf.R_aligned)
+        dcm_to_quat(gsf.R_aligned, q)
+        set_attitude(gsf, model, (q[0], q[1], q[2], q[3]))
 
 
 @kernel
@@ -75,50 +95,68 @@ def accel_fusion_gain(gsf):
 
 
 @kernel
-def predict_attitude(gsf, model, imu, gain):
-    """Propagate one model's attitude over an IMU sample; `gain` is `accel_fusion_gain`."""
-    dt = imu.delta_ang_dt
-    bias = gsf.gyro_bias[model]
-    rate_dt = max(dt, MIN_DT_S)
-    rate_x = imu.delta_ang[0] / rate_dt - bias[0]
-    rate_y = imu.delta_ang[1] / rate_dt - bias[1]
-    rate_z = imu.delta_ang[2] / rate_dt - bias[2]
-
-    tilt_x, tilt_y, tilt_z = 0.0, 0.0, 0.0
-    if gain > 0.0:
-        tilt_x, tilt_y, tilt_z = _tilt_correction(gsf, model, rate_y, rate_z, gain)
-
-    if math.sqrt(rate_x * rate_x + rate_y * rate_y + rate_z * rate_z) < BIAS_LEARNING_SPIN_LIMIT:
-        bias[0] = _limited_bias(bias[0] - tilt_x * GYRO_BIAS_GAIN * dt)
-        bias[1] = _limited_bias(bias[1] - tilt_y * GYRO_BIAS_GAIN * dt)
-        bias[2] = _limited_bias(bias[2] - tilt_z * GYRO_BIAS_GAIN * dt)
-
-    rotate_by_body_increment(
-        gsf.q[model],
-        imu.delta_ang[0] + (tilt_x - bias[0]) * dt,
-        imu.delta_ang[1] + (tilt_y - bias[1]) * dt,
-        imu.delta_ang[2] + (tilt_z - bias[2]) * dt,
-    )
+def predict_attitudes(gsf, imu, gain):
+    """Propagate the attitudes of all models over an IMU sample; `gain` is `accel_fusion_gain`."""
+    _correct_rotations(gsf, imu, gain)
+    # one after the other, for a sum of them would have to be formed in this order
+    small = True
+    for model in range(LANES):
+        small = small and gsf.rotation_squared[model] < SMALL_ANGLE_SQUARED
+    if small:
+        _rotate_a_little(gsf)
+        return
+    for model in range(LANES):
+        turn = rotation_vector_to_quat(gsf.rotation[0, model], gsf.rotation[1, model], gsf.rotation[2, model])
+        w, x, y, z = quat_product(attitude(gsf, model), turn)
+        set_attitude(gsf, model, unit_length(w, x, y, z))
 
 
 @kernel
-def _tilt_correction(gsf, model, rate_y, rate_z, gain):
-    """Rotation rate (rad/s, body) that turns the estimated down direction towards the measured one."""
-    q = gsf.q[model]
-    # the earth's down axis in the body frame: last row of the rotation matrix
-    down_x = 2.0 * (q[1] * q[3] - q[0] * q[2])
-    down_y = 2.0 * (q[2] * q[3] + q[0] * q[1])
-    down_z = q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]
-    acc_x, acc_y, acc_z = gsf.accel_lpf[0], gsf.accel_lpf[1], gsf.accel_lpf[2]
-    scale = gain / _norm(gsf.accel_lpf)
-    if _knows_airspeed(gsf):
-        acc_y -= gsf.true_airspeed * rate_z
-        acc_z += gsf.true_airspeed * rate_y
-    return (
-        (down_y * acc_z - down_z * acc_y) * scale,
-        (down_z * acc_x - down_x * acc_z) * scale,
-        (down_x * acc_y - down_y * acc_x) * scale,
-    )
+def _correct_rotations(gsf, imu, gain):
+    """Learn the gyro biases and set `gsf.rotation`: the sample's, less the bias, and towards the measured vertical."""
+    dt = imu.delta_ang_dt
+    rate_dt = max(dt, MIN_DT_S)
+    turn_x, turn_y, turn_z = imu.delta_ang[0], imu.delta_ang[1], imu.delta_ang[2]
+    measured_x, measured_y, measured_z = turn_x / rate_dt, turn_y / rate_dt, turn_z / rate_dt
+    force_x, force_y, force_z = gsf.accel_lpf[0], gsf.accel_lpf[1], gsf.accel_lpf[2]
+    scale = gain / _norm(gsf.accel_lpf) if gain > 0.0 else 0.0
+    airspeed = gsf.true_airspeed if _knows_airspeed(gsf) else 0.0
+    for model in range(LANES):
+        bias_x, bias_y, bias_z = gsf.gyro_bias[0, model], gsf.gyro_bias[1, model], gsf.gyro_bias[2, model]
+        rate_x, rate_y, rate_z = measured_x - bias_x, measured_y - bias_y, measured_z - bias_z
+        w, x, y, z = attitude(gsf, model)
+        # the earth's down axis in the body frame: last row of the rotation matrix
+        down_x = 2.0 * (x * z - w * y)
+        down_y = 2.0 * (y * z + w * x)
+        down_z = w * w - x * x - y * y + z * z
+        side = force_y - airspeed * rate_z
+        along = force_z + airspeed * rate_y
+        tilt_x = (down_y * along - down_z * side) * scale
+        tilt_y = (down_z * force_x - down_x * along) * scale
+        tilt_z = (down_x * side - down_y * force_x) * scale
+
+        learns = math.sqrt(rate_x * rate_x + rate_y * rate_y + rate_z * rate_z) < BIAS_LEARNING_SPIN_LIMIT
+        bias_x = _limited_bias(bias_x - tilt_x * GYRO_BIAS_GAIN * dt) if learns else bias_x
+        bias_y = _limited_bias(bias_y - tilt_y * GYRO_BIAS_GAIN * dt) if learns else bias_y
+        bias_z = _limited_bias(bias_z - tilt_z * GYRO_BIAS_GAIN * dt) if learns else bias_z
+        gsf.gyro_bias[0, model], gsf.gyro_bias[1, model], gsf.gyro_bias[2, model] = bias_x, bias_y, bias_z
+
+        rotation_x = turn_x + (tilt_x - bias_x) * dt
+        rotation_y = turn_y + (tilt_y - bias_y) * dt
+        rotation_z = turn_z + (tilt_z - bias_z) * dt
+        gsf.rotation[0, model], gsf.rotation[1, model], gsf.rotation[2, model] = rotation_x, rotation_y, rotation_z
+        gsf.rotation_squared[model] = rotation_x * rotation_x + rotation_y * rotation_y + rotation_z * rotation_z
+
+
+@kernel
+def _rotate_a_little(gsf):
+    """Apply `gsf.rotation` where that of every model is small: `rotate_by_body_increment` of all at once."""
+    for model in range(LANES):
+        turn = small_rotation_to_quat(
+            gsf.rotation[0, model], gsf.rotation[1, model], gsf.rotation[2, model], gsf.rotation_squared[model]
+        )
+        w, x, y, z = quat_product(attitude(gsf, model), turn)
+        set_attitude(gsf, model, unit_length(w, x, y, z))
 
 
 @kernel

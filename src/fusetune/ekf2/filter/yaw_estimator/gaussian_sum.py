@@ -11,15 +11,15 @@ from fusetune.ekf2.filter.yaw_estimator.attitude_filter import (
     accel_fusion_gain,
     align_yaw_of_attitudes,
     filter_acceleration,
-    predict_attitude,
+    predict_attitudes,
     try_align_tilt,
 )
-from fusetune.ekf2.filter.yaw_estimator.gsf_memory import N_MODELS, reset_gsf
+from fusetune.ekf2.filter.yaw_estimator.gsf_memory import N_MODELS, P_YAW_YAW, reset_gsf
 from fusetune.ekf2.filter.yaw_estimator.velocity_yaw_filter import (
     gaussian_density,
     initialise_models,
     look_up_yaw,
-    predict_model,
+    predict_models,
     update_model,
 )
 from fusetune.ekf2.numerics.rotations import wrap_pi
@@ -35,11 +35,9 @@ def predict_gsf(gsf, imu, in_air):
     filter_acceleration(gsf, imu)
     if not gsf.tilt_aligned and not try_align_tilt(gsf, imu):
         return
-    gain = accel_fusion_gain(gsf)
-    for model in range(N_MODELS):
-        predict_attitude(gsf, model, imu, gain)
-        if gsf.vel_fuse_started:
-            predict_model(gsf, model, imu, in_air)
+    predict_attitudes(gsf, imu, accel_fusion_gain(gsf))
+    if gsf.vel_fuse_started:
+        predict_models(gsf, imu, in_air)
 
 
 @kernel
@@ -74,10 +72,10 @@ def _combine_yaw(gsf):
     """Weighted mean direction of the yaws, and the variance of their mixture."""
     north, east = 0.0, 0.0
     for model in range(N_MODELS):
-        north += gsf.weight[model] * math.cos(gsf.x[model, 2])
-        east += gsf.weight[model] * math.sin(gsf.x[model, 2])
+        north += gsf.weight[model] * math.cos(gsf.x[2, model])
+        east += gsf.weight[model] * math.sin(gsf.x[2, model])
     gsf.yaw = math.atan2(east, north)
     gsf.yaw_variance = 0.0
     for model in range(N_MODELS):
-        delta = wrap_pi(gsf.x[model, 2] - gsf.yaw)
-        gsf.yaw_variance += gsf.weight[model] * (gsf.P[model, 2, 2] + delta * delta)
+        delta = wrap_pi(gsf.x[2, model] - gsf.yaw)
+        gsf.yaw_variance += gsf.weight[model] * (gsf.P[P_YAW_YAW, model] + delta * delta)

@@ -15,7 +15,7 @@ from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_s
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.covariance import reset_wind_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
-from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, scale_kalman_gain
 from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL, FLT_EPSILON
 
@@ -120,8 +120,8 @@ def _fuse_drag(ekf, params):
             return
         test_ratio = innovation * innovation / (DRAG_GATE * DRAG_GATE * innovation_variance)
         if ekf.cs.in_air and ekf.cs.wind and not ekf.cs.fake_pos and test_ratio < 1.0:
-            compute_kalman_gain(ekf, drag.H[axis], innovation_variance, ekf.scratch.K)
-            measurement_update(ekf, params, ekf.scratch.K, drag.H[axis], R_acc, innovation)
+            scale_kalman_gain(ekf, innovation_variance)
+            measurement_update(ekf, params, R_acc, innovation)
     update_aid_source_status(ekf, aid, 2, ekf.sensors.drag.sample.time_us, DRAG_GATE)
     aid.fused = True
     aid.time_last_fuse = ekf.time_delayed_us

@@ -42,7 +42,7 @@ def _load_jacobian(jacobian, axis, H):
 @kernel
 def fuse_body_frame_velocity(ekf, params, aid, time_us, measurement, variance, gate, jacobian):
     """Judge and fuse a body velocity (m/s, FRD); `jacobian` is work space of shape (3, 6)."""
-    H, K = ekf.scratch.H, ekf.scratch.K
+    H = ekf.scratch.H
     compute_body_velocity_jacobian(ekf, jacobian)
     clear_jacobian(H)
     for axis in range(3):
@@ -58,8 +58,8 @@ def fuse_body_frame_velocity(ekf, params, aid, time_us, measurement, variance, g
         if axis > 0:
             aid.innovation_variance[axis] = compute_innovation_variance(ekf, H, variance[axis])
         aid.innovation[axis] = predict_body_velocity(ekf, axis) - measurement[axis]
-        compute_kalman_gain(ekf, H, aid.innovation_variance[axis], K)
-        measurement_update(ekf, params, K, H, aid.observation_variance[axis], aid.innovation[axis])
+        compute_kalman_gain(ekf, H, aid.innovation_variance[axis])
+        measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis])
     aid.fused = True
     aid.time_last_fuse = ekf.time_delayed_us
     ekf.time_last_hor_vel_fuse = ekf.time_delayed_us

@@ -111,7 +111,7 @@ def _reset_velocity_to_ev(ekf, params):
     ev, R = ekf.ev, ekf.R_to_earth
     ekf.events.reset_vel_to_vision = True
     if ekf.sensors.ev.sample.vel_frame == EV_FRAME_BODY_FRD:
-        velocity, variance = ekf.scratch.PH[:3], ekf.scratch.PH_reduce[:3]
+        velocity, variance = ekf.scratch.PH[:3], ekf.scratch.K[:3]
         m = ev.vel_measurement
         for i in range(3):
             velocity[i] = component_in_earth(R, i, m[0], m[1], m[2])

@@ -27,6 +27,7 @@ from fusetune.ekf2.filter.common.timing import (
 )
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
+from fusetune.ekf2.filter.observation_gain import multiply_covariance
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.numerics.constants import FLT_EPSILON_IN_EIGHT_DIGITS
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
@@ -161,9 +162,10 @@ def fuse_gnss_yaw(ekf, params, yaw_offset):
         # innovations that stay on one side tell of a wrong yaw gyro bias: let it be learnt faster
         reset_gyro_bias_z_cov(ekf, params)
 
+    multiply_covariance(ekf, H)
     for i in range(ERROR_STATE_SIZE):
-        K[i] = (ekf.P[i, 0] * H[0] + ekf.P[i, 1] * H[1] + ekf.P[i, 2] * H[2]) / variance
-    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
+        K[i] = ekf.scratch.PH[i] / variance
+    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
     ekf.fs.bad_hdg = False
     aid.fused = True
     aid.time_last_fuse = ekf.time_delayed_us

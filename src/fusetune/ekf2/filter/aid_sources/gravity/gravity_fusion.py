@@ -62,7 +62,7 @@ def _update_gravity(ekf, params):
 
 @kernel
 def _fuse_gravity(ekf, params):
-    aid, jacobian, H, K = ekf.aid.gravity, ekf.gravity.jacobian, ekf.scratch.H, ekf.scratch.K
+    aid, jacobian, H = ekf.aid.gravity, ekf.gravity.jacobian, ekf.scratch.H
     clear_jacobian(H)
     for axis in range(3):
         if axis > 0:
@@ -70,8 +70,8 @@ def _fuse_gravity(ekf, params):
             aid.innovation[axis] = -ekf.R_to_earth[2, axis] - aid.observation[axis]
         H[ATTITUDE] = jacobian[axis, 0]
         H[ATTITUDE + 1] = jacobian[axis, 1]
-        compute_kalman_gain(ekf, H, aid.innovation_variance[axis], K)
-        measurement_update(ekf, params, K, H, aid.observation_variance[axis], aid.innovation[axis])
+        compute_kalman_gain(ekf, H, aid.innovation_variance[axis])
+        measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis])
 
 
 @kernel

@@ -13,7 +13,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_f
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov, reset_quat_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
-from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, scale_kalman_gain
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import component_in_body, wrap_pi
 
@@ -78,20 +78,21 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
         if axis == 2 and ekf.cs.synthetic_mag_z:
             continue
         H = jacobians[axis]
+        variance = compute_innovation_variance(ekf, H, R_mag)
         if axis > 0:
-            aid.innovation_variance[axis] = compute_innovation_variance(ekf, H, R_mag)
+            aid.innovation_variance[axis] = variance
             aid.innovation[axis] = predict_mag(ekf, axis) - mag[axis]
         if aid.innovation_variance[axis] < R_mag:
             recover_from_bad_mag_covariance(ekf, params, update_all_states)
             return False
 
-        compute_kalman_gain(ekf, H, aid.innovation_variance[axis], K)
+        scale_kalman_gain(ekf, aid.innovation_variance[axis])
         if not update_all_states:
             keep_only_mag_gains(K)
         elif not update_tilt:
             K[ATTITUDE] = 0.0
             K[ATTITUDE + 1] = 0.0
-        measurement_update(ekf, params, K, H, aid.observation_variance[axis], aid.innovation[axis])
+        measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis])
 
     clear_mag_faults(ekf)
     aid.fused = True
@@ -129,10 +130,9 @@ def fuse_declination(ekf, params, declination, R, update_all_states):
         ekf.fs.bad_mag_decl = True
         return False
 
-    K = ekf.scratch.K
-    compute_kalman_gain(ekf, H, innovation_variance, K)
+    scale_kalman_gain(ekf, innovation_variance)
     if not update_all_states:
-        keep_only_mag_gains(K)
-    measurement_update(ekf, params, K, H, R, innovation)
+        keep_only_mag_gains(ekf.scratch.K)
+    measurement_update(ekf, params, R, innovation)
     ekf.fs.bad_mag_decl = False
     return True

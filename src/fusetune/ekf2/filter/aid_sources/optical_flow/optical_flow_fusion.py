@@ -119,7 +119,7 @@ def fuse_opt_flow(ekf, params, update_terrain):
     Close to the ground the model is far from linear, so that Y is tested anew after X has been fused, and left out
     where it fails.
     """
-    aid, H, K = ekf.aid.optical_flow, ekf.flow.H, ekf.scratch.K
+    aid, H = ekf.aid.optical_flow, ekf.flow.H
     if aid.innovation_rejected:
         set_flow_rejection(ekf, True, True)
         return False
@@ -131,10 +131,10 @@ def fuse_opt_flow(ekf, params, update_terrain):
         if aid.innovation_variance[axis] < aid.observation_variance[axis]:
             initialise_covariance(ekf, params)
             return False
-        compute_kalman_gain(ekf, H[axis], aid.innovation_variance[axis], K)
+        compute_kalman_gain(ekf, H[axis], aid.innovation_variance[axis])
         if not update_terrain:
-            K[TERRAIN] = 0.0
-        measurement_update(ekf, params, K, H[axis], aid.observation_variance[axis], aid.innovation[axis])
+            ekf.scratch.K[TERRAIN] = 0.0
+        measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis])
     ekf.fs.bad_optflow_x = False
     ekf.fs.bad_optflow_y = False
     set_flow_rejection(ekf, aid.test_ratio[0] > 1.0, aid.test_ratio[1] > 1.0)

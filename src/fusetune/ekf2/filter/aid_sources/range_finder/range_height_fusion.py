@@ -17,7 +17,7 @@ from fusetune.ekf2.filter.common.conditions import get_hagl
 from fusetune.ekf2.filter.common.state import POSITION, TERRAIN
 from fusetune.ekf2.filter.covariance import reset_covariance_block
 from fusetune.ekf2.filter.measurement_update import measurement_update
-from fusetune.ekf2.filter.observation_gain import compute_kalman_gain
+from fusetune.ekf2.filter.observation_gain import compute_kalman_gain, multiply_covariance
 from fusetune.ekf2.filter.resets.state_resets import update_terrain_reset_status
 
 HEIGHT = POSITION + 2
@@ -74,12 +74,12 @@ def fuse_hagl_rng(ekf, params, update_height, update_terrain):
 
     H, K = ekf.scratch.H, ekf.scratch.K
     compute_hagl_h(H)
-    compute_kalman_gain(ekf, H, aid.innovation_variance[0], K)
+    compute_kalman_gain(ekf, H, aid.innovation_variance[0])
     k_terrain = K[TERRAIN] if update_terrain else 0.0
     if not update_height:
         K[:] = 0.0
     K[TERRAIN] = k_terrain
-    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
+    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
 
     ekf.reject.hagl = False
     aid.time_last_fuse = ekf.time_delayed_us
@@ -101,8 +101,9 @@ def reset_terrain_to_rng(ekf, params):
     old_terrain = ekf.terrain
     H, K = ekf.scratch.H, ekf.scratch.K
     compute_hagl_h(H)
+    multiply_covariance(ekf, H)
     K[:] = 0.0
     K[TERRAIN] = 1.0
-    measurement_update(ekf, params, K, H, aid.observation_variance[0], aid.innovation[0])
+    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
     update_terrain_reset_status(ekf, ekf.terrain - old_terrain)
     reset_aid_source_status_zero_innovation(ekf, aid, 1)
