@@ -28,7 +28,6 @@ from fusetune.ekf2.replay.recording import (
     joined,
 )
 from fusetune.ekf2.replay.results import Gap, GapResult, ReplayResult, ReplaySummary
-from fusetune.ekf2.replay.scored_rows import ScoredRows
 from fusetune.ekf2.replay.warm_start import without_first_resets
 from fusetune.px4.aid_sources import WITHHOLDABLE
 from fusetune.px4.layouts.logged_state import Handover, LoggedState
@@ -114,18 +113,18 @@ def replay_into(
         How much of the rows is handed on; what is, has the same figures either way.
     """
     ranges = [_runs_of(inputs, gap) for gap in gaps]
-    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers)
+    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers, recording)
     tally = _Tally()
     found: list[GapResult | None] = [None] * len(gaps)
-    runs, scored = len(inputs.arrays.imu), ScoredRows()
+    runs = len(inputs.arrays.imu)
     for begin, end in course.stretches(first_run, runs, [first for first, _ in ranges]):
         for number, (first, last) in enumerate(ranges):
             if first == begin:
                 found[number] = _continue_into_gap(course, gaps[number], first, last)
-        rows = course.run(begin, end)
+        rows = course.run(begin, end, is_last=end == runs)
         tally.add(rows)
-        take(rows if recording is FULL else scored.cut(rows, is_last=end == runs))
-    return tally.summary(course, warm_start_us, found)
+        take(rows)
+    return tally.summary(course, first_run, warm_start_us, found)
 
 
 def begin_course(
@@ -134,6 +133,7 @@ def begin_course(
     overridden: frozenset[str] | None = None,
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
+    recording: Recording = FULL,
 ) -> tuple[Course, int, int | None]:
     """Set the estimator on its way; arguments as for `replay`.
 
@@ -147,13 +147,27 @@ def begin_course(
         for run, change in inputs.parameter_changes
         if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
     ]
-    if start is not None:
-        inputs = without_first_resets(inputs, start.time_us)
-    inputs = without_resets_at(inputs, handovers)
+    inputs = _without_resets(inputs, start, tuple(handovers))
     record = parameter_record(parameters)
-    course = Course(inputs, record, changes, handover_runs(inputs, float(record["EKF2_DELAY_MAX"][0]), handovers))
+    runs = handover_runs(inputs, float(record["EKF2_DELAY_MAX"][0]), handovers)
+    course = Course(inputs, record, changes, runs, recording)
     first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
     return course, first_run, warm_start_us
+
+
+def _without_resets(
+    inputs: EstimatorInputs, start: LoggedState | None, handovers: tuple[Handover, ...]
+) -> EstimatorInputs:
+    """The inputs without the resets that neither a start from a given state nor a handover is; the sets share them."""
+    if start is None and not handovers:
+        return inputs
+
+    def make() -> EstimatorInputs:
+        begun = inputs if start is None else without_first_resets(inputs, start.time_us)
+        return without_resets_at(begun, handovers)
+
+    key = ("without resets", start and start.time_us, tuple(one.time_us for one in handovers))
+    return inputs.memo.get(key, make)
 
 
 def _runs_of(inputs: EstimatorInputs, gap: Gap) -> tuple[int, int]:
@@ -165,10 +179,10 @@ def _continue_into_gap(course: Course, gap: Gap, first: int, last: int) -> GapRe
     """Replay the gap on a copy of the filter; None where the filter has not started, or the flight has no such time."""
     if not course.ekf["filter_initialised"][0]:
         return None
-    branch = course.branch()
-    branch.ekf["sensors"][gap.sensor]["withheld"] = True
+    branch = course.gap_branch(gap.sensor)
     start = int(branch.ekf["time_delayed_us"][0])
-    innovations, _, local_position, _ = joined([branch.run(*stretch) for stretch in branch.stretches(first, last)])
+    parts = [branch.run(*stretch, is_last=stretch[1] == last) for stretch in branch.stretches(first, last)]
+    innovations, _, local_position, _ = joined(parts)
     if not len(local_position):
         return None
     sources = [AID_SOURCE_NAMES.index(name) for name in WITHHOLDABLE[gap.sensor]]
@@ -184,32 +198,29 @@ class _Tally:
     """What is told of all rows, counted as they come."""
 
     def __init__(self) -> None:
-        self._horizons: list[np.ndarray] = []
-        self._diverged = False
         self._faults = 0
         self._resets = {name: 0 for name in LOCAL_POSITION_ROW.names or () if name.endswith("_reset_counter")}
 
     def add(self, rows: RecordArrays) -> None:
-        states, position = rows.states, rows.local_position
-        self._horizons.append(states["timestamp_sample"].copy())
-        self._diverged |= not (np.isfinite(states["states"]).all() and np.isfinite(states["covariances"]).all())
+        position = rows.local_position
         faults = [i for i, name in enumerate(FLAG_COLUMNS) if name.startswith("fs_")]
         bits = rows.flags["flags"][:, faults].astype(np.int64) << np.arange(len(faults))
         self._faults = max(self._faults, int(bits.sum(axis=1).max(initial=0)))
         if len(position):
             self._resets = {name: int(position[name][-1]) for name in self._resets}
 
-    def summary(self, course: Course, warm_start_us: int | None, gaps: Sequence[GapResult | None]) -> ReplaySummary:
-        time = np.concatenate([np.zeros(0, np.int64), *self._horizons])
+    def summary(
+        self, course: Course, first_run: int, warm_start_us: int | None, gaps: Sequence[GapResult | None]
+    ) -> ReplaySummary:
         return ReplaySummary(
             mode=course.inputs.mode,
             imu_samples=len(course.inputs.arrays.imu),
             updates=int(course.recorder["updates"][0]),
-            update_interval_us=float(np.median(np.diff(time))) if len(time) > 1 else 0.0,
+            update_interval_us=course.schedule.update_interval_us(first_run),
             origin=_origin(course.ekf["origin"][0]),
             resets=self._resets,
             filter_fault_flags_max=self._faults,
-            diverged=self._diverged,
+            diverged=bool(course.recorder["diverged"][0]),
             gaps=tuple(one for one in gaps if one is not None),
             warm_start_us=warm_start_us,
             levelled=bool(course.ekf["filter_initialised"][0]),
