@@ -22,8 +22,7 @@ def test_blocks_add_up_and_are_paired(tmp_path: Path) -> None:
     masks = sample_masks(present, window)
     for name in sets:
         found = counted(read_set(folder, name), masks, window, 20.0)
-        together = axes_together([one.samples for one in found.values() if one.samples is not None])
-        velocity = next(one for one in together if one.source == "gnss_vel")
+        velocity = next(one for one in axes_together(found.values()) if one.source == "gnss_vel")
         tables.append(block_rows("flight", name, velocity, edges))
         samples[name] = velocity.samples[2]
     frame = pa.concat_tables(tables).to_pandas()

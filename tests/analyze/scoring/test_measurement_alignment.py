@@ -28,7 +28,7 @@ from fusetune.analyze.scoring.measurement_alignment import (
 )
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.sample_scores import counted as counted_at
-from fusetune.analyze.scoring.sample_scores import score_samples
+from fusetune.analyze.scoring.sample_scores import counted_of_its_own, score_samples
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow
 
@@ -89,16 +89,15 @@ def test_axes_that_share_their_times_are_together(tmp_path: Path) -> None:
     _, folder = make_flight(tmp_path, "flight", {"present": MadeSet()})
     present = read_set(folder, "present")
     masks = sample_masks(present, WINDOW)
-    samples = [own_samples(mask, present.samples[key]) for key, mask in masks.items()]
-    found = {one.source: one for one in axes_together(samples)}
+    found = {one.source: one for one in axes_together(counted_of_its_own(present, masks).values())}
     assert {name: one.axes for name, one in found.items()} == {
         "gnss_vel": [0, 1, 2], "gnss_pos": [0, 1], "baro_hgt": [0],
     }  # fmt: skip
-    together = found["gnss_vel"].innovations()
+    together = found["gnss_vel"].innovations
     assert together.innovation.shape == (1, 3, 50)
     (limits,) = together.winsor_limits()
     np.testing.assert_array_equal(np.ravel(limits), [masks["gnss_vel", axis].winsor_limit for axis in range(3)])
-    assert {name: one.innovation.shape for name, one in found["gnss_vel"].groups()} == {
+    assert {name: one.innovation.shape for name, one in found["gnss_vel"].groups.items()} == {
         "horizontal": (2, 1, 50), "vertical": (1, 1, 50), "all": (3, 1, 50),
     }  # fmt: skip
 

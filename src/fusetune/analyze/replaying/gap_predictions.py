@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fusetune.ekf2.replay.results import GapResult
@@ -11,6 +13,8 @@ HORIZONS = 3
 
 AVERAGED_S = 1.0
 """Innovations of so long before a horizon are averaged: they share the drift, but not the measurement's noise."""
+
+_MOST_SOURCES = 1 << 16
 
 PREDICTION_COLUMNS: dict[str, type] = {
     "gap": np.int32,
@@ -25,28 +29,35 @@ PREDICTION_COLUMNS: dict[str, type] = {
 }
 
 
-def gap_predictions(number: int, result: GapResult) -> dict[str, np.ndarray]:
-    """Means of one gap, the columns of a table with one row per source, axis and horizon."""
-    gap, rows = result.gap, result.innovations
-    length_s = (gap.stop - gap.start) * 1e-6
-    elapsed_s = (rows["timestamp_sample"] - result.start) * 1e-6
-    horizon = np.ceil(elapsed_s / (length_s / HORIZONS)).astype(np.int64)
-    before_s = horizon * (length_s / HORIZONS) - elapsed_s
+def gap_predictions(results: Sequence[GapResult]) -> dict[str, np.ndarray]:
+    """Means of gaps, the columns of a table with one row per gap, source, axis and horizon."""
+    if not results:
+        return {name: np.zeros(0, dtype) for name, dtype in PREDICTION_COLUMNS.items()}
+    rows = np.concatenate([one.innovations for one in results])
+    number = np.repeat(np.arange(len(results)), [len(one.innovations) for one in results])
+    start, stop = (np.array([getattr(one.gap, name) for one in results], np.int64) for name in ("start", "stop"))
+    horizons_s = (stop - start) * 1e-6 / HORIZONS
+    elapsed_s = (rows["timestamp_sample"] - np.array([one.start for one in results])[number]) * 1e-6
+    horizon = np.ceil(elapsed_s / horizons_s[number]).astype(np.int64)
+    before_s = horizon * horizons_s[number] - elapsed_s
     taken = (horizon >= 1) & (horizon <= HORIZONS) & (before_s < AVERAGED_S)
-    key = (rows["source"][taken] * 3 + rows["axis"][taken]) * HORIZONS + horizon[taken] - 1
+    sources = _MOST_SOURCES * number[taken] + rows["source"][taken]
+    key = (sources * 3 + rows["axis"][taken]) * HORIZONS + horizon[taken] - 1
     found, index = np.unique(key, return_inverse=True)
     count = np.bincount(index, minlength=found.size)
 
     def mean(name: str) -> np.ndarray:
         return np.bincount(index, rows[name][taken].astype(np.float64), found.size) / np.maximum(count, 1)
 
+    source = found // (3 * HORIZONS)
+    gap = source // _MOST_SOURCES
     return {
-        "gap": np.full(found.size, number, np.int32),
-        "start": np.full(found.size, gap.start),
-        "stop": np.full(found.size, gap.stop),
-        "source": (found // (3 * HORIZONS)).astype(np.int32),
+        "gap": gap.astype(np.int32),
+        "start": start[gap],
+        "stop": stop[gap],
+        "source": (source % _MOST_SOURCES).astype(np.int32),
         "axis": (found // HORIZONS % 3).astype(np.int32),
-        "horizon_s": (found % HORIZONS + 1) * (length_s / HORIZONS),
+        "horizon_s": (found % HORIZONS + 1) * horizons_s[gap],
         "n": count.astype(np.int32),
         "innovation": mean("innovation"),
         "innovation_variance": mean("innovation_variance"),

@@ -26,6 +26,8 @@ SourceAxis = tuple[str, int]
 _NOT_STORED = ("source", "axis", "measured")
 _AXES = 8
 """More than any source has."""
+_FEW_ROWS = 300_000
+"""Some ten minutes of flight: of those in memory the arrays by axis, half as large again, stay, too."""
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,7 @@ class SortedSamples(Mapping[SourceAxis, AxisSamples]):
         key = rows["source"].astype(np.int64) * _AXES + rows["axis"]
         order = np.argsort(key, kind="stable")
         self._rows, self._gate = rows[order], gate
+        self._kept: dict[SourceAxis, AxisSamples] = {}
         found, starts = np.unique(key[order], return_index=True)
         stops = [*starts[1:].tolist(), len(rows)]
         self._slices = {
@@ -159,7 +162,12 @@ class SortedSamples(Mapping[SourceAxis, AxisSamples]):
         }
 
     def __getitem__(self, key: SourceAxis) -> AxisSamples:
-        return _axis_samples(self._rows[self._slices[key]], self._gate(key[0]))
+        found = self._kept.get(key)
+        if found is None:
+            found = _axis_samples(self._rows[self._slices[key]], self._gate(key[0]))
+            if len(self._rows) <= _FEW_ROWS:
+                self._kept[key] = found
+        return found
 
     def __iter__(self) -> Iterator[SourceAxis]:
         return iter(self._slices)

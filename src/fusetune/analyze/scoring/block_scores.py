@@ -51,7 +51,7 @@ def block_rows(flight: str, set_name: str, samples: AxesTogether, edges: npt.NDA
 
 def _scores(samples: AxesTogether) -> Mapping[str, npt.NDArray[np.float64]]:
     """Of each axis and sample, (A, N)."""
-    given = samples.innovations()
+    given = samples.innovations
     innovation, variance = given.innovation[0], given.innovation_variance[0]
     clipped = winsorised(innovation, given.winsor_limits()[0])
     return {

@@ -61,8 +61,8 @@ def add_ground_metrics(
     ----------
     found : samples of the set on the ground
     """
-    for together in axes_together([one.samples for one in found.values() if one.samples is not None]):
-        add_innovation_metrics(table, set_name, together, _ON_GROUND, settings.confidence, GROUND)
+    for together in axes_together(found.values(), settings.confidence):
+        add_innovation_metrics(table, set_name, together, _ON_GROUND, GROUND)
 
 
 def add_ground_events(table: MetricsTable, set_name: str, events: FilterEvents, ground: ScoringWindow) -> None:

@@ -6,8 +6,8 @@ is therefore compared with no other beside it, and has the same figures whicheve
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -197,11 +197,13 @@ def _single(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return values.astype(np.float32).astype(np.float64)
 
 
-class AxesTogether(NamedTuple):
-    """Axes of one source that share their times, of one set."""
+@dataclass(frozen=True, eq=False)
+class AxesTogether:
+    """Axes of one source that share their times, of one set; `confidence` is that of intervals."""
 
     source: str
     samples: tuple[CountedSamples, ...]
+    confidence: float = np.nan
 
     @property
     def axes(self) -> list[int]:
@@ -212,30 +214,31 @@ class AxesTogether(NamedTuple):
         """(N,) µs"""
         return self.samples[0].mask.time
 
-    def figures(self, name: str) -> npt.NDArray:
-        """(A, N) one of the `FIGURES`."""
-        return np.stack([getattr(one, name) for one in self.samples])
-
-    def innovations(self, confidence: float = np.nan) -> Innovations:
+    @cached_property
+    def innovations(self) -> Innovations:
         """Each axis by itself, what metrics are made of, (1, A, N)."""
         limits = np.array([one.mask.winsor_limit for one in self.samples])[:, None]
-        return _innovations([self.figures(name)[None] for name in FIGURES], [limits], confidence)
+        figures = [np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES]
+        return _innovations(figures, [limits], self.confidence)
 
-    def group(self, axes: Sequence[int], confidence: float = np.nan) -> Innovations | None:
-        """Some axes as one group, (D, 1, N); None where one is missing here."""
-        if not {*axes} <= {*self.axes}:
-            return None
+    @cached_property
+    def groups(self) -> Mapping[str, Innovations]:
+        """Groups of axes (horizontal, vertical, all) that are all here, (D, 1, N), by name."""
+        groups = AID_SOURCES[self.source].groups
+        return {name: self._group(axes) for name, axes in groups if {*axes} <= {*self.axes}}
+
+    def _group(self, axes: Sequence[int]) -> Innovations:
         members = [self.samples[self.axes.index(axis)] for axis in axes]
         limits = [one.mask.winsor_limit for one in members]
         figures = [np.stack([getattr(one, name) for one in members])[:, None] for name in FIGURES]
-        return _innovations(figures, limits, confidence, of_group=True)
+        return _innovations(figures, limits, self.confidence, of_group=True)
 
-    def groups(self, confidence: float = np.nan) -> Iterator[tuple[str, Innovations]]:
-        """Groups of axes (horizontal, vertical, all) that are all here, by name."""
-        for name, axes in AID_SOURCES[self.source].groups:
-            found = self.group(axes, confidence)
-            if found is not None:
-                yield name, found
+    def of_masks(self, masks: Masks) -> AxesTogether | None:
+        """Those of the axes whose measurements are those of some masks; None where none are."""
+        kept = tuple(one for one in self.samples if masks.get((one.mask.source, one.mask.axis)) is one.mask)
+        if not kept:
+            return None
+        return self if len(kept) == len(self.samples) else replace(self, samples=kept)
 
 
 def _innovations(
@@ -245,10 +248,12 @@ def _innovations(
     return Innovations(innovation, variance, ratio, rejected, lambda: limits, confidence, of_group)
 
 
-def axes_together(samples: Sequence[CountedSamples]) -> Iterator[AxesTogether]:
-    """Those of one source and the same times together, in the order in which they come."""
+def axes_together(samples: Iterable[Counted], confidence: float = np.nan) -> Iterator[AxesTogether]:
+    """What there is of one source and the same times together, in the order in which it comes."""
     found: dict[tuple[str, int], list[CountedSamples]] = {}
     for one in samples:
-        found.setdefault((one.mask.source, id(one.mask.time)), []).append(one)
+        if one.samples is not None:
+            mask = one.samples.mask
+            found.setdefault((mask.source, id(mask.time)), []).append(one.samples)
     for (source, _), members in found.items():
-        yield AxesTogether(source, tuple(members))
+        yield AxesTogether(source, tuple(members), confidence)

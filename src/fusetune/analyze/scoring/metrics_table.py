@@ -59,8 +59,7 @@ def add_innovation_metrics(
     table: MetricsTable,
     set_name: str,
     samples: AxesTogether,
-    metrics: Sequence[InnovationMetric],
-    confidence: float,
+    metrics: Sequence[InnovationMetric] = INNOVATION_METRICS,
     prefix: str = "",
 ) -> None:
     """Append figures of axes of one source, and of their groups (horizontal, vertical, all axes).
@@ -68,14 +67,15 @@ def add_innovation_metrics(
     Parameters
     ----------
     samples : nothing is told of too few
+    metrics : by default all
     prefix : to the names of the metrics
     """
     if samples.time.size < FEWEST_SAMPLES:
         return
     axes = [AXES[axis] for axis in samples.axes]
-    _add_figures(table, set_name, samples.source, axes, samples.innovations(confidence), metrics, prefix)
+    _add_figures(table, set_name, samples.source, axes, samples.innovations, metrics, prefix)
     of_groups = [metric for metric in metrics if metric.of_groups]
-    for group, given in samples.groups(confidence):
+    for group, given in samples.groups.items():
         _add_figures(table, set_name, samples.source, [group], given, of_groups, prefix)
 
 
@@ -101,11 +101,6 @@ def _add_figures(
     for place, axis in enumerate(axes):
         for metric, (values, n, lower, upper) in zip(metrics, found, strict=True):
             table.add(set_name, source, axis, prefix + metric.name, values[place], n[place], lower[place], upper[place])
-
-
-def add_all_innovation_metrics(table: MetricsTable, set_name: str, samples: AxesTogether, confidence: float) -> None:
-    """Append all figures of axes of one source and of their groups."""
-    add_innovation_metrics(table, set_name, samples, INNOVATION_METRICS, confidence)
 
 
 def add_events(table: MetricsTable, set_name: str, events: FilterEvents) -> None:

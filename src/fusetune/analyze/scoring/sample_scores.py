@@ -13,7 +13,6 @@ from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.scoring.block_scores import BLOCK_SCHEMA, block_rows
 from fusetune.analyze.scoring.charges import EvidenceCost
 from fusetune.analyze.scoring.measurement_alignment import (
-    AxesTogether,
     Counted,
     CountedSamples,
     Masks,
@@ -23,7 +22,7 @@ from fusetune.analyze.scoring.measurement_alignment import (
     sample_mask,
     sample_masks,
 )
-from fusetune.analyze.scoring.metrics_table import MetricsTable, add_all_innovation_metrics
+from fusetune.analyze.scoring.metrics_table import MetricsTable, add_innovation_metrics
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.window_scores import (
@@ -104,11 +103,11 @@ def score_samples(
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
     blocks, windows = [], []
     samples = [one.samples for one in found.values() if one.samples is not None]
-    for together in axes_together(samples):
-        add_all_innovation_metrics(table, set_name, together, settings.confidence)
-        compared = tuple(one for one in together.samples if masks.get((one.mask.source, one.mask.axis)) is one.mask)
-        if compared:
-            blocks.append(block_rows(table.flight, set_name, AxesTogether(together.source, compared), edges))
+    for together in axes_together(found.values(), settings.confidence):
+        add_innovation_metrics(table, set_name, together)
+        compared = together.of_masks(masks)
+        if compared is not None:
+            blocks.append(block_rows(table.flight, set_name, compared, edges))
         for figures in window_figures(together, wide_edges):
             add_worst_windows(table, set_name, figures)
             windows.append(figures)
@@ -163,5 +162,5 @@ def add_onboard(
     """Append the vehicle's own figures, on the same part of the flight but at the times that it logged."""
     record = ReplayedSet(ONBOARD, parameters, {}, {}, onboard, {}, {})
     found = counted_of_its_own(record, sample_masks(record, window))
-    for together in axes_together([one.samples for one in found.values() if one.samples is not None]):
-        add_all_innovation_metrics(table, ONBOARD, together, settings.confidence)
+    for together in axes_together(found.values(), settings.confidence):
+        add_innovation_metrics(table, ONBOARD, together)

@@ -110,4 +110,4 @@ def write_flight_scores(folder: AnyPath, scores: FlightScores) -> None:
 
 def _write_summary(folder: Path, summary: Mapping[str, Any]) -> None:
     with atomic_path(folder / SCORING_FILE) as temporary:
-        write_document(temporary, summary, sort_keys=True)
+        write_document(temporary, summary, lines=2, sort_keys=True)

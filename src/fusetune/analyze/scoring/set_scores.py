@@ -23,6 +23,7 @@ from fusetune.analyze.scoring.metrics_table import (
     add_true_errors,
     add_whiteness,
 )
+from fusetune.analyze.scoring.reset_jumps import Jumps, reset_jumps
 from fusetune.analyze.scoring.sample_scores import (
     SAMPLES_SCHEMA,
     SampleScores,
@@ -109,9 +110,10 @@ def score_set(yardstick: Yardstick, record: ReplayedSet) -> SetScores:
     """
     window, flight = yardstick.window_of(record), yardstick.flight
     table = MetricsTable(flight.name)
-    events = filter_events(record, yardstick.flying(record))
+    jumps = reset_jumps(record)
+    events = filter_events(record, yardstick.flying(record), jumps)
     add_events(table, record.name, events)
-    _add_ground(table, yardstick, record, excluded=record.name in window.excluded)
+    _add_ground(table, yardstick, record, jumps, excluded=record.name in window.excluded)
     summary = set_summary(record, yardstick.present, window, events, flight)
     if not window.intervals or record.name in window.excluded:
         return _figures_alone(table, summary | {"evidence": _evidence(yardstick, window, record, {}, [])})
@@ -146,7 +148,9 @@ def _evidence(
     return set_evidence(samples, gaps, window.own_resets_s(record.name), yardstick.settings.max_lacking_percent)
 
 
-def _add_ground(table: MetricsTable, yardstick: Yardstick, record: ReplayedSet, *, excluded: bool) -> None:
+def _add_ground(
+    table: MetricsTable, yardstick: Yardstick, record: ReplayedSet, jumps: Mapping[str, Jumps], *, excluded: bool
+) -> None:
     ground, settings = yardstick.ground, yardstick.settings
     if ground.intervals and not excluded:
         masks = yardstick.ground_masks
@@ -155,7 +159,7 @@ def _add_ground(table: MetricsTable, yardstick: Yardstick, record: ReplayedSet, 
         else:
             found = counted(record, masks, ground.of_set(record, settings), settings.max_lacking_percent)
         add_ground_metrics(table, record.name, found, settings)
-    add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
+    add_ground_events(table, record.name, filter_events(record, ground.intervals, jumps), ground)
 
 
 def _of_samples(table: MetricsTable, yardstick: Yardstick, record: ReplayedSet, window: ScoringWindow) -> SampleScores:

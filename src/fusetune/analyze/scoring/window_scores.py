@@ -82,8 +82,8 @@ def window_figures(samples: AxesTogether, edges: npt.NDArray[np.int64]) -> Itera
         return
     parts = parts_of(samples.time, edges)
     axes = tuple(AXES[axis] for axis in samples.axes)
-    yield WindowFigures(samples.source, axes, parts, _figures(samples.innovations(), parts))
-    for name, given in samples.groups():
+    yield WindowFigures(samples.source, axes, parts, _figures(samples.innovations, parts))
+    for name, given in samples.groups.items():
         yield WindowFigures(samples.source, (name,), parts, _figures(given, parts))
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from fusetune.analyze.replaying.gap_predictions import PREDICTION_COLUMNS, gap_predictions
+from fusetune.analyze.replaying.gap_predictions import gap_predictions
 from fusetune.analyze.replaying.store.parts import PREDICTED, RECORDED
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS, FLAGS_ROW, INNOVATION_ROW, LOCAL_POSITION_ROW, STATE_ROW
@@ -66,12 +66,8 @@ def prediction_table(results: Sequence[GapResult]) -> pa.Table:
 
     `innovation_variance` is the mean of the variances that the filter claims; `n` counts the averaged samples.
     """
-    columns: dict[str, list[np.ndarray]] = {name: [] for name in PREDICTION_COLUMNS}
-    for number, result in enumerate(results):
-        for name, values in gap_predictions(number, result).items():
-            columns[name].append(values)
+    table = gap_predictions(results)
     sensors = pa.array([result.gap.sensor for result in results], pa.string())
-    table = {name: np.concatenate([np.zeros(0, dtype), *columns[name]]) for name, dtype in PREDICTION_COLUMNS.items()}
     source = pa.DictionaryArray.from_arrays(pa.array(table.pop("source")), pa.array(AID_SOURCE_NAMES))
     return pa.table({"sensor": sensors.take(pa.array(table["gap"])), "source": source} | table)
 
