@@ -142,6 +142,10 @@ def take_the_folder():
             for log in INPUTS.found.logs:
                 CONTENT.of(log.path)
             CONTENT.save()
+        if workflow.local_exec:
+            # Snakemake 9.27 looks through all jobs again some time after each look where their rate is limited, so
+            # with every job that ends it looks once a second more; here jobs begin no faster than others end.
+            workflow.scheduling_settings.max_jobs_per_timespan = None
         if not workflow.touch:
             # it imports while Snakemake looks for what there is to do
             job_server()
