@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from fusetune.design import write_design
+from fusetune.design.outputs import write_design
 from fusetune.design.study import load_study
 
 

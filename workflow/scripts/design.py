@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusetune.design import write_design
+from fusetune.design.outputs import write_design
 from fusetune.design.parameter_sets import ParameterSet
 
 from job import keep_out, logged_job

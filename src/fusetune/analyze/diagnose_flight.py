@@ -1,4 +1,4 @@
-"""All that is told of a saved flight before any set is compared: health, single effects, noise of its sensors, causes.
+"""All that is told of a saved flight before any set is compared: health, effects, noise and delays of sensors, causes.
 
 One process does it all: flight, replay and motion are shared. A flight that cannot be replayed is asked as well, and of
 a log that could not be read there is nothing to tell.
@@ -17,13 +17,21 @@ from fusetune.analyze.conformance.track_file import write_track
 from fusetune.analyze.diagnosis.diagnose import diagnose
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.effects.all_effects import FlightEffects
-from fusetune.analyze.effects.joined_effects import effects_document
-from fusetune.analyze.flight_files import DIAGNOSIS_FILE, EFFECTS_FILE, HEALTH_FILE, SENSOR_NOISE_FILE, TRACK_FILE
+from fusetune.analyze.effects.effect_files import effects_document
+from fusetune.analyze.flight_files import (
+    DELAYS_FILE,
+    DIAGNOSIS_FILE,
+    EFFECTS_FILE,
+    HEALTH_FILE,
+    SENSOR_NOISE_FILE,
+    TRACK_FILE,
+)
 from fusetune.analyze.health.health_files import health_document
 from fusetune.analyze.health.health_row import HealthRow
 from fusetune.analyze.health.health_table import DEFAULTS, health_rows
 from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise, sensor_noise
 from fusetune.errors import OF_DAMAGE
@@ -45,6 +53,7 @@ def diagnose_flight(
     *,
     replay: ReplaySettings = IN_USE,
     health: HealthSettings = DEFAULTS,
+    present: Mapping[str, float] | None = None,
 ) -> tuple[Diagnosis, ...]:
     """Write `health.json`, `effects.json`, `sensor_noise.json`, `diagnosis.json` and `track.parquet` of a saved flight.
 
@@ -52,6 +61,7 @@ def diagnose_flight(
     ----------
     flight_folder : `results/save/<flight>`
     output_folder : `results/analyze/<flight>`
+    present : values of the present set, with which `delays.json` is written, too; None writes none
 
     Returns
     -------
@@ -62,25 +72,72 @@ def diagnose_flight(
     UserError
         The saved flight is missing or damaged.
     """
-    name = Path(flight_folder).name
     metadata = read_flight_document(Path(flight_folder) / METADATA_FILE)
     is_replayable = metadata["verdict"]["status"] == REPLAYABLE
     used = {entry["topic"] for entry in metadata.get("topics", ()) if is_used(entry["topic"])}
     # of a log that could not be read nothing was saved
-    logged = load_flight(flight_folder, topics=used) if used else Flight(name)
+    logged = load_flight(flight_folder, topics=used) if used else Flight(Path(flight_folder).name)
+    observed = _observed(logged, replay)
+    documents, found, track = _told(observed, metadata, health)
+    if present is not None:
+        documents[DELAYS_FILE] = _delays(observed, present if is_replayable else None)
+    _write(Path(output_folder), documents)
+    write_track(Path(output_folder) / TRACK_FILE, track)
+    return found
+
+
+def estimate_delays(
+    flight_folder: AnyPath,
+    output_folder: AnyPath,
+    present: Mapping[str, float],
+    *,
+    replay: ReplaySettings = IN_USE,
+) -> None:
+    """Write `delays.json` of a saved flight alone, as `diagnose_flight` does with all else.
+
+    Parameters
+    ----------
+    present : values of the present set
+
+    Raises
+    ------
+    UserError
+        The saved flight is missing or damaged.
+    """
+    metadata = read_flight_document(Path(flight_folder) / METADATA_FILE)
+    is_replayable = metadata["verdict"]["status"] == REPLAYABLE
+    logged = load_flight(flight_folder, REPLAY_TOPICS) if is_replayable else Flight(Path(flight_folder).name)
+    document = _delays(_observed(logged, replay), present if is_replayable else None)
+    _write(Path(output_folder), {DELAYS_FILE: document})
+
+
+def _observed(logged: Flight, replay: ReplaySettings) -> ObservedFlight:
     # nothing here asks what the filter predicts without a sensor, which takes most of a replay's time and memory
-    observed = ObservedFlight(logged, replace(replay, withholding=None))
+    return ObservedFlight(logged, replace(replay, withholding=None))
+
+
+def _delays(observed: ObservedFlight, present: Mapping[str, float] | None) -> dict[str, Any]:
+    """Delays by a replay of the present set; none without it."""
+    found = () if present is None else observed.delays(present)
+    return {"flight": observed.logged.name, "delays": [one.document() for one in found]}
+
+
+def _told(
+    observed: ObservedFlight, metadata: Mapping[str, Any], health: HealthSettings
+) -> tuple[dict[str, dict[str, Any]], tuple[Diagnosis, ...], FlownTrack | None]:
+    """The documents by their files, what is wrong, and the track."""
+    logged, is_replayable = observed.logged, metadata["verdict"]["status"] == REPLAYABLE
+    name, start_us = logged.name, int(logged.start_timestamp)
     asked = _Asked(is_replayable)
     no_rows: tuple[HealthRow, ...] = ()
     rows = asked.about("health", no_rows, lambda: health_rows(observed, health))
     tuned = FlightEffects(observed)
     effects = tuned.all() if is_replayable else ()
-    untold = SensorNoise(name, int(logged.start_timestamp), (), (), {}, (), 0.0)
+    untold = SensorNoise(name, start_us, (), (), {}, (), 0.0)
     noise = asked.about("sensor noise", untold, lambda: sensor_noise(observed.flight, observed.airborne))
     nothing: tuple[Diagnosis, ...] = ()
     found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=tuned))
     track = asked.about("track", None, lambda: _track(observed, is_replayable))
-    start_us = int(logged.start_timestamp)
     documents = {
         HEALTH_FILE: health_document(logged, rows),
         EFFECTS_FILE: effects_document(name, effects),
@@ -96,9 +153,7 @@ def diagnose_flight(
             "not_told": asked.failed,
         },
     }
-    _write(Path(output_folder), documents)
-    write_track(Path(output_folder) / TRACK_FILE, track)
-    return found
+    return documents, found, track
 
 
 def _track(observed: ObservedFlight, is_replayable: bool) -> FlownTrack | None:

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write them; always `DONE`."""
-    from fusetune.design import write_design
+    from fusetune.design.outputs import write_design
 
     write_design(options.mission, options.study, options.out)
     return DONE

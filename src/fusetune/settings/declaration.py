@@ -12,6 +12,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from functools import cache
 from types import NoneType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -89,9 +90,15 @@ def meaning_of(kind: type) -> str:
     return " ".join(paragraph.split()).removesuffix(".")
 
 
+@cache
+def _types_of(kind: type) -> Mapping[str, Any]:
+    """Field → its type, whose words Python evaluates anew each time it is asked."""
+    return get_type_hints(kind)
+
+
 def declared(kind: type) -> Iterator[DeclaredSetting]:
     """The settings of a dataclass, in their order."""
-    types = get_type_hints(kind)
+    types = _types_of(kind)
     for each in fields(kind):
         if _KEY in each.metadata:
             default = each.default if each.default_factory is MISSING else each.default_factory()
@@ -109,7 +116,7 @@ def built(kind: type[Settings], values: Mapping[str, Any]) -> Settings:
 
     Lists become tuples, whole numbers floats where the field is one, texts days, and mappings dataclasses.
     """
-    types = get_type_hints(kind)
+    types = _types_of(kind)
     return kind(**{name: _converted(types[name], value) for name, value in values.items()})
 
 

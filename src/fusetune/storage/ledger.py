@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,13 @@ class Ledger:
 
     def record(self, name: str, key: str, files: Iterable[str | os.PathLike[str]]) -> None:
         """Enter files that have just been made, and save the record."""
-        self.entries[name] = {"key": key, "files": _digests(files)}
+        self.record_all({name: (key, files)})
+
+    def record_all(self, made: Mapping[str, tuple[str, Iterable[str | os.PathLike[str]]]]) -> None:
+        """Enter several, each with its key and files, and save the record; nothing where there are none."""
+        if not made:
+            return
+        for name, (key, files) in made.items():
+            self.entries[name] = {"key": key, "files": _digests(files)}
         with atomic_path(self.path) as temporary:
             temporary.write_text(json.dumps(self.entries, indent=1, sort_keys=True), encoding="utf-8")

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from fusetune.analyze.effects.effect_files import effects_document, read_effects
 from fusetune.analyze.effects.estimate import Effect, Estimate
-from fusetune.analyze.effects.joined_effects import effects_document, join_effects, read_effects
+from fusetune.analyze.effects.joined_effects import join_effects
 from fusetune.storage.documents import write_document
 
 

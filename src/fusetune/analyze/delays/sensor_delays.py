@@ -71,22 +71,30 @@ class SensorDelay:
         return cls(**{name: value for name, value in document.items() if name != "unit"})
 
 
-def sensor_delays(prepared: PreparedFlight, record: ReplayedSet) -> tuple[SensorDelay, ...]:
+def sensor_delays(
+    prepared: PreparedFlight,
+    record: ReplayedSet,
+    *,
+    motion: InertialMotion | None = None,
+    places: Mapping[str, VelocityPlace | None] | None = None,
+) -> tuple[SensorDelay, ...]:
     """Delays of the sensors that a replay fused and whose delay the flight tells.
 
     Parameters
     ----------
     record : replay of any set on the flight; what it was told of the delays does not matter for what is found
+    motion : of this replay, where it is known
+    places : sensor → what `velocity_place_of` told of it, of this replay, where it has been asked
     """
-    intervals = airborne_intervals(prepared.flight, record.flags)
-    found, motion = [], None
+    intervals, known = airborne_intervals(prepared.flight, record.flags), places or {}
+    found = []
     for sensor in (*VELOCITIES, *LAGGED):
         parameter = SENSORS[sensor].delay_parameter
         told_s = _told(record, parameter) * 1e-3
         if not any(AID_SOURCES[source].sensor == sensor for source in record.fused_sources):
             continue
         if sensor in VELOCITIES:
-            place = velocity_place_of(record, sensor, intervals)
+            place = known[sensor] if sensor in known else velocity_place_of(record, sensor, intervals)
             lag = None if place is None else place.lag
         else:
             imu = prepared.reconstructed.flight.topics["sensor_combined", 0]

@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from fusetune.analyze.effects.effect_files import read_effects
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.pooled import pooled
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, as_float32
 from fusetune.save.flights_table import of_same_vehicle
 from fusetune.set_names import EFFECT_SETS
-from fusetune.storage.documents import read_as, read_document, write_document
+from fusetune.storage.documents import read_as, write_document
 from fusetune.storage.files import AnyPath, atomic_path
 
 FEWEST_FLIGHTS = 2
@@ -113,18 +114,3 @@ def _joined_of(document: Mapping[str, Any]) -> JoinedEffects:
         {key: tuple(names) for key, names in document["flights"].items()},
         document["refusals"],
     )
-
-
-def effects_document(flight: str, effects: Sequence[Effect]) -> dict[str, Any]:
-    """Effects of one flight as JSON holds them."""
-    return {"flight": flight, "effects": [one.document() for one in effects]}
-
-
-def read_effects(file: AnyPath) -> tuple[Effect, ...]:
-    """Read what `effects_document` made; `UserError` where that cannot be."""
-    return tuple(_effect_of(one) for one in read_document(file)["effects"])
-
-
-def _effect_of(document: Mapping[str, Any]) -> Effect:
-    estimates = tuple(Estimate(**one) for one in document["estimates"])
-    return Effect(document["id"], estimates, document["refusal"], document["figures"])

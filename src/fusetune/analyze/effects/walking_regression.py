@@ -20,9 +20,10 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg.lapack import dpbtrf, dpbtrs
 from scipy.special import stdtrit
 
+from fusetune.analyze.metrics.whitened_regression import rows_of_blocks
 from fusetune.analyze.smoothing.smoothed_velocity import NORMAL_QUARTILE
 
 Array = npt.NDArray[np.float64]
@@ -265,8 +266,11 @@ class _Solved:
             band[0, :-states] += self.kept**2 / self.gained
             band[states, :-states] -= self.kept / self.gained
             band[0, :states] += 1.0 / self.first
-            factor = cholesky_banded(band, lower=True, check_finite=False)
-            self.projected = cho_solve_banded((factor, True), given.border, check_finite=False)
+            # as LAPACK has it: it is asked for hundreds of times, and what lies around it takes longer
+            factor, info = dpbtrf(band, lower=1)
+            if info:
+                raise np.linalg.LinAlgError(f"the equations are not positive definite, from row {info} on")
+            self.projected = dpbtrs(factor, given.border, lower=1)[0]
             corner -= np.einsum("ki,kj->ij", given.border, self.projected)
             self.log_information = log_determinant = 2.0 * float(np.sum(np.log(factor[0])))
             log_determinant += states * (knots - 1) * math.log(self.gained) + float(np.sum(np.log(self.first)))
@@ -334,12 +338,9 @@ class _Solved:
         later = given.knot_s[1:] - given.knot_s[0]
         of_steps = np.repeat(np.floor(later / BLOCK_S).astype(np.int64), self.states)
         block = np.concatenate([given.block, np.minimum(of_steps, given.block.max())])
-        changes = []
-        for one in np.unique(given.block):
-            own = block == one
-            part = net[own]
-            moment = part.T @ residual[own]
-            changes.append(np.linalg.pinv(self.normal - part.T @ part, hermitian=True) @ moment)
+        parts = [(net[own], residual[own]) for own in rows_of_blocks(block, np.unique(given.block))]
+        without = np.linalg.pinv(np.stack([self.normal - part.T @ part for part, _ in parts]), hermitian=True)
+        changes = [one @ (part.T @ left) for one, (part, left) in zip(without, parts, strict=True)]
         count = len(changes)
         spread = np.var(np.array(changes), axis=0) * (count - 1)
         return np.sqrt(spread), count

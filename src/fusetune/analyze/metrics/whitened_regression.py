@@ -71,8 +71,7 @@ class Fit:
             return None
         normal, moment = scaled.T @ scaled, scaled.T @ target
         without = []
-        for one in blocks:
-            own = block == one
+        for own in rows_of_blocks(block, blocks):
             part, rest = scaled[own], target[own]
             without.append(np.linalg.lstsq(normal - part.T @ part, moment - part.T @ rest, rcond=None)[0])
         spread = np.sum((np.array(without) - np.mean(without, axis=0)) ** 2, axis=0)
@@ -85,6 +84,13 @@ class Fit:
         left = target - scaled @ self.solution
         variance = float(left @ left) / max(left.size - self.solution.size, 1)
         return np.asarray(np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(scaled.T @ scaled)), 0.0)))
+
+
+def rows_of_blocks(block: npt.NDArray[np.int64], wanted: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
+    """Rows of each wanted block, ascending, where `block` (N,) says in which each row lies."""
+    order = np.argsort(block, kind="stable")
+    first, stop = (np.searchsorted(block[order], wanted, side) for side in ("left", "right"))
+    yield from (order[begin:end] for begin, end in zip(first.tolist(), stop.tolist(), strict=True))
 
 
 def generalised(rows: list[Rows], order: int) -> Fit:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from fusetune.analyze.delays.inertial_motion import InertialMotion, inertial_motion
-from fusetune.analyze.delays.sensor_delays import velocity_place_of
+from fusetune.analyze.delays.sensor_delays import SensorDelay, sensor_delays, velocity_place_of
 from fusetune.analyze.delays.velocity_place import VelocityPlace
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import airborne_intervals
@@ -20,7 +21,7 @@ from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.save.verdict import Verdict, judge
-from fusetune.set_names import AS_FLOWN
+from fusetune.set_names import AS_FLOWN, PRESENT
 
 GROUND_EFFECT_US = 5_000_000
 """After take-off and before landing the ground still shows in the sensors (PX4's ecl_ekf scripts cut as much)."""
@@ -92,6 +93,14 @@ class ObservedFlight:
     def gnss_place(self) -> VelocityPlace | None:
         """Delay and place of the GNSS antenna; None where the flight does not tell them."""
         return velocity_place_of(self.replayed, "gnss", self.airborne)
+
+    def delays(self, overrides: Mapping[str, float]) -> tuple[SensorDelay, ...]:
+        """Delays of the sensors, by a replay with other values of parameters; that which flew where it is the same."""
+        if not self.prepared.is_as_flown(overrides):
+            return sensor_delays(self.prepared, replay_set(self.prepared, PRESENT, overrides))
+        in_air = airborne_intervals(self.flight, self.replayed.flags)
+        places = {"gnss": self.gnss_place} if in_air == self.airborne else {}
+        return sensor_delays(self.prepared, self.replayed, motion=self.inertial, places=places)
 
     def since_start_s(self, timestamp: int) -> float:
         """Seconds from the start of the log, for a time in µs since boot."""

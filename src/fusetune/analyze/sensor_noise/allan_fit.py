@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import nnls
-from scipy.stats import chi2
 
+from fusetune.analyze.metrics.consistency import chi2_quantile
 from fusetune.analyze.sensor_noise.allan import FEWEST_MEANS, KINDS, AllanCurve, NoiseKind, degrees_of_freedom
 from fusetune.analyze.sensor_noise.allan_model import FLICKER, NoiseModel
 
@@ -163,8 +163,8 @@ def interval(deviation: Array, freedom: Array) -> tuple[Array, Array]:
     """95 % interval of deviations with their degrees of freedom: σ² f / χ² (NIST SP 1065, section 5.3)."""
     low, high = (0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE))
     return (
-        np.asarray(deviation * np.sqrt(freedom / chi2.ppf(high, freedom))),
-        np.asarray(deviation * np.sqrt(freedom / chi2.ppf(low, freedom))),
+        np.asarray(deviation * np.sqrt(freedom / chi2_quantile(high, freedom))),
+        np.asarray(deviation * np.sqrt(freedom / chi2_quantile(low, freedom))),
     )
 
 
@@ -277,7 +277,7 @@ def _figure(curve: AllanCurve, kind: NoiseKind, part: float, variance: float) ->
         )
     above = part + NORMAL * deviation
     if freedom > 1.0:
-        above = max(above, part * freedom / float(chi2.ppf(0.5 * (1.0 - CONFIDENCE), freedom)))
+        above = max(above, part * freedom / float(chi2_quantile(0.5 * (1.0 - CONFIDENCE), freedom)))
     return NoiseFigure(None, 0.0, math.sqrt(above), freedom, _refusal(curve, kind))
 
 

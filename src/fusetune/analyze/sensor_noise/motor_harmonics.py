@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import spectrogram
 
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.throttle import Throttle
+from fusetune.analyze.sensor_noise.periodograms import frequencies, periodograms, segment_starts
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
 from fusetune.analyze.sensor_noise.spectrum import Tone, segment_length
 
@@ -122,18 +122,16 @@ def _spectra_in_time(series: SensorSeries, intervals: Sequence[Interval]) -> _Tr
     """Spectral density of short times, axes summed; None of too few."""
     length = segment_length(series) // 2
     times, densities = [], []
-    frequency = np.zeros(0)
     for start, stop in intervals:
         rows = slice(*np.searchsorted(series.time, (start, stop)))
         values, time = series.values[rows], series.time[rows]
         if len(values) < 2 * length:
             continue
-        frequency, middle, power = spectrogram(values, series.rate_hz, "hann", length, length // 2, axis=0)
-        densities.append(power.sum(axis=1).T)
-        times.append(time[np.clip(np.round(middle * series.rate_hz).astype(np.int64), 0, len(time) - 1)])
+        densities += [some.sum(axis=1) for some in periodograms(values, series.rate_hz, length)]
+        times.append(time[segment_starts(len(values), length) + length // 2])
     if not times or sum(map(len, times)) < FEWEST_SPECTRA:
         return None
-    return _Tracks(np.concatenate(times), frequency, np.concatenate(densities))
+    return _Tracks(np.concatenate(times), frequencies(length, series.rate_hz), np.concatenate(densities))
 
 
 def _slope(tracks: _Tracks, tone: Tone, throttle: Array) -> float | None:

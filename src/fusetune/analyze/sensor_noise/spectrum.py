@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import binary_closing, percentile_filter, uniform_filter1d
-from scipy.signal import welch
-from scipy.stats import chi2
 
 from fusetune.analyze.flight.intervals import Interval, stretches
+from fusetune.analyze.metrics.consistency import chi2_quantile
+from fusetune.analyze.sensor_noise.periodograms import frequencies, periodograms, segment_starts
 from fusetune.analyze.sensor_noise.sensor_series import SensorSeries
 
 Array = npt.NDArray[np.float64]
@@ -78,7 +78,7 @@ class Spectrum:
         band = (self.frequency_hz >= min(LOWEST_FLOOR_HZ, 0.5 * highest)) & (self.frequency_hz <= highest)
         together = max(round(_SMOOTHED_HZ / self.resolution_hz), 1)
         independent = max(_CORRELATION_OF_SEGMENTS * self.segments, 1.0) * max(together / _BINS_OF_HANN, 1.0)
-        below = float(chi2.ppf(FLOOR, 2.0 * independent)) / (2.0 * independent)
+        below = float(chi2_quantile(FLOOR, 2.0 * independent)) / (2.0 * independent)
         smooth = uniform_filter1d(self.density, together, axis=0, mode="nearest")
         return float(np.mean(np.quantile(smooth[band], FLOOR, axis=0))) / below
 
@@ -103,17 +103,12 @@ def spectrum(series: SensorSeries, intervals: Sequence[Interval]) -> Spectrum | 
     """Welch's estimate over all stretches without a gap inside the intervals, µs; None where they are too short."""
     length = segment_length(series)
     pieces = series.pieces(intervals, length * series.step_s)
-    density, segments, frequency = np.zeros((length // 2 + 1, series.values.shape[1])), 0, np.zeros(0)
-    for piece in pieces:
-        count = 1 + (len(piece) - length) // (length // 2)
-        if count < 1:
-            continue
-        frequency, one = welch(piece, 1.0 / series.step_s, nperseg=length, axis=0)
-        density += one * count
-        segments += count
+    segments = sum(len(segment_starts(len(piece), length)) for piece in pieces)
     if segments < FEWEST_SEGMENTS:
         return None
-    return Spectrum(frequency[1:], (density / segments)[1:], segments)
+    rate_hz = 1.0 / series.step_s
+    density = sum(some.sum(axis=0) for piece in pieces for some in periodograms(piece, rate_hz, length))
+    return Spectrum(frequencies(length, rate_hz)[1:], (np.asarray(density).T / segments)[1:], segments)
 
 
 def segment_length(series: SensorSeries) -> int:

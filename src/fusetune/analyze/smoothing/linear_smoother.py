@@ -16,11 +16,11 @@ smoother as a Gauss-Newton method", 1994.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve, cholesky_banded
-from scipy.linalg.lapack import dtbtrs
+from scipy.linalg.lapack import dpbtrf, dpotrf, dpotrs, dtbtrs
 
 Array = npt.NDArray[np.float64]
 
@@ -99,6 +99,11 @@ class Equations:
     border: Array
     corner: Array
 
+    @property
+    def arrays(self) -> tuple[Array, Array, Array]:
+        """All three."""
+        return self.banded, self.border, self.corner
+
 
 def equations(model: LinearModel, process: Array, measurement: Array) -> Equations:
     """Those of a model's residuals, without what is known of x_0 and g.
@@ -119,31 +124,40 @@ def equations(model: LinearModel, process: Array, measurement: Array) -> Equatio
     border[:-1] += left @ moves
     border[1:] -= process[:, :, None] * moves
     corner = _summed(sights, measurement) + _summed(moves, process)
-    return Equations(_banded(diagonal, -np.swapaxes(left, 1, 2)), border.reshape(epochs * size, -1), corner)
+    # as LAPACK wants them in memory, or it is given copies
+    banded = np.asfortranarray(_banded(diagonal, -np.swapaxes(left, 1, 2)))
+    return Equations(banded, np.asfortranarray(border.reshape(epochs * size, -1)), corner)
 
 
 class Solved:
     """x is eliminated by A = L Lᵀ of its part, g from what is left; what is left then, of the 1, is the cost.
 
+    LAPACK is called as it is: a search asks for some hundred of these, and what else its callers do takes as long.
+
     Attributes
     ----------
-    constants, constant_covariance : (m,), (m, m)
+    constants : (m,)
     cost : of the most probable course
     log_determinant : of the equations of x and g
     """
 
     def __init__(self, given: Equations) -> None:
         """`given` is used up."""
-        self._factor = cholesky_banded(given.banded, overwrite_ab=True, lower=True, check_finite=False)
+        self._factor = _positive(dpbtrf(given.banded, lower=1, overwrite_ab=1))
         self._halved, info = dtbtrs(self._factor, given.border, uplo="L")
         assert info == 0, "a Cholesky factor has no zeros on its diagonal"
         # not by a matrix product: its order of summation could change with the number of cores
         corner = given.corner - np.einsum("ki,kj->ij", self._halved, self._halved)
-        schur = cho_factor(corner[:-1, :-1], lower=True, check_finite=False)
-        self.constants = -cho_solve(schur, corner[:-1, -1], check_finite=False)
-        self.constant_covariance = cho_solve(schur, np.eye(self.constants.size), check_finite=False)
+        self._schur = _positive(dpotrf(corner[:-1, :-1], lower=1, clean=0))
+        self.constants: Array = -dpotrs(self._schur, corner[:-1, -1], lower=1)[0]
         self.cost = float(corner[-1, -1] + corner[-1, :-1] @ self.constants)
-        self.log_determinant = 2.0 * float(np.sum(np.log(self._factor[0])) + np.sum(np.log(np.diag(schur[0]))))
+        logarithms = np.log(self._factor[0]).sum() + np.log(self._schur.diagonal()).sum()
+        self.log_determinant = 2.0 * float(logarithms)
+
+    @cached_property
+    def constant_covariance(self) -> Array:
+        """(m, m)"""
+        return np.asarray(dpotrs(self._schur, np.eye(self.constants.size), lower=1)[0])
 
     def states(self) -> Array:
         """(N n,) by the other half of the factor."""
@@ -151,6 +165,14 @@ class Solved:
         found, info = dtbtrs(self._factor, right[:, None], uplo="L", trans="T")
         assert info == 0, "a Cholesky factor has no zeros on its diagonal"
         return np.asarray(found)[:, 0]
+
+
+def _positive(found: tuple[Array, int]) -> Array:
+    """A Cholesky factor, of LAPACK's answer."""
+    factor, info = found
+    if info:
+        raise np.linalg.LinAlgError(f"the equations are not positive definite, from row {info} on")
+    return factor
 
 
 def smooth(model: LinearModel) -> Smoothed:

@@ -58,17 +58,23 @@ class NoiseTerms:
         ----------
         factors : on the variances of the process noises, then of the measurement noises
         """
-        banded = sum(term.banded / factor for term, factor in zip(self._terms, factors, strict=True))
-        border = sum(term.border / factor for term, factor in zip(self._terms, factors, strict=True))
-        corner = sum(term.corner / factor for term, factor in zip(self._terms, factors, strict=True))
-        given = Equations(np.asarray(banded), np.asarray(border), np.asarray(corner))
+        given = self._summed(factors)
         given.banded[0, : self._first.size] += 1.0 / self._first
-        given.corner[:-1, :-1] += np.diag(1.0 / self._constants)
+        given.corner.ravel()[: -given.corner.shape[0] : given.corner.shape[0] + 1] += 1.0 / self._constants
         log_variances = self._log_variances + float(self._counts @ np.log(factors))
         if markov is not None:
             log_variances += self._add_markov(given.banded, markov)
         solved = Solved(given)
         return Likelihood(solved.cost, solved.log_determinant + log_variances)
+
+    def _summed(self, factors: Sequence[float]) -> Equations:
+        first, *others = zip(self._terms, factors, strict=True)
+        banded, border, corner = (values / first[1] for values in first[0].arrays)
+        for term, factor in others:
+            banded += term.banded / factor
+            border += term.border / factor
+            corner += term.corner / factor
+        return Equations(banded, border, corner)
 
     def _add_markov(self, banded: Array, markov: GaussMarkov) -> float:
         """Their equations; the logarithms of their variances."""
