@@ -114,7 +114,7 @@ def job_server():
     server = start_job_server(
         shell.get_executable(),
         PROJECT / "workflow" / "scripts",
-        ahead=["save_flight.py", "diagnose_flight.py", "estimate_delays.py", "analyze_flight.py", "flight_page.py"],
+        ahead=["save_flight.py", "tell_flight.py", "analyze_flight.py", "flight_page.py"],
         prepare="fusetune.ekf2.replay.warm_up:load_kernels",
         when="fusetune.ekf2.replay.loop",
     )
