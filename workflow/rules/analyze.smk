@@ -1,29 +1,5 @@
 if MENDS_DELAYS:
 
-    rule estimate_delays:
-        input:
-            flight="results/save/{flight}",
-            present=ancient("results/save/present.json"),
-            kernels=KERNELS_READY,
-        output:
-            update(replay_files([PRESENT])),
-            delays="results/analyze/{flight}/delays.json",
-        log:
-            "results/logs/delays/{flight}.log",
-        conda:
-            "../envs/fusetune.yaml"
-        resources:
-            **replay_resources(1, 1),
-        params:
-            sets=overrides_of([PRESENT]),
-            replay=asdict(SETTINGS.replay),
-            code=DIGEST["replay"],
-            delay_code=DIGEST["delays"],
-        message:
-            "Analyze: replay {wildcards.flight} with the present parameters, estimate delays"
-        script:
-            "../scripts/estimate_delays.py"
-
     # Whether there are sets with mended delays, or with other effects as measured, is known when all flights have told.
     checkpoint join_delays:
         input:
@@ -63,10 +39,9 @@ rule analyze_flight:
         kernels=KERNELS_READY,
         delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
         effects=ancient("results/analyze/effects.json") if MENDS_DELAYS else [],
-        present_replay=replay_files([PRESENT]) if MENDS_DELAYS else [],
         found="results/search/found.json" if SEARCH else [],
     output:
-        update(replay_files([AS_FLOWN] if MENDS_DELAYS else [PRESENT, AS_FLOWN])),
+        update(replay_files([PRESENT, AS_FLOWN])),
         expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
     log:
         "results/logs/analyze/{flight}.log",

@@ -3,7 +3,7 @@ import csv
 from dataclasses import astuple, replace
 from functools import cache
 
-from fusetune.analyze.flight_files import DIAGNOSED_FILES, FLIGHT_FILES
+from fusetune.analyze.flight_files import CONFORMANCE_FILE, DELAYS_FILE, DIAGNOSED_FILES, FLIGHT_FILES, TRACK_FILE
 from fusetune.analyze.replaying.store.parts import PARTS
 from fusetune.apply.parameter_files.names import PARAMETER_FILES
 from fusetune.design.covariance.named_files import files_of_design
@@ -26,6 +26,12 @@ ANALYZED_FILES = [
     *(f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES),
 ]
 """What the analysis of a flight leaves that others read."""
+
+
+MENDS_DELAYS = SETTINGS.delays.mend
+
+TOLD_FILES = [*DIAGNOSED_FILES, TRACK_FILE, CONFORMANCE_FILE, *([DELAYS_FILE] if MENDS_DELAYS else [])]
+"""What is told of a flight before any set is compared."""
 
 
 def read_csv(path):
@@ -66,21 +72,12 @@ def sets_found():
     return SETS.found(present_found()) if SETS.around else SETS
 
 
-def overrides_of(names):
-    """Params function: the values of some sets, so that only sets whose values change are replayed again."""
-    return lambda wildcards: SETS.overrides(names, present_found().parameters if PRESENT in names else {})
-
-
 def sets_of_analysis(wildcards):
     """Params function: the values of all sets that a flight is replayed with."""
     present = present_found()
     around = {pset.name: pset.overrides for pset in present.sets}
-    names = [name for name in SETS.replayed if name != PRESENT or not MENDS_DELAYS]
     mended = SETS.mended(SETS.mendable, present.parameters, mended_delays()) if mended_delays() else {}
-    return {**SETS.overrides(names, present.parameters), **around, **mended, **effect_overrides(wildcards)}
-
-
-MENDS_DELAYS = SETTINGS.delays.mend
+    return {**SETS.overrides(SETS.replayed, present.parameters), **around, **mended, **effect_overrides(wildcards)}
 
 
 def mended_delays():

@@ -114,7 +114,7 @@ def job_server():
     server = start_job_server(
         shell.get_executable(),
         PROJECT / "workflow" / "scripts",
-        ahead=["save_flight.py", "diagnose_flight.py", "estimate_delays.py", "analyze_flight.py", "flight_page.py"],
+        ahead=["save_flight.py", "tell_flight.py", "analyze_flight.py", "flight_page.py"],
         prepare="fusetune.ekf2.replay.warm_up:load_kernels",
         when="fusetune.ekf2.replay.loop",
     )
@@ -142,6 +142,10 @@ def take_the_folder():
             for log in INPUTS.found.logs:
                 CONTENT.of(log.path)
             CONTENT.save()
+        if workflow.local_exec:
+            # Snakemake 9.27 looks through all jobs again some time after each look where their rate is limited, so
+            # with every job that ends it looks once a second more; here jobs begin no faster than others end.
+            workflow.scheduling_settings.max_jobs_per_timespan = None
         if not workflow.touch:
             # it imports while Snakemake looks for what there is to do
             job_server()
