@@ -17,7 +17,7 @@ from fusetune.analyze.flight.manoeuvre_classes import FLOWN_CLASSES
 from fusetune.apply.by_manoeuvre import by_manoeuvre
 from fusetune.apply.decide import decide
 from fusetune.apply.evidence import AIDED, AimEvidence, AnalyzedFlight, FlightEvidence
-from fusetune.apply.pieces_evidence import PiecesOfFlight, evidence_in, in_classes
+from fusetune.apply.pieces_evidence import PiecesOfFlight, Words, evidence_in, in_classes
 from fusetune.apply.settings import DecisionSettings
 from fusetune.storage.documents import read_document, write_document
 
@@ -40,9 +40,8 @@ def made_flight(number: int) -> tuple[FlightEvidence, PiecesOfFlight]:
     ]
     name, kind, piece, label, nis = zip(*rows, strict=True)
     pieces = PiecesOfFlight(
-        "lanes", np.array(name, object), np.array(kind, object), np.array(piece), np.array(piece) // 3,
-        np.array([AIDED] * len(rows), object), np.array(label, object), np.full(len(rows), 100.0), np.array(nis),
-        np.zeros(len(rows)),
+        "lanes", Words.of(name), Words.of(kind), np.array(piece), np.array(piece) // 3, Words.of([AIDED] * len(rows)),
+        Words.of(label), np.full(len(rows), 100.0), np.array(nis), np.zeros(len(rows)),
     )  # fmt: skip
     sums = np.array(nis).reshape(2, 6, 2)
     aim = AimEvidence(AIDED, 1.0, COLUMNS, np.array([0.5, 0.5]), np.full((6, 2), 100.0), sums, np.zeros((2, 6, 2)))

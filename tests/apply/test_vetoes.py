@@ -11,7 +11,7 @@ from tests.apply.statistics.test_leave_one_out import flight as evidence
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.vetoes import vetoes
+from fusetune.apply.vetoes import break_rates, vetoes
 
 SETTINGS = DecisionSettings()
 NOTHING = METRICS_SCHEMA.empty_table()
@@ -36,7 +36,7 @@ def flights(own: list[dict[str, Any]], base: list[dict[str, Any]] | None = None)
 
 
 def reasons(made: list[AnalyzedFlight], metrics: pa.Table = NOTHING) -> list[str]:
-    return vetoes("b", "a", made, metrics, SETTINGS)
+    return vetoes("b", "a", made, break_rates(metrics), SETTINGS)
 
 
 def resets(*counts: int) -> list[dict[str, Any]]:

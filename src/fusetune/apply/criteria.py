@@ -30,6 +30,9 @@ _FIGURES = {
 }
 """Criterion → source, axis and metric in the metrics table."""
 
+_METRICS = sorted({metric for _, _, metric in _FIGURES.values()} | {"lag1_correlation", "break_rate_gate"})
+"""What is looked up: a small part of what a flight has."""
+
 _AIDING = tuple(source.name for source in AID_SOURCES.values() if source.summed)
 
 
@@ -48,7 +51,8 @@ def criteria(
 
 
 def _indexed(metrics: pa.Table, flights: set[str]) -> dict[tuple[str, str, str, str], list[float]]:
-    kept = metrics.filter(pc.is_in(metrics["flight"], value_set=pa.array(sorted(flights), pa.string())))
+    counted = pc.is_in(metrics["flight"], value_set=pa.array(sorted(flights), pa.string()))
+    kept = metrics.filter(pc.and_(counted, pc.is_in(metrics["metric"], value_set=pa.array(_METRICS))))
     index: dict[tuple[str, str, str, str], list[float]] = defaultdict(list)
     columns = (kept[name].to_pylist() for name in ("set", "source", "axis", "metric", "value"))
     for set_name, source, axis, metric, value in zip(*columns, strict=True):
@@ -111,11 +115,13 @@ def paper_entries(
     """What paper mode needs of every set; consistent means within the paper's bounds on at least half the flights."""
     names = {flight.name for flight in flights if flight.evidence is not None}
     wanted = pc.and_(pc.equal(metrics["metric"], "mean_nis"), pc.equal(metrics["source"], "gnss_vel"))
-    rows = [row for row in metrics.filter(wanted).to_pylist() if row["axis"] == "all" and row["flight"] in names]
+    inside: dict[str, list[bool]] = {}
+    for row in metrics.filter(wanted).to_pylist():
+        if row["axis"] == "all" and row["flight"] in names and is_known(row):
+            inside.setdefault(row["set"], []).append(is_inside(row))
     entries = []
     for name in sets:
-        inside = [is_inside(row) for row in rows if row["set"] == name and is_known(row)]
-        consistent = bool(np.mean(inside) >= 0.5) if inside else None
+        consistent = bool(np.mean(inside[name]) >= 0.5) if name in inside else None
         rate = values[name]["break_rate_gate"]
         rate = 0.0 if math.isnan(rate) else rate
         entries.append(PaperEntry(name, values[name]["paper_aggregate_rms"], consistent, rate))

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
@@ -54,7 +55,7 @@ from fusetune.apply.sensitivity.result import Sensitivity
 from fusetune.apply.sensitivity.sensitivity import sensitivity
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.study_trials import trials_of_study
-from fusetune.apply.vetoes import vetoes
+from fusetune.apply.vetoes import break_rates, vetoes
 from fusetune.apply.wording import named, paragraph, smaller
 from fusetune.errors import UserError
 from fusetune.finding import documents
@@ -224,7 +225,8 @@ def _ranked_and_chosen(
     recommended: Recommended | None = None,
 ) -> tuple[list[RankedSet], Choice]:
     """Sets against one of them, and what is chosen among them."""
-    vetoed = {name: vetoes(name, present, flights, metrics, settings) for name in sets if name != present}
+    rates = break_rates(metrics)
+    vetoed = {name: vetoes(name, present, flights, rates, settings) for name in sets if name != present}
     if recommended is not None and recommended.name in vetoed:
         vetoed[recommended.name] += recommended.objections
     ranked = rank(sets, present, flights, {name: why for name, why in vetoed.items() if why}, settings)
@@ -446,11 +448,12 @@ def _write_per_flight(folder: Path, flights: Sequence[AnalyzedFlight]) -> None:
     for flight in flights:
         if flight.evidence is not None:
             parts = {aim: flight.evidence.aim(aim) for aim in AIMS}
+            unknown = np.full(len(flight.evidence.sets), np.nan)
+            scores = {"score": flight.evidence.scores}
+            scores |= {f"{aim}_score": unknown if part is None else part.scores for aim, part in parts.items()}
             for index, name in enumerate(flight.evidence.sets):
-                row = {"flight": flight.name, "set": name, "score": float(flight.evidence.scores[index])}
-                for aim, part in parts.items():
-                    row[f"{aim}_score"] = float(part.scores[index]) if part is not None else math.nan
-                rows.append(row)
+                own = {figure: float(values[index]) for figure, values in scores.items()}
+                rows.append({"flight": flight.name, "set": name, **own})
     figures = ["score", *(f"{aim}_score" for aim in AIMS)]
     schema = pa.schema([("flight", pa.string()), ("set", pa.string()), *((name, pa.float64()) for name in figures)])
     with atomic_path(folder / "per_flight.parquet") as temporary:

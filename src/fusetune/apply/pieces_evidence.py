@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +28,25 @@ _COLUMNS = ("flight", "mission", "set", "class", "piece", "leg", "aim", "source"
 
 
 @dataclass(frozen=True)
+class Words:
+    """A column of few different words; `codes` (N,) are their places in `words`."""
+
+    words: tuple[str, ...]
+    codes: npt.NDArray[np.integer]
+
+    @classmethod
+    def of(cls, column: Sequence[str]) -> Words:
+        """A column as it is written."""
+        words, codes = np.unique(np.array(column, dtype=str), return_inverse=True)
+        return cls(tuple(words.tolist()), codes)
+
+    def places_in(self, order: Sequence[str]) -> npt.NDArray[np.int64]:
+        """(N,) the place of each row's word in a sequence of words, −1 where it is none of them."""
+        places = {word: place for place, word in enumerate(order)}
+        return np.array([places.get(word, -1) for word in self.words], np.int64)[self.codes]
+
+
+@dataclass(frozen=True)
 class PiecesOfFlight:
     """Rows of `results/analyze/legs.parquet` of one flight, as arrays (N,).
 
@@ -40,19 +58,19 @@ class PiecesOfFlight:
     """
 
     mission: str
-    name: npt.NDArray[Any]
-    kind: npt.NDArray[Any]
+    name: Words
+    kind: Words
     piece: npt.NDArray[np.int64]
     leg: npt.NDArray[np.int64]
-    aim: npt.NDArray[Any]
-    label: npt.NDArray[Any]
+    aim: Words
+    label: Words
     n: Array
     sum_nis: Array
     sum_log_variance: Array
 
     def of_classes(self, classes: Sequence[str]) -> Flags:
         """Rows of some manoeuvre classes."""
-        return np.isin(self.kind, list(classes))
+        return np.asarray(self.kind.places_in(classes) >= 0)
 
     def of_leg(self, leg: int) -> Flags:
         """Rows of a leg of the mission."""
@@ -73,39 +91,42 @@ def read_flight_pieces(path: AnyPath) -> dict[str, PiecesOfFlight]:
 
 
 def _of_flight(table: pa.Table) -> PiecesOfFlight:
-    text = {name: _texts(table[name]) for name in ("set", "class", "aim", "source")}
-    axis, horizon = table["axis"].to_numpy(), pc.fill_null(table["horizon_s"], np.nan).to_numpy()
-    keys, place = np.unique(
-        np.rec.fromarrays([text["source"].astype(str), axis, np.nan_to_num(horizon)]), return_inverse=True
-    )
-    labels = np.array(
-        [
-            f"{source} {AXES[axis]}" + (f" after {seconds:g} s" if seconds else "")
-            for source, axis, seconds in keys.tolist()
-        ],
-        dtype=object,
-    )
-    is_aided = text["aim"] == AIDED
+    name, kind, aim, source = (_words(table[column]) for column in ("set", "class", "aim", "source"))
+    horizon = np.nan_to_num(pc.fill_null(table["horizon_s"], np.nan).to_numpy())
+    is_aided = aim.places_in([AIDED]) == 0
     # of an error without the sensor, and of the smoothed velocity, the error alone counts, as in the whole decision
     nis = np.where(is_aided, table["sum_nis"].to_numpy(), table["sum_squares"].to_numpy())
     log_variance = np.where(is_aided, table["sum_log_variance"].to_numpy(), 0.0)
     return PiecesOfFlight(
         str(table["mission"][0].as_py()),
-        text["set"],
-        text["class"],
+        name,
+        kind,
         table["piece"].to_numpy().astype(np.int64),
         pc.fill_null(table["leg"], -1).to_numpy().astype(np.int64),
-        text["aim"],
-        labels[place],
+        aim,
+        _labels(source, table["axis"].to_numpy(), horizon),
         table["n"].to_numpy().astype(np.float64),
         nis,
         log_variance,
     )
 
 
-def _texts(column: pa.ChunkedArray) -> npt.NDArray[Any]:
+def _words(column: pa.ChunkedArray) -> Words:
     one = column.combine_chunks()
-    return np.array(one.dictionary.to_pylist(), dtype=object)[one.indices.to_numpy()]
+    return Words(tuple(one.dictionary.to_pylist()), one.indices.to_numpy())
+
+
+def _labels(source: Words, axis: npt.NDArray[np.integer], horizon: Array) -> Words:
+    """What a row is of, 0 s standing for no horizon, as `AimEvidence.columns` has it."""
+    times, time = np.unique(horizon, return_inverse=True)
+    numbers = (source.codes.astype(np.int64) * len(AXES) + axis) * times.size + time
+    kept, codes = np.unique(numbers, return_inverse=True)
+    labels = []
+    for number in kept.tolist():
+        seconds = times[number % times.size]
+        place, of_axis = divmod(number // times.size, len(AXES))
+        labels.append(f"{source.words[place]} {AXES[of_axis]}" + (f" after {seconds:g} s" if seconds else ""))
+    return Words(tuple(labels), codes)
 
 
 def evidence_in(whole: FlightEvidence, pieces: PiecesOfFlight, rows: Flags) -> FlightEvidence | None:
@@ -151,17 +172,12 @@ def in_classes(
 
 
 def _aim_in(aim: AimEvidence, sets: Sequence[str], pieces: PiecesOfFlight, rows: Flags) -> AimEvidence | None:
-    rows = rows & (pieces.aim == aim.name) & np.isin(pieces.label, aim.columns) & np.isin(pieces.name, sets)
+    place, column = pieces.name.places_in(sets), pieces.label.places_in(aim.columns)
+    rows = rows & (pieces.aim.places_in([aim.name]) == 0) & (column >= 0) & (place >= 0)
     if not rows.any():
         return None
     blocks, block = np.unique(pieces.piece[rows], return_inverse=True)
-    place = {name: number for number, name in enumerate(sets)}
-    column_of = {label: number for number, label in enumerate(aim.columns)}
-    index = (
-        np.array([place[name] for name in pieces.name[rows]]),
-        block,
-        np.array([column_of[label] for label in pieces.label[rows]]),
-    )
+    index = (place[rows], block, column[rows])
     shape = (len(sets), blocks.size, len(aim.columns))
     n, nis, log_variance = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for sums, values in ((n, pieces.n), (nis, pieces.sum_nis), (log_variance, pieces.sum_log_variance)):

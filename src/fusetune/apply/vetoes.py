@@ -7,6 +7,7 @@ more than one flight, where there are more than one.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -45,14 +46,18 @@ BreakRates = Mapping[tuple[str, str, str, str], tuple[float, float]]
 
 
 def vetoes(
-    name: str, present: str, flights: Sequence[AnalyzedFlight], metrics: pa.Table, settings: DecisionSettings
+    name: str,
+    present: str,
+    flights: Sequence[AnalyzedFlight],
+    rates: Mapping[str, BreakRates],
+    settings: DecisionSettings,
 ) -> list[str]:
     """Reasons in words against a set; empty where there are none.
 
     Parameters
     ----------
     flights : all analysed flights; those that the present set could not be scored on count for nobody
-    metrics : the figures of all flights (columns of `METRICS_SCHEMA`)
+    rates : of each set its own, as `break_rates` finds them
     """
     scored = [flight for flight in flights if flight.evidence is not None]
     reasons = _failures(name, scored, settings)
@@ -64,7 +69,8 @@ def vetoes(
     reasons += event_reasons(pairs, settings)
     reasons += _out_of_range(name, flights)
     names = [flight.name for flight in scored]
-    return reasons + break_reasons(name, present, names, _break_rates((name, present), metrics), settings.confidence)
+    both = {**rates.get(present, {}), **rates.get(name, {})}
+    return reasons + break_reasons(name, present, names, both, settings.confidence)
 
 
 def event_reasons(pairs: EventPairs, settings: DecisionSettings) -> list[str]:
@@ -164,21 +170,17 @@ def _out_of_range(name: str, flights: Sequence[AnalyzedFlight]) -> list[str]:
     return reasons
 
 
-def _break_rates(sets: Sequence[str], metrics: pa.Table) -> BreakRates:
-    rows = metrics.filter(
-        pc.and_(
-            pc.and_(
-                pc.equal(metrics["metric"], "break_rate_gate"),
-                pc.is_in(metrics["axis"], value_set=pa.array(AXES)),
-            ),
-            pc.is_in(metrics["set"], value_set=pa.array(sets)),
-        )
-    ).to_pylist()
-    return {
-        (row["set"], row["source"], row["axis"], row["flight"]): (row["value"], row["n"])
-        for row in rows
-        if math.isfinite(row["value"]) and row["n"] > 0
-    }
+def break_rates(metrics: pa.Table) -> Mapping[str, BreakRates]:
+    """Set → its break rates, of the figures of all flights (columns of `METRICS_SCHEMA`)."""
+    wanted = pc.and_(
+        pc.equal(metrics["metric"], "break_rate_gate"), pc.is_in(metrics["axis"], value_set=pa.array(AXES))
+    )
+    rates: dict[str, dict[tuple[str, str, str, str], tuple[float, float]]] = {}
+    for row in metrics.filter(wanted).to_pylist():
+        if math.isfinite(row["value"]) and row["n"] > 0:
+            key = (row["set"], row["source"], row["axis"], row["flight"])
+            rates.setdefault(row["set"], {})[key] = (row["value"], row["n"])
+    return rates
 
 
 def break_reasons(name: str, present: str, flights: Sequence[str], rates: BreakRates, confidence: float) -> list[str]:
@@ -204,6 +206,8 @@ def break_reasons(name: str, present: str, flights: Sequence[str], rates: BreakR
     return reasons
 
 
+# the present set's are asked for beside every other's
+@lru_cache(maxsize=4096)
 def _interval(rate: tuple[float, float], confidence: float) -> tuple[float, float]:
     share, samples = rate
     bounds = clopper_pearson(round(share * samples), round(samples), confidence)

@@ -22,7 +22,7 @@ from fusetune.apply.history.entries import AFTER, BEFORE, DecisionEntry, Evidenc
 from fusetune.apply.ranking import improvement_percent
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.mean_difference import mean_differences
-from fusetune.apply.vetoes import vetoes
+from fusetune.apply.vetoes import break_rates, vetoes
 
 CONFIRMED, REFUTED, UNKNOWN = "confirmed", "refuted", "not yet known"
 AS_PREDICTED, LESS, MORE = "as predicted", "less", "more"
@@ -46,7 +46,7 @@ def judge_change(
     if not evidence:
         return None
     both = [one for one in evidence if AFTER in one.sets]
-    objections = vetoes(AFTER, BEFORE, measured, metrics_of(measured), settings)
+    objections = vetoes(AFTER, BEFORE, measured, break_rates(metrics_of(measured)), settings)
     paired = _paired(both, settings)
     after = [EvidenceFlight(one.flight, "", "", *_own_scores(one)) for one in both]
     return OutcomeEntry(

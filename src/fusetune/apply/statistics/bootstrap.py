@@ -22,6 +22,9 @@ FEWEST_REDRAWN = 5
 """With fewer units no draw lies as far out as Student's quantiles: of 4, one in 256 has one unit only, and the tail of
 a 95 % interval is 1.2e-4."""
 
+_FIGURES_AT_ONCE = 1 << 16
+"""Of an array: half a megabyte, which stays in the processor's cache."""
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -82,20 +85,31 @@ def _redrawn_aim(aim: AimEvidence, columns: npt.NDArray[np.int64], slots: int, g
     picks = generator.integers(0, blocks, size=(slots, blocks))
     cells = (np.arange(slots)[:, None] * blocks + picks).ravel()
     weights = np.bincount(cells, minlength=slots * blocks).reshape(slots, blocks).astype(np.float64)
-    n = np.zeros((slots, 1, axes))
-    nis = np.zeros((slots, columns.size, axes))
-    log_variance = np.zeros_like(nis)
+    whole = aim.column_scores
+    # all of a thousand sets at once would take gigabytes
+    at_once = max(1, _FIGURES_AT_ONCE // max(slots * axes, 1))
+    parts = [columns[start : start + at_once] for start in range(0, max(columns.size, 1), at_once)]
+    return np.concatenate([_rescored(aim, part, weights, whole) for part in parts], axis=1)
+
+
+def _rescored(aim: AimEvidence, columns: npt.NDArray[np.int64], weights: Array, whole: Array) -> Array:
+    """(slots, S) scores of some sets with each block as often as a slot has drawn it."""
+    slots, blocks = weights.shape
+    n = np.zeros((slots, 1, aim.n.shape[1]))
+    nis = np.zeros((slots, columns.size, aim.n.shape[1]))
+    has_variance = bool(aim.sum_log_variance.any())
+    log_variance = np.zeros_like(nis if has_variance else n)
     # Summed block by block, not by a matrix product: its order of summation could change with the number of cores.
     for block in range(blocks):
         weight = weights[:, block, None, None]
         n += weight * aim.n[block]
         nis += weight * aim.sum_nis[columns, block]
-        if aim.sum_log_variance.any():
+        if has_variance:
             log_variance += weight * aim.sum_log_variance[columns, block]
     with np.errstate(invalid="ignore", divide="ignore"):
         scores = profile_nll(nis / n, log_variance / n)
     # A draw may hold none of the blocks in which a column has samples: then the column says what it says on the whole.
-    scores = np.where(n > 0.0, scores, aim.column_scores[columns])
+    scores = np.where(n > 0.0, scores, whole[columns])
     return np.asarray((scores * aim.column_weights).sum(axis=-1))
 
 

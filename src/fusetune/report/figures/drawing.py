@@ -181,7 +181,17 @@ def decades(axes: Axes) -> None:
 
 
 def _power_of_ten(value: float, _: int | None = None) -> str:
-    return "10" + str(round(math.log10(value))).translate(_RAISED)
+    return power_of_ten(round(math.log10(value)))
+
+
+def power_of_ten(exponent: int) -> str:
+    """As it is printed."""
+    return "10" + str(exponent).translate(_RAISED)
+
+
+def set_title(axes: Axes, words: str) -> None:
+    """The title of axes on top of which nothing stands, so that none of it has to be measured to find a place above."""
+    axes.set_title(words, y=1.0)
 
 
 def label_margins(axes: Axes, left: float = 0.47, below: float = 0.3) -> None:

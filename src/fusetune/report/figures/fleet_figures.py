@@ -1,4 +1,4 @@
-"""Figures of a fleet: each over the flights in the order of time, and as a histogram."""
+"""Figures of a fleet: each over the flights in the order of time, and what its histogram shows."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from matplotlib.ticker import MaxNLocator
 
 from fusetune.apply.fleet.flights import SEVERITIES, FleetTable
 from fusetune.report.figure_words import figure_words
-from fusetune.report.figures.drawing import new_figure
+from fusetune.report.figures.drawing import decades, label_margins, new_figure
+from fusetune.report.figures.histogram_panels import LIMIT_COLOUR, HistogramPanel
 from fusetune.report.severity_words import SEVERITY_COLOURS
 
 Array = npt.NDArray[np.float64]
 
-LIMIT_COLOUR = "#CC0000"
-HISTOGRAM_COLOUR = "#56B4E9"
 _OTHERS_COLOUR = "#8F9BA8"
 _COLUMNS = 3
 _PANEL_INCH = (3.35, 1.75)
@@ -56,15 +55,16 @@ def draw_trends(table: FleetTable, columns: Sequence[int], changes: Sequence[Map
             axes.plot(np.flatnonzero(beyond), values[beyond], "o", markerfacecolor="none", markersize=7,
                       markeredgecolor=SEVERITY_COLOURS[severity], markeredgewidth=1.2)  # fmt: skip
         _steps(axes, table, rows, column, [one for one in changes if (one["id"], one["unit"]) == (name.id, name.unit)])
-        _limit(axes.axhline, name.limit, values)
+        if name.limit is not None and _is_within_reach(name.limit, values):
+            axes.axhline(name.limit, color=LIMIT_COLOUR, linewidth=0.9, linestyle="--")
         axes.set_xlim(-0.6, rows.size - 0.4)
         axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
         if _spans_decades(values):
-            axes.set_yscale("log")
-            axes.minorticks_off()
+            decades(axes)
         else:
             axes.yaxis.set_major_locator(MaxNLocator(4))
         axes.set_xlabel("flight, by date")
+        label_margins(axes, below=0.24)
     _legend(figure, colours)
     return figure
 
@@ -108,32 +108,25 @@ def _steps(
             axes.axvline(edge - 0.5, color="#222222", linewidth=0.8, linestyle=":")
 
 
-def draw_histograms(figures: Sequence[Mapping[str, Any]]) -> Figure:
-    """A panel per figure of `fleet.json`: counts, median, middle 90 %, limit, and how many lie beyond the bins."""
-    figure, panels = _panels(len(figures))
-    for axes, one in zip(panels, figures, strict=True):
-        found, spread = one["histogram"], one["distribution"]
-        edges, counts = np.array(found["edges"]), np.array(found["counts"])
-        axes.set_title(_title(one["id"], one["unit"]), fontsize=7.5)
-        axes.axvspan(spread["p05"], spread["p95"], color="#000000", alpha=0.06, linewidth=0)
-        axes.bar(edges[:-1], counts, np.diff(edges), align="edge", color=HISTOGRAM_COLOUR, edgecolor="white",
-                 linewidth=0.4)  # fmt: skip
-        axes.axvline(spread["median"], color="#222222", linewidth=1.2)
-        _limit(axes.axvline, one["limit"], np.array([edges[0], edges[-1]]))
-        beyond = [f"{found[side]} {side}" for side in ("below", "above") if found[side]]
-        note = f"{spread['n']} flights" + "".join(f", {words}" for words in beyond)
-        axes.text(0.98, 0.95, note, ha="right", va="top", fontsize=6.5, color="#555555", transform=axes.transAxes)
-        axes.yaxis.set_major_locator(MaxNLocator(3, integer=True))
-        axes.xaxis.set_major_locator(MaxNLocator(4))
-        axes.set_ylim(0, 1.25 * max(int(counts.max()), 1))
-        axes.grid(visible=False, axis="x")
-    return figure
+def histogram_panel(one: Mapping[str, Any]) -> HistogramPanel:
+    """A figure of `fleet.json`: counts, median, middle 90 %, limit, and how many lie beyond the bins."""
+    found, spread = one["histogram"], one["distribution"]
+    beyond = [f"{found[side]} {side}" for side in ("below", "above") if found[side]]
+    reachable = _is_within_reach(one["limit"], np.array([found["edges"][0], found["edges"][-1]]))
+    return HistogramPanel(
+        title=_title(one["id"], one["unit"]),
+        edges=found["edges"],
+        counts=found["counts"],
+        usual=(spread["p05"], spread["p95"]),
+        median=spread["median"],
+        limit=one["limit"] if reachable else None,
+        note=f"{spread['n']} flights" + "".join(f", {words}" for words in beyond),
+    )
 
 
-def _limit(line: Any, limit: float | None, values: Array) -> None:
+def _is_within_reach(limit: float | None, values: Array) -> bool:
     known = values[np.isfinite(values)]
-    if limit is not None and known.size and abs(limit) <= _WITHIN_REACH * max(float(np.abs(known).max()), 1e-12):
-        line(limit, color=LIMIT_COLOUR, linewidth=0.9, linestyle="--")
+    return limit is not None and known.size > 0 and abs(limit) <= _WITHIN_REACH * max(float(np.abs(known).max()), 1e-12)
 
 
 def _title(figure: str, unit: str) -> str:

@@ -27,6 +27,7 @@ from fusetune.report.figures.drawing import (
     new_figure,
     save_png,
     set_colours,
+    set_title,
 )
 from fusetune.report.figures.flight_ratios import (
     SMALLEST_RATIO,
@@ -114,7 +115,7 @@ def plot_flight(
 
 
 def _track(axes: Axes, data: _FlightData) -> None:
-    axes.set_title("Track")
+    set_title(axes, "Track")
     gnss = _measured_track(data)
     if gnss is not None:
         axes.plot(gnss[:, 1], gnss[:, 0], ".", color="#D55E00", markersize=3, label="GNSS", zorder=2)
@@ -159,7 +160,7 @@ def _aligned_truth(data: _FlightData) -> Array | None:
 
 
 def _height(axes: Axes, data: _FlightData) -> None:
-    axes.set_title("Height above the origin")
+    set_title(axes, "Height above the origin")
     local = data.local
     for source, colour, label in (("baro_hgt", "#56B4E9", "barometer"), ("gnss_hgt", "#D55E00", "GNSS")):
         samples = data.samples.get((source, 0))
@@ -187,7 +188,7 @@ def _limit_to_bulk(axes: Axes, values: Array) -> None:
 
 
 def _ratios_by_source(axes: Axes, data: _FlightData) -> None:
-    axes.set_title(f"Test ratios of the set “{data.present}”, largest of all axes")
+    set_title(axes, f"Test ratios of the set “{data.present}”, largest of all axes")
     ratios = data.ratios[data.present]
     for source in ratios:
         _draw_ratios(axes, data, ratios[source], linewidth=0.9, label=AID_SOURCES[source].label)
@@ -200,9 +201,9 @@ def _ratios_by_set(axes: Axes, data: _FlightData, colours: dict[str, str]) -> No
     ratios = data.ratios[data.present]
     source = "gnss_vel" if "gnss_vel" in ratios else next(iter(ratios), None)
     if source is None:
-        axes.set_title("No aid source was fused")
+        set_title(axes, "No aid source was fused")
         return
-    axes.set_title(f"Test ratio of {AID_SOURCES[source].label}, all sets, in their colours below")
+    set_title(axes, f"Test ratio of {AID_SOURCES[source].label}, all sets, in their colours below")
     for name in reversed(data.sets):
         if source in data.ratios[name]:
             width = 1.4 if name == data.present else 0.8
@@ -228,7 +229,7 @@ def _finish_ratios(axes: Axes, data: _FlightData) -> None:
 
 
 def _breaks(axes: Axes, data: _FlightData, colours: dict[str, str]) -> None:
-    axes.set_title("Fusion breaks: GNSS, height, magnetometer beyond the gate")
+    set_title(axes, "Fusion breaks: GNSS, height, magnetometer beyond the gate")
     for row, name in enumerate(data.sets):
         times = [time[ratio > 1.0] for time, ratio in data.ratios[name].values()]
         time = data.seconds(np.concatenate(times)) if times else np.zeros(0)

@@ -17,7 +17,7 @@ from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, OnboardSamples
 from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.report.figures.drawing import decades, drawn_rows, label_margins, new_figure
+from fusetune.report.figures.drawing import decades, drawn_rows, label_margins, new_figure, set_title
 from fusetune.report.severity_words import SEVERITY_COLOURS
 
 AID_TOPICS = tuple(source.topic for source in MEASURED_SOURCES.values())
@@ -93,7 +93,7 @@ def _seconds(flight: Flight, time: int) -> float:
 
 
 def _lanes(axes: Axes, flight: Flight, airborne: Sequence[Interval], bars: Sequence[Bar]) -> None:
-    axes.set_title("What was found, and when")
+    set_title(axes, "What was found, and when")
     for row, bar in enumerate(bars):
         height = 0.62 if bar.is_cause else 0.34
         # an instant is to be seen as well

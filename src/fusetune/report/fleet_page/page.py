@@ -11,7 +11,8 @@ import numpy as np
 from fusetune.apply.fleet.flights import OF_FLIGHT
 from fusetune.report.counted import count_words
 from fusetune.report.figures.drawing import figure_style, save_png
-from fusetune.report.figures.fleet_figures import draw_histograms, draw_trends
+from fusetune.report.figures.fleet_figures import draw_trends, histogram_panel
+from fusetune.report.figures.histogram_panels import histograms_svg
 from fusetune.report.fleet_page.answer import fleet_answer
 from fusetune.report.fleet_page.fleet_results import Document, FleetResults, read_fleet_results
 from fusetune.report.fleet_page.matrix import matrix_section
@@ -24,7 +25,7 @@ from fusetune.report.fleet_page.statistics_sections import (
     verdicts_section,
 )
 from fusetune.report.html_page import PageHead, page_links, write_page
-from fusetune.storage.files import AnyPath
+from fusetune.storage.files import AnyPath, atomic_path
 
 TRENDS_FILE = "trends.png"
 
@@ -85,20 +86,21 @@ def plot_fleet(results: FleetResults, figure_folder: AnyPath) -> tuple[Path, lis
     """Draw the trends and the histograms; returns their files, of which there is none where nothing can be drawn."""
     folder = Path(figure_folder)
     trends = folder / TRENDS_FILE
-    for old in (trends, *folder.glob("histograms_*.png")):
+    for old in (trends, *folder.glob("histograms_*.svg")):
         old.unlink(missing_ok=True)
     histograms = []
-    with figure_style():
-        columns = _trend_columns(results)
-        if columns:
+    columns = _trend_columns(results)
+    if columns:
+        with figure_style():
             save_png(draw_trends(results.table, columns, results.changes), trends)
-        drawn = [one for one in results.figures if _is_spread(one)]
-        troubled = [one for one in drawn if one["verdict"]["worst"] in ("warning", "fail")][:_IN_A_PICTURE]
-        others = [one for one in drawn if one not in troubled]
-        parts = [troubled, *(others[start : start + _IN_A_PICTURE] for start in range(0, len(others), _IN_A_PICTURE))]
-        for place, part in enumerate(one for one in parts if one):
-            histograms.append(folder / f"histograms_{place}.png")
-            save_png(draw_histograms(part), histograms[-1])
+    drawn = [one for one in results.figures if _is_spread(one)]
+    troubled = [one for one in drawn if one["verdict"]["worst"] in ("warning", "fail")][:_IN_A_PICTURE]
+    others = [one for one in drawn if one not in troubled]
+    parts = [troubled, *(others[start : start + _IN_A_PICTURE] for start in range(0, len(others), _IN_A_PICTURE))]
+    for place, part in enumerate(one for one in parts if one):
+        histograms.append(folder / f"histograms_{place}.svg")
+        with atomic_path(histograms[-1]) as temporary:
+            temporary.write_text(histograms_svg([histogram_panel(one) for one in part]), encoding="utf-8")
     return trends, histograms
 
 
