@@ -155,20 +155,20 @@ def _add_ground(
     if ground.intervals and not excluded:
         masks = yardstick.ground_masks
         if record is yardstick.present:
-            found = counted_of_its_own(record, masks)
+            sources = counted_of_its_own(record, masks)
         else:
-            found = counted(record, masks, ground.of_set(record, settings), settings.max_lacking_percent)
-        add_ground_metrics(table, record.name, found, settings)
+            sources = counted(record, masks, ground.of_set(record, settings), settings.max_lacking_percent)
+        add_ground_metrics(table, record.name, sources, settings)
     add_ground_events(table, record.name, filter_events(record, ground.intervals, jumps), ground)
 
 
 def _of_samples(table: MetricsTable, yardstick: Yardstick, record: ReplayedSet, window: ScoringWindow) -> SampleScores:
     masks, settings = yardstick.masks, yardstick.settings
     if record is yardstick.present:
-        found = counted_of_its_own(record, masks)
+        sources = counted_of_its_own(record, masks)
     else:
-        found = counted(record, masks, window, settings.max_lacking_percent)
-    return score_samples(table, record.name, found, masks, window, settings)
+        sources = counted(record, masks, window, settings.max_lacking_percent)
+    return score_samples(table, record.name, sources, masks, window, settings)
 
 
 def _gaps(yardstick: Yardstick, record: ReplayedSet, window: ScoringWindow) -> list[CountedGaps]:
