@@ -143,8 +143,12 @@ def test_one_more_set_costs_only_its_own(
     assert any(source.startswith("truth_") for source in read_table(whole / "metrics.parquet")["source"].to_pylist())
     assert not [file for file in whole.iterdir() if file.is_dir()]
     assert analyze(grown, ["present", "narrow"]) == ("present", "as_flown", "narrow")
+    former = replay_files(grown, "delayed")
+    for file in former:
+        file.write_bytes(b"of an earlier version")
     kept = {name: pieces_of(grown)[key] for name, key in keys_of(grown).items()}
     assert analyze(grown, list(SETS)) == ("delayed",)
+    assert not any(file.exists() for file in former)
     after = pieces_of(grown)
     assert {name: after[key] for name, key in keys_of(grown).items() if name in kept} == kept
     assert analyze(grown, list(SETS)) == ()

@@ -65,12 +65,17 @@ TABLES = {
 
 @dataclass(frozen=True)
 class SetScores:
-    """Scores of one set on a flight: its rows of the tables of `FlightScores`, and how it fared.
+    """Scores of one set on a flight.
 
     Attributes
     ----------
-    samples : the scored samples, rows of `sample_scores.SAMPLES_SCHEMA`
-    summary : its part of `scoring.json`
+    metrics : all figures, see `fusetune.analyze.scoring.metrics_schema`
+    blocks : sums over blocks of about 10 s, which the decision draws from, see `block_scores`
+    windows : figures in windows of about 30 s, see `window_scores`
+    withheld : predictions without a sensor, see `withheld_scores`
+    smoothed : velocity against the smoothed one, see `smoothed_scores`
+    samples : the scored samples, see `sample_scores`
+    summary : how the set fared, its part of `scoring.json`
     """
 
     metrics: pa.Table
