@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fusetune.analyze import scored_sets
 from fusetune.analyze.analyze_flight import AnalysisSettings, MadeWith, analyze_flight, grade_saved_flight
 from fusetune.analyze.evaluate import evaluate
 from fusetune.analyze.flight_files import FLIGHT_FILES, KEPT_SCORES_FILE, SAMPLES_FILE, SCORE_TABLES, SCORING_FILE
@@ -23,6 +24,7 @@ from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
 from fusetune.analyze.replaying.prepared_flight import prepare_flight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.store.parts import TABLES, replay_files, table_file
+from fusetune.analyze.scoring import yardstick
 from fusetune.analyze.scoring.score_flight import write_flight_scores
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.ulog.writer import write_ulog
@@ -119,8 +121,11 @@ def test_scores_in_memory_are_those_of_the_files(
         assert alone.summary["sets"][name] == scores.summary["sets"][name]
 
 
-def test_one_more_set_costs_only_its_own(survey_flight: Flight, tmp_path: Path) -> None:
-    """The same files as all at once, also by several threads; what is kept of the others is not touched."""
+def test_one_more_set_costs_only_its_own(
+    survey_flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same files as all at once, also by several threads and as of a flight that is too long to keep in memory;
+    what is kept of the others is not touched."""
     saved, grown, whole = tmp_path / "flight", tmp_path / "grown", tmp_path / "whole"
     saved.mkdir()
     write_flight(saved, survey_flight)
@@ -131,10 +136,19 @@ def test_one_more_set_costs_only_its_own(survey_flight: Flight, tmp_path: Path) 
         sets = {name: replayed[name] for name in (*names, "as_flown")}
         return analyze_flight(saved, folder, sets, names, made_with=made_with, threads=threads)
 
-    assert analyze(whole, list(SETS), threads=2) == ("present", "as_flown", "delayed", "narrow")
+    with monkeypatch.context() as long:
+        long.setattr(scored_sets, "MOST_IN_MEMORY", 0)
+        long.setattr(yardstick, "MOST_KEPT_STATES", 0)
+        assert analyze(whole, list(SETS), threads=2) == ("present", "as_flown", "delayed", "narrow")
+    assert any(source.startswith("truth_") for source in read_table(whole / "metrics.parquet")["source"].to_pylist())
+    assert not [file for file in whole.iterdir() if file.is_dir()]
     assert analyze(grown, ["present", "narrow"]) == ("present", "as_flown", "narrow")
+    former = replay_files(grown, "delayed")
+    for file in former:
+        file.write_bytes(b"of an earlier version")
     kept = {name: pieces_of(grown)[key] for name, key in keys_of(grown).items()}
     assert analyze(grown, list(SETS)) == ("delayed",)
+    assert not any(file.exists() for file in former)
     after = pieces_of(grown)
     assert {name: after[key] for name, key in keys_of(grown).items() if name in kept} == kept
     assert analyze(grown, list(SETS)) == ()

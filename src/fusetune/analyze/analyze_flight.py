@@ -9,7 +9,7 @@ one reads leaves the memory, so that this is that of the largest step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +21,7 @@ from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFl
 from fusetune.analyze.replaying.replay_flight import copy_replay, write_replay
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings
 from fusetune.analyze.replaying.store.ledger import ReplayLedger
+from fusetune.analyze.replaying.store.parts import replay_files, summary_file
 from fusetune.analyze.scored_sets import SetsToScore, write_scores
 from fusetune.analyze.scoring.score_flight import read_onboard
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, ScoredFlight, scored_flight
@@ -105,12 +106,22 @@ def analyze_flight(
     settings = settings or AnalysisSettings()
     work = _FlightAtWork(flight_folder, output_folder, settings, made_with)
     written = work.write_replays({name: replayed[name] for name in (present, AS_FLOWN) if name in replayed})
+    _drop_replays(output_folder, {*replayed} - {present, AS_FLOWN})
     work.write_grade(anew=AS_FLOWN in written)
     sets = {name: replayed.get(name) for name in dict.fromkeys((present, *scored))}
     made = write_scores(
         SetsToScore(present, sets, work.scores_made_of()), output_folder, work, settings.scoring, threads
     )
     return tuple(dict.fromkeys((*written, *made)))
+
+
+def _drop_replays(folder: AnyPath, names: Collection[str]) -> None:
+    """Remove the files of replays that are not written any more, which an earlier version left."""
+    there = {file.name for file in Path(folder).iterdir()}
+    for name in names:
+        if summary_file(folder, name).name in there:
+            for file in replay_files(folder, name):
+                file.unlink(missing_ok=True)
 
 
 class _FlightAtWork:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from fusetune.analyze.flight_files import KEPT_SCORES_FILE
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
-from fusetune.analyze.replaying.replay_flight import replay_set
+from fusetune.analyze.replaying.replay_flight import replay_set, write_replay
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import SampleSpool
 from fusetune.analyze.replaying.store.parts import summary_file
@@ -27,6 +29,12 @@ from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.freed_memory import give_back_freed_memory
 from fusetune.storage.ledger import key_of
+
+MOST_IN_MEMORY = 150_000
+"""IMU samples of a flight, some ten minutes, up to which all that a replay records is kept in memory."""
+
+SCRATCH_PREFIX = ".scoring-"
+"""Of folders for the replays of longer ones."""
 
 
 class SavedFlight(Protocol):
@@ -130,20 +138,37 @@ class _SetsAtWork:
             yield from zip(names, pool.map(self._scores, names), strict=True)
 
     def _scores(self, name: str) -> SetScores:
-        scores = score_set(self.yardstick, self._record(name))
+        with self._record(name) as record:
+            scores = score_set(self.yardstick, record)
         give_back_freed_memory()
         return scores
 
-    def _record(self, name: str) -> ReplayedSet:
-        present = self.yardstick.present
+    @contextmanager
+    def _record(self, name: str) -> Iterator[ReplayedSet]:
+        present, recording = self.yardstick.present, self.yardstick.recording
         if name == present.name:
-            return present
-        if self._antenna is not None and name == self._antenna.name:
-            return self._antenna
-        return self._replayed(name, self.yardstick.recording)
+            yield present
+        elif self._antenna is not None and name == self._antenna.name:
+            yield self._antenna
+        elif recording is FULL and self._is_long:
+            with TemporaryDirectory(prefix=SCRATCH_PREFIX, dir=self._folder) as scratch:
+                yield self._replayed_on_disk(name, scratch)
+        else:
+            yield self._replayed(name, recording)
+
+    @property
+    def _is_long(self) -> bool:
+        return len(self._flight.prepared.inputs.arrays.imu) > MOST_IN_MEMORY
 
     def _replayed(self, name: str, recording: Recording) -> ReplayedSet:
         overrides = self._asked.sets[name]
         if overrides is None:
             return read_set(self._folder, name, self._spool)
         return replay_set(self._flight.prepared, name, overrides, recording)
+
+    def _replayed_on_disk(self, name: str, folder: AnyPath) -> ReplayedSet:
+        overrides = self._asked.sets[name]
+        if overrides is None:
+            return read_set(self._folder, name, self._spool)
+        write_replay(self._flight.prepared, name, overrides, folder)
+        return read_set(folder, name)

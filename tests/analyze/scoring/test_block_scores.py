@@ -21,8 +21,9 @@ def test_blocks_add_up_and_are_paired(tmp_path: Path) -> None:
     present = read_set(folder, "present")
     masks = sample_masks(present, window)
     for name in sets:
-        found = counted(read_set(folder, name), masks, window, 20.0)
-        velocity = next(one for one in axes_together(found.values()) if one.source == "gnss_vel")
+        sources = counted(read_set(folder, name), masks, window, 20.0)
+        found = next(one for one in sources if ("gnss_vel", 0) in one)
+        (velocity,) = axes_together(found.values())
         tables.append(block_rows("flight", name, velocity, edges))
         samples[name] = velocity.samples[2]
     frame = pa.concat_tables(tables).to_pandas()

@@ -89,7 +89,8 @@ def test_axes_that_share_their_times_are_together(tmp_path: Path) -> None:
     _, folder = make_flight(tmp_path, "flight", {"present": MadeSet()})
     present = read_set(folder, "present")
     masks = sample_masks(present, WINDOW)
-    found = {one.source: one for one in axes_together(counted_of_its_own(present, masks).values())}
+    own = counted_of_its_own(present, masks)
+    found = {one.source: one for each in own for one in axes_together(each.values())}
     assert {name: one.axes for name, one in found.items()} == {
         "gnss_vel": [0, 1, 2], "gnss_pos": [0, 1], "baro_hgt": [0],
     }  # fmt: skip

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtri
 
-from fusetune.analyze.metrics.metric import Bounds, InnovationMetric, Innovations, InWindow
+from fusetune.analyze.metrics.metric import Bounds, InnovationMetric, Innovations, InWindow, mean_of_samples
 from fusetune.analyze.metrics.whiteness import independent_samples
 
 Array = npt.NDArray[np.float64]
@@ -21,7 +21,7 @@ def mean_nis(innovation: Array, innovation_variance: Array) -> Array:
     -------
     (...) array; D is expected. A large S makes it tiny, so a small value alone is no merit.
     """
-    return np.mean(np.sum(np.square(innovation) / innovation_variance, axis=0), axis=-1)
+    return mean_of_samples(np.sum(np.square(innovation) / innovation_variance, axis=0))
 
 
 def chi2_quantile(probability: float, dof: Array | float) -> Array:
@@ -70,7 +70,7 @@ def c_nis(innovation: Array, innovation_variance: Array) -> Array:
     nis = np.sum(np.square(innovation) / innovation_variance, axis=0)
     with np.errstate(divide="ignore"):
         spread = np.abs(np.log(np.var(nis, axis=-1, ddof=1) / (2.0 * dimension)))
-    return j_nis(np.mean(nis, axis=-1), dimension) + spread
+    return j_nis(mean_of_samples(nis), dimension) + spread
 
 
 def _nis_of_samples(given: Innovations) -> Array:

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.metrics.metric import SOURCE_UNIT, InnovationMetric, Innovations, InWindow
+from fusetune.analyze.metrics.metric import SOURCE_UNIT, InnovationMetric, Innovations, InWindow, mean_of_samples
 
 Array = npt.NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def rms_innovation(innovation: Array) -> Array:
     ----------
     García, Molina, Trincado: averaged innovation over N_T measurements.
     """
-    return np.sqrt(np.mean(np.square(innovation), axis=-1))
+    return np.sqrt(mean_of_samples(np.square(innovation)))
 
 
 def rms_norm(innovation: Array) -> Array:
@@ -37,12 +37,12 @@ def rms_norm(innovation: Array) -> Array:
     -------
     (...) array: sqrt(Σ |ν|² / N); with D = 2 the paper's horizontal figure, with D = 1 the vertical one
     """
-    return np.sqrt(np.mean(np.sum(np.square(innovation), axis=0), axis=-1))
+    return np.sqrt(mean_of_samples(np.sum(np.square(innovation), axis=0)))
 
 
 def mean_innovation(innovation: Array) -> Array:
     """Mean of the innovations, (..., N) → (...); an unbiased model has 0."""
-    return np.mean(innovation, axis=-1)
+    return mean_of_samples(innovation)
 
 
 def _squared_norm(given: Innovations) -> Array:

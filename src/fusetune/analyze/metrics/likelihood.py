@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.analyze.metrics.metric import InnovationMetric, Innovations, InWindow
+from fusetune.analyze.metrics.metric import InnovationMetric, Innovations, InWindow, mean_of_samples
 
 Array = npt.NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def _winsorised(given: Innovations) -> Array:
 
 
 def _mean_log_variance(given: Innovations) -> Array:
-    return np.asarray(np.mean(np.log(given.innovation_variance), axis=-1))
+    return mean_of_samples(np.log(given.innovation_variance))
 
 
 def _sum(values: Iterable[Array]) -> Array:
@@ -82,12 +82,12 @@ def _sum(values: Iterable[Array]) -> Array:
 
 
 def _mean(nll: Callable[[Array, Array], Array], innovation: Array, given: Innovations) -> Array:
-    return _sum(np.mean(nll(*axis), axis=-1) for axis in zip(innovation, given.innovation_variance, strict=True))
+    return _sum(mean_of_samples(nll(*axis)) for axis in zip(innovation, given.innovation_variance, strict=True))
 
 
 def _profile(innovation: Array, given: Innovations) -> Array:
     axes = zip(innovation, given.innovation_variance, given.once(_mean_log_variance), strict=True)
-    return _sum(profile_nll(np.mean(np.square(nu) / s, axis=-1), log_s) for nu, s, log_s in axes)
+    return _sum(profile_nll(mean_of_samples(np.square(nu) / s), log_s) for nu, s, log_s in axes)
 
 
 def _winsorised_nll(given: Innovations) -> Array:

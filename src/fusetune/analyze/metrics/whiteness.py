@@ -5,7 +5,7 @@ import numpy.typing as npt
 from scipy.fft import next_fast_len
 from scipy.special import chdtrc
 
-from fusetune.analyze.metrics.metric import InnovationMetric, Innovations
+from fusetune.analyze.metrics.metric import InnovationMetric, Innovations, mean_of_samples
 
 Array = npt.NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def autocorrelation(values: Array, lags: int) -> Array:
     -------
     (..., lags) array; 0 where the values do not vary
     """
-    centred = values - np.mean(values, axis=-1, keepdims=True)
+    centred = values - mean_of_samples(values)[..., None]
     power = np.sum(np.square(centred), axis=-1)
     # Sums of products at all lags at once: the transform of the power spectrum, padded so that nothing wraps around.
     length = next_fast_len(values.shape[-1] + lags, real=True)

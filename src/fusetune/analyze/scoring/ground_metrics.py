@@ -4,7 +4,7 @@ Rotors stand still, GNSS and barometer are at their calmest and a filter is easi
 wait before take-off would hide how the sets differ. Apart, it shows noise without motion.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from fusetune.analyze.flight.intervals import Cut, Interval, merged, subtract
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
@@ -53,16 +53,17 @@ def ground_window(
 
 
 def add_ground_metrics(
-    table: MetricsTable, set_name: str, found: Mapping[SourceAxis, Counted], settings: ScoringSettings
+    table: MetricsTable, set_name: str, sources: Iterable[Mapping[SourceAxis, Counted]], settings: ScoringSettings
 ) -> None:
     """Append the metrics that are given of the ground, of every source and axis, named `ground_…`.
 
     Parameters
     ----------
-    found : samples of the set on the ground
+    sources : samples of the set on the ground
     """
-    for together in axes_together(found.values(), settings.confidence):
-        add_innovation_metrics(table, set_name, together, _ON_GROUND, GROUND)
+    for found in sources:
+        for together in axes_together(found.values(), settings.confidence):
+            add_innovation_metrics(table, set_name, together, _ON_GROUND, GROUND)
 
 
 def add_ground_events(table: MetricsTable, set_name: str, events: FilterEvents, ground: ScoringWindow) -> None:

@@ -21,7 +21,7 @@ from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis, gate_of
 from fusetune.analyze.scoring.charges import EvidenceCost, OwnEvidence, charged, passed_over
 from fusetune.analyze.scoring.window import ScoringWindow
-from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES, AidSource
 
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""
@@ -78,18 +78,19 @@ def sample_masks(record: ReplayedSet, window: ScoringWindow) -> dict[SourceAxis,
     """
     found: dict[SourceAxis, SampleMask] = {}
     for source in MEASURED_SOURCES.values():
-        for axis in range(source.axes):
-            mask = sample_mask(record, (source.name, axis), window)
-            if mask is not None:
-                found[source.name, axis] = _with_shared_time(mask, found, source.name)
+        found |= source_masks(record, source, window)
     return found
 
 
-def _with_shared_time(mask: SampleMask, found: Masks, source: str) -> SampleMask:
-    for (name, _), other in found.items():
-        if name == source and np.array_equal(other.time, mask.time):
-            return SampleMask(mask.source, mask.axis, other.time, mask.tolerance, mask.row, mask.innovation)
-    return mask
+def source_masks(record: ReplayedSet, source: AidSource, window: ScoringWindow) -> dict[SourceAxis, SampleMask]:
+    """Those of the axes of one source."""
+    found: dict[SourceAxis, SampleMask] = {}
+    for axis in range(source.axes):
+        mask = sample_mask(record, (source.name, axis), window)
+        if mask is not None:
+            alike = (one.time for one in found.values() if np.array_equal(one.time, mask.time))
+            found[source.name, axis] = replace(mask, time=next(alike, mask.time))
+    return found
 
 
 def sample_mask(record: ReplayedSet, key: SourceAxis, window: ScoringWindow) -> SampleMask | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +16,12 @@ from fusetune.analyze.scoring.measurement_alignment import (
     Counted,
     CountedSamples,
     Masks,
+    SampleMask,
     axes_together,
     counted_samples,
     own_samples,
-    sample_mask,
     sample_masks,
+    source_masks,
 )
 from fusetune.analyze.scoring.metrics_table import MetricsTable, add_innovation_metrics
 from fusetune.analyze.scoring.settings import ScoringSettings
@@ -59,34 +60,43 @@ class SampleScores(NamedTuple):
     costs: Mapping[SourceAxis, EvidenceCost]
 
 
-def counted(
-    record: ReplayedSet, masks: Masks, window: ScoringWindow, max_lacking_percent: float
-) -> dict[SourceAxis, Counted]:
-    """Samples of a set at the masks, and of sources that these do not have at the set's own measurements."""
-    found: dict[SourceAxis, Counted] = {}
+OfSource = Mapping[SourceAxis, Counted]
+"""Samples of the axes of one source."""
+
+
+def counted(record: ReplayedSet, masks: Masks, window: ScoringWindow, max_lacking_percent: float) -> Iterator[OfSource]:
+    """Samples of a set at the masks, and of sources that these do not have at the set's own measurements.
+
+    One source comes after the other, so that those of an hour's flight are not in memory at once.
+    """
     for source in MEASURED_SOURCES.values():
-        for axis in range(source.axes):
-            key = source.name, axis
+        found: dict[SourceAxis, Counted] = {}
+        keys = [(source.name, axis) for axis in range(source.axes)]
+        is_more = any(key not in masks and key in record.first_fused for key in keys)
+        own = source_masks(record, source, window) if is_more else {}
+        for key in keys:
             if key in masks:
                 found[key] = counted_samples(masks[key], record, window, max_lacking_percent)
-            elif key in record.first_fused and (own := sample_mask(record, key, window)) is not None:
-                found[key] = Counted(_whole(own.time.size), own_samples(own, record.samples[key]))
-    return found
+            elif key in own:
+                found[key] = _own(own[key], record)
+        if found:
+            yield found
 
 
-def counted_of_its_own(record: ReplayedSet, masks: Masks) -> dict[SourceAxis, Counted]:
-    """Samples of the set that the masks are of."""
-    return {key: Counted(_whole(mask.time.size), own_samples(mask, record.samples[key])) for key, mask in masks.items()}
+def counted_of_its_own(record: ReplayedSet, masks: Masks) -> Iterator[OfSource]:
+    """Samples of the set that the masks are of, one source after the other."""
+    for source in dict.fromkeys(source for source, _ in masks):
+        yield {key: _own(mask, record) for key, mask in masks.items() if key[0] == source}
 
 
-def _whole(count: int) -> EvidenceCost:
-    return EvidenceCost(count, 0, 0)
+def _own(mask: SampleMask, record: ReplayedSet) -> Counted:
+    return Counted(EvidenceCost(mask.time.size, 0, 0), own_samples(mask, record.samples[mask.source, mask.axis]))
 
 
 def score_samples(
     table: MetricsTable,
     set_name: str,
-    found: Mapping[SourceAxis, Counted],
+    sources: Iterable[OfSource],
     masks: Masks,
     window: ScoringWindow,
     settings: ScoringSettings,
@@ -97,26 +107,31 @@ def score_samples(
 
     Parameters
     ----------
-    found : the set's samples
+    sources : the set's samples
     masks : of the present set
     """
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
     blocks, windows = [], []
-    samples = [one.samples for one in found.values() if one.samples is not None]
-    for together in axes_together(found.values(), settings.confidence):
-        add_innovation_metrics(table, set_name, together)
-        compared = together.of_masks(masks)
-        if compared is not None:
-            blocks.append(block_rows(table.flight, set_name, compared, edges))
-        for figures in window_figures(together, wide_edges):
-            add_worst_windows(table, set_name, figures)
-            windows.append(figures)
+    samples: list[CountedSamples] = []
+    costs: dict[SourceAxis, EvidenceCost] = {}
+    for found in sources:
+        costs |= {key: one.cost for key, one in found.items() if key in masks}
+        for together in axes_together(found.values(), settings.confidence):
+            add_innovation_metrics(table, set_name, together)
+            compared = together.of_masks(masks)
+            if compared is not None:
+                blocks.append(block_rows(table.flight, set_name, compared, edges))
+            for figures in window_figures(together, wide_edges):
+                add_worst_windows(table, set_name, figures)
+                windows.append(figures)
+            # of what is sampled at every update the samples would fill the disk, and no plot shows them
+            if not MEASURED_SOURCES[together.source].every_update:
+                samples += together.samples
     return SampleScores(
         pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
         window_rows(table.flight, set_name, windows, wide_edges),
-        # of what is sampled at every update the samples would fill the disk, and no plot shows them
-        _sample_rows(set_name, [one for one in samples if not MEASURED_SOURCES[one.mask.source].every_update]),
-        {key: found[key].cost for key in masks},
+        _sample_rows(set_name, samples),
+        costs,
     )
 
 
@@ -161,6 +176,6 @@ def add_onboard(
 ) -> None:
     """Append the vehicle's own figures, on the same part of the flight but at the times that it logged."""
     record = ReplayedSet(ONBOARD, parameters, {}, {}, onboard, {}, {})
-    found = counted_of_its_own(record, sample_masks(record, window))
-    for together in axes_together(found.values(), settings.confidence):
-        add_innovation_metrics(table, ONBOARD, together)
+    for found in counted_of_its_own(record, sample_masks(record, window)):
+        for together in axes_together(found.values(), settings.confidence):
+            add_innovation_metrics(table, ONBOARD, together)

@@ -13,7 +13,7 @@ from fusetune.analyze.flight.reference_truth import TRUTH_TOPICS
 from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
-from fusetune.analyze.scoring.set_scores import SetScores, score_flight, score_set
+from fusetune.analyze.scoring.set_scores import TABLES, SetScores, score_flight, score_set
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.yardstick import WITH_MEASURED_ANTENNA, ScoredFlight, Yardstick
 from fusetune.px4.flight import Flight
@@ -36,27 +36,8 @@ SCORE_TOPICS = (
 
 
 @dataclass(frozen=True)
-class FlightScores:
-    """Scores of all sets on one flight.
-
-    Attributes
-    ----------
-    metrics : all figures, see `fusetune.analyze.scoring.metrics_schema`
-    blocks : sums over blocks of about 10 s, which the decision draws from, see `block_scores`
-    windows : figures in windows of about 30 s, see `window_scores`
-    withheld : predictions without a sensor, see `withheld_scores`
-    smoothed : velocity against the smoothed one, see `smoothed_scores`
-    samples : the scored samples, see `sample_scores`
-    summary : what was scored of the flight, and how each set fared
-    """
-
-    metrics: pa.Table
-    blocks: pa.Table
-    windows: pa.Table
-    withheld: pa.Table
-    smoothed: pa.Table
-    samples: pa.Table
-    summary: dict[str, Any]
+class FlightScores(SetScores):
+    """Scores of all sets on one flight: the rows of one after the other; `summary` is what `scoring.json` holds."""
 
     def figure(self, set_name: str, source: str, axis: str, metric: str) -> float:
         """One figure of a set (docs/metrics.md names them).
@@ -116,13 +97,12 @@ def score_sets(
 
 def joined_scores(flight: SetScores, sets: Mapping[str, SetScores]) -> FlightScores:
     """The scores of a flight out of those of its sets, in their order; the flight's own figures come last."""
+
+    def joined(name: str) -> pa.Table:
+        return pa.concat_tables([getattr(one, name) for one in (*sets.values(), flight)]).unify_dictionaries()
+
     return FlightScores(
-        metrics=pa.concat_tables([*(one.metrics for one in sets.values()), flight.metrics]),
-        blocks=pa.concat_tables([one.blocks for one in sets.values()]),
-        windows=pa.concat_tables([one.windows for one in sets.values()]),
-        withheld=pa.concat_tables([one.withheld for one in sets.values()]),
-        smoothed=pa.concat_tables([one.smoothed for one in sets.values()]),
-        samples=pa.concat_tables([one.samples for one in sets.values()]).unify_dictionaries(),
+        **{name: joined(name) for name in TABLES},
         summary=joined_summary(flight, {name: one.summary for name, one in sets.items()}),
     )
 

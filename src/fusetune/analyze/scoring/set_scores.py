@@ -65,12 +65,17 @@ TABLES = {
 
 @dataclass(frozen=True)
 class SetScores:
-    """Scores of one set on a flight: its rows of the tables of `FlightScores`, and how it fared.
+    """Scores of one set on a flight.
 
     Attributes
     ----------
-    samples : the scored samples, rows of `sample_scores.SAMPLES_SCHEMA`
-    summary : its part of `scoring.json`
+    metrics : all figures, see `fusetune.analyze.scoring.metrics_schema`
+    blocks : sums over blocks of about 10 s, which the decision draws from, see `block_scores`
+    windows : figures in windows of about 30 s, see `window_scores`
+    withheld : predictions without a sensor, see `withheld_scores`
+    smoothed : velocity against the smoothed one, see `smoothed_scores`
+    samples : the scored samples, see `sample_scores`
+    summary : how the set fared, its part of `scoring.json`
     """
 
     metrics: pa.Table
@@ -155,20 +160,20 @@ def _add_ground(
     if ground.intervals and not excluded:
         masks = yardstick.ground_masks
         if record is yardstick.present:
-            found = counted_of_its_own(record, masks)
+            sources = counted_of_its_own(record, masks)
         else:
-            found = counted(record, masks, ground.of_set(record, settings), settings.max_lacking_percent)
-        add_ground_metrics(table, record.name, found, settings)
+            sources = counted(record, masks, ground.of_set(record, settings), settings.max_lacking_percent)
+        add_ground_metrics(table, record.name, sources, settings)
     add_ground_events(table, record.name, filter_events(record, ground.intervals, jumps), ground)
 
 
 def _of_samples(table: MetricsTable, yardstick: Yardstick, record: ReplayedSet, window: ScoringWindow) -> SampleScores:
     masks, settings = yardstick.masks, yardstick.settings
     if record is yardstick.present:
-        found = counted_of_its_own(record, masks)
+        sources = counted_of_its_own(record, masks)
     else:
-        found = counted(record, masks, window, settings.max_lacking_percent)
-    return score_samples(table, record.name, found, masks, window, settings)
+        sources = counted(record, masks, window, settings.max_lacking_percent)
+    return score_samples(table, record.name, sources, masks, window, settings)
 
 
 def _gaps(yardstick: Yardstick, record: ReplayedSet, window: ScoringWindow) -> list[CountedGaps]:

@@ -29,6 +29,9 @@ from fusetune.ekf2.replay.recording import FULL, SCORING, Recording
 from fusetune.px4.flight import Flight
 from fusetune.set_names import ANTENNA_MENDED, mended_name
 
+MOST_KEPT_STATES = 100_000
+"""Some ten minutes of flight."""
+
 WITH_MEASURED_ANTENNA = (ANTENNA_MENDED, mended_name(ANTENNA_MENDED))
 
 
@@ -68,6 +71,7 @@ class Yardstick:
     ) -> None:
         self.scored, self.present, self.settings = scored, present, settings or ScoringSettings()
         self._antenna = antenna
+        self._states: FilterStates | None = None
         self.airborne: Sequence[Interval] = airborne_intervals(self.flight, present.flags)
         self.window: ScoringWindow = scoring_window(present, self.airborne, scored.log_gaps, self.settings)
 
@@ -112,10 +116,15 @@ class Yardstick:
         """The predictions in gaps that are scored."""
         return gap_masks(self.present, self.window)
 
-    @cached_property
+    @property
     def states(self) -> FilterStates:
-        """Of the present set."""
-        return self.present.states()
+        """Of the present set; of a long flight they are fetched each time, as they are large."""
+        if self._states is not None:
+            return self._states
+        states = self.present.states()
+        if states.time.size <= MOST_KEPT_STATES:
+            self._states = states
+        return states
 
     @cached_property
     def whiteness(self) -> Mapping[SourceAxis, Whiteness]:
@@ -148,5 +157,5 @@ class Yardstick:
     def make(self) -> None:
         """Make all that scores ask for, so that several threads find it made."""
         if self.window.intervals:
-            _ = self.masks, self.gaps, self.states, self.whiteness, self.references, self.smoothed
+            _ = self.masks, self.gaps, self.whiteness, self.references, self.smoothed
         _ = self.ground_masks, self.present.first_fused, self.present.reset_times
