@@ -102,6 +102,12 @@ class ObservedFlight:
         places = {"gnss": self.gnss_place} if in_air == self.airborne else {}
         return sensor_delays(self.prepared, self.replayed, motion=self.inertial, places=places)
 
+    def without_replay(self) -> ObservedFlight:
+        """The same flight, prepared, and none of what takes memory with the length of its replay."""
+        other = ObservedFlight(self.logged, self.settings)
+        other.__dict__.update(flight=self.flight, prepared=self.prepared)
+        return other
+
     def since_start_s(self, timestamp: int) -> float:
         """Seconds from the start of the log, for a time in µs since boot."""
         return (timestamp - self.logged.start_timestamp) * 1e-6
