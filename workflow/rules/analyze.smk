@@ -41,8 +41,8 @@ rule analyze_flight:
         effects=ancient("results/analyze/effects.json") if MENDS_DELAYS else [],
         found="results/search/found.json" if SEARCH else [],
     output:
-        update(replay_files([PRESENT, AS_FLOWN])),
-        expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
+        update(REPLAYED_FILES),
+        SCORED_FILES,
     log:
         "results/logs/analyze/{flight}.log",
     # so that pictures are drawn while the decision, which needs all scores, is on its way
