@@ -28,6 +28,10 @@ if MENDS_DELAYS:
             "../scripts/join_delays.py"
 
 
+# Where cores are more than flights, a flight has several, for its sets are worked on side by side. No figure depends on it.
+THREADS_OF_A_FLIGHT = max(1, min(MOST_THREADS_OF_A_FLIGHT, (workflow.cores or 1) // max(1, len(LOGS))))
+
+
 # All sets of a flight are one job's work. Of those that follow from what the flights show it is known too late that they
 # are, and of the others they may be thousands: only the files of the two that others read are asked for by name. What
 # of a set is out of date the job looks up in a record of its own, and leaves all else as it is.
@@ -49,9 +53,14 @@ rule analyze_flight:
     priority: 1
     conda:
         "../envs/fusetune.yaml"
+    threads: THREADS_OF_A_FLIGHT
     # around the present values each parameter makes two sets at the most
     resources:
-        **replay_resources(len(SETS.replayed) + 2 * len(SETS.around), len(SETS.scored) + 2 * len(SETS.around)),
+        **replay_resources(
+            len(SETS.replayed) + 2 * len(SETS.around),
+            len(SETS.scored) + 2 * len(SETS.around),
+            THREADS_OF_A_FLIGHT,
+        ),
     params:
         sets=sets_of_analysis,
         replay=asdict(SETTINGS.replay),
