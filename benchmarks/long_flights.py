@@ -31,7 +31,7 @@ from fusetune.save.flight_folder import read_metadata
 
 STUDY = ROOT / "config/studies/paper_table11.yaml"
 JOBS = ("save", "diagnose", "analyse", "draw")
-ANALYSIS_STEPS = ("write_replays", "write_as_flown", "grade_flight", "write_flight_fidelity", "write_scores")
+ANALYSIS_STEPS = ("write_replay", "grade_flight", "write_flight_fidelity", "write_scores")
 
 
 def main() -> None:

@@ -18,9 +18,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fusetune.analyze.scoring import sample_scores, score_flight, score_sets
+from fusetune.analyze.scoring import sample_scores, score_flight, set_scores, yardstick
 
-MODULES = (score_flight, score_sets, sample_scores)
+MODULES = (score_flight, set_scores, sample_scores, yardstick)
 
 REPEATS = 5
 
@@ -28,18 +28,18 @@ PARTS = {
     "reading the flight": ("load_flight", "canonical"),
     "reading the replays": ("read_set",),
     "scored part of the flight": ("scoring_window", "ground_window"),
-    "pairing measurements": ("paired_samples",),
-    "figures of axes and groups": ("add_axis_metrics", "add_group_metrics"),
+    "pairing measurements": ("counted", "counted_of_its_own", "sample_masks"),
+    "figures of axes and groups": ("add_all_innovation_metrics",),
     "blocks": ("block_rows",),
     "windows": ("window_figures", "window_rows", "add_worst_windows"),
-    "ground": ("add_ground_metrics",),
+    "ground": ("add_ground_metrics", "add_ground_events"),
     "whiteness of the sources": ("source_whiteness", "add_whiteness"),
-    "smoothed velocity": ("smoothed_velocity",),
+    "smoothed velocity": ("smoothed_velocity", "velocity_differences", "smoothed_rows"),
     "true errors": ("read_references", "true_errors", "add_true_errors"),
-    "gaps": ("paired_gaps", "add_withheld_metrics", "withheld_rows", "add_true_drift"),
-    "events and activity": ("filter_events", "scoring_summary"),
+    "gaps": ("gap_masks", "counted_gaps", "add_withheld_metrics", "withheld_rows", "add_true_drift"),
+    "events and activity": ("reset_jumps", "filter_events", "set_summary"),
     "as flown": ("onboard_samples", "write_onboard"),
-    "writing": ("_write",),
+    "writing": ("scores_writer",),
 }
 """Part → functions that the modules call by these names."""
 

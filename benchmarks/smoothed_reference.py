@@ -49,7 +49,7 @@ def measure(folder: Path) -> None:
     scored = scored_flight(prepared.flight)
     present = records[PRESENT]
     airborne = airborne_intervals(scored.flight, present.flags)
-    window = scoring_window([present], PRESENT, airborne, scored.log_gaps, ScoringSettings())
+    window = scoring_window(present, airborne, scored.log_gaps, ScoringSettings())
     start = time.process_time()
     references = {
         name: smoothed_velocity(record, scored.flight, window.intervals, STEP_US) for name, record in records.items()

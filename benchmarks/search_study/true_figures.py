@@ -62,7 +62,7 @@ class JudgedFlight:
         """As `score_sets` has it: the present set's."""
         present, flight = replay_set(self.prepared, PRESENT, {}), self.prepared.flight
         gaps = imu_gaps(flight, self._scoring.log_gap_s)
-        return scoring_window([present], PRESENT, airborne_intervals(flight, present.flags), gaps, self._scoring)
+        return scoring_window(present, airborne_intervals(flight, present.flags), gaps, self._scoring)
 
     def figures(self, overrides: Mapping[str, float]) -> Array:
         """(4,) `FIGURES` of a set; NaN where it has none, as of a set that diverges."""
@@ -72,7 +72,7 @@ class JudgedFlight:
         table = MetricsTable(self.prepared.flight.name)
         errors = true_errors(record, record.states(), self._truth, self._window, self._scoring.confidence)
         add_true_errors(table, record.name, errors)
-        add_true_drift(table, [record], self._truth, self._window)
+        add_true_drift(table, record, self._truth, self._window)
         rows = {
             (row["source"], row["axis"]): row["value"]
             for row in table.finished().to_pylist()

@@ -24,7 +24,7 @@ from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.save.thresholds import VerdictThresholds
-from fusetune.settings.checking import checked, read_checked
+from fusetune.settings.checking import checked, read_checked, validate
 from fusetune.settings.declaration import section, setting
 from fusetune.settings.schema import schema_of
 from fusetune.storage.files import AnyPath
@@ -90,13 +90,6 @@ class Configuration:
         "of the newest real flight that counts",
         at_least=1,
     )
-    sets_per_job: int = setting(
-        8,
-        "parameter sets that one job replays at the most; files stay one per flight and set; the profile for Slurm has "
-        "its own number",
-        low=1,
-        high=1000,
-    )
     search_job: Literal["round", "flight"] = setting(
         "round",
         "what one job of a search takes: all flights of a `round`, on all cores, or one `flight` of it; the files are "
@@ -134,6 +127,10 @@ class Configuration:
             yield f"covariance_designs: two files are called {name}; expected different names"
 
 
+RETIRED = {"sets_per_job": "no longer asked for, as one job takes all sets of a flight; delete it"}
+"""Keys of former releases → what is to be said of them."""
+
+
 def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None = None) -> Configuration:
     """Read the configuration from files and from the command line.
 
@@ -150,9 +147,13 @@ def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None
         A file cannot be read; a key, a value or what they make together is wrong.
     """
     schema = schema_of(Configuration)
+    retired = {name: {"not": {}, "description": reason} for name, reason in RETIRED.items()}
+    schema = schema | {"properties": schema["properties"] | retired}
     asked: dict[str, Any] = {}
     for file in files:
         asked = _joined(asked, read_checked(file, schema))
+    if given:
+        validate(given, schema, "--config")
     return checked(Configuration, _joined(asked, given or {}), "--config" if given else files[-1])
 
 

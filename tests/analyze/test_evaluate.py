@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
+import sqlite3
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
+import pandas as pd
 import pytest
 
-from fusetune.analyze.analyze_flight import AnalysisSettings, analyze_flight, grade_saved_flight
+from fusetune.analyze.analyze_flight import AnalysisSettings, MadeWith, analyze_flight, grade_saved_flight
 from fusetune.analyze.evaluate import evaluate
-from fusetune.analyze.flight_files import FLIGHT_FILES, SAMPLES_FILE, SCORE_TABLES, SCORING_FILE
+from fusetune.analyze.flight_files import FLIGHT_FILES, KEPT_SCORES_FILE, SAMPLES_FILE, SCORE_TABLES, SCORING_FILE
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
 from fusetune.analyze.replaying.prepared_flight import prepare_flight
 from fusetune.analyze.replaying.replay_flight import replay_set
-from fusetune.analyze.replaying.store.parts import replay_files
-from fusetune.analyze.replaying.store.row_groups import tables_in_groups
-from fusetune.analyze.scoring.sample_scores import SAMPLES_SCHEMA
-from fusetune.analyze.scoring.score_sets import score_sets, scored_flight
+from fusetune.analyze.replaying.store.parts import TABLES, replay_files, table_file
+from fusetune.analyze.scoring.score_flight import write_flight_scores
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.ulog.writer import write_ulog
 from fusetune.save.flight_folder import load_flight, write_flight
-from fusetune.storage.documents import read_document, write_document
-from fusetune.storage.parquet import write_table
+from fusetune.storage.documents import read_document
+from fusetune.storage.parquet import read_table
 
 # the delay gives other times to the same measurements, the gate rejects some of them
 SETS: dict[str, dict[str, float]] = {
@@ -84,7 +84,7 @@ def test_scores_in_memory_are_those_of_the_files(
     replayed = {**SETS, "as_flown": {}}
     analyze_flight(saved, written, replayed, list(SETS))
     declared = [written / name for name in FLIGHT_FILES]
-    declared += [file for name in replayed for file in replay_files(written, name)]
+    declared += [file for name in ("present", "as_flown") for file in replay_files(written, name)]
     assert set(written.iterdir()) == set(declared)
     # the grade that may be asked for before all this is the same
     trust = read_document(written / "fidelity.json")["trust"]
@@ -96,26 +96,79 @@ def test_scores_in_memory_are_those_of_the_files(
     )
 
     monkeypatch.chdir(empty)
-    samples: list[pa.Table] = []
     with files_opened_for_writing() as opened:
         prepared = prepare_flight(load_flight(saved))
         replays = {name: replay_set(prepared, name, overrides) for name, overrides in SETS.items()}
         scores = evaluate(prepared, replays)
-        score_sets(scored_flight(prepared.flight), replays.values(), take_samples=samples.append)
     assert opened == []
     assert list(empty.iterdir()) == []
 
     assert scores.summary["status"] == "scored"
     assert prepared.reconstructed.changed == (kind == "thinned")
-    for table, file in SCORE_TABLES.items():
-        assert getattr(scores, table).num_rows > 0
-        write_table(getattr(scores, table), empty / file)
-    with tables_in_groups(empty / SAMPLES_FILE, SAMPLES_SCHEMA) as take:
-        for rows in samples:
-            take(rows)
-    write_document(empty / SCORING_FILE, scores.summary, sort_keys=True)
-    for file in (*SCORE_TABLES.values(), SAMPLES_FILE, SCORING_FILE):
+    write_flight_scores(empty, scores)
+    for file in (*SCORE_TABLES.values(), SCORING_FILE):
         assert (empty / file).read_bytes() == (written / file).read_bytes(), file
+    assert read_table(written / SAMPLES_FILE).equals(scores.samples)
+    # each set by itself, and the others', in whatever order and recorded in full
+    for name in ("narrow", "delayed"):
+        alone = evaluate(prepared, {"present": replays["present"], name: SETS[name]})
+        for table in SCORE_TABLES:
+            whole, part = (getattr(one, table).to_pandas() for one in (scores, alone))
+            whole, part = (one[one["set"] == name].reset_index(drop=True) for one in (whole, part))
+            pd.testing.assert_frame_equal(whole, part, check_exact=True)
+        assert alone.summary["sets"][name] == scores.summary["sets"][name]
+
+
+def test_one_more_set_costs_only_its_own(survey_flight: Flight, tmp_path: Path) -> None:
+    """The same files as all at once, also by several threads; what is kept of the others is not touched."""
+    saved, grown, whole = tmp_path / "flight", tmp_path / "grown", tmp_path / "whole"
+    saved.mkdir()
+    write_flight(saved, survey_flight)
+    replayed = {**SETS, "as_flown": {}}
+    made_with = MadeWith("replay", "scores")
+
+    def analyze(folder: Path, names: list[str], threads: int = 1) -> tuple[str, ...]:
+        sets = {name: replayed[name] for name in (*names, "as_flown")}
+        return analyze_flight(saved, folder, sets, names, made_with=made_with, threads=threads)
+
+    assert analyze(whole, list(SETS), threads=2) == ("present", "as_flown", "delayed", "narrow")
+    assert analyze(grown, ["present", "narrow"]) == ("present", "as_flown", "narrow")
+    kept = {name: pieces_of(grown)[key] for name, key in keys_of(grown).items()}
+    assert analyze(grown, list(SETS)) == ("delayed",)
+    after = pieces_of(grown)
+    assert {name: after[key] for name, key in keys_of(grown).items() if name in kept} == kept
+    assert analyze(grown, list(SETS)) == ()
+    for file in FLIGHT_FILES:
+        assert (grown / file).read_bytes() == (whole / file).read_bytes(), file
+    # as flown the present values: one replay
+    for table in TABLES:
+        flown, present = (table_file(grown, name, table).read_bytes() for name in ("as_flown", "present"))
+        assert flown == present, table
+    # a damaged piece, or file, is made again
+    with sqlite3.connect(grown / KEPT_SCORES_FILE) as database:
+        database.execute("UPDATE scores SET tables = 'spoiled' WHERE key = ?", (keys_of(grown)["narrow"],))
+    assert analyze(grown, list(SETS)) == ("narrow",)
+    (grown / KEPT_SCORES_FILE).write_bytes(b"no database at all, but long enough to look like one" * 100)
+    assert analyze(grown, list(SETS)) == ("present", "delayed", "narrow")
+    for file in FLIGHT_FILES:
+        assert (grown / file).read_bytes() == (whole / file).read_bytes(), file
+
+
+def keys_of(folder: Path) -> dict[str, str]:
+    """The keys of the sets in the file that keeps scores."""
+    with closing(sqlite3.connect(folder / KEPT_SCORES_FILE)) as database:
+        rows = database.execute("SELECT key, summary FROM scores").fetchall()
+    found = {key: json.loads(summary) for key, summary in rows}
+    by_overrides = {json.dumps(one["overrides"]): key for key, one in found.items() if "overrides" in one}
+    return {
+        name: by_overrides[json.dumps(values)] for name, values in SETS.items() if json.dumps(values) in by_overrides
+    }
+
+
+def pieces_of(folder: Path) -> dict[str, tuple]:
+    """What is kept under each key."""
+    with closing(sqlite3.connect(folder / KEPT_SCORES_FILE)) as database:
+        return {row[0]: row for row in database.execute("SELECT * FROM scores")}
 
 
 def test_a_replay_at_hand_is_as_good_as_one_made_anew(survey_flight: Flight) -> None:

@@ -21,7 +21,7 @@ JSON_VALUES = st.recursive(
 )
 
 
-@pytest.mark.parametrize("form", [{}, {"lines": True}, {"sort_keys": True}])
+@pytest.mark.parametrize("form", [{}, {"lines": 1}, {"lines": 2, "sort_keys": True}, {"sort_keys": True}])
 def test_what_was_written_is_read_and_is_plain_json(tmp_path: Path, form: dict[str, bool]) -> None:
     file = tmp_path / "a.json"
     write_document(file, DOCUMENT, **form)

@@ -49,7 +49,7 @@ def simulated_logs(demonstration: Workspace) -> list[bytes]:
 def test_a_changed_present_replays_only_the_present_set_and_jobs_elsewhere_find_it(
     workspace: Workspace, demonstration: Workspace
 ) -> None:
-    workspace.write("config.yaml", CONFIG | QUICK | {"sets_per_job": 2, "effects": {"try_measured": True}})
+    workspace.write("config.yaml", CONFIG | QUICK | {"effects": {"try_measured": True}})
     flights, results = workspace.folder / "flights", workspace.folder / "results"
     low, high = simulated_logs(demonstration)
     (flights / "first.ulg").write_bytes(low)
@@ -64,14 +64,12 @@ def test_a_changed_present_replays_only_the_present_set_and_jobs_elsewhere_find_
     assert present["flight"] == "second"
     replayed = {
         name: (results / "logs" / name).read_text(encoding="utf-8").splitlines()[-1]
-        for name in ("delays/first.log", "replay/first.1.log", "analyze/first.log")
+        for name in ("tell/first.log", "analyze/first.log")
     }
-    assert replayed["delays/first.log"] == "replayed: present; up to date: 0"
-    # of the first run
-    assert replayed["replay/first.1.log"] == "replayed: low, high; up to date: 0"
+    assert replayed["tell/first.log"] == "told: delays"
     # two flights measure what the vehicle is told otherwise: config/vehicles/quadrotor.yaml has less ground effect than
     # PX4's default of 4 m
-    assert replayed["analyze/first.log"] == "replayed: ground_effect_mended; up to date: 1"
+    assert replayed["analyze/first.log"] == "replayed or scored: present, ground_effect_mended; up to date: 3"
     decision = json.loads((results / "apply" / "decision.json").read_text(encoding="utf-8"))
     assert "ground_effect_mended" in {one["set"] for one in decision["sets"]}
     assert "effect.ground_effect" in {one["id"] for one in decision["findings"]}

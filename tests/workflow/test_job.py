@@ -20,6 +20,37 @@ print(table["a"].to_numpy().sum(), numba.njit(lambda x: x + 1)(1), {"pandas", "s
 """
 
 
+SERVED = """
+from pathlib import Path
+from snakemake.shell import shell
+from fusetune.running.job_server import start_job_server
+
+onstart:
+    global server
+    server = start_job_server(shell.get_executable(), Path("."), (), "json:dumps", "nothing")
+    shell.executable(server.shell)
+
+onsuccess:
+    assert Path("parent").read_text() == f"{server.process.pid} 2"
+
+rule all:
+    default_target: True
+    output: "parent"
+    params: of={"one": 2}
+    script: "job_of_it.py"
+"""
+
+
+def test_scripts_as_snakemake_starts_them_are_copies_of_the_server(tmp_path: Path) -> None:
+    (tmp_path / "Snakefile").write_text(SERVED)
+    script = "import os\nopen(snakemake.output[0], 'w').write(f\"{os.getppid()} {snakemake.params.of['one']}\")\n"
+    (tmp_path / "job_of_it.py").write_text(script)
+    command = [sys.executable, "-m", "snakemake", "--cores", "1"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "AssertionError" not in done.stderr
+
+
 def run(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], cwd=SCRIPTS, capture_output=True, text=True, check=False)
 

@@ -27,8 +27,9 @@ def sets_of(*parameters: dict[str, Any]) -> dict[str, Any]:
         ("small.yaml", STUDY | {"sets": [STUDY["sets"][0]] * 2}, ("small.yaml", "duplicate", "low")),
         ("hop.yaml", MISSION | {"waypoints": [{"lat": 47.4, "lon": 8.5}]}, ("hop.yaml", "waypoints[0]", "alt")),
         ("hop.yaml", MISSION | {"speed": 5}, ("hop.yaml", "speed", "speed_m_s")),
-        ("config.yaml", CONFIG | {"sets_per_jop": 4}, ("config.yaml", "sets_per_jop", "sets_per_job")),
-        ("config.yaml", CONFIG | {"sets_per_job": 0}, ("config.yaml", "sets_per_job", "1")),
+        ("config.yaml", CONFIG | {"search_jop": "flight"}, ("config.yaml", "search_jop", "search_job")),
+        ("config.yaml", CONFIG | {"seed": -1}, ("config.yaml", "seed", "0")),
+        ("config.yaml", CONFIG | {"sets_per_job": 8}, ("config.yaml", "sets_per_job", "no longer", "delete it")),
         ("config.yaml", CONFIG | {"decision": {"draws": "many"}}, ("config.yaml", "decision.draws", "whole number")),
         ("config.yaml", CONFIG | {"flights_dir": "nowhere"}, ("config.yaml", "flights_dir", "nowhere")),
         ("config.yaml", CONFIG | {"study": "config/none.yaml"}, ("config/none.yaml", "cannot be read", "path")),
@@ -70,7 +71,10 @@ def test_a_key_of_the_configuration_that_stands_twice(workspace: Workspace) -> N
     assert "'seed' stands twice" in result.stdout
 
 
-@pytest.mark.parametrize(("setting", "part"), [("seed=nan", "seed is nan"), ("sets_per_jop=4", "'sets_per_jop'")])
+@pytest.mark.parametrize(
+    ("setting", "part"),
+    [("seed=nan", "seed is nan"), ("sets_per_jop=4", "'sets_per_jop'"), ("sets_per_job=48", "sets_per_job: no longer")],
+)
 def test_a_broken_value_on_the_command_line(workspace: Workspace, setting: str, part: str) -> None:
     result = workspace.run("--dry-run", "--config", setting)
     assert result.returncode != 0

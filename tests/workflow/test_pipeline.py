@@ -36,9 +36,7 @@ def read_flights(workspace: Workspace) -> dict[str, dict[str, str]]:
 def test_an_empty_folder_plans_one_simulated_flight_per_set(workspace: Workspace) -> None:
     planned = workspace.planned_jobs()
     planned.pop("compile_kernels", None)
-    of_flights = dict.fromkeys(
-        ("simulate_flight", "save_flight", "diagnose_flight", "conform_flight", "flight_page"), 2
-    )
+    of_flights = dict.fromkeys(("simulate_flight", "save_flight", "tell_flight", "flight_page"), 2)
     assert planned == {"design": 1, "mission_map": 1, **of_flights, **SUMMARIES}
 
 
@@ -53,9 +51,8 @@ def test_the_demonstration_ends_with_parameters_decision_and_report(demonstratio
     assert {row["status"] for row in flights.values()} == {"replayable"}
     assert list(flights) == ["flight_1_low", "flight_2_high"]
     for flight in flights:
-        for name in ("present", "low", "high"):
-            summary = json.loads((results / "analyze" / flight / f"{name}.json").read_text(encoding="utf-8"))
-            assert summary["status"] == "ok"
+        sets = json.loads((results / "analyze" / flight / "scoring.json").read_text(encoding="utf-8"))["sets"]
+        assert {name: sets[name]["status"] for name in ("present", "low", "high")} == dict.fromkeys(sets, "scored")
 
 
 def test_the_present_set_carries_the_values_of_the_newest_flight(demonstration: Workspace) -> None:
@@ -85,7 +82,7 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     message = struct.pack("<HBB", len(note) + 1, ord("I"), len("char[5] note")) + note
     log = (flown.folder / "flights" / "first.ulg").read_bytes()
     (flown.folder / "flights" / "second.ulg").write_bytes(log + message)
-    of_flight = dict.fromkeys(("save_flight", "diagnose_flight", "conform_flight", "flight_page"), 1)
+    of_flight = dict.fromkeys(("save_flight", "tell_flight", "flight_page"), 1)
     assert flown.planned_jobs() == {**of_flight, **SUMMARIES}
     flown.run_ok("--cores", "2", DECISION)
     assert read_flights(flown)["second"]["status"] == "replayable"
@@ -98,10 +95,11 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     flown.run_ok("--cores", "2", DECISION)
     for flight in ("first", "second"):
         log = flown.folder / "results" / "logs" / "analyze" / f"{flight}.log"
-        assert "replayed: new; up to date: 3" in log.read_text(encoding="utf-8")
-        for name in (f"analyze/{flight}/{pset}.states.parquet" for pset in ("present", "low", "high")):
-            assert flown.results()[name] == before[name]
-    assert len(list((flown.folder / "results" / "analyze").glob("*/new.json"))) == 2
+        assert "replayed or scored: new; up to date: 4" in log.read_text(encoding="utf-8")
+        name = f"analyze/{flight}/present.states.parquet"
+        assert flown.results()[name] == before[name]
+        scoring = json.loads((flown.folder / f"results/analyze/{flight}/scoring.json").read_text(encoding="utf-8"))
+        assert list(scoring["sets"]) == ["high", "low", "new", "present"]
 
 
 def test_only_broken_logs_still_end_with_a_report(workspace: Workspace) -> None:

@@ -1,32 +1,4 @@
-# The present set is replayed by the job that estimates delays, where there is one.
-REPLAY_CHUNKS = in_chunks([name for name in SETS.replayed if name != PRESENT or not MENDS_DELAYS])
-
-
 if MENDS_DELAYS:
-
-    rule estimate_delays:
-        input:
-            flight="results/save/{flight}",
-            present=ancient("results/save/present.json"),
-            kernels=KERNELS_READY,
-        output:
-            update(replay_files([PRESENT])),
-            delays="results/analyze/{flight}/delays.json",
-        log:
-            "results/logs/delays/{flight}.log",
-        conda:
-            "../envs/fusetune.yaml"
-        resources:
-            **replay_resources(1, 1),
-        params:
-            sets=overrides_of([PRESENT]),
-            replay=asdict(SETTINGS.replay),
-            code=DIGEST["replay"],
-            delay_code=DIGEST["delays"],
-        message:
-            "Analyze: replay {wildcards.flight} with the present parameters, estimate delays"
-        script:
-            "../scripts/estimate_delays.py"
 
     # Whether there are sets with mended delays, or with other effects as measured, is known when all flights have told.
     checkpoint join_delays:
@@ -55,94 +27,42 @@ if MENDS_DELAYS:
         script:
             "../scripts/join_delays.py"
 
-    for number, chunk in enumerate(in_chunks(SETS.mendable), 1):
 
-        rule:
-            name:
-                f"replay_mended_{number}"
-            input:
-                flight="results/save/{flight}",
-                present=ancient("results/save/present.json"),
-                delays=ancient("results/analyze/delays.json"),
-                kernels=KERNELS_READY,
-            output:
-                update(replay_files([mended_name(name) for name in chunk])),
-            log:
-                f"results/logs/replay/{{flight}}.mended.{number}.log",
-            conda:
-                "../envs/fusetune.yaml"
-            resources:
-                **replay_resources(len(chunk)),
-            params:
-                sets=mended_overrides_of(chunk),
-                replay=asdict(SETTINGS.replay),
-                code=DIGEST["replay"],
-            message:
-                f"Analyze: replay {{wildcards.flight}} with mended delays, {', '.join(chunk)}"
-            script:
-                "../scripts/replay_flight.py"
+# Where cores are more than flights, a flight has several, for its sets are worked on side by side. No figure depends on it.
+THREADS_OF_A_FLIGHT = max(1, min(MOST_THREADS_OF_A_FLIGHT, (workflow.cores or 1) // max(1, len(LOGS))))
 
 
-# Replays of several sets are one job's work; each set keeps its own files. They are updated, not made anew, so that a
-# job that is started for a new set leaves the others' files as they are. The last sets are replayed by the job that
-# scores all; with no more sets than one job takes, there is no other.
-for number, chunk in enumerate(REPLAY_CHUNKS[:-1], 1):
-
-    rule:
-        name:
-            f"replay_{number}"
-        input:
-            flight="results/save/{flight}",
-            present=ancient("results/save/present.json"),
-            kernels=KERNELS_READY,
-        output:
-            update(replay_files(chunk)),
-        log:
-            f"results/logs/replay/{{flight}}.{number}.log",
-        benchmark:
-            f"results/benchmarks/replay/{{flight}}.{number}.tsv"
-        conda:
-            "../envs/fusetune.yaml"
-        resources:
-            **replay_resources(len(chunk)),
-        params:
-            sets=overrides_of(chunk),
-            replay=asdict(SETTINGS.replay),
-            code=DIGEST["replay"],
-        message:
-            f"Analyze: replay {{wildcards.flight}} with {', '.join(chunk)}"
-        script:
-            "../scripts/replay_flight.py"
-
-
+# All sets of a flight are one job's work. Of those that follow from what the flights show it is known too late that they
+# are, and of the others they may be thousands: only the files of the two that others read are asked for by name. What
+# of a set is out of date the job looks up in a record of its own, and leaves all else as it is.
 rule analyze_flight:
     input:
         flight="results/save/{flight}",
         # what it says comes in as a parameter, so that only other values make anything again
         present=ancient("results/save/present.json"),
         kernels=KERNELS_READY,
-        replays=[file for chunk in REPLAY_CHUNKS[:-1] for file in replay_files(chunk)],
         delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
         effects=ancient("results/analyze/effects.json") if MENDS_DELAYS else [],
-        present_replay=replay_files([PRESENT]) if MENDS_DELAYS else [],
-        mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
         found="results/search/found.json" if SEARCH else [],
     output:
-        update(replay_files(REPLAY_CHUNKS[-1])),
-        expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
+        update(REPLAYED_FILES),
+        SCORED_FILES,
     log:
         "results/logs/analyze/{flight}.log",
-    benchmark:
-        "results/benchmarks/analyze/{flight}.tsv"
     # so that pictures are drawn while the decision, which needs all scores, is on its way
     priority: 1
     conda:
         "../envs/fusetune.yaml"
+    threads: THREADS_OF_A_FLIGHT
     # around the present values each parameter makes two sets at the most
     resources:
-        **replay_resources(len(REPLAY_CHUNKS[-1]) + 2 * len(SETS.around), len(SETS.scored) + 2 * len(SETS.around)),
+        **replay_resources(
+            len(SETS.replayed) + 2 * len(SETS.around),
+            len(SETS.scored) + 2 * len(SETS.around),
+            THREADS_OF_A_FLIGHT,
+        ),
     params:
-        sets=sets_of_analysis(REPLAY_CHUNKS[-1]),
+        sets=sets_of_analysis,
         replay=asdict(SETTINGS.replay),
         code=DIGEST["replay"],
         scored=scored_sets,
@@ -161,8 +81,6 @@ rule join_conformance:
         conformance=expand("results/analyze/{flight}/conformance.json", flight=LOGS),
         listed="results/save/flights.csv",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
-        # asked for so that a set that is new is scored before flights are split
-        replays=of_replayable_flights(ANALYZED_FILES),
     output:
         legs="results/analyze/legs.parquet",
         missions="results/analyze/missions.json",

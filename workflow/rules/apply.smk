@@ -7,9 +7,8 @@ rule decide:
         # what the input functions read: where it is missing, the checkpoint has to run again
         listed="results/save/flights.csv",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
-        # asked for so that a set that is new is replayed and scored, and a file that was taken away is made again
-        replays=of_replayable_flights(ANALYZED_FILES),
-        mended=of_mended_sets("results/analyze/{{flight}}/{pset}.{part}"),
+        # asked for so that a file that was taken away is made again
+        tables=of_replayable_flights(SCORED_FILES),
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
         effects="results/analyze/effects.json" if MENDS_DELAYS else [],
         diagnoses=of_replayable_flights("results/analyze/{flight}/diagnosis.json"),
@@ -57,6 +56,6 @@ rule decide:
         contents=contents(*CONFIGURATION_FILES),
         code=DIGEST["apply"],
     message:
-        "Apply: decide over {params.sets}"
+        "Apply: rank the sets, decide"
     script:
         "../scripts/decide.py"

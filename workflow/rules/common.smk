@@ -3,43 +3,40 @@ import csv
 from dataclasses import astuple, replace
 from functools import cache
 
-from fusetune.analyze.flight_files import DIAGNOSED_FILES, FLIGHT_FILES
+from fusetune.analyze.flight_files import CONFORMANCE_FILE, DELAYS_FILE, DIAGNOSED_FILES, FLIGHT_FILES, TRACK_FILE
 from fusetune.analyze.replaying.store.parts import PARTS
 from fusetune.apply.parameter_files.names import PARAMETER_FILES
 from fusetune.design.covariance.named_files import files_of_design
 from fusetune.storage.cells import as_it_was
 from fusetune.storage.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
-from fusetune.set_names import mended_name
+from fusetune.set_names import AS_FLOWN, mended_name
 from fusetune.storage.documents import read_document
 from fusetune.save import read_present
 from fusetune.save.discovery import printable
 
-ANALYZED_FILES = [
-    *(f"results/analyze/{{flight}}/{pset}.{part}" for pset in SETS.replayed for part in PARTS),
-    *(f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES),
-]
-"""What the analysis of a flight leaves, of all sets."""
+
+REPLAYED_FILES = [f"results/analyze/{{flight}}/{pset}.{part}" for pset in (PRESENT, AS_FLOWN) for part in PARTS]
+"""The replays that are kept of a flight."""
+
+SCORED_FILES = [f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES]
+"""What the analysis of a flight leaves beside them."""
 
 
-def replay_files(names):
-    """Files of the replays of some sets on a flight."""
-    return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=PARTS)
+MENDS_DELAYS = SETTINGS.delays.mend
 
-
-def in_chunks(names):
-    """So many sets as one job replays, at a time."""
-    return [names[first : first + SETTINGS.sets_per_job] for first in range(0, len(names), SETTINGS.sets_per_job)]
+TOLD_FILES = [*DIAGNOSED_FILES, TRACK_FILE, CONFORMANCE_FILE, *([DELAYS_FILE] if MENDS_DELAYS else [])]
+"""What is told of a flight before any set is compared."""
 
 
 def read_csv(path):
-    told_in_one_line(check_checksum, path, RUN_AGAIN)
+    check_checksum(path, RUN_AGAIN)
     with open(path, encoding="utf-8", newline="") as file:
         return [{as_it_was(name): as_it_was(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
 
 
 def replayable_flights():
-    rows = read_csv(checkpoints.list_flights.get().output.csv)
+    rows = read_once(read_csv, checkpoints.list_flights.get().output.csv)
     # What other flights left here is no answer to these; a dry run, which mends nothing, may meet it.
     return [row["flight"] for row in rows if row["status"] == "replayable" and row["flight"] in LOGS]
 
@@ -49,9 +46,20 @@ def of_replayable_flights(patterns):
     return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
+@cache
+def read_in_state(function, path, state):
+    return told_in_one_line(function, path)
+
+
+def read_once(function, path):
+    """What a function reads from a file; read anew only when the file has changed, for every job asks for it."""
+    found = os.stat(path) if os.path.exists(path) else None
+    return read_in_state(function, path, found and (found.st_mtime_ns, found.st_size, found.st_ino))
+
+
 def present_found():
     """What flies now and, of a study around it, the sets."""
-    return told_in_one_line(read_present, checkpoints.list_flights.get().output.present)
+    return read_once(read_present, checkpoints.list_flights.get().output.present)
 
 
 def sets_found():
@@ -59,40 +67,26 @@ def sets_found():
     return SETS.found(present_found()) if SETS.around else SETS
 
 
-def overrides_of(names):
-    """Params function: the values of some sets, so that only sets whose values change are replayed again."""
-    return lambda wildcards: SETS.overrides(names, present_found().parameters if PRESENT in names else {})
-
-
-def sets_of_analysis(names):
-    """Params function: the values of the sets that the job which scores a flight replays.
-
-    Beside its share of the sets with known names these are all around the present values: how many there are is known
-    too late for rules of their own.
-    """
-
-    def values(wildcards):
-        around = {pset.name: pset.overrides for pset in present_found().sets} if SETS.around else {}
-        return {**overrides_of(names)(wildcards), **around, **effect_overrides(wildcards)}
-
-    return values
-
-
-MENDS_DELAYS = SETTINGS.delays.mend
+def sets_of_analysis(wildcards):
+    """Params function: the values of all sets that a flight is replayed with."""
+    present = present_found()
+    around = {pset.name: pset.overrides for pset in present.sets}
+    mended = SETS.mended(SETS.mendable, present.parameters, mended_delays()) if mended_delays() else {}
+    return {**SETS.overrides(SETS.replayed, present.parameters), **around, **mended, **effect_overrides(wildcards)}
 
 
 def mended_delays():
     """Parameters of delays that are proved wrong, with the values to set."""
     if not MENDS_DELAYS:
         return {}
-    return told_in_one_line(read_document, checkpoints.join_delays.get().output.delays)["mended"]
+    return read_once(read_document, checkpoints.join_delays.get().output.delays)["mended"]
 
 
 def effect_values():
     """Sets that take single effects as the flights measure them, with what they change."""
     if not MENDS_DELAYS or not SETTINGS.effects.try_measured:
         return {}
-    return told_in_one_line(read_document, checkpoints.join_delays.get().output.effects)["sets"]
+    return read_once(read_document, checkpoints.join_delays.get().output.effects)["sets"]
 
 
 def effects_are_mended():
@@ -136,25 +130,12 @@ def set_descriptions(wildcards):
     return sets.described({pset.name: pset.description for pset in (*INPUTS.study.sets, *around)})
 
 
-def of_mended_sets(pattern):
-    """Input function: files of the sets with mended delays, where there are any."""
-    return lambda wildcards: expand(
-        expand(pattern, pset=mended_sets(), part=PARTS),
-        flight=getattr(wildcards, "flight", None) or replayable_flights(),
-    )
-
-
-def mended_overrides_of(names):
-    """Params function: the values of some sets with the delays mended, by the names that they have then."""
-    return lambda wildcards: SETS.mended(names, present_found().parameters, mended_delays())
-
-
 FLIGHT_BY_FLIGHT = SETTINGS.search_job == "flight"
 """Whether each flight's part of a round of a search is a job of its own."""
 
 
 def searched_flights_found():
-    return told_in_one_line(read_document, checkpoints.search_flights.get().output[0])["flights"]
+    return read_once(read_document, checkpoints.search_flights.get().output[0])["flights"]
 
 
 def asked_before(number):
@@ -177,7 +158,7 @@ HISTORY = "results/history"
 @cache
 def changes_flown():
     """Of every flight that flew a change decided before: which, and the values before and after it."""
-    rows = read_csv(checkpoints.list_flights.get().output.csv)
+    rows = read_once(read_csv, checkpoints.list_flights.get().output.csv)
     if not os.path.isdir(HISTORY):
         return {}
     # it reads saved flights
@@ -195,7 +176,7 @@ def of_flights_after(pattern):
 def closing_words():
     if not os.path.exists("results/save/flights.csv"):
         return "Done."
-    statuses = [row["status"] for row in read_csv("results/save/flights.csv")]
+    statuses = [row["status"] for row in told_in_one_line(read_csv, "results/save/flights.csv")]
     kind = "simulated flights" if DEMONSTRATED else "flights"
     refused = len(statuses) - statuses.count("replayable")
     flights = f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv)."

@@ -1,17 +1,18 @@
 # What is told of each flight before any set is compared: of every log, replayable or not.
 
 
-rule diagnose_flight:
+rule tell_flight:
     input:
         flight="results/save/{flight}",
+        missions=list(INPUTS.mission_files),
+        # what it says comes in as a parameter, so that only other values make anything again
+        present=ancient(lambda wildcards: checkpoints.list_flights.get().output.present if MENDS_DELAYS else []),
         kernels=KERNELS_READY,
     output:
-        expand("results/analyze/{{flight}}/{file}", file=DIAGNOSED_FILES),
-        track="results/analyze/{flight}/track.parquet",
+        # what of it is out of date the job looks up in a record of its own, and leaves all else as it is
+        update(expand("results/analyze/{{flight}}/{file}", file=TOLD_FILES)),
     log:
-        "results/logs/diagnose/{flight}.log",
-    benchmark:
-        "results/benchmarks/diagnose/{flight}.tsv"
+        "results/logs/tell/{flight}.log",
     conda:
         "../envs/fusetune.yaml"
     # it holds log and replay at once, and a thinned log is the smaller one of a flight as long
@@ -19,37 +20,20 @@ rule diagnose_flight:
         mem_mb=of_its_logs(KERNELS_MB, DIAGNOSED_MB_PER_MB),
         runtime=of_its_logs(10, 0.1),
     params:
+        present=lambda wildcards: present_found().parameters if MENDS_DELAYS else None,
         replay=asdict(SETTINGS.replay),
         health=asdict(SETTINGS.health),
-        code=DIGEST["diagnose"],
-    message:
-        "Analyze: what is wrong on {wildcards.flight}"
-    script:
-        "../scripts/diagnose_flight.py"
-
-
-rule conform_flight:
-    input:
-        flight="results/save/{flight}",
-        track="results/analyze/{flight}/track.parquet",
-        missions=list(INPUTS.mission_files),
-    output:
-        "results/analyze/{flight}/conformance.json",
-    log:
-        "results/logs/conformance/{flight}.log",
-    conda:
-        "../envs/fusetune.yaml"
-    resources:
-        mem_mb=of_its_logs(LIBRARIES_MB, 0.3),
-        runtime=of_its_logs(5, 0.01),
-    params:
-        settings=asdict(SETTINGS.conformance),
+        conformance=asdict(SETTINGS.conformance),
         contents=contents(*INPUTS.mission_files),
-        code=DIGEST["conformance"],
+        code={
+            "diagnosis": DIGEST["diagnose"],
+            "delays": DIGEST["diagnose"],
+            "conformance": DIGEST["conformance"],
+        },
     message:
-        "Analyze: which mission {wildcards.flight} flew"
+        "Analyze: what is wrong on {wildcards.flight}, its delays, which mission it flew"
     script:
-        "../scripts/conform_flight.py"
+        "../scripts/tell_flight.py"
 
 
 rule join_health:

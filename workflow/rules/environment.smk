@@ -1,4 +1,5 @@
 # Where jobs find the package and its compiled kernels, and how a run goes on after one that was killed.
+import atexit
 import logging
 import os
 import signal
@@ -34,11 +35,13 @@ def prepend_to_path_list(variable, folder):
 sys.path.insert(0, str(PROJECT / "src"))
 prepend_to_path_list("PYTHONPATH", str(PROJECT / "src"))
 from snakemake.exceptions import WorkflowError
+from snakemake.shell import shell
 
 from fusetune.running.cluster_jobs import cancel_queued_jobs
 from fusetune.storage.content import ContentDigests
 from fusetune.errors import UserError, demand_room, write_error
 from fusetune.running.job_environment import use_job_environment
+from fusetune.running.job_server import start_job_server
 from fusetune.running.job_sources import JOB_SOURCES, job_digest
 from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 from fusetune.running.recovery import (
@@ -106,6 +109,21 @@ def tell_what_a_run_would_mend():
 
 
 @cache
+def job_server():
+    """The process of which jobs that this one runs itself are copies, where there can be one."""
+    server = start_job_server(
+        shell.get_executable(),
+        PROJECT / "workflow" / "scripts",
+        ahead=["save_flight.py", "tell_flight.py", "analyze_flight.py", "flight_page.py"],
+        prepare="fusetune.ekf2.replay.warm_up:load_kernels",
+        when="fusetune.ekf2.replay.loop",
+    )
+    if server is not None:
+        atexit.register(server.end)
+    return server
+
+
+@cache
 def take_the_folder():
     if not workflow.is_main_process:
         return
@@ -124,10 +142,23 @@ def take_the_folder():
             for log in INPUTS.found.logs:
                 CONTENT.of(log.path)
             CONTENT.save()
+        if workflow.local_exec:
+            # Snakemake 9.27 looks through all jobs again some time after each look where their rate is limited, so
+            # with every job that ends it looks once a second more; here jobs begin no faster than others end.
+            workflow.scheduling_settings.max_jobs_per_timespan = None
+        if not workflow.touch:
+            # it imports while Snakemake looks for what there is to do
+            job_server()
     except UserError as error:
         told_and_ended(error)
     except OSError as error:
         told_and_ended(write_error(error, os.getcwd()) or error)
+
+
+def let_jobs_be_served():
+    """Let the jobs that this process runs itself begin as copies of the server."""
+    if not workflow.touch and job_server() is not None:
+        shell.executable(job_server().shell)
 
 
 def before_any_job(wildcards):

@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusetune.analyze.analyze_flight import AnalysisSettings, analyze_flight
+from threadpoolctl import threadpool_limits
+
+from fusetune.analyze.analyze_flight import AnalysisSettings, MadeWith, analyze_flight
 from fusetune.analyze.replaying.settings import ReplaySettings
-from fusetune.analyze.replaying.store.ledger import ReplayLedger
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.set_names import FOUND
@@ -18,19 +19,26 @@ if TYPE_CHECKING:
     snakemake: Any
 
 keep_out("pandas")
-with logged_job(snakemake.log[0]):
+# Snakemake lets numerics have as many threads as the job: for small matrices they cost time, and change the last bits
+with logged_job(snakemake.log[0]), threadpool_limits(1):
     params = snakemake.params
     flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
-    ledger = ReplayLedger(flight, folder, [params.code, dict(params.replay)])
     found = read_document(snakemake.input.found)["on_flights"].get(flight.name) if snakemake.input.found else None
     searched = {FOUND: found} if found is not None else {}
     sets, scored = {**params.sets, **searched}, [*params.scored, *searched]
-    outdated = ledger.outdated(sets)
     settings = AnalysisSettings(
         built(ReplaySettings, params.replay),
         ScoringSettings(**params.scoring),
         TrustSettings(**params.trust),
     )
-    analyze_flight(flight, folder, outdated, scored, present=params.present, settings=settings)
-    ledger.record(outdated)
-    print(f"replayed: {', '.join(outdated) or 'none'}; up to date: {len(sets) - len(outdated)}")
+    made = analyze_flight(
+        flight,
+        folder,
+        sets,
+        scored,
+        present=params.present,
+        settings=settings,
+        made_with=MadeWith(params.code, params.score_code),
+        threads=snakemake.threads,
+    )
+    print(f"replayed or scored: {', '.join(made) or 'none'}; up to date: {len({*sets, *scored}) - len(made)}")

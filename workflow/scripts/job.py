@@ -1,21 +1,31 @@
-"""What every job does around its work: write to its log, be known as at work, tell a user's mistake in one line."""
+"""What every job does around its work: log, be known as at work, tell a user's mistake in one line, what it cost."""
 
 from __future__ import annotations
 
 import signal
 import sys
+import time
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
 
 from fusetune.errors import UserError, write_error
 from fusetune.running.run_lock import join_run
+
+try:
+    import resource
+except ImportError:  # as on Windows
+    resource = None  # type: ignore[assignment]
+
+LOGS, COSTS = Path("results/logs"), Path("results/benchmarks")
 
 
 @contextmanager
 def logged_job(log: str) -> Iterator[None]:
     """Send what the body prints to `log`; end the process with status 1 where the input or the disk is at fault."""
     failure: Exception | None = None
+    begin = time.perf_counter()
     try:
         with (
             open(log, "w", encoding="utf-8", errors="backslashreplace") as file,
@@ -29,6 +39,7 @@ def logged_job(log: str) -> Iterator[None]:
                 failure = error
                 print(_fault_of_the_user(error) or traceback.format_exc())
                 raise
+        _write_cost(Path(log), time.perf_counter() - begin)
     except KeyboardInterrupt:
         raise SystemExit(128 + signal.SIGINT) from None
     except Exception as error:
@@ -38,6 +49,19 @@ def logged_job(log: str) -> Iterator[None]:
             raise
         print(fault, file=sys.stderr)
         raise SystemExit(1) from None
+
+
+def _write_cost(log: Path, wall_s: float) -> None:
+    """Write what a job took, as Snakemake's `benchmark` would, had the job no parent that was there before it."""
+    if resource is None or not log.is_relative_to(LOGS):
+        return
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    cpu_s = sum(one.ru_utime + one.ru_stime for one in used)
+    rss_mb = max(one.ru_maxrss for one in used) / (1 << 20 if sys.platform == "darwin" else 1 << 10)
+    file = COSTS / log.relative_to(LOGS).with_suffix(".tsv")
+    with suppress(OSError):  # nothing rests on it
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f"s\tmax_rss\tcpu_time\n{wall_s:.4f}\t{rss_mb:.2f}\t{cpu_s:.4f}\n", encoding="ascii")
 
 
 def _fault_of_the_user(error: Exception) -> UserError | None:

@@ -24,8 +24,8 @@ def evaluate(
 ) -> FlightScores:
     """Replay parameter sets on a flight and score them.
 
-    All sets are scored on the present set's samples: what a candidate lacks there costs it alone. Only the limit beyond
-    which errors are clipped follows from all complete sets. A search that asks for one candidate after the other hands
+    All sets are scored on the present set's samples, and clipped at its limits: what a candidate lacks there costs it
+    alone. A search that asks for one candidate after the other hands
     on the present set's replay, so that it is made once and two sets are in memory at a time::
 
         now = replay_set(prepared, "present", {})

@@ -26,6 +26,9 @@ CONFORMANCE_FILE = "conformance.json"
 ONBOARD_FILE = "onboard.innovations.parquet"
 FIDELITY_FILE = "fidelity.json"
 
+KEPT_SCORES_FILE = ".scores.sqlite"
+"""Scores of single sets, see `fusetune.analyze.scoring.kept_scores`; saves work, and is no result."""
+
 DIAGNOSED_FILES = (HEALTH_FILE, EFFECTS_FILE, SENSOR_NOISE_FILE, DIAGNOSIS_FILE)
 """Of every flight that was saved, replayable or not."""
 

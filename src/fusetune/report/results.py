@@ -1,6 +1,6 @@
 """What the report reads: the decision, and the figures and samples of all flights."""
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,14 +10,16 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from fusetune.analyze.flight_files import SAMPLES_FILE
 from fusetune.apply.history.entries import HISTORY_FILE
 from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.apply.sensitivity.files import NOTHING_TOLD, SENSITIVITY_FILE, ToldSensitivity, read_sensitivity
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
+from fusetune.report.scored_samples import scored_samples
 from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
-from fusetune.storage.parquet import read_pieces, read_table
+from fusetune.storage.parquet import read_table
 
 OUT = (NOT_ELIGIBLE, NOT_SCORED)
 """Parts in the decision of sets that cannot be chosen."""
@@ -150,11 +152,12 @@ def pooled_samples(results: Results) -> list[PooledSamples]:
     values: dict[tuple[str, int], dict[str, list[npt.NDArray[np.float64]]]] = {}
     normalised: dict[tuple[str, int], dict[str, list[npt.NDArray[np.float64]]]] = {}
     for flight in results.flights:
-        for (source, axis, name), innovation, variance in _runs(results.folders[flight] / "samples.parquet"):
-            if name in results.shown:
-                scaled = innovation / np.sqrt(variance)
-                values.setdefault((source, axis), {}).setdefault(name, []).append(innovation)
-                normalised.setdefault((source, axis), {}).setdefault(name, []).append(scaled)
+        for one in scored_samples(results.folders[flight] / SAMPLES_FILE, ("innovation", "innovation_variance")):
+            if one.set_name in results.shown:
+                innovation, variance = (column.astype(np.float64) for column in one.columns)
+                key, scaled = (one.source, one.axis), innovation / np.sqrt(variance)
+                values.setdefault(key, {}).setdefault(one.set_name, []).append(innovation)
+                normalised.setdefault(key, {}).setdefault(one.set_name, []).append(scaled)
     order = {name: index for index, name in enumerate(AID_SOURCES)}
     return [
         PooledSamples(
@@ -165,21 +168,6 @@ def pooled_samples(results: Results) -> list[PooledSamples]:
         )
         for source, axis in sorted(values, key=lambda key: (order[key[0]], key[1]))
     ]
-
-
-def _runs(path: Path) -> Iterator[tuple[tuple[str, int, str], npt.NDArray[np.float64], npt.NDArray[np.float64]]]:
-    """Source, axis and set, innovations and their variances, of rows that lie together."""
-    for table in read_pieces(path, ["set", "source", "axis", "innovation", "innovation_variance"]):
-        names, sources = (table[name].combine_chunks() for name in ("set", "source"))
-        axis = table["axis"].to_numpy()
-        key = np.stack([sources.indices.to_numpy(), axis, names.indices.to_numpy()])
-        starts = np.flatnonzero(np.r_[True, (np.diff(key) != 0).any(axis=0)][: len(axis)])
-        innovation, variance = (
-            table[name].to_numpy().astype(np.float64) for name in ("innovation", "innovation_variance")
-        )
-        for start, stop in zip(starts.tolist(), [*starts[1:].tolist(), len(axis)], strict=True):
-            told = (sources[start].as_py(), int(axis[start]), names[start].as_py())
-            yield told, innovation[start:stop], variance[start:stop]
 
 
 def figure_values(results: Results, source: str, axis: str, metric: str) -> pd.DataFrame:

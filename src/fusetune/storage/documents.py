@@ -26,7 +26,7 @@ def write_document(
     path: str | os.PathLike[str],
     document: Mapping[str, Any],
     *,
-    lines: bool = False,
+    lines: int = 0,
     sort_keys: bool = False,
     allow_nan: bool = True,
 ) -> None:
@@ -35,20 +35,20 @@ def write_document(
     Parameters
     ----------
     lines
-        One line per entry instead of indentation, at which the encoder is slow.
+        One line per entry instead of indentation, at which the encoder is slow; 2 for the entries of entries as well.
     sort_keys, allow_nan
         As for `json.dumps`.
     """
     if not document or _DIGEST in document:
         raise ValueError(f"a document has entries, and none of them is {_DIGEST!r}")
 
-    def text_of(value: Any, indent: int | None) -> str:
+    def text_of(value: Any, lines: int, indent: int | None = None) -> str:
+        if lines and isinstance(value, Mapping) and value:
+            entries = sorted(value.items()) if sort_keys else value.items()
+            return "{\n" + ",\n".join(f"{json.dumps(str(key))}: {text_of(one, lines - 1)}" for key, one in entries) + "\n}"
         return json.dumps(value, indent=indent, sort_keys=sort_keys, ensure_ascii=False, allow_nan=allow_nan)
 
-    if lines:
-        text = "{\n" + ",\n".join(f"{json.dumps(key)}: {text_of(value, None)}" for key, value in document.items())
-    else:
-        text = text_of(document, 1).removesuffix("\n}")
+    text = text_of(document, lines, None if lines else 1).removesuffix("\n}")
     # a name that is no text, as of a file of another encoding, becomes the escape that JSON has for it
     content = text.encode("utf-8", errors="backslashreplace")
     Path(path).write_bytes(content + _seal_of(content))

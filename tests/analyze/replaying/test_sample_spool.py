@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fusetune.analyze.replaying.samples import SampleSpool, SpooledRows
+from fusetune.analyze.replaying.samples import SampleSpool, SortedSamples
 from fusetune.analyze.replaying.store.reader import ColumnsOnDisk, read_innovations
 from fusetune.errors import UserError
 
@@ -75,15 +75,20 @@ def test_sets_share_a_spool(tmp_path: Path) -> None:
         np.testing.assert_array_equal(samples["mag", 0].innovation, mag["innovation"])
 
 
-def test_rows_are_read_as_they_were_put(tmp_path: Path) -> None:
-    kept = SpooledRows(SampleSpool(tmp_path))
-    parts = [np.arange(5.0), np.zeros(0), np.array([(1, 2.0)], [("a", "i4"), ("b", "f8")])]
-    for part in parts:
-        kept.append(part)
-    for found, part in zip(kept, parts, strict=True):
-        assert found.dtype == part.dtype
-        np.testing.assert_array_equal(found, part)
-    assert len(kept[1:]) == 2
+def test_samples_in_memory_are_those_on_the_disk(tmp_path: Path) -> None:
+    rows = table(80, 3, measured=False)
+    pq.write_table(rows, tmp_path / "a.parquet")
+    names = [name for name in rows.column_names if name != "source"]
+    sources = sorted(SOURCES)
+    structured = np.zeros(80, [("source", "i4"), *((name, rows[name].to_numpy().dtype) for name in names)])
+    structured["source"] = [sources.index(name) for name in rows["source"].to_pylist()]
+    for name in names:
+        structured[name] = rows[name].to_numpy()
+    found, read = SortedSamples(structured, sources, lambda _: 1.0), read_innovations(tmp_path / "a.parquet", {})
+    assert set(found) == set(read)
+    for key, samples in found.items():
+        for name in ("timestamp_sample", "observation", "innovation", "test_ratio", "fused", "rejected"):
+            np.testing.assert_array_equal(getattr(samples, name), getattr(read[key], name))
 
 
 def test_a_column_that_a_table_lacks_is_no_column(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ def test_ground_time_is_what_is_left_before_take_off_and_after_landing(tmp_path:
     flight = ScoringWindow(((at(10.0), at(60.0)),), (), {}, at(3.0))
     log = START_US, at(END_S)
     airborne = [(at(10.0), at(60.0))]
-    found = ground_window([read_set(folder, "present")], "present", airborne, log, (), flight, ScoringSettings())
+    found = ground_window(read_set(folder, "present"), airborne, log, (), flight, ScoringSettings())
     expected = (at(3.0), at(10.0) - BEFORE_TAKE_OFF_US), (at(60.0) + AFTER_LANDING_US, at(END_S))
     assert found.intervals == expected
 
@@ -29,7 +29,7 @@ def test_resets_and_gaps_are_cut_on_the_ground_as_in_flight(tmp_path: Path) -> N
     flight = ScoringWindow(((at(10.0), at(60.0)),), (), {}, at(10.0))
     gaps = [(at(71.0), at(71.5))]
     found = ground_window(
-        [read_set(folder, "present")], "present", [(at(10.0), at(60.0))], (START_US, at(END_S)), gaps, flight,
+        read_set(folder, "present"), [(at(10.0), at(60.0))], (START_US, at(END_S)), gaps, flight,
         ScoringSettings(reset_cut_s=2.0),
     )  # fmt: skip
     assert found.intervals == (
@@ -42,8 +42,8 @@ def test_resets_and_gaps_are_cut_on_the_ground_as_in_flight(tmp_path: Path) -> N
 def test_a_flight_without_warm_up_has_no_ground_time(tmp_path: Path) -> None:
     _, folder = make_flight(tmp_path, "flight", {"present": MadeSet()})
     never = ScoringWindow((), (), {}, None, "nothing")
-    records = [read_set(folder, "present")]
-    assert not ground_window(records, "present", [], (0, 10**9), (), never, ScoringSettings()).intervals
+    present = read_set(folder, "present")
+    assert not ground_window(present, [], (0, 10**9), (), never, ScoringSettings()).intervals
 
 
 def test_ground_figures_have_names_of_their_own(tmp_path: Path) -> None:

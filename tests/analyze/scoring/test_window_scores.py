@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fusetune.analyze.metrics.likelihood import gaussian_nll
-from fusetune.analyze.scoring.measurement_alignment import PairedSamples, paired_rows
+from fusetune.analyze.scoring.measurement_alignment import AxesTogether, CountedSamples, SampleMask
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.window_scores import add_worst_windows, window_edges, window_figures, window_rows
@@ -12,21 +12,16 @@ from fusetune.analyze.scoring.window_scores import add_worst_windows, window_edg
 SECOND = 1_000_000
 
 
-def pairs(innovation: np.ndarray, axis: int = 0, variance: float = 1.0) -> PairedSamples:
-    """Innovations (S, N) once a second."""
-    sets = tuple("ab"[: innovation.shape[0]])
-    rows = [
-        paired_rows(
-            {
-                "innovation": one,
-                "innovation_variance": np.full(one.shape, variance),
-                "test_ratio": np.square(one) / 25.0,
-                "rejected": np.square(one) > 25.0,
-            }
-        )
-        for one in innovation
-    ]
-    return PairedSamples("gnss_vel", axis, sets, np.arange(innovation.shape[1], dtype=np.int64) * SECOND, rows)
+def samples(*innovations: list[float]) -> AxesTogether:
+    """Innovations of GNSS velocity, an axis each, once a second, that claim a variance of 1."""
+    time = np.arange(len(innovations[0]), dtype=np.int64) * SECOND
+    return AxesTogether("gnss_vel", tuple(_of_axis(axis, np.array(one), time) for axis, one in enumerate(innovations)))
+
+
+def _of_axis(axis: int, innovation: np.ndarray, time: np.ndarray) -> CountedSamples:
+    mask = SampleMask("gnss_vel", axis, time, 0.0, np.arange(time.size), innovation)
+    square = np.square(innovation)
+    return CountedSamples(mask, innovation, np.ones(time.size), square / 25.0, square > 25.0)
 
 
 @pytest.mark.parametrize(
@@ -39,39 +34,42 @@ def test_a_rest_shorter_than_half_a_window_joins_its_neighbour(length_s: int, ed
 
 
 def test_figures_of_windows_by_hand() -> None:
-    innovation = np.array([[1.0, -1.0, 3.0, 4.0], [0.0, 0.0, 6.0, 0.0]])
-    figures = window_figures([pairs(innovation)], "x", np.array([0, 2, 4]) * SECOND)
+    given = samples([1.0, -1.0, 3.0, 4.0], [0.0, 0.0, 6.0, 0.0])
+    figures = next(window_figures(given, np.array([0, 2, 4]) * SECOND))
+    assert figures.axes == ("x", "y")
     np.testing.assert_allclose(figures.values["rms_innovation"], [[1.0, np.sqrt(12.5)], [0.0, np.sqrt(18.0)]])
     np.testing.assert_allclose(figures.values["mean_nis"], [[1.0, 12.5], [0.0, 18.0]])
     np.testing.assert_allclose(figures.values["break_rate_3sd"], [[0.0, 0.5], [0.0, 0.5]])
     np.testing.assert_allclose(figures.values["break_rate_5sd"], [[0.0, 0.0], [0.0, 0.5]])
     np.testing.assert_allclose(figures.values["break_rate_gate"], [[0.0, 0.0], [0.0, 0.5]])
-    assert figures.counts.tolist() == [2, 2]
+    assert figures.parts.counts.tolist() == [2, 2]
 
 
 def test_the_likelihood_is_winsorised_by_the_spread_of_the_whole_flight() -> None:
     # median |ν| is 1, so the limit is 5 · 1.4826
-    innovation = np.array([[1.0, -1.0, 1.0, 100.0]])
-    figures = window_figures([pairs(innovation)], "x", np.array([0, 2, 4]) * SECOND)
+    figures = next(window_figures(samples([1.0, -1.0, 1.0, 100.0]), np.array([0, 2, 4]) * SECOND))
     limit, one = 5.0 * 1.4826, np.ones(1)
     expected = 0.5 * (gaussian_nll(one, one) + gaussian_nll(limit * one, one))
     np.testing.assert_allclose(figures.values["nll_winsorised"][0, 1], expected[0])
 
 
 def test_axes_together_add_up_and_break_when_any_does() -> None:
-    x, y = np.array([[3.0, 0.0]]), np.array([[4.0, 6.0]])
-    figures = window_figures([pairs(x, 0), pairs(y, 1)], "horizontal", np.array([0, 2]) * SECOND)
+    given = samples([3.0, 0.0, 0.0, 0.0], [4.0, 6.0, 0.0, 0.0])
+    figures = {one.axes: one for one in window_figures(given, np.array([0, 2, 4]) * SECOND)}["horizontal",]
     assert figures.values["rms_innovation"][0, 0] == pytest.approx(np.sqrt((25.0 + 36.0) / 2.0))
     assert figures.values["mean_nis"][0, 0] == pytest.approx((25.0 + 36.0) / 2.0)
     assert figures.values["break_rate_5sd"][0, 0] == 0.5
 
 
+def test_too_few_samples_have_no_windows() -> None:
+    assert list(window_figures(samples([3.0, 0.0, 1.0]), np.array([0, 2]) * SECOND)) == []
+
+
 def test_the_worst_window_is_no_nearly_empty_one() -> None:
-    innovation = np.array([[1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 100.0]])
+    given = samples([1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 100.0])
     edges = np.array([0, 4, 8, 12]) * SECOND
-    figures = window_figures([pairs(innovation)], "x", edges)
     table = MetricsTable("f")
-    add_worst_windows(table, figures)
+    add_worst_windows(table, "a", next(window_figures(given, edges)))
     rows = {row["metric"]: row["value"] for row in table.finished().to_pylist()}
     assert rows["worst_window_rms"] == 2.0
     assert rows["worst_window_nis"] == 4.0
@@ -79,10 +77,11 @@ def test_the_worst_window_is_no_nearly_empty_one() -> None:
 
 
 def test_rows_name_window_edges_and_samples() -> None:
-    innovation = np.array([[1.0, -1.0, 3.0, 4.0], [0.0, 0.0, 6.0, 0.0]])
     edges = np.array([0, 2, 4]) * SECOND
-    table = window_rows("f", window_figures([pairs(innovation)], "x", edges), edges).to_pylist()
-    assert len(table) == 2 * 2 * 6
-    row = next(one for one in table if (one["set"], one["window"], one["metric"]) == ("b", 1, "rms_innovation"))
+    figures = list(window_figures(samples([1.0, -1.0, 3.0, 4.0], [0.0, 0.0, 6.0, 0.0]), edges))
+    table = window_rows("f", "b", figures, edges).to_pylist()
+    # two axes, and the group of both
+    assert len(table) == 3 * 2 * 6
+    row = next(one for one in table if (one["axis"], one["window"], one["metric"]) == ("y", 1, "rms_innovation"))
     assert row["value"] == pytest.approx(np.sqrt(18.0))
-    assert (row["start_us"], row["stop_us"], row["n"], row["axis"]) == (2 * SECOND, 4 * SECOND, 2, "x")
+    assert (row["set"], row["start_us"], row["stop_us"], row["n"]) == ("b", 2 * SECOND, 4 * SECOND, 2)

@@ -1,6 +1,7 @@
 """Predictions in gaps, paired between sets and summed up; expectations by hand."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +11,17 @@ from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.scoring.charges import EvidenceCost
 from fusetune.analyze.scoring.metrics_table import MetricsTable
-from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.true_errors import Truth
 from fusetune.analyze.scoring.window import ScoringWindow
-from fusetune.analyze.scoring.withheld_scores import add_true_drift, add_withheld_metrics, paired_gaps, withheld_rows
+from fusetune.analyze.scoring.withheld_scores import (
+    CountedGaps,
+    add_true_drift,
+    add_withheld_metrics,
+    counted_gaps,
+    gap_masks,
+    own_gaps,
+    withheld_rows,
+)
 
 SECOND = 1_000_000
 WINDOW = ScoringWindow(((0, 100 * SECOND),), (), {}, 0)
@@ -46,29 +54,36 @@ def predicted(starts_s: list[int], errors: list[float], variance: float = 1.0) -
     }
 
 
-LENIENT = ScoringSettings(max_lacking_percent=50.0)
+def counted(now: ReplayedSet, other: ReplayedSet, most_lacking: float = 20.0, **window: Any) -> list[CountedGaps]:
+    """Predictions of another set in the gaps of the present one."""
+    masks = gap_masks(now, WINDOW)
+    return counted_gaps(masks, other, dataclasses.replace(WINDOW, **window), most_lacking)
 
 
 def test_the_gaps_are_those_of_the_present_set_that_lie_in_the_window() -> None:
     now = record("present", predicted([10, 20, 30, 95], [1.0, -2.0, 3.0, 4.0]))
     late = record("late", predicted([20, 30, 40, 95], [5.0, 6.0, 0.1, 7.0]))
-    (group,) = paired_gaps([now, late], "present", WINDOW, LENIENT)
+    (mask,) = gap_masks(now, WINDOW)
     # The gap at 95 s reaches beyond the window; that at 40 s the present set does not have.
-    np.testing.assert_array_equal(group.start, np.array([10, 20, 30]) * SECOND)
-    # The other set lacks that at 10 s: 5 robust standard deviations of the present set's errors, of median 2, count.
-    np.testing.assert_allclose(group.error, [[1.0, -2.0, 3.0], [5 * 1.4826 * 2.0, 5.0, 6.0]])
-    assert group.costs["late"] == EvidenceCost(mask=3, lacking=1, after_reset=0)
+    np.testing.assert_array_equal(mask.start, np.array([10, 20, 30]) * SECOND)
+    np.testing.assert_allclose(mask.error, [1.0, -2.0, 3.0])
+    # 5 robust standard deviations of the present set's errors, of median 2
+    assert mask.winsor_limit == pytest.approx(5 * 1.4826 * 2.0)
+    (found,) = counted(now, late, 50.0)
+    # The other set lacks that at 10 s.
+    np.testing.assert_allclose(found.error, [5 * 1.4826 * 2.0, 5.0, 6.0])
+    assert found.cost == EvidenceCost(mask=3, lacking=1, after_reset=0)
+    (own,) = own_gaps([mask])
+    np.testing.assert_array_equal(own.error, mask.error)
 
 
-def test_a_set_that_lacks_too_much_is_left_out_and_no_other_is_touched() -> None:
+def test_a_set_that_lacks_too_much_is_left_out() -> None:
     now = record("present", predicted([10, 20, 30], [1.0, 2.0, 3.0]))
-    good, late = record("good", predicted([10, 20, 30], [0.5, 1.0, 1.5])), record("late", predicted([30], [9.0]))
-    (group,) = paired_gaps([now, late, good], "present", WINDOW)
-    (without,) = paired_gaps([now, good], "present", WINDOW)
-    assert group.sets == without.sets == ("present", "good")
-    np.testing.assert_array_equal(group.error, without.error)
-    assert group.winsor_limit == without.winsor_limit
-    assert group.costs["late"].lacking_percent == pytest.approx(200 / 3)
+    (found,) = counted(now, record("late", predicted([30], [9.0])))
+    assert not found.is_compared
+    assert found.cost.lacking_percent == pytest.approx(200 / 3)
+    (found,) = counted(now, record("good", predicted([10, 20, 30], [0.5, 1.0, 1.5])))
+    np.testing.assert_array_equal(found.error, [0.5, 1.0, 1.5])
 
 
 @pytest.mark.parametrize("broken", [{"innovation": np.nan}, {"innovation_variance": 0.0}])
@@ -77,9 +92,9 @@ def test_a_prediction_that_is_no_number_is_lacking(broken: dict[str, float]) -> 
     other = predicted([10, 20, 30, 40], [0.1, 0.1, 0.1, 0.1])
     for name, value in broken.items():
         other[name][1] = value
-    (group,) = paired_gaps([now, record("other", other)], "present", WINDOW, LENIENT)
-    np.testing.assert_allclose(group.error[1], [0.1, 5 * 1.4826, 0.1, 0.1])
-    np.testing.assert_allclose(group.variance[1], 1.0)
+    (found,) = counted(now, record("other", other), 50.0)
+    np.testing.assert_allclose(found.error, [0.1, 5 * 1.4826, 0.1, 0.1])
+    np.testing.assert_allclose(found.variance, 1.0)
 
 
 def test_a_horizon_without_a_measurement_before_it_says_nothing() -> None:
@@ -89,42 +104,37 @@ def test_a_horizon_without_a_measurement_before_it_says_nothing() -> None:
     both = {name: np.concatenate([long[name], short[name]]) for name in long}
     without = {name: np.delete(values, 1) for name, values in both.items()}
     without["innovation"] = np.array([0.5, 0.5, 0.1, 0.1, 0.1])
-    (_, after_9_s) = paired_gaps([record("present", both), record("other", without)], "present", WINDOW, LENIENT)
-    np.testing.assert_allclose(after_9_s.error, [[1.0, 2.0, 1.0], [0.5, 2.0, 0.5]])
+    (_, after_9_s) = counted(record("present", both), record("other", without), 50.0)
+    np.testing.assert_allclose(after_9_s.error, [0.5, 2.0, 0.5])
 
 
 def test_a_gap_after_a_reset_of_its_own_counts_no_better_than_the_present_set() -> None:
-    window = dataclasses.replace(WINDOW, own_resets={"other": (Cut(18 * SECOND, 22 * SECOND, "reset"),)})
+    around = {"own_resets": {"other": (Cut(18 * SECOND, 22 * SECOND, "reset"),)}}
     now = record("present", predicted([10, 20, 30], [1.0, -2.0, 3.0]))
     other = record("other", predicted([10, 20, 30], [0.1, 0.2, 0.3]))
-    (group,) = paired_gaps([now, other], "present", window)
-    np.testing.assert_allclose(group.error, [[1.0, -2.0, 3.0], [0.1, -2.0, 0.3]])
-    # A set with resets of its own has no say in what is clipped, in gaps after none of them either.
-    assert group.complete == (True, False)
-    assert group.winsor_limit == pytest.approx(5 * 1.4826 * 2.0)
-    early = dataclasses.replace(WINDOW, own_resets={"other": (Cut(3 * SECOND, 6 * SECOND, "reset"),)})
-    (group,) = paired_gaps([now, other], "present", early)
-    np.testing.assert_allclose(group.error[1], [0.1, 0.2, 0.3])
-    assert group.winsor_limit == pytest.approx(5 * 1.4826 * 2.0)
+    (found,) = counted(now, other, **around)
+    np.testing.assert_allclose(found.error, [0.1, -2.0, 0.3])
+    early = {"own_resets": {"other": (Cut(3 * SECOND, 6 * SECOND, "reset"),)}}
+    (found,) = counted(now, other, **early)
+    np.testing.assert_allclose(found.error, [0.1, 0.2, 0.3])
     # What it does worse than the present set stays its own.
     other = record("other", predicted([10, 20, 30], [0.1, 4.0, 0.3]))
-    (group,) = paired_gaps([now, other], "present", window)
-    np.testing.assert_allclose(group.error[1], [0.1, 4.0, 0.3])
+    (found,) = counted(now, other, **around)
+    np.testing.assert_allclose(found.error, [0.1, 4.0, 0.3])
 
 
 def test_a_gap_counts_only_while_the_present_set_uses_the_sensor() -> None:
-    withheld = predicted([10, 20, 30], [1.0, 2.0, 3.0])
-    records = [record("present", withheld, fused_until_s=21), record("other", withheld)]
-    (group,) = paired_gaps(records, "present", WINDOW)
-    np.testing.assert_array_equal(group.start, [10 * SECOND, 20 * SECOND])
+    now = record("present", predicted([10, 20, 30], [1.0, 2.0, 3.0]), fused_until_s=21)
+    (mask,) = gap_masks(now, WINDOW)
+    np.testing.assert_array_equal(mask.start, [10 * SECOND, 20 * SECOND])
 
 
 def test_figures_by_hand() -> None:
     now = record("present", predicted([10, 20, 30, 40], [3.0, -3.0, 3.0, -3.0], variance=9.0))
     other = record("other", predicted([10, 20, 30, 40], [1.0, 1.0, 1.0, 1.0], variance=1.0))
-    groups = paired_gaps([now, other], "present", WINDOW)
     table = MetricsTable("made")
-    add_withheld_metrics(table, groups)
+    add_withheld_metrics(table, "present", own_gaps(gap_masks(now, WINDOW)))
+    add_withheld_metrics(table, "other", counted(now, other))
     rows = {(row["set"], row["metric"]): row["value"] for row in table.finished().to_pylist()}
     assert rows["present", "withheld_rms_9s"] == pytest.approx(3.0)
     assert rows["other", "withheld_rms_9s"] == pytest.approx(1.0)
@@ -133,15 +143,17 @@ def test_figures_by_hand() -> None:
     assert rows["other", "withheld_nll_9s"] == pytest.approx(0.5 * (1 + np.log(2 * np.pi)))
 
 
-def test_outliers_are_winsorised_at_a_limit_that_no_set_has_to_itself() -> None:
+def test_outliers_are_winsorised_at_the_present_sets_limit() -> None:
     now = record("present", predicted(list(range(0, 80, 5)), [1.0] * 15 + [100.0]))
-    other = record("other", predicted(list(range(0, 80, 5)), [1.0] * 16))
-    groups = paired_gaps([now, other], "present", WINDOW)
-    rows = withheld_rows("made", groups, np.array([0, 40, 80]) * SECOND).to_pandas()
+    other = record("other", predicted(list(range(0, 80, 5)), [2.0] * 15 + [50.0]))
+    edges = np.array([0, 40, 80]) * SECOND
+    rows = withheld_rows("made", "present", own_gaps(gap_masks(now, WINDOW)), edges).to_pandas()
     # 5 robust standard deviations: 5 · 1.4826 · the median 1.0
     assert rows["error_winsorised"].max() == pytest.approx(5 * 1.4826)
     assert rows["error"].max() == 100.0
     assert rows.groupby("block")["start_us"].nunique().tolist() == [8, 8]
+    rows = withheld_rows("made", "other", counted(now, other), edges).to_pandas()
+    assert rows["error_winsorised"].max() == pytest.approx(5 * 1.4826)
 
 
 def test_growth_of_the_true_error_over_a_gap() -> None:
@@ -158,7 +170,7 @@ def test_growth_of_the_true_error_over_a_gap() -> None:
     truth = Truth(time, course, speed, time[:0], np.zeros((0, 4)), None)
     table = MetricsTable("made")
     now = dataclasses.replace(record("present", {}), gaps=lambda: columns)
-    add_true_drift(table, [now], truth, WINDOW)
+    add_true_drift(table, now, truth, WINDOW)
     rows = {row["source"]: row["value"] for row in table.finished().to_pylist()}
     assert rows["truth_withheld_position"] == pytest.approx(3.0)
     assert rows["truth_withheld_velocity"] == pytest.approx(0.0, abs=1e-9)

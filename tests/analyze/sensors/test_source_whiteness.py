@@ -124,7 +124,7 @@ def test_simulated_receivers_are_told_apart(kind: str) -> None:
     )
     record = replay_set(prepare_flight(flight, ReplaySettings()), "present", {})
     airborne = airborne_intervals(flight, record.flags)
-    window = scoring_window([record], "present", airborne, (), ScoringSettings())
+    window = scoring_window(record, airborne, (), ScoringSettings())
     found = source_whiteness(record, record.states(), flight, window.intervals)
     shares = {
         source: np.mean([found[source, axis].white_share for axis in (0, 1)]) for source in ("gnss_vel", "gnss_pos")

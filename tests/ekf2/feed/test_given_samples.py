@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fusetune.ekf2.feed.given_samples import given_samples
-from fusetune.ekf2.feed.inputs import arrivals_of, build_inputs
+from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, build_inputs
 from fusetune.px4.flight import Flight, ParameterHistory
 from fusetune.px4.layouts.release_layouts import canonical
 
@@ -133,10 +133,10 @@ def test_of_sound_sensors_every_message_is_given():
 
 def test_the_count_is_what_the_inputs_hold():
     flight = canonical(made_flight(1, 16, 0))
-    arrivals = _wide_arrivals(build_inputs(flight).arrays)
+    arrays = build_inputs(flight).arrays
     found = given_samples(flight)
     for name in ("gnss", "mag", "baro", "range", "flow", "airspeed", "auxvel"):
-        assert found[name].given == np.sum(arrivals[name] >= 0)
+        assert found[name].given == len(_positions(arrays, name))
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,8 @@ def test_without_any_one_field_nothing_that_is_given_is_no_number(topic):
         if told:
             assert told[0].reason == f"lacks the field {name}"
             assert told[0].rows == ROWS
-        used = {sensor: getattr(arrays, sensor)[rows[rows >= 0]] for sensor, rows in _arrivals(arrays)}
+        sensors = ("gnss", "mag", "baro", "range", "flow", "airspeed", "auxvel")
+        used = {sensor: getattr(arrays, sensor)[_positions(arrays, sensor)] for sensor in sensors}
         for column in ("lat_deg", "lon_deg", "alt", "vel", "hacc", "vacc", "sacc", "pdop"):
             assert np.isfinite(used["gnss"][column]).all(), (name, column)
         for sensor, column in (("mag", "mag"), ("baro", "hgt"), ("flow", "flow_rate"), ("range", "range")):
@@ -261,14 +262,9 @@ def test_a_topic_without_messages_gives_nothing_and_stops_nothing(topic):
     assert all(one.topic != topic for one in given_samples(flight).values())
 
 
-def _wide_arrivals(arrays):
-    return arrivals_of(arrays.arrivals, 0, len(arrays.imu))
-
-
-def _arrivals(arrays):
-    return [
-        (name, _wide_arrivals(arrays)[name]) for name in ("gnss", "mag", "baro", "range", "flow", "airspeed", "auxvel")
-    ]
+def _positions(arrays, name):
+    """Of the samples of a sensor, those that arrive."""
+    return arrays.arrivals["position"][arrays.arrivals["field"] == ARRIVAL_FIELDS.index(name)]
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,8 @@ import numpy as np
 from fusetune.ekf2.feed import inputs as estimator_inputs
 from fusetune.ekf2.feed.inputs import (
     ARRIVAL,
-    ARRIVALS,
+    ARRIVAL_FIELDS,
     IMU_ROW,
-    arrivals_of,
     build_inputs,
     imu_samples,
     without_arrivals,
@@ -38,26 +37,9 @@ def test_arrivals_of_a_flight_are_small(survey_flight: Flight) -> None:
     assert np.all(np.diff(arrays.arrivals["run"]) >= 0)
 
 
-def test_arrivals_of_a_stretch_are_those_of_each_run() -> None:
-    names = ARRIVALS.names
+def test_arrivals_can_be_left_out_by_field_and_run() -> None:
+    names = ARRIVAL_FIELDS
     told = [(2, "mag", 0), (2, "gnss", 5), (3, "reset_gyro_bias", 1), (4, "mag", 1), (7, "command", 3)]
     arrivals = np.array([(run, names.index(name), position) for run, name, position in told], ARRIVAL)
-    stretch = arrivals_of(arrivals, 2, 7)
-    assert stretch["mag"].tolist() == [0, -1, 1, -1, -1]
-    assert stretch["gnss"].tolist() == [5, -1, -1, -1, -1]
-    assert stretch["command"].tolist() == stretch["baro"].tolist() == [-1] * 5
-    assert stretch["reset_gyro_bias"].tolist() == [False, True, False, False, False]
-    assert not stretch["reset_accel_bias"].any()
     left = without_arrivals(arrivals, ("mag", "reset_gyro_bias"), np.arange(8) < 4)
     assert [(run, names[field]) for run, field, _ in left.tolist()] == [(2, "gnss"), (4, "mag"), (7, "command")]
-    assert len(arrivals_of(arrivals, 5, 5)) == 0
-
-
-def test_a_stretch_has_the_samples_of_its_runs(survey_flight: Flight) -> None:
-    arrays = build_inputs(survey_flight).arrays
-    stretch = arrays.of_runs(300, 500)
-    assert len(stretch.imu) == len(stretch.arrivals) == 200
-    np.testing.assert_array_equal(stretch.imu["time_us"], arrays.imu["time_us"][300:500])
-    # positions in the other arrays hold in every stretch
-    np.testing.assert_array_equal(stretch.arrivals["baro"], arrivals_of(arrays.arrivals, 0, 600)["baro"][300:500])
-    assert stretch.baro is arrays.baro

@@ -3,13 +3,10 @@
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from numba import njit
 from scipy.spatial.transform import Rotation
 
-from fusetune.ekf2.feed.buffers import BUFFERS_MEMORY, initialise_buffers, push_imu
-from fusetune.ekf2.feed.message_samples import imu_samples
+from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE
-from fusetune.ekf2.feed.sensors import SENSORS
 from fusetune.ekf2.filter.common.parameters import complete, parameter_record
 from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import (
     DOWN_SAMPLER_MEMORY,
@@ -17,37 +14,11 @@ from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import (
     initialise_down_sampler,
     reset_down_sampler,
 )
+from fusetune.ekf2.replay.flight_schedule import flight_schedule
+from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
 
 DT = np.float32(0.004)
-HORIZON = np.dtype(
-    [
-        ("buffers", BUFFERS_MEMORY),
-        ("sensors", SENSORS),
-        ("down_sampler", DOWN_SAMPLER_MEMORY),
-        ("imu_newest", IMU_SAMPLE),
-        ("imu_delayed", IMU_SAMPLE),
-        ("time_delayed_us", "i8"),
-        ("time_latest_us", "i8"),
-    ],
-    align=True,
-)
-
-
-@njit
-def follow_horizon(horizon, params, imu, times):
-    initialise_buffers(horizon, params, imu[0].time_us)
-    initialise_down_sampler(horizon.down_sampler)
-    count = 0
-    for i in range(len(imu)):
-        if accumulate_imu(horizon.down_sampler, imu[i]):
-            horizon.imu_newest = horizon.down_sampler.sample
-            reset_down_sampler(horizon.down_sampler, params)
-            push_imu(horizon, imu[i].time_us)
-            times[count, 0] = imu[i].time_us
-            times[count, 1] = horizon.time_delayed_us
-            count += 1
-    return count
 
 
 def constant_motion(count, rate, acceleration):
@@ -60,14 +31,13 @@ def constant_motion(count, rate, acceleration):
 
 
 def down_sampled(imu, predict_us):
-    params = parameter_record(complete({}, {"EKF2_PREDICT_US": predict_us}))
     sampler = np.zeros(1, DOWN_SAMPLER_MEMORY)
     initialise_down_sampler(sampler[0])
     out = []
     for sample in imu:
         if accumulate_imu(sampler[0], sample):
             out.append(sampler[0]["sample"].copy())
-            reset_down_sampler(sampler[0], params[0])
+            reset_down_sampler(sampler[0], predict_us)
     return out
 
 
@@ -114,12 +84,14 @@ def test_velocity_without_rotation_is_the_plain_sum():
 def test_fusion_time_horizon_is_that_of_px4(shared_logs, shared_reference, name):
     """Expected: time stamps of every update of PX4 v1.16's own EKF2 on the same log."""
     flight = read_ulog(shared_logs / f"{name}.ulg")
-    imu = imu_samples(flight.topics["sensor_combined", 0])
+    inputs = build_inputs(canonical(flight))
     params = parameter_record(complete(flight.parameters.initial, {}, flight.release))
-    times = np.zeros((len(imu), 2), np.int64)
-    count = follow_horizon(np.zeros(1, HORIZON)[0], params[0], imu, times)
+    tables = flight_schedule(inputs, params[0], ()).tables
+    newest = np.arange(len(tables.intervals))
+    oldest = np.maximum(newest - int(tables.lengths["imu_length"][0]) + 1, 0)
+    times = tables.intervals["time_us"]
     expected = pq.read_table(
         shared_reference / name / "deep" / "estimator_states.parquet", columns=["timestamp", "timestamp_sample"]
     )
-    np.testing.assert_array_equal(times[:count, 0], expected["timestamp"].to_numpy())
-    np.testing.assert_array_equal(times[:count, 1], expected["timestamp_sample"].to_numpy())
+    np.testing.assert_array_equal(times, expected["timestamp"].to_numpy())
+    np.testing.assert_array_equal(times[oldest], expected["timestamp_sample"].to_numpy())

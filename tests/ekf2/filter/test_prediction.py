@@ -14,7 +14,7 @@ from tests.ekf2.filter.height_and_field_records import (
 )
 
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT_REF_RANGE
-from fusetune.ekf2.filter.prediction import predict_covariance, predict_state, update_average_interval
+from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
 from fusetune.ekf2.numerics.constants import ONE_G
 
 DT = 0.01
@@ -190,12 +190,3 @@ def test_earth_rate_and_coriolis_once_the_latitude_is_known():
     predict_state(ekf, make_parameters())
     np.testing.assert_allclose(ekf["q"], [1, 0, 0, 0], atol=1e-15)
     assert ekf["vel"][1] == pytest.approx(2 * spin * np.sin(latitude) * speed * DT, rel=1e-9)
-
-
-def test_average_interval_follows_the_samples_within_limits():
-    ekf = make_estimator()
-    imu = ekf["imu_delayed"]
-    imu["delta_ang_dt"] = imu["delta_vel_dt"] = 0.1
-    ekf["dt_ekf_avg"] = 0.01
-    update_average_interval(ekf, make_parameters(EKF2_PREDICT_US=10000))
-    assert ekf["dt_ekf_avg"] == pytest.approx(0.99 * 0.01 + 0.01 * 0.02, rel=1e-6)

@@ -12,8 +12,9 @@ from tests.ekf2.replay.px4_agreement import Limits, assert_replay_agrees
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.course import RUNS_PER_STRETCH
-from fusetune.ekf2.replay.recording import joined, with_fields
+from fusetune.ekf2.replay.recording import SCORING, joined, with_fields
 from fusetune.ekf2.replay.replay import replay, replay_into
+from fusetune.ekf2.replay.results import ReplaySummary
 from fusetune.px4.flight import Flight
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 
@@ -223,3 +224,24 @@ def test_replay_is_that_of_px4_with_random_parameters(shared_logs, shared_refere
     )
     found = assert_replay_agrees(shared_logs / f"{name}.ulg", shared_reference_random / name, tmp_path, limits)
     assert len(found) == 6
+
+
+def test_a_scoring_recording_has_the_figures_of_a_full_one(flight, result):
+    """Steps and their neighbours are found here in the full rows, over all of the flight at once."""
+    scored = replay(build_inputs(flight), complete(flight.parameters.initial, {}, flight.release), recording=SCORING)
+    assert_equal_rows(scored.innovations, result.innovations)
+    assert_equal_rows(scored.flags, result.flags)
+    states = {"quaternion": "states", "velocity": "states"}
+    firsts = {"quaternion": 0, "velocity": 4, "attitude_variance": 0, "velocity_variance": 3, "position_variance": 6}
+    np.testing.assert_array_equal(scored.states["timestamp_sample"], result.states["timestamp_sample"])
+    for name, first in firsts.items():
+        of = result.states[states.get(name, "covariances")]
+        np.testing.assert_array_equal(scored.states[name], of[:, first : first + scored.states[name].shape[1]])
+    rows = result.local_position
+    counters = np.stack([rows[name] for name in rows.dtype.names if name.endswith("_reset_counter")])
+    steps = np.flatnonzero(np.diff(counters).any(axis=0)) + 1
+    assert len(steps) > 2
+    kept = sorted({0, len(rows) - 1} | {row for step in steps for row in range(max(step - 2, 0), step + 1)})
+    assert_equal_rows(scored.local_position, rows[kept])
+    for field in dataclasses.fields(ReplaySummary):
+        assert getattr(scored, field.name) == getattr(result, field.name)

@@ -40,16 +40,16 @@ def student_t_nll(innovation: Array, innovation_variance: Array, dof: float = ST
 
 
 def winsor_limit(innovation: Array) -> float:
-    """Limit beyond which innovations are winsorised: 5 robust standard deviations over all given sets together.
+    """Limit beyond which innovations are winsorised: 5 robust standard deviations of those of the present set.
 
-    It must not depend on S: clipping ν/√S would let a set win by making S small.
+    It must not depend on S: clipping ν/√S would let a set win by making S small. The array may be put in another order.
     """
     median = float(np.median(np.abs(innovation), overwrite_input=True))
     return WINSOR_STANDARD_DEVIATIONS * NORMAL_CONSISTENCY * median if median > 0.0 else math.inf
 
 
-def winsorised(innovation: Array, limit: float) -> Array:
-    """Innovations clipped to ±limit."""
+def winsorised(innovation: Array, limit: float | Array) -> Array:
+    """Innovations clipped to ±limit, which is one figure or broadcasts against them."""
     return np.clip(innovation, -limit, limit)
 
 
@@ -104,7 +104,7 @@ METRICS = (
         lambda given: _mean(student_t_nll, given.innovation, given), "lower",
     ),
     InnovationMetric(
-        "nll_winsorised", "nat", "the same with innovations clipped at 5 robust standard deviations of complete sets",
+        "nll_winsorised", "nat", "the same, clipped at 5 robust standard deviations of the present set's",
         lambda given: _mean(gaussian_nll, given.once(_winsorised), given), "lower",
         window=InWindow("worst_window_nll_winsorised", _winsorised_nll),
     ),

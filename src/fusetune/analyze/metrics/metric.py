@@ -60,7 +60,8 @@ class Innovations:
 
     Attributes
     ----------
-    winsor_limits : gives those of the axes, (D,), see `fusetune.analyze.metrics.likelihood.winsor_limit`
+    winsor_limits : gives those of the axes, (D,), each one figure or (S, 1), see
+        `fusetune.analyze.metrics.likelihood.winsor_limit`
     confidence : of intervals
     of_group : whether they stand for a group of axes, which may be one alone
     """
@@ -69,7 +70,7 @@ class Innovations:
     innovation_variance: Array
     test_ratio: Array
     rejected: npt.NDArray[np.bool_]
-    winsor_limits: Callable[[], Sequence[float]]
+    winsor_limits: Callable[[], Sequence[float | Array]]
     confidence: float = 0.95
     of_group: bool = False
     _made: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)

@@ -23,7 +23,7 @@ from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, St
 from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
-from fusetune.ekf2.replay.recording import RecordArrays
+from fusetune.ekf2.replay.recording import FULL, RecordArrays, Recording
 from fusetune.ekf2.replay.replay import replay, replay_into
 from fusetune.ekf2.replay.results import Gap, ReplayResult, ReplaySummary
 from fusetune.px4.flight import Flight
@@ -52,6 +52,17 @@ class PreparedFlight:
         """A complete set: the log's own parameters, but for some."""
         return complete(self.flight.parameters.initial, overrides, self.flight.release)
 
+    def course_of(self, overrides: Mapping[str, float]) -> tuple[Any, ...]:
+        """What the replay of a set follows from beside the flight: sets that have it in common have one replay.
+
+        Returns
+        -------
+        Its parameters, and which of their changes in flight are applied to it
+        """
+        params = self.parameters(overrides)
+        changed = {change.name for _, change in self.inputs.parameter_changes}
+        return (*sorted(params.items()), *sorted(changed - {*overrides}))
+
     def is_as_flown(self, overrides: Mapping[str, float]) -> bool:
         """Whether a set with these values is replayed as the parameters that flew are: it changes none, nor keeps one
         from changing in flight."""
@@ -76,9 +87,10 @@ class PreparedFlight:
         take: Callable[[RecordArrays], None],
         params: Mapping[str, float],
         overridden: frozenset[str] = frozenset(),
+        recording: Recording = FULL,
     ) -> ReplaySummary:
         """Replay a complete set and hand on its rows as they come, see `fusetune.ekf2.replay.replay.replay_into`."""
-        summary = replay_into(take, self.inputs, params, overridden=overridden, **self._shared())
+        summary = replay_into(take, self.inputs, params, overridden=overridden, recording=recording, **self._shared())
         return self._with_measured_gaps(summary, params)
 
     def measured(self, innovations: np.ndarray, params: Mapping[str, float], of: ReplaySummary) -> np.ndarray:
@@ -89,9 +101,14 @@ class PreparedFlight:
         return {"start": self.start.state, "gaps": self.gaps, "handovers": self.handovers}
 
     def _with_measured_gaps(self, summary: Summary, params: Mapping[str, float]) -> Summary:
+        if not summary.gaps or not self.reconstructed.changed:
+            return summary
+        # told apart for all gaps at once
+        ends = np.cumsum([len(gap.innovations) for gap in summary.gaps])
+        measured = self.measured(np.concatenate([gap.innovations for gap in summary.gaps]), params, summary)
         gaps = tuple(
-            dataclasses.replace(gap, innovations=gap.innovations[self.measured(gap.innovations, params, summary)])
-            for gap in summary.gaps
+            dataclasses.replace(gap, innovations=gap.innovations[own])
+            for gap, own in zip(summary.gaps, np.split(measured, ends[:-1]), strict=True)
         )
         return dataclasses.replace(summary, gaps=gaps)
 

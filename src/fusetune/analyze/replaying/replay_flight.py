@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -18,27 +19,31 @@ from fusetune.analyze.replaying.replayed_set import (
     joined_steps,
     values_of,
 )
-from fusetune.analyze.replaying.samples import SampleSpool, SpooledSamples, gate_of
+from fusetune.analyze.replaying.samples import AxisSamples, SortedSamples, SourceAxis, gate_of
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.replaying.store.columns import (
     PREDICTED_TABLES,
     flags_table,
-    innovation_table,
     local_position_table,
 )
+from fusetune.analyze.replaying.store.parts import TABLES, summary_file, table_file
 from fusetune.analyze.replaying.store.reader import columns_of
 from fusetune.analyze.replaying.store.writer import finish_replay, replay_writer
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import (
     FLAGS_ROW,
+    FULL,
     INNOVATION_ROW,
     LOCAL_POSITION_ROW,
     RecordArrays,
+    Recording,
     joined_rows,
     with_fields,
 )
 from fusetune.ekf2.replay.results import ReplaySummary
 from fusetune.save.flight_folder import load_flight
-from fusetune.storage.files import AnyPath
+from fusetune.storage.documents import read_document, write_document
+from fusetune.storage.files import AnyPath, atomic_path
 
 _LOCAL_POSITION = np.dtype(
     [(name, LOCAL_POSITION_ROW[name]) for name in LOCAL_POSITION_ROW.names or () if name != "q"], align=True
@@ -46,16 +51,19 @@ _LOCAL_POSITION = np.dtype(
 """What is kept in memory of the published position."""
 
 
-def replay_set(prepared: PreparedFlight, name: str, overrides: Mapping[str, float]) -> ReplayedSet:
+def replay_set(
+    prepared: PreparedFlight, name: str, overrides: Mapping[str, float], recording: Recording = FULL
+) -> ReplayedSet:
     """Replay one set and keep in memory what scores are made of; no file is written.
 
     Parameters
     ----------
     name, overrides : of the set; parameters in which it differs from the log's own
+    recording : `SCORING` leaves out the states' IMU steps, and the published position but around resets
     """
     params = prepared.parameters(overrides)
-    kept = _Kept()
-    summary = prepared.replay_into(kept.take, params, frozenset(overrides))
+    kept = _Kept(recording)
+    summary = prepared.replay_into(kept.take, params, frozenset(overrides), recording)
     document = summary_document(ReplayIdentity(name, overrides, params, prepared.description(summary)), summary)
     parameters = values_of(document, "params")
     changed = prepared.reconstructed.changed
@@ -70,7 +78,7 @@ def replay_set(prepared: PreparedFlight, name: str, overrides: Mapping[str, floa
         flags=columns_of(flags_table(joined_rows(kept.flags, FLAGS_ROW))),
         local_position=columns_of(local_position_table(joined_rows(kept.local_position, _LOCAL_POSITION))),
         states=partial(joined_states, kept.states),
-        steps=partial(joined_steps, kept.states),
+        steps=partial(joined_steps, kept.states) if recording is FULL else None,
         withheld=withheld,
         gaps=gaps,
     )
@@ -79,7 +87,8 @@ def replay_set(prepared: PreparedFlight, name: str, overrides: Mapping[str, floa
 class _Kept:
     """Takes the rows of a replay and keeps what scores are made of."""
 
-    def __init__(self) -> None:
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
         self.innovations: list[np.ndarray] = []
         self.states: list[Columns] = []
         self.local_position: list[np.ndarray] = []
@@ -87,20 +96,23 @@ class _Kept:
 
     def take(self, rows: RecordArrays) -> None:
         self.innovations.append(rows.innovations)
-        states = {name: block.of_rows(rows.states) for name, block in (STATE_BLOCKS | STEP_BLOCKS).items()}
+        if self._recording is FULL:
+            states = {name: block.of_rows(rows.states) for name, block in (STATE_BLOCKS | STEP_BLOCKS).items()}
+        else:
+            states = {name: rows.states[name] for name in STATE_BLOCKS}
         self.states.append({"time": rows.states["timestamp_sample"].copy(), **states})
         self.local_position.append(with_fields(rows.local_position, _LOCAL_POSITION.names or ()))
         self.flags.append(rows.flags)
 
     def samples(
         self, parameters: Mapping[str, float], measured: Callable[[np.ndarray], np.ndarray] | None
-    ) -> SpooledSamples:
+    ) -> Mapping[SourceAxis, AxisSamples]:
         """The innovations by source and axis; `measured` tells which rows are of samples that stand in the log."""
-        samples = SpooledSamples(SampleSpool(), partial(gate_of, parameters))
         rows = joined_rows(self.innovations, INNOVATION_ROW)
         self.innovations.clear()
-        samples.add(innovation_table(rows, measured and measured(rows)))
-        return samples
+        if measured is not None:
+            rows = rows[measured(rows)]
+        return SortedSamples(rows, AID_SOURCE_NAMES, partial(gate_of, parameters))
 
 
 def replay_saved_flight(
@@ -155,3 +167,23 @@ def write_replay(
             writer.write_spooled(lambda rows: prepared.measured(rows, values, summary))
     finish_replay(folder, ReplayIdentity(name, overrides, values, prepared.description(summary)), summary)
     return summary
+
+
+def copy_replay(
+    prepared: PreparedFlight, folder: AnyPath, source: str, name: str, overrides: Mapping[str, float]
+) -> None:
+    """Write the files of a set whose replay is that of another one (`PreparedFlight.course_of`), which has its files.
+
+    Raises
+    ------
+    UserError
+        If a file of the other set is missing or damaged.
+    """
+    for table in TABLES:
+        with atomic_path(table_file(folder, name, table)) as path:
+            shutil.copyfile(table_file(folder, source, table), path)
+    document = read_document(summary_file(folder, source), sealed=False)
+    params = prepared.parameters(overrides)
+    document |= {"set": name, "overrides": dict(overrides), "params": params}
+    with atomic_path(summary_file(folder, name)) as path:
+        write_document(path, document)

@@ -11,7 +11,8 @@ import io
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import IO, Any, overload
+from threading import Lock
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,8 @@ SourceAxis = tuple[str, int]
 _NOT_STORED = ("source", "axis", "measured")
 _AXES = 8
 """More than any source has."""
+_FEW_ROWS = 300_000
+"""Some ten minutes of flight: of those in memory the arrays by axis, half as large again, stay, too."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +62,16 @@ class SampleSpool:
     """
 
     def __init__(self, folder: AnyPath | None = None) -> None:
+        # several threads may read what one of them has put in
+        self._lock = Lock()
         # lives as long as the samples in it
         self._file: IO[bytes] = io.BytesIO() if folder is None else tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
 
     def put(self, rows: np.ndarray) -> int:
         """Append rows; their place."""
-        place = self._file.seek(0, 2)
-        self._file.write(rows.tobytes())
+        with self._lock:
+            place = self._file.seek(0, 2)
+            self._file.write(rows.tobytes())
         return place
 
     def get(self, places: Iterable[tuple[int, int]], dtype: np.dtype) -> np.ndarray:
@@ -73,41 +79,12 @@ class SampleSpool:
         places = list(places)
         rows = np.zeros(sum(count for _, count in places), dtype)
         content, done = rows.view(np.uint8).data, 0
-        for place, count in places:
-            self._file.seek(place)
-            done += self._file.readinto(content[done : done + count * dtype.itemsize])  # type: ignore[attr-defined]
+        with self._lock:
+            for place, count in places:
+                self._file.seek(place)
+                done += self._file.readinto(content[done : done + count * dtype.itemsize])  # type: ignore[attr-defined]
         assert done == len(content), "what was put into the spool can be read from it"
         return rows
-
-
-class SpooledRows(Sequence[np.ndarray]):
-    """Arrays of rows, each read from the spool when it is asked for."""
-
-    def __init__(self, spool: SampleSpool) -> None:
-        self._spool = spool
-        self._parts: list[tuple[int, int, np.dtype]] = []
-
-    def append(self, rows: np.ndarray) -> None:
-        self._parts.append((self._spool.put(rows), len(rows), rows.dtype))
-
-    def in_order(self, places: Iterable[int]) -> SpooledRows:
-        """The same arrays in another order."""
-        ordered = SpooledRows(self._spool)
-        ordered._parts = [self._parts[place] for place in places]
-        return ordered
-
-    @overload
-    def __getitem__(self, number: int) -> np.ndarray: ...
-    @overload
-    def __getitem__(self, number: slice) -> list[np.ndarray]: ...
-    def __getitem__(self, number: int | slice) -> np.ndarray | list[np.ndarray]:
-        if isinstance(number, slice):
-            return [self[one] for one in range(len(self))[number]]
-        place, count, dtype = self._parts[number]
-        return self._spool.get([(place, count)], dtype)
-
-    def __len__(self) -> int:
-        return len(self._parts)
 
 
 class SpooledSamples(Mapping[SourceAxis, AxisSamples]):
@@ -160,6 +137,46 @@ class SpooledSamples(Mapping[SourceAxis, AxisSamples]):
 
     def __contains__(self, key: object) -> bool:
         return key in self._places
+
+
+class SortedSamples(Mapping[SourceAxis, AxisSamples]):
+    """Samples of a set on a flight, in memory.
+
+    Parameters
+    ----------
+    rows : with the fields of `AxisSamples`, `source` and `axis`; of each source and axis in order of time
+    names : of the sources by their number
+    """
+
+    def __init__(self, rows: np.ndarray, names: Sequence[str], gate: Callable[[str], float]) -> None:
+        key = rows["source"].astype(np.int64) * _AXES + rows["axis"]
+        order = np.argsort(key, kind="stable")
+        self._rows, self._gate = rows[order], gate
+        self._kept: dict[SourceAxis, AxisSamples] = {}
+        found, starts = np.unique(key[order], return_index=True)
+        stops = [*starts[1:].tolist(), len(rows)]
+        self._slices = {
+            (names[number // _AXES], number % _AXES): slice(start, stop)
+            for number, start, stop in zip(found.tolist(), starts.tolist(), stops, strict=True)
+            if names[number // _AXES] in MEASURED_SOURCES
+        }
+
+    def __getitem__(self, key: SourceAxis) -> AxisSamples:
+        found = self._kept.get(key)
+        if found is None:
+            found = _axis_samples(self._rows[self._slices[key]], self._gate(key[0]))
+            if len(self._rows) <= _FEW_ROWS:
+                self._kept[key] = found
+        return found
+
+    def __iter__(self) -> Iterator[SourceAxis]:
+        return iter(self._slices)
+
+    def __len__(self) -> int:
+        return len(self._slices)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._slices
 
 
 def _axis_samples(rows: np.ndarray, gate: float) -> AxisSamples:

@@ -12,8 +12,8 @@ cost itself:
   `reset_cut_s` after it, its error counts as no smaller than the present set's at the same measurement, and its
   variance as its usual one, for a reset sets that, too.
 
-So neither what a reset makes small nor what is not there can make a score better. Nor has such a set a say in the limit
-beyond which the errors of all are clipped: with or without it the others' scores are the same.
+So neither what a reset makes small nor what is not there can make a score better. Nor has another set a say in the limit
+beyond which errors are clipped, which is the present set's: with or without it the others' scores are the same.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class OwnEvidence:
 
     @property
     def is_complete(self) -> bool:
-        """Whether it lacks none and has no reset of its own: such sets say what counts for the others."""
+        """Whether it lacks none and has no reset of its own, so that all counts as it is."""
         return not (self.lacking.any() or self.has_own_resets)
 
 

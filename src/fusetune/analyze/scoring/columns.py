@@ -15,3 +15,8 @@ BY_AXIS = (*FLIGHT_AND_SET, *columns_of(pa.string(), "source", "axis"))
 
 SOURCE_AND_AXIS = (pa.field("source", pa.string()), pa.field("axis", pa.int32()))
 """Axes by their place among those of their source."""
+
+
+def repeated(name: str, rows: int) -> pa.Array:
+    """A column with one text in all rows."""
+    return pa.repeat(pa.scalar(name, pa.string()), rows)

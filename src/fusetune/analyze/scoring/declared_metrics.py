@@ -25,7 +25,7 @@ class Family(NamedTuple):
 FAMILIES = (
     Family("Innovations of a source, by axis; with ● also by group of axes", INNOVATION_METRICS),
     Family("How a source served in flight after the warm-up", SERVICE_METRICS),
-    Family("The error of the source itself, see below", WHITENESS_METRICS),
+    Family("The error of the source itself, see below, of the present set and of `delay_mended`", WHITENESS_METRICS),
     Family("What the estimator is told of a source, by axis, of the present set", TOLD_METRICS),
     Family("Predictions while a sensor is withheld", (*WITHHELD_METRICS, DRIFT)),
     Family("What the filter did beside fusing: source `filter`", EVENT_METRICS),

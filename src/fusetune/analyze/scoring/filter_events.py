@@ -1,5 +1,6 @@
 """What the filter did beside fusing: resets and how far they moved it, faults, lost sources, time spent without aid."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy.typing as npt
 from fusetune.analyze.flight.intervals import Interval, duration, inside
 from fusetune.analyze.metrics.metric import Metric
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
-from fusetune.analyze.scoring.reset_jumps import FAR, JumpFigures, jump_figures, reset_jumps, significant
+from fusetune.analyze.scoring.reset_jumps import FAR, JumpFigures, Jumps, jump_figures, reset_jumps, significant
 from fusetune.px4.aid_sources import AID_SOURCES
 
 _FLAGS_OF_SOURCES = tuple(
@@ -101,13 +102,17 @@ SERVICE_METRICS: tuple[Metric[SourceAid], ...] = (
 """How a source served in flight after the warm-up."""
 
 
-def filter_events(record: ReplayedSet, flight: tuple[Interval, ...]) -> FilterEvents:
+def filter_events(
+    record: ReplayedSet, flight: tuple[Interval, ...], all_jumps: Mapping[str, Jumps] | None = None
+) -> FilterEvents:
     """Count the events of one replay.
 
     Parameters
     ----------
     flight : flight time after the warm-up, µs: before it every filter resets and switches sources
+    all_jumps : from `reset_jumps`, where they are known
     """
+    all_jumps = reset_jumps(record) if all_jumps is None else all_jumps
     resets = {kind: int(np.count_nonzero(inside(times, flight))) for kind, times in record.reset_times.items()}
     time = record.flags.get("timestamp", np.zeros(0)).astype(np.int64)
     columns = {}
@@ -121,7 +126,7 @@ def filter_events(record: ReplayedSet, flight: tuple[Interval, ...]) -> FilterEv
         stopped = time[1:][values[:-1].astype(bool) & ~values[1:].astype(bool)]
         timeouts[flag.removeprefix("cs_")] = int(np.count_nonzero(inside(stopped, flight)))
     faults = tuple(sorted(name for name, values in record.flags.items() if name.startswith("fs_") and values.any()))
-    jumps = {kind: found for kind, one in reset_jumps(record).items() if (found := one.inside(flight)).time.size}
+    jumps = {kind: found for kind, one in all_jumps.items() if (found := one.inside(flight)).time.size}
     fault_s = {name: _time_true(time, record.flags[name], flight) for name in faults}
     return FilterEvents(
         flight_s=duration(flight) * 1e-6,

@@ -4,28 +4,28 @@ Rotors stand still, GNSS and barometer are at their calmest and a filter is easi
 wait before take-off would hide how the sets differ. Apart, it shows noise without motion.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from fusetune.analyze.flight.intervals import Cut, Interval, merged, subtract
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.samples import SourceAxis
 from fusetune.analyze.scoring.filter_events import ON_GROUND, FilterEvents
-from fusetune.analyze.scoring.measurement_alignment import PairedSamples, paired_samples
-from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable, add_innovation_metrics, groups_of
+from fusetune.analyze.scoring.measurement_alignment import Counted, axes_together
+from fusetune.analyze.scoring.metrics_table import MetricsTable, add_innovation_metrics
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.window import ScoringWindow, after, cuts_within, own_resets
-from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
+from fusetune.analyze.scoring.window import ScoringWindow, after, cuts_within
 
 BEFORE_TAKE_OFF_US = 2_000_000
 """Cut from the ground time before a take-off: the rotors run, and the land detector tells late."""
 AFTER_LANDING_US = 1_000_000
 GROUND = "ground_"
 """Before the name of a metric that is given of the time on the ground."""
+_ON_GROUND = tuple(metric for metric in INNOVATION_METRICS if metric.on_ground)
 
 
 def ground_window(
-    records: Sequence[ReplayedSet],
-    present: str,
+    present: ReplayedSet,
     airborne: Sequence[Interval],
     log: Interval,
     gaps: Sequence[Interval],
@@ -36,9 +36,10 @@ def ground_window(
 
     Parameters
     ----------
+    present : replay of the set from whose resets it follows
     airborne, gaps : µs, as for `scoring_window`
     log : start and end of the log, µs
-    window : of the flight; the sets that it leaves out are left out here too
+    window : of the flight
     """
     flying = [Cut(start - BEFORE_TAKE_OFF_US, stop + AFTER_LANDING_US, "in the air") for start, stop in airborne]
     standing = subtract([log], flying)
@@ -46,30 +47,22 @@ def ground_window(
         standing = after(standing, window.warm_up_end)
     if window.warm_up_end is None or not standing:
         return ScoringWindow((), (), window.excluded, window.warm_up_end, "no time on the ground after the warm-up")
-    present_record = next(record for record in records if record.name == present)
-    cuts = merged(cuts_within(present_record, standing, gaps, settings))
+    cuts = merged(cuts_within(present, standing, gaps, settings))
     intervals = subtract(standing, cuts)
-    own = own_resets(records, present, intervals, settings)
-    return ScoringWindow(intervals, cuts, window.excluded, window.warm_up_end, own_resets=own)
+    return ScoringWindow(intervals, cuts, window.excluded, window.warm_up_end)
 
 
 def add_ground_metrics(
-    table: MetricsTable, records: Sequence[ReplayedSet], present: str, ground: ScoringWindow, settings: ScoringSettings
+    table: MetricsTable, set_name: str, found: Mapping[SourceAxis, Counted], settings: ScoringSettings
 ) -> None:
-    """Append the metrics that are given of the ground, of every source and axis, named `ground_…`."""
-    if not ground.intervals:
-        return
-    metrics = [metric for metric in INNOVATION_METRICS if metric.on_ground]
-    standing = [record for record in records if record.name not in ground.excluded]
-    for source in MEASURED_SOURCES.values():
-        pairs: dict[int, PairedSamples] = {}
-        for axis in range(source.axes):
-            found = paired_samples(standing, (source.name, axis), present, ground, settings=settings)
-            if found is not None and found.time.size >= FEWEST_SAMPLES:
-                pairs[axis] = found
-        single = [(AXES[axis], [one]) for axis, one in pairs.items()]
-        for axis_name, members in (*single, *groups_of(pairs)):
-            add_innovation_metrics(table, members, axis_name, metrics, settings.confidence, GROUND)
+    """Append the metrics that are given of the ground, of every source and axis, named `ground_…`.
+
+    Parameters
+    ----------
+    found : samples of the set on the ground
+    """
+    for together in axes_together([one.samples for one in found.values() if one.samples is not None]):
+        add_innovation_metrics(table, set_name, together, _ON_GROUND, settings.confidence, GROUND)
 
 
 def add_ground_events(table: MetricsTable, set_name: str, events: FilterEvents, ground: ScoringWindow) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,11 +11,10 @@ import pyarrow as pa
 
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.metrics.error_figures import ErrorFigure
-from fusetune.analyze.metrics.metric import Bounds, InnovationMetric
+from fusetune.analyze.metrics.metric import Bounds, InnovationMetric, Innovations
 from fusetune.analyze.scoring.filter_events import EVENT_METRICS, SERVICE_METRICS, FilterEvents
-from fusetune.analyze.scoring.measurement_alignment import PairedSamples, innovations_of
+from fusetune.analyze.scoring.measurement_alignment import AxesTogether
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
-from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.sensors.source_whiteness import WHITE_SHARE, WHITENESS_METRICS, Whiteness, joint_white_share
 from fusetune.analyze.sensors.told_noise import TOLD_METRICS, ToldNoise
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
@@ -32,7 +30,7 @@ class MetricsTable:
     """Rows under construction."""
 
     flight: str
-    _columns: dict[str, list] = field(default_factory=lambda: {name: [] for name in METRICS_SCHEMA.names})
+    _rows: list[tuple] = field(default_factory=list)
 
     def add(
         self,
@@ -46,81 +44,68 @@ class MetricsTable:
         upper: float = np.nan,
     ) -> None:
         """Append one figure."""
-        row = (self.flight, set_name, source, axis, metric, float(value), float(lower), float(upper), float(n))
-        for column, item in zip(self._columns.values(), row, strict=True):
-            column.append(item)
-
-    def add_each(
-        self, sets: tuple[str, ...], source: str, axis: str, metric: str, values: Array | Bounds, n: float | Array
-    ) -> None:
-        """Append one figure per set, `values` and, where they are not the same for all, `n` (S,)."""
-        bounds = values if isinstance(values, Bounds) else Bounds(values, *[np.full(values.shape, np.nan)] * 2)
-        counts = np.broadcast_to(n, bounds.value.shape)
-        for name, *row in zip(sets, bounds.value, counts, bounds.lower, bounds.upper, strict=True):
-            self.add(name, source, axis, metric, *row)
-
-    def add_metric_by_metric(self, tables: Sequence[MetricsTable]) -> None:
-        """Append the rows of several tables, the first of each, then the second of each, and so on."""
-        for name, column in self._columns.items():
-            column += itertools.chain.from_iterable(zip(*(one._columns[name] for one in tables), strict=True))
+        self._rows.append((self.flight, set_name, source, axis, metric, value, lower, upper, n))
 
     def finished(self) -> pa.Table:
-        return pa.table({name: pa.array(v) for name, v in self._columns.items()}, schema=METRICS_SCHEMA)
-
-
-def add_axis_metrics(table: MetricsTable, pairs: PairedSamples, settings: ScoringSettings) -> None:
-    """Append all figures of one source and axis for all its sets."""
-    if pairs.time.size >= FEWEST_SAMPLES:
-        add_innovation_metrics(table, [pairs], AXES[pairs.axis], INNOVATION_METRICS, settings.confidence)
-
-
-def add_group_metrics(table: MetricsTable, pairs: dict[int, PairedSamples], settings: ScoringSettings) -> None:
-    """Append the aggregates (horizontal, vertical, all axes) of one source, whose axes share their samples.
-
-    Parameters
-    ----------
-    pairs : by axis
-    """
-    of_groups = [metric for metric in INNOVATION_METRICS if metric.of_groups]
-    for group, members in groups_of(pairs):
-        add_innovation_metrics(table, members, group, of_groups, settings.confidence)
+        columns = zip(*self._rows, strict=True) if self._rows else [()] * len(METRICS_SCHEMA)
+        arrays = {
+            field.name: np.array(values, np.float64) if field.type == pa.float64() else list(values)
+            for field, values in zip(METRICS_SCHEMA, columns, strict=True)
+        }
+        return pa.table(arrays, schema=METRICS_SCHEMA)
 
 
 def add_innovation_metrics(
     table: MetricsTable,
-    members: Sequence[PairedSamples],
-    axis: str,
+    set_name: str,
+    samples: AxesTogether,
     metrics: Sequence[InnovationMetric],
     confidence: float,
     prefix: str = "",
 ) -> None:
-    """Append figures of some axes of one source together, of one set after the other.
+    """Append figures of axes of one source, and of their groups (horizontal, vertical, all axes).
 
     Parameters
     ----------
-    axis : name of the axis or group
+    samples : nothing is told of too few
     prefix : to the names of the metrics
     """
-    tables = []
-    for first, given in innovations_of(members, confidence, of_group=axis not in AXES):
-        one = MetricsTable(table.flight)
-        for metric in metrics:
-            samples = given.samples if metric.samples is None else metric.samples(given)
-            one.add_each(first.sets, first.source, axis, prefix + metric.name, metric.function(given), samples)
-        tables.append(one)
-    table.add_metric_by_metric(tables)
-
-
-def groups_of(pairs: dict[int, PairedSamples]) -> Iterator[tuple[str, list[PairedSamples]]]:
-    """Groups of axes of one source (horizontal, vertical, all) that share their samples and sets, with their axes."""
-    if not pairs:
+    if samples.time.size < FEWEST_SAMPLES:
         return
-    for group, axes in AID_SOURCES[next(iter(pairs.values())).source].groups:
-        members = [pairs[axis] for axis in axes if axis in pairs]
-        if len(members) != len(axes) or members[0].time.size < FEWEST_SAMPLES:
-            continue
-        if all(np.array_equal(one.time, members[0].time) and one.sets == members[0].sets for one in members):
-            yield group, members
+    axes = [AXES[axis] for axis in samples.axes]
+    _add_figures(table, set_name, samples.source, axes, samples.innovations(confidence), metrics, prefix)
+    of_groups = [metric for metric in metrics if metric.of_groups]
+    for group, given in samples.groups(confidence):
+        _add_figures(table, set_name, samples.source, [group], given, of_groups, prefix)
+
+
+def _add_figures(
+    table: MetricsTable,
+    set_name: str,
+    source: str,
+    axes: Sequence[str],
+    given: Innovations,
+    metrics: Sequence[InnovationMetric],
+    prefix: str,
+) -> None:
+    """Of one axis or group after the other, all metrics."""
+    unknown = [np.nan] * len(axes)
+    found = []
+    for metric in metrics:
+        value = metric.function(given)
+        n = [float(given.samples)] * len(axes) if metric.samples is None else metric.samples(given).tolist()
+        if isinstance(value, Bounds):
+            found.append((value.value.tolist(), n, value.lower.tolist(), value.upper.tolist()))
+        else:
+            found.append((value.tolist(), n, unknown, unknown))
+    for place, axis in enumerate(axes):
+        for metric, (values, n, lower, upper) in zip(metrics, found, strict=True):
+            table.add(set_name, source, axis, prefix + metric.name, values[place], n[place], lower[place], upper[place])
+
+
+def add_all_innovation_metrics(table: MetricsTable, set_name: str, samples: AxesTogether, confidence: float) -> None:
+    """Append all figures of axes of one source and of their groups."""
+    add_innovation_metrics(table, set_name, samples, INNOVATION_METRICS, confidence)
 
 
 def add_events(table: MetricsTable, set_name: str, events: FilterEvents) -> None:
@@ -133,7 +118,7 @@ def add_events(table: MetricsTable, set_name: str, events: FilterEvents) -> None
             table.add(set_name, source, "all", service.name, service.function(aid), aid.samples)
 
 
-def add_whiteness(table: MetricsTable, set_name: str, found: dict[tuple[str, int], Whiteness]) -> None:
+def add_whiteness(table: MetricsTable, set_name: str, found: Mapping[tuple[str, int], Whiteness]) -> None:
     """Append what is white of each source's error, by axis and by group (the share of the summed variances)."""
     for (source, axis), one in found.items():
         for metric in WHITENESS_METRICS:

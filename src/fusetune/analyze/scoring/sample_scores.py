@@ -1,38 +1,39 @@
-"""Figures that are made of the samples of one source and axis at a time: per sample, block and window."""
+"""Figures that are made of the samples of one set: per sample, block and window."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
-from fusetune.analyze.replaying.samples import AxisSamples, SampleSpool, SourceAxis
+from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.scoring.block_scores import BLOCK_SCHEMA, block_rows
 from fusetune.analyze.scoring.charges import EvidenceCost
-from fusetune.analyze.scoring.measurement_alignment import PairedSamples, SamplesOfSet, paired_samples
-from fusetune.analyze.scoring.metrics_table import (
-    FEWEST_SAMPLES,
-    MetricsTable,
-    add_axis_metrics,
-    add_group_metrics,
-    groups_of,
+from fusetune.analyze.scoring.measurement_alignment import (
+    AxesTogether,
+    Counted,
+    CountedSamples,
+    Masks,
+    axes_together,
+    counted_samples,
+    own_samples,
+    sample_mask,
+    sample_masks,
 )
+from fusetune.analyze.scoring.metrics_table import MetricsTable, add_all_innovation_metrics
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.window_scores import (
-    WINDOW_SCHEMA,
     add_worst_windows,
     window_edges,
     window_figures,
     window_rows,
 )
-from fusetune.px4.aid_sources import AXES, MEASURED_SOURCES
+from fusetune.px4.aid_sources import MEASURED_SOURCES
 from fusetune.set_names import ONBOARD
-from fusetune.storage.files import AnyPath
-from fusetune.storage.freed_memory import give_back_freed_memory
 
 SAMPLES_SCHEMA = pa.schema(
     [
@@ -50,26 +51,46 @@ SAMPLES_SCHEMA = pa.schema(
 
 
 class SampleScores(NamedTuple):
-    """Rows of `scores.parquet` and of `windows.parquet`, and what each set cost itself, by source and axis."""
+    """Rows of `scores.parquet`, `windows.parquet` and `samples.parquet`, and what the set cost itself, by source and
+    axis."""
 
     blocks: pa.Table
     windows: pa.Table
-    costs: Mapping[SourceAxis, Mapping[str, EvidenceCost]]
+    samples: pa.Table
+    costs: Mapping[SourceAxis, EvidenceCost]
 
 
-def no_sample_scores() -> SampleScores:
-    """Of a flight of which nothing is scored; made when asked for, as PyArrow's first table looks for pandas."""
-    return SampleScores(BLOCK_SCHEMA.empty_table(), WINDOW_SCHEMA.empty_table(), {})
+def counted(
+    record: ReplayedSet, masks: Masks, window: ScoringWindow, max_lacking_percent: float
+) -> dict[SourceAxis, Counted]:
+    """Samples of a set at the masks, and of sources that these do not have at the set's own measurements."""
+    found: dict[SourceAxis, Counted] = {}
+    for source in MEASURED_SOURCES.values():
+        for axis in range(source.axes):
+            key = source.name, axis
+            if key in masks:
+                found[key] = counted_samples(masks[key], record, window, max_lacking_percent)
+            elif key in record.first_fused and (own := sample_mask(record, key, window)) is not None:
+                found[key] = Counted(_whole(own.time.size), own_samples(own, record.samples[key]))
+    return found
+
+
+def counted_of_its_own(record: ReplayedSet, masks: Masks) -> dict[SourceAxis, Counted]:
+    """Samples of the set that the masks are of."""
+    return {key: Counted(_whole(mask.time.size), own_samples(mask, record.samples[key])) for key, mask in masks.items()}
+
+
+def _whole(count: int) -> EvidenceCost:
+    return EvidenceCost(count, 0, 0)
 
 
 def score_samples(
     table: MetricsTable,
-    records: Sequence[ReplayedSet],
-    present: str,
+    set_name: str,
+    found: Mapping[SourceAxis, Counted],
+    masks: Masks,
     window: ScoringWindow,
     settings: ScoringSettings,
-    take_samples: Callable[[pa.Table], None] | None = None,
-    spool_folder: AnyPath | None = None,
 ) -> SampleScores:
     """Append the figures of every source and axis, and of their groups; sums of blocks and windows.
 
@@ -77,60 +98,59 @@ def score_samples(
 
     Parameters
     ----------
-    records : replays of the sets that are scored
-    take_samples, spool_folder : as for `score_sets`
+    found : the set's samples
+    masks : of the present set
     """
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
     blocks, windows = [], []
-    costs: dict[SourceAxis, Mapping[str, EvidenceCost]] = {}
-    for source in MEASURED_SOURCES.values():
-        pairs: dict[int, PairedSamples] = {}
-        spool = SampleSpool(spool_folder)
-        for axis in range(source.axes):
-            found = paired_samples(records, (source.name, axis), present, window, spool, settings)
-            if found is not None:
-                pairs[axis] = found
-        for one in pairs.values():
-            add_axis_metrics(table, one, settings)
-            if one.sets[0] == present:
-                blocks.append(block_rows(table.flight, one, edges))
-                costs[source.name, one.axis] = one.costs
-            # of what is sampled at every update the samples would fill the disk, and no plot shows them
-            if take_samples is not None and not source.every_update:
-                for of_set in one.each():
-                    take_samples(_sample_rows(of_set, one.winsor_limit))
-        if pairs:
-            add_group_metrics(table, pairs, settings)
-        single = [(AXES[axis], [one]) for axis, one in pairs.items() if one.time.size >= FEWEST_SAMPLES]
-        for axis_name, members in (*single, *groups_of(pairs)):
-            figures = window_figures(members, axis_name, wide_edges)
-            add_worst_windows(table, figures)
-            windows.append(window_rows(table.flight, figures, wide_edges))
-        give_back_freed_memory()
+    samples = [one.samples for one in found.values() if one.samples is not None]
+    for together in axes_together(samples):
+        add_all_innovation_metrics(table, set_name, together, settings.confidence)
+        compared = tuple(one for one in together.samples if masks.get((one.mask.source, one.mask.axis)) is one.mask)
+        if compared:
+            blocks.append(block_rows(table.flight, set_name, AxesTogether(together.source, compared), edges))
+        for figures in window_figures(together, wide_edges):
+            add_worst_windows(table, set_name, figures)
+            windows.append(figures)
     return SampleScores(
         pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
-        pa.concat_tables(windows) if windows else WINDOW_SCHEMA.empty_table(),
-        costs,
+        window_rows(table.flight, set_name, windows, wide_edges),
+        # of what is sampled at every update the samples would fill the disk, and no plot shows them
+        _sample_rows(set_name, [one for one in samples if not MEASURED_SOURCES[one.mask.source].every_update]),
+        {key: found[key].cost for key in masks},
     )
 
 
-def _sample_rows(pairs: SamplesOfSet, winsor_limit: float) -> pa.Table:
+def _sample_rows(set_name: str, samples: list[CountedSamples]) -> pa.Table:
     """Rows of `samples.parquet` of one set."""
-    n = pairs.time.size
+    counts = [one.mask.time.size for one in samples]
+    names = list(dict.fromkeys(one.mask.source for one in samples))
+    number = np.array([names.index(one.mask.source) for one in samples], np.int32)
 
-    def repeated(name: str) -> pa.Array:
-        return pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, np.int32)), pa.array([name], pa.string()))
+    def joined(name: str) -> pa.Array:
+        return pa.array(
+            np.concatenate(
+                [np.zeros(0, np.float32), *(getattr(one, name) for one in samples)],
+                dtype=np.float32,
+                casting="same_kind",
+            )
+        )
 
-    columns = {
-        "set": repeated(pairs.sets[0]),
-        "source": repeated(pairs.source),
-        "axis": pa.array(np.full(n, pairs.axis, dtype=np.int8)),
-        "time_us": pa.array(pairs.time),
-    }
-    for name in ("innovation", "innovation_variance", "test_ratio"):
-        columns[name] = pa.array(getattr(pairs, name)[0].astype(np.float32))
-    columns["winsor_limit"] = pa.array(np.full(n, winsor_limit))
-    return pa.table(columns, schema=SAMPLES_SCHEMA)
+    return pa.table(
+        {
+            "set": pa.DictionaryArray.from_arrays(
+                pa.array(np.zeros(sum(counts), np.int32)), pa.array([set_name], pa.string())
+            ),
+            "source": pa.DictionaryArray.from_arrays(pa.array(np.repeat(number, counts)), pa.array(names, pa.string())),
+            "axis": pa.array(np.repeat(np.array([one.mask.axis for one in samples], np.int8), counts)),
+            "time_us": pa.array(np.concatenate([np.zeros(0, np.int64), *(one.mask.time for one in samples)])),
+            **{name: joined(name) for name in ("innovation", "innovation_variance", "test_ratio")},
+            "winsor_limit": pa.array(
+                np.repeat(np.array([one.mask.winsor_limit for one in samples], np.float64), counts)
+            ),
+        },
+        schema=SAMPLES_SCHEMA,
+    )
 
 
 def add_onboard(
@@ -142,12 +162,6 @@ def add_onboard(
 ) -> None:
     """Append the vehicle's own figures, on the same part of the flight but at the times that it logged."""
     record = ReplayedSet(ONBOARD, parameters, {}, {}, onboard, {}, {})
-    for source in MEASURED_SOURCES.values():
-        pairs = {}
-        for axis in range(source.axes):
-            found = paired_samples([record], (source.name, axis), ONBOARD, window)
-            if found is not None:
-                pairs[axis] = found
-                add_axis_metrics(table, found, settings)
-        if pairs:
-            add_group_metrics(table, pairs, settings)
+    found = counted_of_its_own(record, sample_masks(record, window))
+    for together in axes_together([one.samples for one in found.values() if one.samples is not None]):
+        add_all_innovation_metrics(table, ONBOARD, together, settings.confidence)

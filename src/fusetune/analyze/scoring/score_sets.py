@@ -2,49 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
-from fusetune.analyze.flight.excitation import Excitation, excitation
-from fusetune.analyze.flight.intervals import Interval
-from fusetune.analyze.flight.phases import IMU_TOPICS, airborne_intervals, imu_gaps
-from fusetune.analyze.flight.reference_truth import TRUTH_TOPICS, Truth, read_references
+from fusetune.analyze.flight.phases import IMU_TOPICS, imu_gaps
+from fusetune.analyze.flight.reference_truth import TRUTH_TOPICS
 from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, onboard_samples
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
-from fusetune.analyze.scoring.filter_events import filter_events
-from fusetune.analyze.scoring.ground_metrics import add_ground_events, add_ground_metrics, ground_window
-from fusetune.analyze.scoring.metrics_table import (
-    MetricsTable,
-    add_events,
-    add_told_noise,
-    add_true_errors,
-    add_whiteness,
-)
-from fusetune.analyze.scoring.sample_scores import add_onboard, no_sample_scores, score_samples
-from fusetune.analyze.scoring.scoring_summary import scoring_summary
-from fusetune.analyze.scoring.set_evidence import set_evidence
+from fusetune.analyze.scoring.set_scores import SetScores, score_flight, score_set
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.smoothed_scores import SMOOTHED_SCHEMA, STEP_US, SmoothedScores
-from fusetune.analyze.scoring.true_errors import true_errors
-from fusetune.analyze.scoring.window import ScoringWindow, after, end_of_warm_up, scoring_window
-from fusetune.analyze.scoring.withheld_scores import (
-    add_true_drift,
-    add_withheld_metrics,
-    paired_gaps,
-    withheld_rows,
-)
-from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
-from fusetune.analyze.sensors.told_noise import told_noises
-from fusetune.analyze.smoothing.smoothed_velocity import smoothed_velocity
+from fusetune.analyze.scoring.yardstick import WITH_MEASURED_ANTENNA, ScoredFlight, Yardstick
 from fusetune.px4.flight import Flight
-from fusetune.set_names import ANTENNA_MENDED, PRESENT, mended_name
-from fusetune.storage.files import AnyPath
-from fusetune.storage.freed_memory import give_back_freed_memory
+from fusetune.set_names import PRESENT
 
 SCORE_TOPICS = (
     *dict.fromkeys(
@@ -63,22 +36,6 @@ SCORE_TOPICS = (
 
 
 @dataclass(frozen=True)
-class ScoredFlight:
-    """What scores need of the flight itself, beside the replays.
-
-    Attributes
-    ----------
-    flight : canonical; of its topics only what nothing else stands for here
-    log_gaps : gaps in the IMU samples of the log, µs
-    onboard : innovations that the vehicle logged, by source and axis
-    """
-
-    flight: Flight
-    log_gaps: tuple[Interval, ...]
-    onboard: Mapping[SourceAxis, AxisSamples]
-
-
-@dataclass(frozen=True)
 class FlightScores:
     """Scores of all sets on one flight.
 
@@ -89,6 +46,7 @@ class FlightScores:
     windows : figures in windows of about 30 s, see `window_scores`
     withheld : predictions without a sensor, see `withheld_scores`
     smoothed : velocity against the smoothed one, see `smoothed_scores`
+    samples : the scored samples, see `sample_scores`
     summary : what was scored of the flight, and how each set fared
     """
 
@@ -97,6 +55,7 @@ class FlightScores:
     windows: pa.Table
     withheld: pa.Table
     smoothed: pa.Table
+    samples: pa.Table
     summary: dict[str, Any]
 
     def figure(self, set_name: str, source: str, axis: str, metric: str) -> float:
@@ -138,118 +97,36 @@ def score_sets(
     *,
     present: str = PRESENT,
     settings: ScoringSettings | None = None,
-    take_samples: Callable[[pa.Table], None] | None = None,
-    spool_folder: AnyPath | None = None,
 ) -> FlightScores:
     """Score every parameter set of one flight.
 
-    The window, the samples and the gaps are those of the present set; what another set lacks of them costs it alone. Of
-    samples one source and axis is looked up at a time, of states one set.
+    The window, the samples, the gaps and the limits beyond which errors are clipped are those of the present set; what
+    another set lacks of them costs it alone.
 
     Parameters
     ----------
-    replays : of all sets, the present one among them
+    replays : of all sets, the present one among them; the others with at least what `Yardstick.recording` says
     present : the set that flies now; the others are compared with it
-    take_samples : is given the scored samples, rows of `sample_scores.SAMPLES_SCHEMA`
-    spool_folder : takes nameless files of paired samples; by default they stay in memory
     """
-    settings, flight = settings or ScoringSettings(), scored.flight
     records = sorted(replays, key=lambda record: record.name != present)
-    airborne = airborne_intervals(flight, records[0].flags)
-    window = scoring_window(records, present, airborne, scored.log_gaps, settings)
-    phases = {record.name: _flight_after_warm_up(record, records[0], airborne, window, settings) for record in records}
-    events = {record.name: filter_events(record, phases[record.name]) for record in records}
-
-    table = MetricsTable(flight.name)
-    for name, event in events.items():
-        add_events(table, name, event)
-    log = flight.start_timestamp, flight.last_timestamp
-    ground = ground_window(records, present, airborne, log, scored.log_gaps, window, settings)
-    add_ground_metrics(table, records, present, ground, settings)
-    for record in records:
-        add_ground_events(table, record.name, filter_events(record, ground.intervals), ground)
-    samples, gaps = no_sample_scores(), []
-    whiteness: dict[SourceAxis, Whiteness] = {}
-    smoothed, reference, moved = SMOOTHED_SCHEMA.empty_table(), None, None
-    if window.intervals:
-        kept = [record for record in records if record.name not in window.excluded]
-        samples = score_samples(table, kept, present, window, settings, take_samples, spool_folder)
-        # Replays from elsewhere, such as PX4's own estimator, come without gaps.
-        has_gaps = all(record.withheld is not None for record in kept)
-        gaps = paired_gaps(kept, present, window, settings) if has_gaps else []
-        add_withheld_metrics(table, gaps)
-        add_onboard(table, scored.onboard, window, settings, records[0].parameters)
-        fused = {source for record in records for source in record.fused_sources}
-        references = read_references(flight, fused, records[0].parameters)
-        reference = smoothed_velocity(_with_measured_antenna(kept), flight, window.intervals, STEP_US)
-        differences = SmoothedScores(reference)
-        whiteness, moved = _add_state_figures(table, kept, flight, references, window, settings, differences)
-        smoothed = differences.rows(flight.name, window.block_edges(settings.block_s))
-        for truth in references:
-            if truth.kind == "truth" and has_gaps:
-                add_true_drift(table, kept, truth, window)
-    edges = window.block_edges(settings.block_s) if gaps else np.zeros(0, np.int64)
-    withheld = withheld_rows(flight.name, gaps, edges)
-    evidence = set_evidence([record.name for record in records], window, samples.costs, gaps, settings)
-    summary = scoring_summary(flight, records, present, window, events, evidence, whiteness, settings)
-    summary["excitation"] = None if moved is None else moved.document()
-    summary["smoothed_reference"] = None if reference is None else reference.document
-    return FlightScores(table.finished(), samples.blocks, samples.windows, withheld, smoothed, summary)
+    antenna = next((one for one in records if one.name in WITH_MEASURED_ANTENNA), None)
+    yardstick = Yardstick(scored, records[0], settings, antenna)
+    return joined_scores(score_flight(yardstick), {record.name: score_set(yardstick, record) for record in records})
 
 
-def _with_measured_antenna(kept: Sequence[ReplayedSet]) -> ReplayedSet:
-    """The replay that the smoothed velocity is made of: the present one, or the one with the antenna as measured.
-
-    The measured velocities are those of the antenna, less what the told place makes of them. Made with a wrong place,
-    the reference has the present set's error, and a set that mends it would seem to be farther off the truth.
-    """
-    names = (ANTENNA_MENDED, mended_name(ANTENNA_MENDED))
-    return next((one for one in kept if one.name in names), kept[0])
-
-
-def _flight_after_warm_up(
-    record: ReplayedSet,
-    present: ReplayedSet,
-    airborne: Sequence[Interval],
-    window: ScoringWindow,
-    settings: ScoringSettings,
-) -> tuple[Interval, ...]:
-    """Flight time of one set after its own warm-up: before it every filter resets and switches sources."""
-    if window.warm_up_end is None:
-        return tuple(airborne)
-    return after(airborne, end_of_warm_up(record, present, settings))
+def joined_scores(flight: SetScores, sets: Mapping[str, SetScores]) -> FlightScores:
+    """The scores of a flight out of those of its sets, in their order; the flight's own figures come last."""
+    return FlightScores(
+        metrics=pa.concat_tables([*(one.metrics for one in sets.values()), flight.metrics]),
+        blocks=pa.concat_tables([one.blocks for one in sets.values()]),
+        windows=pa.concat_tables([one.windows for one in sets.values()]),
+        withheld=pa.concat_tables([one.withheld for one in sets.values()]),
+        smoothed=pa.concat_tables([one.smoothed for one in sets.values()]),
+        samples=pa.concat_tables([one.samples for one in sets.values()]).unify_dictionaries(),
+        summary=joined_summary(flight, {name: one.summary for name, one in sets.items()}),
+    )
 
 
-def _add_state_figures(
-    table: MetricsTable,
-    records: Sequence[ReplayedSet],
-    flight: Flight,
-    references: Sequence[Truth],
-    window: ScoringWindow,
-    settings: ScoringSettings,
-    differences: SmoothedScores,
-) -> tuple[dict[SourceAxis, Whiteness], Excitation | None]:
-    """Append what takes the states of each replay: whiteness of the sources, errors against the references.
-
-    The differences to the smoothed velocity are taken, too.
-
-    Returns
-    -------
-    The whiteness and the motion as the first of the records, the present set, sees them
-    """
-    present: dict[SourceAxis, Whiteness] = {}
-    moved: Excitation | None = None
-    for number, record in enumerate(records):
-        states = record.states()
-        found = source_whiteness(record, states, flight, window.intervals)
-        add_whiteness(table, record.name, found)
-        if not number:
-            present = found
-            moved = excitation(states.time, states.velocity, states.quaternion, window.intervals)
-            add_told_noise(table, record.name, told_noises(record, window.intervals))
-        for truth in references:
-            figures = true_errors(record, states, truth, window, settings.confidence)
-            add_true_errors(table, record.name, figures, truth.kind)
-        differences.add(record.name, states)
-        give_back_freed_memory()
-    return present, moved
+def joined_summary(flight: SetScores, sets: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """What `scoring.json` holds."""
+    return flight.summary | {"sets": dict(sets)}

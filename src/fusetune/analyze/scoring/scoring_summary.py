@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.analyze.replaying.samples import SourceAxis
 from fusetune.analyze.scoring.activity import inactive_parameters, same_results
 from fusetune.analyze.scoring.filter_events import FilterEvents
 from fusetune.analyze.scoring.settings import ScoringSettings
@@ -19,25 +20,19 @@ from fusetune.px4.aid_sources import AXES
 from fusetune.px4.flight import Flight
 
 
-def scoring_summary(
+def flight_summary(
     flight: Flight,
-    records: Sequence[ReplayedSet],
     present: str,
     window: ScoringWindow,
-    events: Mapping[str, FilterEvents],
-    evidence: Mapping[str, Mapping[str, Any]],
-    whiteness: Mapping[tuple[str, int], Whiteness],
+    whiteness: Mapping[SourceAxis, Whiteness],
     settings: ScoringSettings,
 ) -> dict[str, Any]:
-    """The summary of a flight, as JSON can hold it.
+    """What was scored of a flight, as JSON can hold it; its sets are to be added.
 
     Parameters
     ----------
-    events : of every set, in the flight after the warm-up
-    evidence : of every set, from `set_evidence`
     whiteness : of the sources, as the present set sees it
     """
-    by_name = {record.name: record for record in records}
     return {
         "flight": flight.name,
         "status": "scored" if window.intervals else "not_scored",
@@ -50,10 +45,6 @@ def scoring_summary(
         "intervals_us": [list(interval) for interval in window.intervals],
         "block_edges_us": window.block_edges(settings.block_s).tolist() if window.intervals else [],
         "cuts": documents(cut.finding for cut in window.cuts),
-        "sets": {
-            name: _set_summary(record, by_name[present], window, events[name], flight) | {"evidence": evidence[name]}
-            for name, record in by_name.items()
-        },
         "white_share": {
             f"{source}.{AXES[axis]}": round(one.white_share, 4)
             for (source, axis), one in whiteness.items()
@@ -62,9 +53,16 @@ def scoring_summary(
     }
 
 
-def _set_summary(
+def set_summary(
     record: ReplayedSet, present: ReplayedSet, window: ScoringWindow, events: FilterEvents, flight: Flight
 ) -> dict[str, Any]:
+    """How a set fared, as JSON can hold it.
+
+    Parameters
+    ----------
+    window : as the set sees it
+    events : in the flight after its warm-up
+    """
     excluded = window.excluded.get(record.name, "")
     ok = record.status == "ok"
     outcome = "excluded" if excluded else "scored" if window.intervals else "not_scored"

@@ -8,49 +8,42 @@ from typing import Any
 
 from fusetune.analyze.replaying.samples import SourceAxis
 from fusetune.analyze.scoring.charges import EvidenceCost
-from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.window import ScoringWindow
-from fusetune.analyze.scoring.withheld_scores import PairedGaps
+from fusetune.analyze.scoring.withheld_scores import CountedGaps
 
 
 def set_evidence(
-    sets: Sequence[str],
-    window: ScoringWindow,
-    samples: Mapping[SourceAxis, Mapping[str, EvidenceCost]],
-    gaps: Sequence[PairedGaps],
-    settings: ScoringSettings,
-) -> dict[str, dict[str, Any]]:
-    """By set: its evidence, as JSON can hold it.
+    samples: Mapping[SourceAxis, EvidenceCost],
+    gaps: Sequence[CountedGaps],
+    own_resets_s: float,
+    max_lacking_percent: float,
+) -> dict[str, Any]:
+    """The evidence of a set, as JSON can hold it.
+
+    Parameters
+    ----------
+    samples : what it cost itself, by source and axis
+    own_resets_s : scored time around resets of its own
+    max_lacking_percent : a set that lacks more is left out
 
     Returns
     -------
     `samples` and `gaps` hold by source what of the mask the set lacks, and what of it follows its own resets (of its
-    axes and horizons the one that costs most); `own_resets_s` is the scored time around these; `left_out` says of each
-    source why the set is not compared there.
+    axes and horizons the one that costs most); `own_resets_s`; `left_out` says of each source why the set is not
+    compared there.
     """
-    return {name: _of_set(name, window, samples, gaps, settings) for name in sets}
-
-
-def _of_set(
-    name: str,
-    window: ScoringWindow,
-    samples: Mapping[SourceAxis, Mapping[str, EvidenceCost]],
-    gaps: Sequence[PairedGaps],
-    settings: ScoringSettings,
-) -> dict[str, Any]:
-    of_samples = _dearest((source, costs[name]) for (source, _), costs in samples.items() if name in costs)
-    of_gaps = _dearest((group.source, group.costs[name]) for group in gaps if name in group.costs)
+    of_samples = _dearest((source, cost) for (source, _), cost in samples.items())
+    of_gaps = _dearest((one.mask.source, one.cost) for one in gaps)
     left_out = {
         source: f"lacks {one.lacking} of {one.mask} {what} of {source} that the present set has, "
-        f"more than {settings.max_lacking_percent:g} %"
+        f"more than {max_lacking_percent:g} %"
         for what, costs in (("gaps", of_gaps), ("samples", of_samples))
         for source, one in costs.items()
-        if one.lacking_percent > settings.max_lacking_percent
+        if one.lacking_percent > max_lacking_percent
     }
     return {
         "samples": {source: asdict(one) for source, one in of_samples.items()},
         "gaps": {source: asdict(one) for source, one in of_gaps.items()},
-        "own_resets_s": round(window.own_resets_s(name), 3),
+        "own_resets_s": round(own_resets_s, 3),
         "left_out": left_out,
     }
 

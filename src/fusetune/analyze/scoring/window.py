@@ -4,8 +4,10 @@ It follows from the present set and the log alone, so that no other set can take
 does in it is its own affair: resets of its own do not cut, see `fusetune.analyze.scoring.charges`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +25,8 @@ FUSION_DELAY_US = 500_000
 class ScoringWindow:
     """Scored intervals of a flight, µs, half-open and in order, with what was cut and which sets were left out.
 
-    `own_resets` holds, for each set other than the present one, the times around resets of its own, which are scored
-    all the same.
+    As it is for a set other than the present one (`of_set`), `own_resets` holds the times around its resets, which are
+    scored all the same, and `excluded` why it is left out.
     """
 
     intervals: tuple[Interval, ...]
@@ -51,6 +53,13 @@ class ScoringWindow:
         left = subtract(self.intervals, self.own_resets.get(name, ()))
         return (duration(self.intervals) - duration(left)) * 1e-6
 
+    def of_set(self, record: ReplayedSet, settings: ScoringSettings) -> ScoringWindow:
+        """The same window as it is for a set other than the present one: its own resets, and why it is left out."""
+        reason, own = _failure(record), own_resets(record, self.intervals, settings)
+        return replace(
+            self, excluded={record.name: reason} if reason else {}, own_resets={record.name: own} if own else {}
+        )
+
     def block_edges(self, length_s: float) -> npt.NDArray[np.int64]:
         """Edges of blocks of equal length, as near to `length_s` as the span of the window allows, µs."""
         start, stop = self.intervals[0][0], self.intervals[-1][1]
@@ -69,46 +78,38 @@ def aiding_start(record: ReplayedSet) -> int | None:
 
 
 def scoring_window(
-    records: Sequence[ReplayedSet],
-    present: str,
-    airborne: Sequence[Interval],
-    gaps: Sequence[Interval],
-    settings: ScoringSettings,
+    present: ReplayedSet, airborne: Sequence[Interval], gaps: Sequence[Interval], settings: ScoringSettings
 ) -> ScoringWindow:
     """Find the part of a flight on which all its parameter sets are scored alike.
 
     Parameters
     ----------
-    records : replays of all sets on this flight, the present one among them
-    present : name of the present set, from whose warm-up and resets the window follows
+    present : replay of the present set, from whose warm-up and resets the window follows
     airborne : flight time, µs
     gaps : gaps in the IMU data, µs
 
     Returns
     -------
     ScoringWindow
-        Without intervals, and with a reason, where nothing can be scored. A set that diverged or that never starts
-        aiding is left out with its reason.
+        Without intervals, and with a reason, where nothing can be scored: as where the set diverged or never starts
+        aiding.
     """
-    present_record = next(record for record in records if record.name == present)
-    excluded = {record.name: _failure(record) for record in records if _failure(record)}
-    if present in excluded:
-        return ScoringWindow((), (), excluded, None, f"the present set: {excluded[present]}")
+    failure = _failure(present)
+    if failure:
+        return ScoringWindow((), (), {present.name: failure}, None, f"the present set: {failure}")
     if not airborne:
-        return ScoringWindow((), (), excluded, None, "the log holds no flight time")
-    warm_up_end = end_of_warm_up(present_record, present_record, settings)
+        return ScoringWindow((), (), {}, None, "the log holds no flight time")
+    warm_up_end = end_of_warm_up(present, present, settings)
     flying = after(airborne, warm_up_end)
-    single_cuts = cuts_within(present_record, flying, gaps, settings)
+    single_cuts = cuts_within(present, flying, gaps, settings)
     cuts = merged(single_cuts)
-    intervals = subtract(flying, cuts)
-    own = own_resets(records, present, intervals, settings)
-    window = ScoringWindow(intervals, cuts, excluded, warm_up_end, own_resets=own)
+    window = ScoringWindow(subtract(flying, cuts), cuts, {}, warm_up_end)
     if window.duration_s < settings.minimum_scored_s:
         reason = (
             f"only {window.duration_s:.1f} s of flight remain after the warm-up and the cuts, "
             f"{settings.minimum_scored_s:g} s are needed: {_what_was_taken(airborne, flying, single_cuts)}"
         )
-        return ScoringWindow((), cuts, excluded, warm_up_end, reason)
+        return ScoringWindow((), cuts, {}, warm_up_end, reason)
     return window
 
 
@@ -159,17 +160,9 @@ def cuts_within(
     return _within([*cuts, *_around_resets(present, behind)], flying)
 
 
-def own_resets(
-    records: Sequence[ReplayedSet], present: str, intervals: Sequence[Interval], settings: ScoringSettings
-) -> dict[str, tuple[Cut, ...]]:
-    """Times around the resets of each set but the present one that reach into the intervals."""
-    behind = round(settings.reset_cut_s * 1e6)
-    found = {
-        record.name: merged(_within(_around_resets(record, behind), intervals))
-        for record in records
-        if record.name != present
-    }
-    return {name: cuts for name, cuts in found.items() if cuts}
+def own_resets(record: ReplayedSet, intervals: Sequence[Interval], settings: ScoringSettings) -> tuple[Cut, ...]:
+    """Times around the resets of a set other than the present one that reach into the intervals."""
+    return merged(_within(_around_resets(record, round(settings.reset_cut_s * 1e6)), intervals))
 
 
 def _within(cuts: Sequence[Cut], intervals: Sequence[Interval]) -> list[Cut]:

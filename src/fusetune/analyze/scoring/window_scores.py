@@ -1,5 +1,8 @@
 """Figures of each source in windows of about 30 s, and of the worst window: what the mean over a flight hides."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +11,12 @@ import pyarrow as pa
 
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.metrics.metric import Innovations
-from fusetune.analyze.scoring.columns import BY_AXIS, columns_of
-from fusetune.analyze.scoring.measurement_alignment import PairedSamples, innovations_of
-from fusetune.analyze.scoring.metrics_table import MetricsTable
+from fusetune.analyze.scoring.columns import BY_AXIS, columns_of, repeated
+from fusetune.analyze.scoring.measurement_alignment import AxesTogether
+from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable
+from fusetune.analyze.scoring.parts import Parts, parts_of
 from fusetune.analyze.scoring.window import ScoringWindow
+from fusetune.px4.aid_sources import AXES
 
 Array = npt.NDArray[np.float64]
 
@@ -33,15 +38,19 @@ _FULL_ENOUGH = 0.5
 """A window with less than this share of the samples of the fullest one cannot be the worst."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WindowFigures:
-    """Figures of one source and axis: `values[metric]` is (S, W) for sets and windows that hold samples."""
+    """Figures of axes of one source, or of a group of them, in the windows that hold samples.
+
+    Attributes
+    ----------
+    axes : names of the axes (A,), or of the group
+    values : by metric, (A, W)
+    """
 
     source: str
-    axis: str
-    sets: tuple[str, ...]
-    window: npt.NDArray[np.int64]
-    counts: npt.NDArray[np.int64]
+    axes: tuple[str, ...]
+    parts: Parts
     values: dict[str, Array]
 
 
@@ -58,68 +67,72 @@ def window_edges(window: ScoringWindow, length_s: float) -> npt.NDArray[np.int64
     return np.append(edges, stop)
 
 
-def window_figures(members: list[PairedSamples], axis: str, edges: npt.NDArray[np.int64]) -> WindowFigures:
-    """Figures of some axes of one source together; one axis alone is the usual case.
+def window_figures(samples: AxesTogether, edges: npt.NDArray[np.int64]) -> Iterator[WindowFigures]:
+    """Figures of the axes of one source, each by itself, and of each group of them; none of too few samples.
 
     Parameters
     ----------
-    members : axes that share their samples and sets
-    axis : name of the axis or group
     edges : of `window_edges`
 
     Returns
     -------
     The metrics of innovations that are declared to have windows
     """
-    first = members[0]
-    index = np.clip(np.searchsorted(edges, first.time, side="right") - 1, 0, edges.size - 2)
-    starts = np.flatnonzero(np.r_[True, np.diff(index) != 0])
-    counts = np.diff(np.r_[starts, index.size])
-    of_sets = [_figures(given, starts, counts) for _, given in innovations_of(members)]
-    values = {name: np.concatenate([one[name] for one in of_sets]) for name in of_sets[0]}
-    return WindowFigures(first.source, axis, first.sets, index[starts], counts, values)
+    if samples.time.size < FEWEST_SAMPLES:
+        return
+    parts = parts_of(samples.time, edges)
+    axes = tuple(AXES[axis] for axis in samples.axes)
+    yield WindowFigures(samples.source, axes, parts, _figures(samples.innovations(), parts))
+    for name, given in samples.groups():
+        yield WindowFigures(samples.source, (name,), parts, _figures(given, parts))
 
 
-def _figures(given: Innovations, starts: npt.NDArray[np.int64], counts: npt.NDArray[np.int64]) -> dict[str, Array]:
-    """Figures (1, W) of one set in the windows that begin at the rows `starts` and hold `counts` samples."""
-
+def _figures(given: Innovations, parts: Parts) -> dict[str, Array]:
     def mean(values: npt.NDArray) -> Array:
-        return np.add.reduceat(values.astype(np.float64), starts, axis=-1) / counts
+        return np.add.reduceat(values.astype(np.float64), parts.starts, axis=-1) / parts.counts
 
     return {name: window.of_mean(mean(window.score(given))) for name, window in _METRICS.items()}
 
 
-def add_worst_windows(table: MetricsTable, figures: WindowFigures) -> None:
+def add_worst_windows(table: MetricsTable, set_name: str, figures: WindowFigures) -> None:
     """Append the largest figure of any window; windows with few samples do not count."""
-    full = figures.counts >= _FULL_ENOUGH * figures.counts.max()
-    for name, window in _METRICS.items():
-        worst = figures.values[name][:, full].max(axis=1)
-        table.add_each(figures.sets, figures.source, figures.axis, window.worst, worst, figures.counts.sum())
+    counts = figures.parts.counts
+    full = counts >= _FULL_ENOUGH * counts.max()
+    worst = {window.worst: figures.values[name][:, full].max(axis=1).tolist() for name, window in _METRICS.items()}
+    for place, axis in enumerate(figures.axes):
+        for name, values in worst.items():
+            table.add(set_name, figures.source, axis, name, values[place], float(counts.sum()))
 
 
-def window_rows(flight: str, figures: WindowFigures, edges: npt.NDArray[np.int64]) -> pa.Table:
-    """Rows of `windows.parquet`."""
-    sets, windows, metrics = len(figures.sets), figures.window.size, len(figures.values)
-    rows = sets * windows * metrics
-    # In the order set, window, metric.
-    values = np.stack(list(figures.values.values()), axis=-1)
-    window = np.tile(np.repeat(figures.window, metrics), sets)
+def window_rows(flight: str, set_name: str, figures: Sequence[WindowFigures], edges: npt.NDArray[np.int64]) -> pa.Table:
+    """Rows of `windows.parquet`, in the order axis, window, metric."""
+    if not figures:
+        return WINDOW_SCHEMA.empty_table()
+    windows = [one.parts.number.size for one in figures for _ in one.axes]
+    values = np.concatenate([np.stack(list(one.values.values()), axis=-1).ravel() for one in figures])
+    number = np.concatenate([one.parts.number for one in figures for _ in one.axes])
+    counts = np.concatenate([one.parts.counts for one in figures for _ in one.axes])
+    metrics = len(_METRICS)
+    # of each axis, so many rows
+    rows = np.array(windows) * metrics
+    of_metrics = np.tile(np.arange(metrics, dtype=np.int32), number.size)
+    window = np.repeat(number, metrics)
     return pa.table(
         {
-            "flight": _repeated([flight], np.zeros(rows, dtype=np.int32)),
-            "set": _repeated(figures.sets, np.repeat(np.arange(sets, dtype=np.int32), windows * metrics)),
-            "source": _repeated([figures.source], np.zeros(rows, dtype=np.int32)),
-            "axis": _repeated([figures.axis], np.zeros(rows, dtype=np.int32)),
+            "flight": repeated(flight, values.size),
+            "set": repeated(set_name, values.size),
+            "source": _taken([one.source for one in figures for _ in one.axes], rows),
+            "axis": _taken([axis for one in figures for axis in one.axes], rows),
             "window": pa.array(window.astype(np.int32)),
             "start_us": pa.array(edges[window]),
             "stop_us": pa.array(edges[window + 1]),
-            "metric": _repeated(list(figures.values), np.tile(np.arange(metrics, dtype=np.int32), sets * windows)),
-            "value": pa.array(values.ravel()),
-            "n": pa.array(np.tile(np.repeat(figures.counts, metrics), sets).astype(np.int64)),
+            "metric": pa.array([*_METRICS], pa.string()).take(pa.array(of_metrics)),
+            "value": pa.array(values),
+            "n": pa.array(np.repeat(counts, metrics).astype(np.int64)),
         },
         schema=WINDOW_SCHEMA,
     )
 
 
-def _repeated(names: list[str] | tuple[str, ...], index: npt.NDArray[np.int32]) -> pa.Array:
-    return pa.array(names, pa.string()).take(pa.array(index))
+def _taken(names: Sequence[str], rows: npt.NDArray[np.int64]) -> pa.Array:
+    return pa.array(names, pa.string()).take(pa.array(np.repeat(np.arange(len(names), dtype=np.int32), rows)))

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
 from fusetune.analyze.metrics.innovation_metrics import rms_innovation
-from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit, winsorised
+from fusetune.analyze.metrics.likelihood import gaussian_nll, winsor_limit
 from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
+from fusetune.analyze.replaying.samples import SourceAxis
 from fusetune.analyze.scoring.charges import EvidenceCost, OwnEvidence, charged
-from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of
+from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of, repeated
 from fusetune.analyze.scoring.metrics_table import MetricsTable
-from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.px4.aid_sources import AID_SOURCES, AXES, WITHHOLDABLE
@@ -49,103 +50,121 @@ _STALE_US = 1_000_000
 """A sensor that the present set has not fused for so long was not there to be withheld."""
 
 
-@dataclass(frozen=True)
-class PairedGaps:
-    """Predictions of one source, axis and horizon in the gaps of the present set, as they count; arrays (S, G), the
-    sets first. `complete` and `costs` are as of `fusetune.analyze.scoring.measurement_alignment.PairedSamples`."""
+@dataclass(frozen=True, eq=False)
+class GapMask:
+    """Predictions in gaps that are scored, of one source, axis and horizon: those of the present set; arrays (G,).
+
+    `key` names gap, source, axis and horizon.
+    """
 
     sensor: str
     source: str
     axis: int
     horizon_s: float
-    sets: tuple[str, ...]
+    key: npt.NDArray[np.int64]
     gap: npt.NDArray[np.int64]
     start: npt.NDArray[np.int64]
     n: npt.NDArray[np.int64]
     error: Array
     variance: Array
-    complete: tuple[bool, ...] = ()
-    costs: Mapping[str, EvidenceCost] = field(default_factory=dict)
+
+    @cached_property
+    def winsor_limit(self) -> float:
+        """See `fusetune.analyze.metrics.likelihood.winsor_limit`; of the present set alone, as no other has a say."""
+        return winsor_limit(self.error.copy())
+
+
+@dataclass(frozen=True, eq=False)
+class CountedGaps:
+    """A set's predictions in the gaps of a mask, as they count, (G,), and what the set cost itself.
+
+    Of a set that lacks too many to be compared `error` and `variance` are empty.
+    """
+
+    mask: GapMask
+    error: Array
+    variance: Array
+    cost: EvidenceCost
 
     @property
-    def winsor_limit(self) -> float:
-        """See `fusetune.analyze.metrics.likelihood.winsor_limit`; of the complete sets, as others have no say."""
-        return winsor_limit(self.error[list(self.complete)] if self.complete else self.error)
+    def is_compared(self) -> bool:
+        return bool(self.error.size)
 
 
-WITHHELD_METRICS: tuple[Metric[PairedGaps], ...] = (
+WITHHELD_METRICS: tuple[Metric[CountedGaps], ...] = (
     Metric(
         "withheld_rms_{horizon}s", SOURCE_UNIT, "root mean square error after so many seconds without the sensor",
         lambda gaps: rms_innovation(gaps.error), "lower", ("report",),
     ),
     Metric(
         "withheld_nll_{horizon}s", "nat", "negative log-likelihood of the same per gap",
-        lambda gaps: np.mean(gaussian_nll(gaps.error, gaps.variance), axis=1), "lower",
+        lambda gaps: np.mean(gaussian_nll(gaps.error, gaps.variance)), "lower",
     ),
 )  # fmt: skip
 """By axis and horizon."""
 
-DRIFT: Metric[Sequence[PairedGaps]] = Metric(
+DRIFT: Metric[Sequence[CountedGaps]] = Metric(
     "withheld_drift", SOURCE_UNIT, "root mean square of the error's norm at the last of these, of groups of axes",
-    lambda members: np.sqrt(np.mean(sum(np.square(one.error) for one in members), axis=1)), "lower",
+    lambda members: np.sqrt(np.mean(sum(np.square(one.error) for one in members))), "lower",
 )  # fmt: skip
 
 
-def paired_gaps(
-    records: Sequence[ReplayedSet], present: str, window: ScoringWindow, settings: ScoringSettings | None = None
-) -> list[PairedGaps]:
+def gap_masks(present: ReplayedSet, window: ScoringWindow) -> tuple[GapMask, ...]:
     """Predictions in the gaps of the present set that lie wholly in the scored part of the flight.
 
-    Parameters
-    ----------
-    records : sets that are scored on this flight, the present one among them; each with predictions
-    present : a gap counts if this set used the sensor when the gap began. What the others lack, and what follows their
-        own resets, counts as `fusetune.analyze.scoring.charges` says.
-    settings : by how much a set that lacks gaps is left out
+    A gap counts if this set used the sensor when the gap began. A replay from elsewhere has none.
     """
-    most = (settings or ScoringSettings()).max_lacking_percent
-    records = sorted(records, key=lambda record: record.name != present)
-    tables = [_by_key(record.withheld()) for record in records if record.withheld is not None]
-    base = tables[0]
+    if present.withheld is None:
+        return ()
+    base = _by_key(present.withheld())
     usable = _inside(base["start"], base["stop"], window) & _is_usable(base)
-    groups: list[PairedGaps] = []
+    found: list[GapMask] = []
     for sensor, sources in WITHHOLDABLE.items():
         for source in sources:
             used = usable & (base["sensor"] == sensor) & (base["source"] == source)
-            used &= _in_use(records[0], source, base["start"])
+            used &= _in_use(present, source, base["start"])
             for axis in range(AID_SOURCES[source].axes):
                 for horizon in np.unique(base["horizon_s"][used]):
                     take = np.flatnonzero(used & (base["axis"] == axis) & (base["horizon_s"] == horizon))
                     if take.size:
-                        mask = {name: values[take] for name, values in base.items()}
-                        groups.append(_paired(records, tables, mask, window, most))
-    return groups
+                        columns = {name: base[name][take] for name in ("key", "gap", "start", "n")}
+                        error, variance = base["innovation"][take], base["innovation_variance"][take]
+                        found.append(
+                            GapMask(sensor, source, axis, float(horizon), **columns, error=error, variance=variance)
+                        )
+    return tuple(found)
 
 
-def _paired(
-    records: Sequence[ReplayedSet],
-    tables: Sequence[Mapping[str, npt.NDArray]],
-    mask: Mapping[str, npt.NDArray],
-    window: ScoringWindow,
-    most_lacking_percent: float,
-) -> PairedGaps:
-    """One source, axis and horizon: those rows of the present set, the first of the records, and the others' like."""
-    source, axis = str(mask["source"][0]), int(mask["axis"][0])
-    matched = [_matched(record, table, mask, window) for record, table in zip(records, tables, strict=True)]
-    costs = {record.name: one.cost for record, one in zip(records, matched, strict=True)}
-    kept = [number for number, one in enumerate(matched) if one.cost.lacking_percent <= most_lacking_percent]
-    present = matched[0].error
-    limit = winsor_limit(np.stack([matched[number].error for number in kept if matched[number].is_complete]))
-    counted = [
-        charged(one.error, one.variance, present, one.lacking, one.after_reset, limit, one.alone)
-        for one in (matched[number] for number in kept)
-    ]
-    return PairedGaps(
-        str(mask["sensor"][0]), source, axis, float(mask["horizon_s"][0]),
-        tuple(records[number].name for number in kept), mask["gap"], mask["start"], mask["n"],
-        np.stack([one.error for one in counted]), np.stack([one.variance for one in counted]),
-        tuple(matched[number].is_complete for number in kept), costs,
-    )  # fmt: skip
+def counted_gaps(
+    masks: Sequence[GapMask], record: ReplayedSet, window: ScoringWindow, max_lacking_percent: float
+) -> list[CountedGaps]:
+    """Predictions of a set in the present set's gaps; what it lacks, and what follows its own resets, counts as
+    `fusetune.analyze.scoring.charges` says.
+
+    Parameters
+    ----------
+    window : as the set sees it (`ScoringWindow.of_set`)
+    max_lacking_percent : a set that lacks more is left out
+    """
+    if record.withheld is None or not masks:
+        return []
+    matched = _matched(masks, record, _by_key(record.withheld()), window)
+    return [_counted(mask, one, max_lacking_percent) for mask, one in zip(masks, matched, strict=True)]
+
+
+def own_gaps(masks: Sequence[GapMask]) -> list[CountedGaps]:
+    """Predictions of the present set."""
+    return [CountedGaps(one, one.error, one.variance, EvidenceCost(one.error.size, 0, 0)) for one in masks]
+
+
+def _counted(mask: GapMask, one: _Matched, max_lacking_percent: float) -> CountedGaps:
+    cost = one.cost
+    if cost.lacking_percent > max_lacking_percent:
+        return CountedGaps(mask, np.zeros(0), np.zeros(0), cost)
+    if one.is_complete:
+        return CountedGaps(mask, one.error, one.variance, cost)
+    found = charged(one.error, one.variance, mask.error, one.lacking, one.after_reset, mask.winsor_limit, one.alone)
+    return CountedGaps(mask, found.error, found.variance, cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,23 +178,39 @@ class _Matched(OwnEvidence):
 
 
 def _matched(
-    record: ReplayedSet,
-    table: Mapping[str, npt.NDArray],
-    mask: Mapping[str, npt.NDArray],
-    window: ScoringWindow,
-) -> _Matched:
-    start, resets = mask["start"], record.name in window.own_resets
+    masks: Sequence[GapMask], record: ReplayedSet, table: Mapping[str, npt.NDArray], window: ScoringWindow
+) -> list[_Matched]:
+    """Of each mask; looked up for all of them at once."""
+    counts = [mask.key.size for mask in masks]
+    key, start = (np.concatenate([getattr(mask, name) for mask in masks]) for name in ("key", "start"))
+    resets = record.name in window.own_resets
     if not table["key"].size:
         nothing, nowhere = np.zeros(start.shape), np.zeros(start.shape, bool)
-        return _Matched(~nowhere, nowhere, resets, nothing, nothing + 1.0, nowhere)
-    row = np.minimum(np.searchsorted(table["key"], mask["key"]), table["key"].size - 1)
+        return _parted(counts, ~nowhere, nowhere, resets, nothing, nothing + 1.0, nowhere)
+    row = np.minimum(np.searchsorted(table["key"], key), table["key"].size - 1)
     # Before it was fused once a source is predicted from nothing.
-    since = record.first_fused.get((str(mask["source"][0]), 0), np.iinfo(np.int64).max)
-    absent = table["key"][row] != mask["key"]
+    never = np.iinfo(np.int64).max
+    since = np.repeat([record.first_fused.get((mask.source, 0), never) for mask in masks], counts)
+    absent = table["key"][row] != key
     lacking = absent | ~_is_usable(table)[row] | (start < since)
-    alone = absent & (start >= since) & np.isin(mask["key"] // _HORIZONS, table["key"] // _HORIZONS)
+    alone = absent & (start >= since) & np.isin(key // _HORIZONS, table["key"] // _HORIZONS)
     after_reset = window.after_own_reset(record.name, start) & ~lacking
-    return _Matched(lacking, after_reset, resets, table["innovation"][row], table["innovation_variance"][row], alone)
+    error, variance = table["innovation"][row], table["innovation_variance"][row]
+    return _parted(counts, lacking, after_reset, resets, error, variance, alone)
+
+
+def _parted(
+    counts: Sequence[int],
+    lacking: npt.NDArray[np.bool_],
+    after_reset: npt.NDArray[np.bool_],
+    resets: bool,
+    error: Array,
+    variance: Array,
+    alone: npt.NDArray[np.bool_],
+) -> list[_Matched]:
+    ends = np.cumsum(counts).tolist()
+    parts = [slice(stop - count, stop) for stop, count in zip(ends, counts, strict=True)]
+    return [_Matched(lacking[one], after_reset[one], resets, error[one], variance[one], alone[one]) for one in parts]
 
 
 def _is_usable(table: Mapping[str, npt.NDArray]) -> npt.NDArray[np.bool_]:
@@ -210,75 +245,82 @@ def _in_use(record: ReplayedSet, source: str, start: npt.NDArray[np.int64]) -> n
     return (last <= start) & (start - last <= _STALE_US)
 
 
-def withheld_rows(flight: str, groups: Sequence[PairedGaps], edges: npt.NDArray[np.int64]) -> pa.Table:
-    """The predictions as rows of `WITHHELD_SCHEMA`, with the block that each gap begins in."""
-    tables = [_rows_of(flight, group, edges) for group in groups]
-    return pa.concat_tables(tables) if tables else WITHHELD_SCHEMA.empty_table()
+def withheld_rows(flight: str, set_name: str, gaps: Sequence[CountedGaps], edges: npt.NDArray[np.int64]) -> pa.Table:
+    """The predictions of a set as rows of `WITHHELD_SCHEMA`, with the block that each gap begins in."""
+    gaps = [one for one in gaps if one.is_compared]
+    if not gaps:
+        return WITHHELD_SCHEMA.empty_table()
+    counts = np.array([one.error.size for one in gaps])
+    rows = int(counts.sum())
 
+    def joined(name: str) -> npt.NDArray:
+        return np.concatenate([getattr(one.mask, name) for one in gaps])
 
-def _rows_of(flight: str, group: PairedGaps, edges: npt.NDArray[np.int64]) -> pa.Table:
-    sets, gaps = group.error.shape
-    block = np.clip(np.searchsorted(edges, group.start, side="right") - 1, 0, edges.size - 2)
-    clipped = winsorised(group.error, group.winsor_limit)
-    count = sets * gaps
+    def texts(name: str) -> pa.Array:
+        which = np.repeat(np.arange(counts.size, dtype=np.int32), counts)
+        return pa.array([getattr(one.mask, name) for one in gaps], pa.string()).take(pa.array(which))
+
+    start, error = joined("start"), np.concatenate([one.error for one in gaps])
+    block = np.clip(np.searchsorted(edges, start, side="right") - 1, 0, edges.size - 2)
+    limit = np.repeat([one.mask.winsor_limit for one in gaps], counts)
     columns = {
-        "flight": pa.array([flight] * count, pa.string()),
-        "set": pa.array(np.repeat(np.array(group.sets, dtype=object), gaps), pa.string()),
-        "sensor": pa.array([group.sensor] * count, pa.string()),
-        "gap": pa.array(np.tile(group.gap.astype(np.int32), sets)),
-        "start_us": pa.array(np.tile(group.start, sets)),
-        "block": pa.array(np.tile(block.astype(np.int32), sets)),
-        "source": pa.array([group.source] * count, pa.string()),
-        "axis": pa.array(np.full(count, group.axis, np.int32)),
-        "horizon_s": pa.array(np.full(count, group.horizon_s)),
-        "n": pa.array(np.tile(group.n.astype(np.int32), sets)),
-        "error": pa.array(group.error.ravel()),
-        "error_winsorised": pa.array(clipped.ravel()),
-        "variance": pa.array(group.variance.ravel()),
+        "flight": repeated(flight, rows),
+        "set": repeated(set_name, rows),
+        "sensor": texts("sensor"),
+        "gap": pa.array(joined("gap").astype(np.int32)),
+        "start_us": pa.array(start),
+        "block": pa.array(block.astype(np.int32)),
+        "source": texts("source"),
+        "axis": pa.array(np.repeat(np.array([one.mask.axis for one in gaps], np.int32), counts)),
+        "horizon_s": pa.array(np.repeat(np.array([one.mask.horizon_s for one in gaps]), counts)),
+        "n": pa.array(joined("n").astype(np.int32)),
+        "error": pa.array(error),
+        "error_winsorised": pa.array(np.clip(error, -limit, limit)),
+        "variance": pa.array(np.concatenate([one.variance for one in gaps])),
     }
     return pa.table(columns, schema=WITHHELD_SCHEMA)
 
 
-def add_withheld_metrics(table: MetricsTable, groups: Sequence[PairedGaps]) -> None:
+def add_withheld_metrics(table: MetricsTable, set_name: str, gaps: Sequence[CountedGaps]) -> None:
     """Append RMS error and NLL per axis and horizon, and the drift at the end of the gaps (by group of axes)."""
-    last = {}
-    for group in groups:
-        gaps = group.error.shape[1]
-        if gaps < FEWEST_GAPS:
+    longest: dict[str, float] = {}
+    for one in gaps:
+        longest[one.mask.sensor] = max(longest.get(one.mask.sensor, 0.0), one.mask.horizon_s)
+    last: dict[SourceAxis, CountedGaps] = {}
+    for one in gaps:
+        mask, count = one.mask, one.error.size
+        if count < FEWEST_GAPS:
             continue
         for metric in WITHHELD_METRICS:
-            name = metric.name.format(horizon=f"{group.horizon_s:g}")
-            table.add_each(group.sets, group.source, AXES[group.axis], name, metric.function(group), gaps)
-        if group.horizon_s >= max(other.horizon_s for other in groups if other.sensor == group.sensor):
-            last[group.source, group.axis] = group
+            name = metric.name.format(horizon=f"{mask.horizon_s:g}")
+            table.add(set_name, mask.source, AXES[mask.axis], name, float(metric.function(one)), count)
+        if mask.horizon_s >= longest[mask.sensor]:
+            last[mask.source, mask.axis] = one
     for source in dict.fromkeys(source for source, _ in last):
         for name, axes in AID_SOURCES[source].groups:
             members = [last[source, axis] for axis in axes if (source, axis) in last]
             if len(members) == len(axes) and all(_are_alike(one, members[0]) for one in members):
-                drift = DRIFT.function(members)
-                table.add_each(members[0].sets, source, name, DRIFT.name, drift, members[0].gap.size)
+                drift = float(DRIFT.function(members))
+                table.add(set_name, source, name, DRIFT.name, drift, members[0].mask.gap.size)
 
 
-def _are_alike(one: PairedGaps, other: PairedGaps) -> bool:
-    return one.sets == other.sets and np.array_equal(one.gap, other.gap)
+def _are_alike(one: CountedGaps, other: CountedGaps) -> bool:
+    return np.array_equal(one.mask.gap, other.mask.gap)
 
 
-def add_true_drift(table: MetricsTable, records: Sequence[ReplayedSet], truth: Truth, window: ScoringWindow) -> None:
+def add_true_drift(table: MetricsTable, record: ReplayedSet, truth: Truth, window: ScoringWindow) -> None:
     """Append by how much the true horizontal error of position and velocity grew over the gaps without GNSS (RMS)."""
-    for record in records:
-        if record.gaps is None:
-            continue
-        gaps = record.gaps()
-        rows = (gaps["sensor"] == "gnss") & _inside(gaps["start"], gaps["stop"], window)
-        if np.count_nonzero(rows) < FEWEST_GAPS:
-            continue
-        for quantity, fields, course in (("position", "x y", truth.position), ("velocity", "vx vy", truth.velocity)):
-            begin, end = (
-                np.column_stack([gaps[f"{name}_{moment}"][rows] for name in fields.split()])
-                - interpolate(truth.time, course, gaps[f"timestamp_{moment}"][rows])[:, :2]
-                for moment in ("begin", "end")
-            )
-            drift = float(np.sqrt(np.mean(np.sum(np.square(end - begin), axis=1))))
-            table.add(
-                record.name, f"truth_withheld_{quantity}", "horizontal", "rmse", drift, int(np.count_nonzero(rows))
-            )
+    if record.gaps is None:
+        return
+    gaps = record.gaps()
+    rows = (gaps["sensor"] == "gnss") & _inside(gaps["start"], gaps["stop"], window)
+    if np.count_nonzero(rows) < FEWEST_GAPS:
+        return
+    for quantity, fields, course in (("position", "x y", truth.position), ("velocity", "vx vy", truth.velocity)):
+        begin, end = (
+            np.column_stack([gaps[f"{name}_{moment}"][rows] for name in fields.split()])
+            - interpolate(truth.time, course, gaps[f"timestamp_{moment}"][rows])[:, :2]
+            for moment in ("begin", "end")
+        )
+        drift = float(np.sqrt(np.mean(np.sum(np.square(end - begin), axis=1))))
+        table.add(record.name, f"truth_withheld_{quantity}", "horizontal", "rmse", drift, int(np.count_nonzero(rows)))

@@ -18,24 +18,21 @@ import numpy.typing as npt
 
 from fusetune.analyze.delays.sensor_delays import velocity_place_of
 from fusetune.analyze.delays.velocity_place import VelocityPlace
-from fusetune.analyze.flight.intervals import Interval
-from fusetune.analyze.flight.phases import airborne_intervals, imu_gaps
-from fusetune.analyze.metrics.attitude import interpolate
-from fusetune.analyze.metrics.likelihood import winsor_limit, winsorised
+from fusetune.analyze.metrics.likelihood import winsorised
 from fusetune.analyze.replaying.prepared_flight import REPLAY_TOPICS, PreparedFlight, prepare_flight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.filter_events import filter_events
-from fusetune.analyze.scoring.measurement_alignment import paired_samples
-from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
+from fusetune.analyze.scoring.measurement_alignment import counted_samples
+from fusetune.analyze.scoring.score_sets import SCORE_TOPICS, scored_flight
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.smoothed_scores import STEP_US
-from fusetune.analyze.scoring.window import ScoringWindow, after, end_of_warm_up, scoring_window
-from fusetune.analyze.scoring.withheld_scores import paired_gaps
-from fusetune.analyze.sensors.source_whiteness import source_whiteness
-from fusetune.analyze.smoothing.smoothed_velocity import SmoothedVelocity, smoothed_velocity
+from fusetune.analyze.scoring.smoothed_scores import velocity_differences
+from fusetune.analyze.scoring.window import ScoringWindow
+from fusetune.analyze.scoring.withheld_scores import counted_gaps
+from fusetune.analyze.scoring.yardstick import Yardstick
 from fusetune.analyze.trials.tried_set import ONE_STEP, SMOOTHED, WITHHELD, Column, Rejections, Sums, TriedSet
+from fusetune.ekf2.replay.recording import SCORING
 from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES, WITHHOLDABLE
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
@@ -92,10 +89,8 @@ class TriedFlight:
         self.name = prepared.flight.name
         self._prepared, self._settings = prepared, settings
         self._base = replay_set(prepared, BASE, base)
-        self._airborne = airborne_intervals(prepared.flight, self._base.flags)
-        self._gaps = imu_gaps(prepared.flight, settings.scoring.log_gap_s)
-        self._window = self._window_of([self._base])
-        self.reason = self._window.reason
+        self._yardstick = Yardstick(scored_flight(prepared.flight, settings.scoring), self._base, settings.scoring)
+        self.reason = self._yardstick.window.reason
         """Why nothing can be compared on the flight; empty where it can."""
 
     @cached_property
@@ -106,11 +101,8 @@ class TriedFlight:
     @cached_property
     def whiteness(self) -> dict[str, float]:
         """How white the error of each source is as the base sees it, 0 … 1: the mean over its axes."""
-        if not self._window.intervals:
-            return {}
-        found = source_whiteness(self._base, self._base.states(), self._prepared.flight, self._window.intervals)
         shares: dict[str, list[float]] = {}
-        for (source, _), one in found.items():
+        for (source, _), one in self._yardstick.whiteness.items():
             if np.isfinite(one.white_share):
                 shares.setdefault(source, []).append(one.white_share)
         return {source: float(np.mean(values)) for source, values in shares.items()}
@@ -118,36 +110,19 @@ class TriedFlight:
     @cached_property
     def place(self) -> VelocityPlace | None:
         """Delay and place of the GNSS antenna; None where the flight does not tell them."""
-        return velocity_place_of(self._base, "gnss", self._airborne)
+        return velocity_place_of(self._base, "gnss", self._yardstick.airborne)
 
     def try_set(self, overrides: Mapping[str, float]) -> TriedSet:
         """Replay a set and compare it; parameters in which it differs from the log's own."""
-        return self._compared(replay_set(self._prepared, TRIED, overrides))
-
-    def _window_of(self, records: list[ReplayedSet]) -> ScoringWindow:
-        return scoring_window(records, BASE, self._airborne, self._gaps, self._settings.scoring)
-
-    @cached_property
-    def _reference(self) -> SmoothedVelocity | None:
-        return smoothed_velocity(self._base, self._prepared.flight, self._window.intervals, STEP_US)
-
-    @cached_property
-    def _base_differences(self) -> Array:
-        """(N, 3) velocity of the base less the smoothed one."""
-        return self._differences(self._base)
-
-    def _differences(self, record: ReplayedSet) -> Array:
-        assert self._reference is not None
-        states = record.states()
-        return interpolate(states.time, states.velocity, self._reference.time) - self._reference.velocity
+        return self._compared(replay_set(self._prepared, TRIED, overrides, SCORING))
 
     def _compared(self, record: ReplayedSet) -> TriedSet:
-        window = self._window_of([self._base, record])
+        window = self._yardstick.window_of(record)
         if not window.intervals:
             return TriedSet(reason=window.reason)
         if record.name in window.excluded:
             return TriedSet(reason=window.excluded[record.name])
-        events = filter_events(record, self._flying(record, window))
+        events = filter_events(record, self._yardstick.flying(record))
         return TriedSet(
             sums=dict(chain(self._one_step(record, window), self._withheld(record, window), self._smoothed(record))),
             flight_s=events.flight_s,
@@ -157,37 +132,32 @@ class TriedFlight:
             rejections=dict(self._rejections(record, window)),
         )
 
-    def _flying(self, record: ReplayedSet, window: ScoringWindow) -> tuple[Interval, ...]:
-        assert window.warm_up_end is not None
-        return after(self._airborne, end_of_warm_up(record, self._base, self._settings.scoring))
-
     def _one_step(self, record: ReplayedSet, window: ScoringWindow) -> Iterable[tuple[Column, Sums]]:
+        masks, most = self._yardstick.masks, self._settings.scoring.max_lacking_percent
         for source in self._settings.sources:
             for axis in range(AID_SOURCES[source].axes):
-                pairs = paired_samples(
-                    [self._base, record], (source, axis), BASE, window, settings=self._settings.scoring
-                )
-                if pairs is None or pairs.sets != (BASE, TRIED):
-                    continue
-                base, tried = (rows for rows in pairs.rows)
-                limit = winsor_limit(base["innovation"].astype(np.float64)[None])
-                variance = tried["innovation_variance"].astype(np.float64)
-                clipped = winsorised(tried["innovation"].astype(np.float64), limit)
-                yield Column(ONE_STEP, source, axis), _sums(clipped, variance)
+                mask = masks.get((source, axis))
+                found = None if mask is None else counted_samples(mask, record, window, most).samples
+                if mask is not None and found is not None:
+                    clipped = winsorised(found.innovation, mask.winsor_limit)
+                    yield Column(ONE_STEP, source, axis), _sums(clipped, found.innovation_variance)
 
     def _withheld(self, record: ReplayedSet, window: ScoringWindow) -> Iterable[tuple[Column, Sums]]:
-        for group in paired_gaps([self._base, record], BASE, window, self._settings.scoring):
-            if group.source in self._settings.withheld_sources and group.sets == (BASE, TRIED):
-                clipped = winsorised(group.error[1], winsor_limit(group.error[:1]))
-                yield Column(WITHHELD, group.source, group.axis, group.horizon_s), _sums(clipped)
+        most = self._settings.scoring.max_lacking_percent
+        masks = [one for one in self._yardstick.gaps if one.source in self._settings.withheld_sources]
+        for found in counted_gaps(masks, record, window, most):
+            if found.is_compared:
+                mask = found.mask
+                clipped = winsorised(found.error, mask.winsor_limit)
+                yield Column(WITHHELD, mask.source, mask.axis, mask.horizon_s), _sums(clipped)
 
     def _smoothed(self, record: ReplayedSet) -> Iterable[tuple[Column, Sums]]:
-        if self._reference is None:
+        mask = self._yardstick.smoothed
+        if mask is None:
             return
-        differences = self._differences(record)
-        for axis in range(3):
-            clipped = winsorised(differences[:, axis], winsor_limit(self._base_differences[:, axis][None]))
-            yield Column(SMOOTHED, self._reference.source, axis), _sums(clipped)
+        differences = velocity_differences(mask.reference, record.states())
+        for axis, limit in enumerate(mask.winsor_limits.tolist()):
+            yield Column(SMOOTHED, mask.reference.source, axis), _sums(winsorised(differences[:, axis], limit))
 
     def _rejections(self, record: ReplayedSet, window: ScoringWindow) -> Iterator[tuple[tuple[str, int], Rejections]]:
         """Of the samples in the scored part, as every set that fuses the source has them."""

@@ -1,20 +1,19 @@
 """EKF2's own covariance recursion along a track, told just before corrections, and at the time of flight.
 
 Nothing of the filter stands here: it runs as it does in a replay, on a flight without errors (`perfect_flight`). Where
-P is wanted as it is just before a correction, a copy of the filter goes on by one update with its buffers emptied; the
+P is wanted as it is just before a correction, a copy of the filter goes on by one update to which no sample comes; the
 same copy going on until its horizon is the present gives P of what the vehicle is told now.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
-from fusetune.ekf2.feed.sensors import SENSOR_MEMORIES
 from fusetune.ekf2.replay.course import Course
 from fusetune.ekf2.replay.recording import RecordArrays
 from fusetune.ekf2.replay.replay import begin_course, replay
@@ -129,10 +128,7 @@ def _thinned(updates: np.ndarray) -> np.ndarray:
 
 def _uncorrected(course: Course, inputs: EstimatorInputs, run: int) -> tuple[Array, Array]:
     """P after one update without measurements, and when the horizon has come to the present, each (24, 24)."""
-    alone = course.branch()
-    alone.inputs = replace(inputs, arrays=inputs.arrays._replace(arrivals=inputs.arrays.arrivals[:0]))
-    for name in SENSOR_MEMORIES:
-        alone.ekf["sensors"][name]["ring"]["time_us"] = 0
+    alone = course.without_samples()
     alone.advance(run, run + 1)
     before = alone.ekf["P"][0].copy()
     alone.reach(run + 1, int(inputs.arrays.imu["time_us"][run]))

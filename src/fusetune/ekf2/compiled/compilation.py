@@ -78,6 +78,11 @@ def ensure_compiled() -> None:
                 _compile(caches, PLAIN)
 
 
+def is_compiled() -> bool:
+    """Whether the kernel cache holds the estimator for this processor, and it may be loaded from there."""
+    return not _setting("DISABLE_JIT") and _may_be_loaded(kernel_folder())
+
+
 def _compile(caches: Path, *options: str) -> None:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(caches), "NUMBA_CACHE_LOCATOR_CLASSES": LOCATOR}
     subprocess.run([sys.executable, "-m", COMPILES, *options], env=environment, umask=0o022, check=False)

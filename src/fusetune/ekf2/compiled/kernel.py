@@ -11,4 +11,4 @@ time; one that does allocate does not compile.
 from numba import njit
 
 kernel = njit(error_model="numpy", _nrt=False)  # type: ignore[call-overload]
-entry_kernel = njit(error_model="numpy", cache=True, _nrt=False)  # type: ignore[call-overload]
+entry_kernel = njit(error_model="numpy", cache=True, nogil=True, _nrt=False)  # type: ignore[call-overload]

@@ -2,7 +2,8 @@
 
 The estimator runs a fixed time behind the newest IMU sample. A sample of an aiding sensor waits in a ring until the
 horizon has passed its time stamp; of several that are due, the newest wins and the older ones are dropped. The replay
-has all samples in arrays already, so a ring holds only time stamps and positions in those arrays.
+has all samples in arrays already, so a ring holds only time stamps and positions in those arrays; and since no state
+of the filter enters, the rings of a flight are run through once, before it is replayed (`fusetune.ekf2.schedule`).
 
 Mirrors PX4 v1.16 `EKF/RingBuffer.h` and the `set…Data` functions of `EKF/estimator_interface.cpp`, including two traits
 that change results: a ring that was emptied forgets the time of its newest sample, and samples that arrive faster than
@@ -13,7 +14,6 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
-from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE
 
 RING_CAPACITY = 256
 """PX4 counts buffer entries in eight bits, so no buffer can be longer."""
@@ -29,24 +29,8 @@ RING = np.dtype(
     align=True,
 )
 
-IMU_RING = np.dtype(
-    [
-        ("sample", IMU_SAMPLE, (RING_CAPACITY,)),
-        *fields("i8", "head", "tail", "size"),
-        ("first_write", "?"),
-    ],
-    align=True,
-)
-
-BUFFERS_MEMORY = np.dtype(
-    [
-        ("imu", IMU_RING),
-        *fields("i8", "imu_length", "observation_length", "min_observation_interval_us"),
-        ("initialised", "?"),
-    ],
-    align=True,
-)
-"""The estimator's sub-record `ekf.buffers`: the IMU's ring, and the lengths of all; those of the sensors are theirs."""
+BUFFER_LENGTHS = np.dtype(fields("i8", "imu_length", "observation_length"), align=True)
+"""The estimator's sub-record `ekf.buffers`: places of the IMU's buffer, and of those of observations."""
 
 
 @kernel
@@ -117,57 +101,24 @@ def newest_time_us(ring):
 
 
 @kernel
-def initialise_buffers(ekf, params, time_us):
-    """Size the buffers from EKF2_DELAY_MAX and EKF2_PREDICT_US; both act at start-up only."""
-    update_period_ms = params.EKF2_PREDICT_US / 1000.0
-    imu_length = min(max(2, int(np.ceil(params.EKF2_DELAY_MAX / update_period_ms))), RING_CAPACITY - 1)
-    observation_length = min(int(np.floor(1.5 * params.EKF2_DELAY_MAX / update_period_ms + 0.5)), imu_length)
-    buffers = ekf.buffers
-    buffers.imu_length = imu_length
-    buffers.observation_length = observation_length
-    buffers.min_observation_interval_us = 0
-    buffers.imu.head = 0
-    buffers.imu.tail = 0
-    buffers.imu.size = imu_length
-    buffers.imu.first_write = True
-    sensors = ekf.sensors
-    reset_ring(sensors.gnss.ring, observation_length)
-    reset_ring(sensors.mag.ring, observation_length)
-    reset_ring(sensors.baro.ring, observation_length)
-    reset_ring(sensors.range.ring, observation_length)
-    reset_ring(sensors.flow.ring, imu_length)
-    reset_ring(sensors.ev.ring, observation_length)
-    reset_ring(sensors.airspeed.ring, observation_length)
-    reset_ring(sensors.auxvel.ring, observation_length)
-    reset_ring(sensors.system_flags.ring, observation_length)
-    reset_ring(sensors.drag.ring, observation_length)
-    buffers.initialised = True
-    ekf.time_delayed_us = time_us
-    ekf.time_latest_us = time_us
+def size_buffers(lengths, predict_us, delay_max_ms):
+    """Lengths of the buffers by EKF2_PREDICT_US and EKF2_DELAY_MAX, which act on them at start-up only."""
+    update_period_ms = predict_us / 1000.0
+    imu_length = min(max(2, int(np.ceil(delay_max_ms / update_period_ms))), RING_CAPACITY - 1)
+    lengths.imu_length = imu_length
+    lengths.observation_length = min(int(np.floor(1.5 * delay_max_ms / update_period_ms + 0.5)), imu_length)
 
 
 @kernel
-def push_imu(ekf, time_latest_us):
-    """Buffer the down-sampled IMU sample in `ekf.imu_newest` and move the fusion time horizon."""
-    buffers = ekf.buffers
-    buffers.imu.sample[advance_for_write(buffers.imu)] = ekf.imu_newest
-    ekf.imu_delayed = buffers.imu.sample[buffers.imu.tail]
-    ekf.time_delayed_us = ekf.imu_delayed.time_us
-    intervals = buffers.observation_length - 1
-    # ARM divides by zero to zero, and PX4 relies on it when all delays are tiny.
-    buffers.min_observation_interval_us = (time_latest_us - ekf.time_delayed_us) // intervals if intervals > 0 else 0
-
-
-@kernel
-def offer(ekf, ring, sample_time_us, delay_ms, slot):
-    """Buffer an aiding sample unless it follows the newest one too closely.
+def offer(ring, sample_time_us, delay_ms, average_interval_s, least_us, slot):
+    """Buffer an aiding sample unless it follows the newest one by less than `least_us`.
 
     Its time stamp becomes the measurement time: less the sensor's delay, less half an estimator interval, both cut
     to whole microseconds as PX4 does. Returns whether the sample was taken.
     """
     delay_us = int(np.float32(delay_ms) * np.float32(1000.0))
-    time_us = sample_time_us - delay_us - int(np.float32(ekf.dt_ekf_avg) * np.float32(5e5))
-    if time_us < newest_time_us(ring) + ekf.buffers.min_observation_interval_us:
+    time_us = sample_time_us - delay_us - int(np.float32(average_interval_s) * np.float32(5e5))
+    if time_us < newest_time_us(ring) + least_us:
         return False
     push(ring, time_us, slot)
     return True

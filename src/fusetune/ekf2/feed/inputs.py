@@ -6,13 +6,14 @@ Built once per flight, since no parameter of the estimator enters: parameter set
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from fusetune.ekf2.feed import message_samples as convert
 from fusetune.ekf2.feed.arrival_order import RunSchedule, schedule_runs
+from fusetune.ekf2.feed.memo import Memo
 from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE, SYSTEM_FLAGS_SAMPLE
 from fusetune.ekf2.feed.taken_samples import AIDING, only_usable
 from fusetune.px4.flight import Flight, ParameterChange, TopicTable, select_rows
@@ -35,11 +36,12 @@ ARRIVAL_TOPICS = (*sorted(AIDING), "system_flags", "command")
 
 BIAS_RESETS = ("reset_accel_bias", "reset_gyro_bias")
 
-ARRIVALS = np.dtype([(name, "i4") for name in ARRIVAL_TOPICS] + [(name, "?") for name in BIAS_RESETS], align=True)
-"""What arrives with one IMU sample: a position in each sample array, -1 for nothing."""
+ARRIVAL_FIELDS = (*ARRIVAL_TOPICS, *BIAS_RESETS)
+"""What can arrive with an IMU sample, by number: samples, system flags, a command, the news of another sensor."""
 
 ARRIVAL = np.dtype([("run", "i4"), ("field", "i4"), ("position", "i4")])
-"""One entry of ARRIVALS, by the number of its field, for most IMU samples come alone; of a reset the position is 1."""
+"""What arrives at a run: the number of its field in ARRIVAL_FIELDS, and its position in the array of its samples; of a
+reset that is 1."""
 
 IMU_ROW = np.dtype(
     [
@@ -48,7 +50,7 @@ IMU_ROW = np.dtype(
         ("delta_vel", "f4", (3,)),
         ("delta_ang_dt", "f4"),
         ("delta_vel_dt", "f4"),
-        ("delta_vel_clipping", "?", (3,)),
+        ("delta_vel_clipping", "u1", (3,)),
     ],
     align=True,
 )
@@ -60,8 +62,7 @@ COMMAND = np.dtype([("timestamp", "i8"), ("command", "i8"), ("param", "f8", (7,)
 
 
 class SampleArrays(NamedTuple):
-    """The arrays that the compiled replay reads; of a whole flight `imu` are IMU_ROW and `arrivals` ARRIVAL in order of
-    their runs, see `of_runs`."""
+    """The arrays that the compiled replay reads; `arrivals` stand in the order of their runs."""
 
     imu: np.ndarray
     arrivals: np.ndarray
@@ -79,10 +80,6 @@ class SampleArrays(NamedTuple):
     system_flags: np.ndarray
     command: np.ndarray
 
-    def of_runs(self, start: int, stop: int) -> SampleArrays:
-        """The same for the estimator's runs from `start` to before `stop` alone, as IMU_SAMPLE and ARRIVALS."""
-        return self._replace(imu=imu_samples(self.imu[start:stop]), arrivals=arrivals_of(self.arrivals, start, stop))
-
 
 def imu_samples(rows: np.ndarray) -> np.ndarray:
     """IMU_ROW → IMU_SAMPLE."""
@@ -92,31 +89,18 @@ def imu_samples(rows: np.ndarray) -> np.ndarray:
     return samples
 
 
-def arrivals_of(arrivals: np.ndarray, start: int, stop: int) -> np.ndarray:
-    """ARRIVAL of a flight → ARRIVALS of the runs from `start` to before `stop`."""
-    first, last = np.searchsorted(arrivals["run"], (start, stop))
-    part = arrivals[first:last]
-    wide = np.zeros(max(stop - start, 0), ARRIVALS)
-    for number, name in enumerate(ARRIVALS.names or ()):
-        if name in ARRIVAL_TOPICS:
-            wide[name] = -1
-        here = part[part["field"] == number]
-        wide[name][here["run"] - start] = here["position"]
-    return wide
-
-
 def without_arrivals(arrivals: np.ndarray, names: Collection[str], runs: np.ndarray) -> np.ndarray:
     """ARRIVAL of a flight without those of some fields at some runs; `runs` (N,) is true for these."""
-    fields = [number for number, name in enumerate(ARRIVALS.names or ()) if name in names]
+    fields = [number for number, name in enumerate(ARRIVAL_FIELDS) if name in names]
     return arrivals[~(np.isin(arrivals["field"], fields) & runs[arrivals["run"]])]
 
 
 def _arrivals(name: str, position: np.ndarray) -> np.ndarray:
-    """One field of ARRIVALS, given for every run, as ARRIVAL."""
+    """What arrives in one field, given for every run, as ARRIVAL."""
     run = np.flatnonzero(position >= 0 if name in ARRIVAL_TOPICS else position)
     found = np.zeros(len(run), ARRIVAL)
     found["run"], found["position"] = run, position[run]
-    found["field"] = (ARRIVALS.names or ()).index(name)
+    found["field"] = ARRIVAL_FIELDS.index(name)
     return found
 
 
@@ -130,6 +114,8 @@ class EstimatorInputs:
     arrays: SampleArrays
     parameter_changes: tuple[tuple[int, ParameterChange], ...]
     """(run, change): changes that the log records in flight, and the run before which each takes effect."""
+    memo: Memo = field(default_factory=Memo, init=False, repr=False, compare=False)
+    """What replays of these samples have in common; inputs made of others by `dataclasses.replace` have their own."""
 
 
 def build_inputs(flight: Flight) -> EstimatorInputs:

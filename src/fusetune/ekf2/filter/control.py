@@ -3,7 +3,6 @@
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.feed.sample_arrival import apply_antenna_yaw_offset, apply_vision_noise, pop
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_control import control_air_data_fusion
 from fusetune.ekf2.filter.aid_sources.auxvel.auxvel_fusion import control_aux_vel_fusion
 from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import control_drag_fusion
@@ -13,7 +12,6 @@ from fusetune.ekf2.filter.aid_sources.fake_pos_control import control_fake_pos_f
 from fusetune.ekf2.filter.aid_sources.gnss.gps_control import control_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
 from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_control import control_optical_flow_fusion
 from fusetune.ekf2.filter.aid_sources.sideslip.sideslip_fusion import control_beta_fusion
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import control_zero_gyro_update
@@ -30,11 +28,10 @@ TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
 
 
 @kernel
-def control_fusion_modes(ekf, params, inputs):
-    """Take the samples that are due and let every aid source start, fuse, reset or stop."""
+def control_fusion_modes(ekf, params):
+    """Let every aid source start, fuse, reset or stop, with the samples that are due."""
     ekf.cs_prev = ekf.cs
     remember_reset_counters(ekf)
-    _pop_due_samples(ekf, params, inputs)
     _follow_system_flags(ekf)
     if not ekf.cs.tilt_align:
         ekf.cs.tilt_align = tilt_variance(ekf) < TILT_ALIGNED_VARIANCE
@@ -59,24 +56,6 @@ def control_fusion_modes(ekf, params, inputs):
     control_fake_pos_fusion(ekf, params)
     control_fake_hgt_fusion(ekf, params)
     update_dead_reckoning_status(ekf, params)
-
-
-@kernel
-def _pop_due_samples(ekf, params, inputs):
-    """Take from every buffer the newest sample that the fusion time horizon has passed, unless it is switched off."""
-    sensors = ekf.sensors
-    pop(ekf, sensors.system_flags, inputs.system_flags, True)
-    pop(ekf, sensors.mag, inputs.mag, int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE)
-    pop(ekf, sensors.flow, inputs.flow, int(params.EKF2_OF_CTRL) == 1)
-    place = pop(ekf, sensors.gnss, inputs.gnss, int(params.EKF2_GPS_CTRL) != 0)
-    apply_antenna_yaw_offset(sensors.gnss, place)
-    pop(ekf, sensors.airspeed, inputs.airspeed, params.EKF2_ARSP_THR > 0.0)
-    pop(ekf, sensors.drag, sensors.drag.made, int(params.EKF2_DRAG_CTRL) > 0)
-    pop(ekf, sensors.baro, inputs.baro, True)
-    pop(ekf, sensors.range, inputs.range, True)
-    place = pop(ekf, sensors.ev, inputs.ev, True)
-    apply_vision_noise(sensors.ev, place)
-    pop(ekf, sensors.auxvel, inputs.auxvel, True)
 
 
 @kernel

@@ -1,18 +1,15 @@
 """The whole estimator: its memory in one record, and one update.
 
-Per IMU sample, `update` first levels the filter if it has not started yet, then, when a new down-sampled sample moved
-the fusion time horizon, predicts covariance and state over the oldest buffered interval, lets every aid source act,
-and corrects the output predictor.
+`update` predicts covariance and state over the interval at the fusion time horizon, lets every aid source act, and
+corrects the output predictor.
 
 Mirrors PX4 v1.16 `EKF/ekf.cpp`, whose `predictState` stands in `prediction.py`.
 """
 
-import math
-
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.feed.buffers import BUFFERS_MEMORY
+from fusetune.ekf2.feed.buffers import BUFFER_LENGTHS
 from fusetune.ekf2.feed.sensors import SENSORS
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_MEMORY
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
@@ -38,12 +35,11 @@ from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.filter.common.local_origin import LOCAL_ORIGIN, initialise_local_origin
 from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
-from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
-from fusetune.ekf2.filter.prediction import predict_covariance, predict_state, update_average_interval
+from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
 from fusetune.ekf2.filter.wind import WIND_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
-from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL, ONE_G
+from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL
 from fusetune.ekf2.numerics.rotations import quat_aligning_with_up, quat_to_dcm
 
 EKF = np.dtype(
@@ -68,19 +64,12 @@ EKF = np.dtype(
         ("gravity", GRAVITY_MEMORY),
         ("wind", WIND_MEMORY),
         ("zero_gyro", ZERO_GYRO_MEMORY),
-        ("down_sampler", DOWN_SAMPLER_MEMORY),
-        ("buffers", BUFFERS_MEMORY),
+        ("buffers", BUFFER_LENGTHS),
         ("output", OUTPUT_MEMORY),
     ],
     align=True,
 )
 """The record `ekf`."""
-
-LEVELLING_LPF_ALPHA = 0.1
-LEVELLING_MIN_SPECIFIC_FORCE = 0.8 * ONE_G
-LEVELLING_MAX_SPECIFIC_FORCE = 1.2 * ONE_G
-LEVELLING_MAX_RATE = math.radians(15.0)
-MIN_IMU_INTERVAL_S = 1e-4
 
 
 @kernel
@@ -91,7 +80,6 @@ def initialise_estimator(ekf, params):
         ekf.R_to_earth[i, i] = 1.0
     ekf.state_reset.quat_change[0] = 1.0
     ekf.dt_ekf_avg = 0.01
-    ekf.is_first_imu_sample = True
     ekf.cs.in_air = True
     ekf.cs_prev.in_air = True
     ekf.height_sensor_ref = HEIGHT_REF_UNKNOWN
@@ -116,60 +104,26 @@ def initialise_estimator(ekf, params):
 
 
 @kernel
-def update(ekf, params, inputs):
-    """Run the filter after an IMU sample; return whether its states are new.
+def level_filter(ekf, params, specific_force):
+    """Start the filter: level it by the specific force (m/s², body), the attitude that it measures at rest."""
+    quat_aligning_with_up(specific_force[0], specific_force[1], specific_force[2], ekf.q)
+    quat_to_dcm(ekf.q, ekf.R_to_earth)
+    initialise_covariance(ekf, params)
+    align_output_predictor(ekf)
+    ekf.filter_initialised = True
+
+
+@kernel
+def update(ekf, params):
+    """Run the filter over `ekf.imu_delayed`, with the samples that are due in `ekf.sensors`.
 
     Parameters
     ----------
-    ekf : EKF record, with `imu_newest` and `imu_delayed` set if `imu_updated`
+    ekf : EKF record
     params : EKF2_PARAMETERS record
-    inputs : named tuple of sample arrays, `fusetune.ekf2.feed.inputs.EstimatorInputs`
     """
-    if not ekf.filter_initialised:
-        ekf.filter_initialised = _initialise_filter(ekf, params)
-        if not ekf.filter_initialised:
-            return False
-    if not ekf.imu_updated:
-        return False
-    ekf.imu_updated = False
-    update_average_interval(ekf, params)
     update_imu_bias_inhibit(ekf, params)
     predict_covariance(ekf, params)
     predict_state(ekf, params)
-    control_fusion_modes(ekf, params, inputs)
+    control_fusion_modes(ekf, params)
     correct_output(ekf, params)
-    return True
-
-
-@kernel
-def _initialise_filter(ekf, params):
-    """Level the filter by the filtered specific force once it is close to 1 g and the vehicle hardly turns."""
-    imu = ekf.imu_newest
-    if imu.delta_vel_dt < MIN_IMU_INTERVAL_S or imu.delta_ang_dt < MIN_IMU_INTERVAL_S:
-        return False
-    alpha = 1.0 if ekf.is_first_imu_sample else LEVELLING_LPF_ALPHA
-    ekf.is_first_imu_sample = False
-    for i in range(3):
-        ekf.accel_lpf[i] += alpha * (imu.delta_vel[i] / imu.delta_vel_dt - ekf.accel_lpf[i])
-        ekf.gyro_lpf[i] += alpha * (imu.delta_ang[i] / imu.delta_ang_dt - ekf.gyro_lpf[i])
-    if not _initialise_tilt(ekf):
-        return False
-    initialise_covariance(ekf, params)
-    align_output_predictor(ekf)
-    return True
-
-
-@kernel
-def _initialise_tilt(ekf):
-    accel, gyro = ekf.accel_lpf, ekf.gyro_lpf
-    specific_force = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
-    rate = math.sqrt(gyro[0] ** 2 + gyro[1] ** 2 + gyro[2] ** 2)
-    if (
-        specific_force < LEVELLING_MIN_SPECIFIC_FORCE
-        or specific_force > LEVELLING_MAX_SPECIFIC_FORCE
-        or rate > LEVELLING_MAX_RATE
-    ):
-        return False
-    quat_aligning_with_up(accel[0], accel[1], accel[2], ekf.q)
-    quat_to_dcm(ekf.q, ekf.R_to_earth)
-    return True

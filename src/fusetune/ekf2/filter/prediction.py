@@ -13,8 +13,6 @@ written out and not generated.
 
 import math
 
-import numpy as np
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, refresh_ellipsoid
@@ -42,16 +40,6 @@ BAD_ACCEL_NOISE = 4.9
 WIND_NOISE_HEIGHT_RATE_SCALER = 0.5
 ACCEL_HORIZ_LPF_TIME_CONSTANT_S = 1.0
 HEIGHT_RATE_LPF_TIME_CONSTANT_S = 10.0
-
-
-@kernel
-def update_average_interval(ekf, params):
-    """Average the estimator interval (s), in single precision since PX4 derives time stamps (µs) from it."""
-    imu = ekf.imu_delayed
-    interval = np.float32(0.5) * (np.float32(imu.delta_vel_dt) + np.float32(imu.delta_ang_dt))
-    nominal = np.float32(1e-6) * np.float32(params.EKF2_PREDICT_US)
-    limited = min(max(interval, np.float32(0.5) * nominal), np.float32(2.0) * nominal)
-    ekf.dt_ekf_avg = float(np.float32(0.99) * np.float32(ekf.dt_ekf_avg) + np.float32(0.01) * limited)
 
 
 @kernel

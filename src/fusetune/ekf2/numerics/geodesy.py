@@ -55,7 +55,12 @@ def project(lat_ref, lon_ref, lat, lon):
 
     Snyder, Map Projections – A Working Manual (1987), eqs. 22-4, 22-5, 25-2 and 5-3.
     """
-    sin_ref, cos_ref = math.sin(lat_ref), math.cos(lat_ref)
+    return project_about(math.sin(lat_ref), math.cos(lat_ref), lon_ref, lat, lon)
+
+
+@kernel
+def project_about(sin_ref, cos_ref, lon_ref, lat, lon):
+    """`project` for a reference whose latitude's sine and cosine are known."""
     sin_lat, cos_lat = math.sin(lat), math.cos(lat)
     cos_d_lon = math.cos(lon - lon_ref)
     c = math.acos(min(max(sin_ref * sin_lat + cos_ref * cos_lat * cos_d_lon, -1.0), 1.0))

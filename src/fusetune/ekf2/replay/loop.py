@@ -1,6 +1,7 @@
-"""The compiled loop: at every IMU sample what PX4's EKF2 module does in one run.
+"""The compiled loops: the schedule of a flight, and the filter's way along it.
 
-Take the IMU sample, the newest message of every aiding topic, the system flags; update the filter; publish.
+Everything else that is compiled is called from here, so that Numba keeps it in one folder. None holds the
+interpreter: threads can replay sets and gaps beside each other.
 """
 
 from __future__ import annotations
@@ -8,70 +9,184 @@ from __future__ import annotations
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import entry_kernel, kernel
-from fusetune.ekf2.feed.buffers import initialise_buffers, push_imu
-from fusetune.ekf2.feed.sample_arrival import receive_aiding, receive_drag
-from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag
+from fusetune.ekf2.feed.buffers import size_buffers
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import save_declination
 from fusetune.ekf2.filter.covariance import reset_accel_bias, reset_gyro_bias
-from fusetune.ekf2.filter.estimator import initialise_estimator, update
-from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import (
-    accumulate_imu,
-    initialise_down_sampler,
-    reset_down_sampler,
+from fusetune.ekf2.filter.estimator import initialise_estimator, level_filter, update
+from fusetune.ekf2.filter.output_predictor.output_predictor import (
+    has_imu_offset,
+    initialise_output_predictor,
+    predict_output,
 )
-from fusetune.ekf2.filter.output_predictor.output_predictor import initialise_output_predictor, predict_output
 from fusetune.ekf2.replay.commands import handle_command
-from fusetune.ekf2.replay.recording import record_update
+from fusetune.ekf2.replay.recording import finish_recording, record_update
 from fusetune.ekf2.replay.withholding import pretend_fused
+from fusetune.ekf2.schedule.imu_intervals import down_sample, last_completed, oldest_buffered
+from fusetune.ekf2.schedule.sensor_actions import schedule_drag, schedule_sensor
+from fusetune.ekf2.schedule.taking_actions import nothing_is_due, take_actions
+from fusetune.ekf2.schedule.timeline import value_at
+from fusetune.ekf2.schedule.updates import schedule_updates
 
-MIN_DT_FACTOR, MAX_DT_FACTOR = np.float32(0.5), np.float32(2.0)
+COMMAND, RESET_ACCEL_BIAS, RESET_GYRO_BIAS = range(3)
+"""What an EVENT is."""
+
+EVENT = np.dtype([("run", "i4"), ("what", "i4"), ("position", "i4")], align=True)
+"""What acts on the filter itself before a run: a command, at a position of its array, or a reset of a bias."""
+
+NO_STOP = np.iinfo(np.int64).max
 
 
 @entry_kernel
-def run_estimator(ekf, params, inputs, views, recorder, records, runs, horizon_us):
-    """Process a stretch of a flight, to its end or until the fusion time horizon has come to `horizon_us`.
+def find_intervals(imu, predict_us, sampler, intervals):
+    """See `fusetune.ekf2.schedule.imu_intervals.down_sample`."""
+    return down_sample(imu, predict_us, sampler[0], intervals)
 
-    `inputs` are of its runs; returned is how many were processed.
-    """
-    for run in range(runs):
-        arrivals = inputs.arrivals[run]
-        if arrivals.command >= 0:
-            handle_command(ekf, params, inputs.command[arrivals.command])
-        if arrivals.reset_accel_bias:
-            reset_accel_bias(ekf, params)
-        if arrivals.reset_gyro_bias:
-            reset_gyro_bias(ekf, params)
-        receive_imu(ekf, params, inputs.imu[run])
-        receive_aiding(ekf, params, inputs, arrivals)
-        if ekf.imu_updated:
-            pretend_fused(ekf)
-        if update(ekf, params, inputs):
-            save_declination(ekf, params)
-            record_update(ekf, params, views, recorder, records, inputs.imu[run].time_us)
-        if ekf.time_delayed_us >= horizon_us:
-            return run + 1
-    return runs
+
+@entry_kernel
+def find_updates(intervals, imu, predict_us, delay_max_ms, start_us, lengths, levelling, updates):
+    """See `fusetune.ekf2.schedule.updates.schedule_updates`; fills `lengths`, of the buffers, too."""
+    size_buffers(lengths[0], value_at(predict_us, 0), delay_max_ms)
+    imu_length = lengths[0].imu_length
+    return schedule_updates(intervals, imu, predict_us, imu_length, start_us, levelling[0], updates)
+
+
+@entry_kernel
+def find_actions(arrived, times_us, delay_ms, wanted, imu, intervals, updates, lengths, ring, ring_length, actions):
+    """See `fusetune.ekf2.schedule.sensor_actions.schedule_sensor`."""
+    return schedule_sensor(
+        arrived, times_us, delay_ms, wanted, imu, intervals, updates, lengths[0], ring[0], ring_length, actions
+    )
+
+
+@entry_kernel
+def find_drag(enabled, imu, intervals, updates, lengths, accumulator, ring, arrived, samples, actions):
+    """See `fusetune.ekf2.schedule.sensor_actions.schedule_drag`."""
+    return schedule_drag(
+        enabled, imu, intervals, updates, lengths[0], accumulator[0], ring[0], arrived, samples, actions
+    )
+
+
+@entry_kernel
+def run_estimator(ekf, params, inputs, schedule, notes, views, recorder, records, start, stop, is_last):
+    """Process the runs from `start` to before `stop`; `is_last` says that the recording ends with them."""
+    updates, actions, events, imu = schedule.updates, schedule.actions, schedule.events, inputs.imu
+    event = _first_at(events, start)
+    update_number = _first_at(updates, start)
+    place = _first_of_update(actions, update_number)
+    if start == 0 and stop > 0:
+        event = _handle_events(ekf, params, inputs, schedule, event, 0)
+        _switch_on(ekf, params, schedule.lengths[0])
+    sample, from_run = start, start
+    while update_number < len(updates) and updates[update_number].run < stop:
+        run = updates[update_number].run
+        while events[event].run <= run:
+            sample = _predict_output_until(ekf, params, imu, sample, events[event].run)
+            event = _handle_events(ekf, params, inputs, schedule, event, events[event].run)
+        sample = _predict_output_until(ekf, params, imu, sample, run + 1)
+        _set_horizon(ekf, schedule.intervals[updates[update_number].delayed])
+        ekf.time_latest_us = imu[run].time_us
+        ekf.dt_ekf_avg = updates[update_number].average_dt
+        nothing_is_due(ekf.sensors)
+        place = take_actions(ekf, inputs, schedule.drag, actions, place, update_number, from_run, NO_STOP, True, notes)
+        from_run = 0
+        pretend_fused(ekf)
+        if not ekf.filter_initialised:
+            level_filter(ekf, params, schedule.levelling[0].accel)
+        update(ekf, params)
+        save_declination(ekf, params)
+        record_update(ekf, params, views, recorder, records, ekf.time_latest_us)
+        update_number += 1
+    while events[event].run < stop:
+        sample = _predict_output_until(ekf, params, imu, sample, events[event].run)
+        event = _handle_events(ekf, params, inputs, schedule, event, events[event].run)
+    if stop > start:
+        take_actions(ekf, inputs, schedule.drag, actions, place, update_number, from_run, stop, False, notes)
+        _predict_output_until(ekf, params, imu, sample, stop)
+        _set_clock(ekf, inputs, schedule, stop)
+    if is_last:
+        finish_recording(recorder, records)
 
 
 @kernel
-def receive_imu(ekf, params, imu):
-    """Feed the output predictor and the down-sampler; move the horizon when an interval is complete."""
-    if not ekf.buffers.initialised:
-        initialise_buffers(ekf, params, imu.time_us)
-        initialise_down_sampler(ekf.down_sampler)
-        initialise_output_predictor(ekf)
-        initialise_estimator(ekf, params)
-    ekf.time_latest_us = imu.time_us
-    predict_output(ekf, params, imu)
-    if accumulate_imu(ekf.down_sampler, imu):
-        ekf.imu_newest = ekf.down_sampler.sample
-        reset_down_sampler(ekf.down_sampler, params)
-        period = np.float32(params.EKF2_PREDICT_US) * np.float32(1e-6)
-        low, high = MIN_DT_FACTOR * period, MAX_DT_FACTOR * period
-        ekf.imu_newest.delta_ang_dt = min(max(np.float32(ekf.imu_newest.delta_ang_dt), low), high)
-        ekf.imu_newest.delta_vel_dt = min(max(np.float32(ekf.imu_newest.delta_vel_dt), low), high)
-        push_imu(ekf, imu.time_us)
-        ekf.imu_updated = True
-    buffers = ekf.buffers
-    if accumulate_drag(ekf, params, imu, buffers.imu_length, buffers.observation_length):
-        receive_drag(ekf.sensors.drag, ekf.drag.produced)
+def _first_at(rows, run):
+    """Index of the first of rows at or after a run."""
+    low, high = 0, len(rows)
+    while low < high:
+        middle = (low + high) // 2
+        if rows[middle].run < run:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _first_of_update(actions, update):
+    low, high = 0, len(actions)
+    while low < high:
+        middle = (low + high) // 2
+        if actions[middle].update < update:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _switch_on(ekf, params, lengths):
+    ekf.buffers.imu_length = lengths.imu_length
+    ekf.buffers.observation_length = lengths.observation_length
+    initialise_output_predictor(ekf)
+    initialise_estimator(ekf, params)
+
+
+@kernel
+def _handle_events(ekf, params, inputs, schedule, event, run):
+    """Carry out the events of one run, between what the run before left and what this one does itself."""
+    events = schedule.events
+    while events[event].run == run:
+        _set_clock(ekf, inputs, schedule, run)
+        if events[event].what == COMMAND:
+            handle_command(ekf, params, inputs.command[events[event].position])
+        elif events[event].what == RESET_ACCEL_BIAS:
+            reset_accel_bias(ekf, params)
+        else:
+            reset_gyro_bias(ekf, params)
+        event += 1
+    return event
+
+
+@kernel
+def _predict_output_until(ekf, params, imu, sample, stop):
+    """Integrate the IMU samples from index `sample` to before `stop` at the full rate; return where it is now."""
+    has_offset = has_imu_offset(ekf.output, params)
+    while sample < stop:
+        predict_output(ekf.output, params, imu[sample], has_offset)
+        sample += 1
+    return sample
+
+
+@kernel
+def _set_clock(ekf, inputs, schedule, stop):
+    """The times that the estimator knows when the runs before `stop` are over."""
+    if stop == 0:
+        return
+    ekf.time_latest_us = inputs.imu[stop - 1].time_us
+    newest = last_completed(schedule.intervals, stop - 1)
+    if newest < 0:
+        ekf.time_delayed_us = inputs.imu[0].time_us
+        return
+    _set_horizon(ekf, schedule.intervals[oldest_buffered(newest, schedule.lengths[0].imu_length)])
+
+
+@kernel
+def _set_horizon(ekf, interval):
+    imu = ekf.imu_delayed
+    ekf.time_delayed_us = interval.time_us
+    imu.time_us = interval.time_us
+    imu.delta_ang_dt = interval.delta_ang_dt
+    imu.delta_vel_dt = interval.delta_vel_dt
+    for axis in range(3):
+        imu.delta_ang[axis] = interval.delta_ang[axis]
+        imu.delta_vel[axis] = interval.delta_vel[axis]
+        imu.delta_vel_clipping[axis] = interval.delta_vel_clipping[axis]

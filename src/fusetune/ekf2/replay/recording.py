@@ -4,12 +4,15 @@ An aid source is recorded whenever it has a new `timestamp_sample` after an upda
 and position at every update; flags when they change, and once a second.
 """
 
+import math
 from collections.abc import Sequence
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.filter.common import state as S
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE, AID_SOURCE_AXES, AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.conditions import (
@@ -18,9 +21,9 @@ from fusetune.ekf2.filter.common.conditions import (
     is_local_vertical_velocity_valid,
 )
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES, FAULT_STATUS_NAMES, REJECTION_NAMES
-from fusetune.ekf2.filter.common.local_origin import origin_altitude, project_to_local
-from fusetune.ekf2.numerics.geodesy import add_to_lat_lon
-from fusetune.ekf2.numerics.rotations import rotate_to_earth
+from fusetune.ekf2.filter.common.local_origin import origin_altitude
+from fusetune.ekf2.numerics.geodesy import metres_per_radian, project_about
+from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
 
 INNOVATION_ROW = np.dtype(
     [
@@ -53,6 +56,19 @@ STATE_ROW = np.dtype(
 )
 """`delta_angle` (rad, body) to `delta_velocity_dt` are the down-sampled IMU interval, dt in s, over which the state was
 predicted before it was corrected to what stands here."""
+
+SCORED_STATE_ROW = np.dtype(
+    [
+        ("timestamp_sample", "i8"),
+        ("quaternion", "f4", (4,)),
+        ("velocity", "f4", (3,)),
+        ("attitude_variance", "f4", (3,)),
+        ("velocity_variance", "f4", (3,)),
+        ("position_variance", "f4", (3,)),
+    ],
+    align=True,
+)
+"""What scores read of a STATE_ROW."""
 
 LOCAL_POSITION_ROW = np.dtype(
     [
@@ -91,27 +107,86 @@ FLAGS_ROW = np.dtype([("timestamp", "i8"), ("flags", "u1", (len(FLAG_COLUMNS),))
 FLAGS_INTERVAL_US = 1_000_000
 MAX_ROWS_PER_UPDATE = sum(AID_SOURCE_AXES.values())
 SOURCE_AXES = np.array([AID_SOURCE_AXES[name] for name in AID_SOURCE_NAMES])
+SINGLE_PRECISION_LIMIT = 2.0**128 - 2.0**103
+"""What is not below it becomes infinite in single precision."""
 
-RECORDER_MEMORY = np.dtype(
+PUBLISHED = np.dtype(
     [
-        ("innovation_rows", "i8"),
-        ("update_rows", "i8"),
-        ("flag_rows", "i8"),
-        ("updates", "i8"),
-        ("last_sample", "i8", (len(AID_SOURCE_NAMES),)),
-        ("last_flags", FLAGS_ROW),
+        ("timestamp", "i8"),
+        *fields("f8", "pos", "vel", shape=(3,)),
+        ("q", "f8", (4,)),
+        *fields("f8", "ref_lat", "ref_lon", "ref_alt", "origin_lat", "origin_lon", "origin_alt", "eph", "epv"),
+        *fields(
+            "i8",
+            "xy_reset_counter",
+            "z_reset_counter",
+            "vxy_reset_counter",
+            "vz_reset_counter",
+            "heading_reset_counter",
+        ),
+        *fields("?", "xy_valid", "z_valid", "is_kept"),
     ],
     align=True,
 )
+"""What a LOCAL_POSITION_ROW is made of, before the projection; positions are m from a global reference (rad, m)."""
+
+PROJECTION = np.dtype(
+    [*fields("f8", "ref_lat", "ref_alt", "metres_north", "metres_east", "origin_lat", "sin_origin", "cos_origin")],
+    align=True,
+)
+"""What the projection needs of the reference and of the origin, which change at resets only."""
+
+PUBLISHED_KEPT = 3
+
+RECORDER_MEMORY = np.dtype(
+    [
+        ("mode", "i8"),
+        *fields("i8", "innovation_rows", "state_rows", "position_rows", "flag_rows", "updates"),
+        ("last_sample", "i8", (len(AID_SOURCE_NAMES),)),
+        ("last_flags", FLAGS_ROW),
+        ("published", PUBLISHED, (PUBLISHED_KEPT,)),
+        ("projection", PROJECTION),
+        *fields("?", "has_position", "diverged"),
+    ],
+    align=True,
+)
+"""What the recorder knows between two updates; `published` holds that of the last three in turn."""
+
+IS_FULL, IS_SCORING, IS_GAP = range(3)
+"""What `mode` says: everything is kept, or what scores need, or of that what is told of a gap."""
+
+
+class Recording(Enum):
+    """How much is kept of a replay."""
+
+    FULL = "full"
+    """Everything."""
+    SCORING = "scoring"
+    """What scores are made of, the same figures: innovations and flags; of the states SCORED_STATE_ROW; of the local
+    position the first and the last row, and around every step of a reset counter the row of the step and the two
+    before it."""
+
+
+FULL, SCORING = Recording
 
 
 class RecordArrays(NamedTuple):
-    """Preallocated rows of one stretch of a replay."""
+    """Rows of one stretch of a replay."""
 
     innovations: np.ndarray
     states: np.ndarray
     local_position: np.ndarray
     flags: np.ndarray
+
+
+class RecordRoom(NamedTuple):
+    """Room for the rows of one stretch."""
+
+    innovations: np.ndarray
+    states: np.ndarray
+    local_position: np.ndarray
+    flags: np.ndarray
+    scored_states: np.ndarray
 
 
 class EstimatorViews(NamedTuple):
@@ -137,13 +212,16 @@ def views_of(ekf: np.ndarray) -> EstimatorViews:
     )
 
 
-def allocate_records(updates: int) -> RecordArrays:
+def allocate_records(updates: int, mode: int) -> RecordRoom:
     """Room for as many updates, whatever they publish."""
-    return RecordArrays(
+    # a step has two rows before it, which may be of the stretch before; the last row may come after a step
+    positions, flags = updates + PUBLISHED_KEPT, 0 if mode == IS_GAP else updates
+    return RecordRoom(
         _zero_rows(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW),
-        _zero_rows(updates, STATE_ROW),
-        _zero_rows(updates, LOCAL_POSITION_ROW),
-        _zero_rows(updates, FLAGS_ROW),
+        _zero_rows(updates if mode == IS_FULL else 0, STATE_ROW),
+        _zero_rows(positions, LOCAL_POSITION_ROW),
+        _zero_rows(flags, FLAGS_ROW),
+        _zero_rows(updates if mode == IS_SCORING else 0, SCORED_STATE_ROW),
     )
 
 
@@ -175,18 +253,36 @@ def with_fields(rows: np.ndarray, names: Sequence[str]) -> np.ndarray:
 
 @kernel
 def record_update(ekf, params, views, recorder, records, timestamp):
-    """Keep what one filter update published."""
+    """Keep what one filter update published, as much of it as the recorder's mode asks for."""
     aids = views.aids
     for source in range(len(aids)):
         if aids[source].timestamp_sample > recorder.last_sample[source]:
             recorder.last_sample[source] = aids[source].timestamp_sample
             _record_innovations(aids[source], source, views.axes[source], recorder, records.innovations)
-    row = recorder.update_rows
-    _record_states(ekf, records.states[row], timestamp)
-    _record_local_position(ekf, params, records.local_position[row], timestamp)
-    recorder.update_rows = row + 1
+    now = recorder.published[recorder.updates % PUBLISHED_KEPT]
+    _note_published(ekf, params, now, timestamp)
+    if recorder.mode == IS_FULL:
+        _record_states(ekf, records.states[recorder.state_rows], timestamp)
+        recorder.state_rows += 1
+        _record_position(now, recorder, records.local_position)
+    else:
+        _record_position_of_steps(recorder, records.local_position)
+    if recorder.mode == IS_SCORING:
+        _record_scored_states(ekf, records.scored_states[recorder.state_rows])
+        recorder.state_rows += 1
+    if recorder.mode != IS_GAP:
+        recorder.diverged |= not _is_finite(ekf)
+        _record_flags(views, recorder, records.flags, timestamp)
     recorder.updates += 1
-    _record_flags(views, recorder, records.flags, timestamp)
+
+
+@kernel
+def finish_recording(recorder, records):
+    """Keep the last row of the local position, if it was not."""
+    if recorder.updates > 0:
+        last = recorder.published[(recorder.updates - 1) % PUBLISHED_KEPT]
+        if not last.is_kept:
+            _record_position(last, recorder, records.local_position)
 
 
 @kernel
@@ -234,39 +330,128 @@ def _record_states(ekf, row, timestamp):
 
 
 @kernel
-def _record_local_position(ekf, params, row, timestamp):
+def _record_scored_states(ekf, row):
+    row.timestamp_sample = ekf.time_delayed_us
+    for i in range(4):
+        row.quaternion[i] = ekf.q[i]
+    for i in range(3):
+        row.velocity[i] = ekf.vel[i]
+        row.attitude_variance[i] = ekf.P[S.ATTITUDE + i, S.ATTITUDE + i]
+        row.velocity_variance[i] = ekf.P[S.VELOCITY + i, S.VELOCITY + i]
+        row.position_variance[i] = ekf.P[S.POSITION + i, S.POSITION + i]
+
+
+@kernel
+def _is_finite(ekf):
+    """Whether all states and variances are finite in single precision, as they are published."""
+    finite = abs(ekf.gpos_alt) < SINGLE_PRECISION_LIMIT
+    for i in range(S.ERROR_STATE_SIZE):
+        finite &= abs(ekf.P[i, i]) < SINGLE_PRECISION_LIMIT
+    for i in range(4):
+        finite &= abs(ekf.q[i]) < SINGLE_PRECISION_LIMIT
+    for i in range(3):
+        finite &= abs(ekf.vel[i]) < SINGLE_PRECISION_LIMIT
+        finite &= abs(ekf.gyro_bias[i]) < SINGLE_PRECISION_LIMIT
+        finite &= abs(ekf.accel_bias[i]) < SINGLE_PRECISION_LIMIT
+        finite &= abs(ekf.mag_I[i]) < SINGLE_PRECISION_LIMIT
+        finite &= abs(ekf.mag_B[i]) < SINGLE_PRECISION_LIMIT
+    finite &= abs(ekf.wind_vel[0]) < SINGLE_PRECISION_LIMIT
+    finite &= abs(ekf.wind_vel[1]) < SINGLE_PRECISION_LIMIT
+    return finite and abs(ekf.terrain) < SINGLE_PRECISION_LIMIT
+
+
+@kernel
+def _note_published(ekf, params, now, timestamp):
     """Position and velocity of the body's origin: the predictor's, which are the IMU's, less its lever arm."""
-    output = ekf.output
-    offset_n, offset_e, offset_d = rotate_to_earth(
-        output.R_to_earth, params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z
-    )
-    newest = output.newest
-    lat, lon = add_to_lat_lon(
-        output.ref_lat, output.ref_lon, output.ref_alt, newest.pos[0] - offset_n, newest.pos[1] - offset_e
-    )
-    x, y = project_to_local(ekf, lat, lon)
-    row.timestamp = timestamp
-    row.timestamp_sample = timestamp
+    output, newest = ekf.output, ekf.output.newest
+    offset = rotate_to_earth(output.R_to_earth, params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z)
+    now.timestamp = timestamp
+    now.is_kept = False
+    for axis in range(3):
+        now.pos[axis] = newest.pos[axis] - offset[axis]
+        now.vel[axis] = newest.vel[axis] - output.vel_imu_rel_body[axis]
+    for i in range(4):
+        now.q[i] = newest.q[i]
+    now.ref_lat, now.ref_lon, now.ref_alt = output.ref_lat, output.ref_lon, output.ref_alt
+    now.origin_lat, now.origin_lon, now.origin_alt = ekf.origin.lat_rad, ekf.origin.lon_rad, origin_altitude(ekf)
+    now.eph = _horizontal_accuracy(ekf)
+    now.epv = np.sqrt(ekf.P[S.POSITION + 2, S.POSITION + 2])
+    reset = ekf.state_reset
+    now.xy_reset_counter = reset.pos_ne_counter
+    now.z_reset_counter = reset.pos_d_counter
+    now.vxy_reset_counter = reset.vel_ne_counter
+    now.vz_reset_counter = reset.vel_d_counter
+    now.heading_reset_counter = reset.quat_counter
+    now.xy_valid = is_local_horizontal_position_valid(ekf)
+    now.z_valid = is_local_vertical_position_valid(ekf) or is_local_vertical_velocity_valid(ekf)
+
+
+@kernel
+def _record_position_of_steps(recorder, rows):
+    """Keep the first row, and around a step of a reset counter that of the step and the two before it."""
+    published, n = recorder.published, recorder.updates
+    now = published[n % PUBLISHED_KEPT]
+    if not recorder.has_position:
+        _record_position(now, recorder, rows)
+        return
+    before = published[(n - 1) % PUBLISHED_KEPT]
+    if (
+        now.xy_reset_counter != before.xy_reset_counter
+        or now.z_reset_counter != before.z_reset_counter
+        or now.vxy_reset_counter != before.vxy_reset_counter
+        or now.vz_reset_counter != before.vz_reset_counter
+        or now.heading_reset_counter != before.heading_reset_counter
+    ):
+        earlier = published[(n - 2) % PUBLISHED_KEPT]
+        if not earlier.is_kept:
+            _record_position(earlier, recorder, rows)
+        if not before.is_kept:
+            _record_position(before, recorder, rows)
+        _record_position(now, recorder, rows)
+
+
+@kernel
+def _record_position(published, recorder, rows):
+    row = rows[recorder.position_rows]
+    recorder.position_rows += 1
+    recorder.has_position = True
+    published.is_kept = True
+    x, y = _local_position(published, recorder.projection)
+    row.timestamp = published.timestamp
+    row.timestamp_sample = published.timestamp
     row.x = x
     row.y = y
-    row.z = newest.pos[2] - offset_d - output.ref_alt + origin_altitude(ekf)
-    row.vx = newest.vel[0] - output.vel_imu_rel_body[0]
-    row.vy = newest.vel[1] - output.vel_imu_rel_body[1]
-    row.vz = newest.vel[2] - output.vel_imu_rel_body[2]
-    q = newest.q
+    row.z = published.pos[2] - published.ref_alt + published.origin_alt
+    row.vx = published.vel[0]
+    row.vy = published.vel[1]
+    row.vz = published.vel[2]
+    q = published.q
     row.heading = np.arctan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
-    row.eph = _horizontal_accuracy(ekf)
-    row.epv = np.sqrt(ekf.P[S.POSITION + 2, S.POSITION + 2])
+    row.eph = published.eph
+    row.epv = published.epv
     for i in range(4):
         row.q[i] = q[i]
-    reset = ekf.state_reset
-    row.xy_reset_counter = reset.pos_ne_counter
-    row.z_reset_counter = reset.pos_d_counter
-    row.vxy_reset_counter = reset.vel_ne_counter
-    row.vz_reset_counter = reset.vel_d_counter
-    row.heading_reset_counter = reset.quat_counter
-    row.xy_valid = is_local_horizontal_position_valid(ekf)
-    row.z_valid = is_local_vertical_position_valid(ekf) or is_local_vertical_velocity_valid(ekf)
+    row.xy_reset_counter = published.xy_reset_counter
+    row.z_reset_counter = published.z_reset_counter
+    row.vxy_reset_counter = published.vxy_reset_counter
+    row.vz_reset_counter = published.vz_reset_counter
+    row.heading_reset_counter = published.heading_reset_counter
+    row.xy_valid = published.xy_valid
+    row.z_valid = published.z_valid
+
+
+@kernel
+def _local_position(published, known):
+    """North and east (m) of the local origin; `known` is a PROJECTION, renewed where it is another's."""
+    if known.metres_north == 0.0 or known.ref_lat != published.ref_lat or known.ref_alt != published.ref_alt:
+        known.ref_lat, known.ref_alt = published.ref_lat, published.ref_alt
+        known.metres_north, known.metres_east = metres_per_radian(published.ref_lat, published.ref_alt)
+    if known.cos_origin == 0.0 or known.origin_lat != published.origin_lat:
+        known.origin_lat = published.origin_lat
+        known.sin_origin, known.cos_origin = math.sin(published.origin_lat), math.cos(published.origin_lat)
+    lat = wrap_pi(published.ref_lat + published.pos[0] / known.metres_north)
+    lon = wrap_pi(published.ref_lon + published.pos[1] / known.metres_east)
+    return project_about(known.sin_origin, known.cos_origin, published.origin_lon, lat, lon)
 
 
 @kernel

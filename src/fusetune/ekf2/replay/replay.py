@@ -21,8 +21,10 @@ from fusetune.ekf2.replay.handover import handover_runs, without_resets_at
 from fusetune.ekf2.replay.kept_rows import KeptRows
 from fusetune.ekf2.replay.recording import (
     FLAG_COLUMNS,
+    FULL,
     LOCAL_POSITION_ROW,
     RecordArrays,
+    Recording,
     joined,
 )
 from fusetune.ekf2.replay.results import Gap, GapResult, ReplayResult, ReplaySummary
@@ -39,6 +41,7 @@ def replay(
     gaps: Sequence[Gap] = (),
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
+    recording: Recording = FULL,
     keep: Callable[[RecordArrays], RecordArrays] | None = None,
 ) -> ReplayResult:
     """Run the estimator over one flight and keep what it published.
@@ -64,6 +67,7 @@ def replay(
         gaps=gaps,
         start=start,
         handovers=handovers,
+        recording=recording,
     )
     return result_of(summary, kept.rows())
 
@@ -83,6 +87,7 @@ def replay_into(
     gaps: Sequence[Gap] = (),
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
+    recording: Recording = FULL,
 ) -> ReplaySummary:
     """Run the estimator over one flight and hand on what it publishes, a stretch of the flight at a time.
 
@@ -104,19 +109,22 @@ def replay_into(
         where the samples end before that time, the filter starts from nothing, as when the vehicle boots.
     handovers : sequence of Handover
         Another estimator instance became primary: the filter takes over what that knew of its sensors.
+    recording : Recording
+        How much of the rows is handed on; what is, has the same figures either way.
     """
     ranges = [_runs_of(inputs, gap) for gap in gaps]
-    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers)
+    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers, recording)
     tally = _Tally()
     found: list[GapResult | None] = [None] * len(gaps)
-    for begin, end in course.stretches(first_run, len(inputs.arrays.imu), [first for first, _ in ranges]):
+    runs = len(inputs.arrays.imu)
+    for begin, end in course.stretches(first_run, runs, [first for first, _ in ranges]):
         for number, (first, last) in enumerate(ranges):
             if first == begin:
                 found[number] = _continue_into_gap(course, gaps[number], first, last)
-        rows = course.run(begin, end)
+        rows = course.run(begin, end, is_last=end == runs)
         tally.add(rows)
         take(rows)
-    return tally.summary(course, warm_start_us, found)
+    return tally.summary(course, first_run, warm_start_us, found)
 
 
 def begin_course(
@@ -125,6 +133,7 @@ def begin_course(
     overridden: frozenset[str] | None = None,
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
+    recording: Recording = FULL,
 ) -> tuple[Course, int, int | None]:
     """Set the estimator on its way; arguments as for `replay`.
 
@@ -138,13 +147,27 @@ def begin_course(
         for run, change in inputs.parameter_changes
         if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
     ]
-    if start is not None:
-        inputs = without_first_resets(inputs, start.time_us)
-    inputs = without_resets_at(inputs, handovers)
+    inputs = _without_resets(inputs, start, tuple(handovers))
     record = parameter_record(parameters)
-    course = Course(inputs, record, changes, handover_runs(inputs, float(record["EKF2_DELAY_MAX"][0]), handovers))
+    runs = handover_runs(inputs, float(record["EKF2_DELAY_MAX"][0]), handovers)
+    course = Course(inputs, record, changes, runs, recording)
     first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
     return course, first_run, warm_start_us
+
+
+def _without_resets(
+    inputs: EstimatorInputs, start: LoggedState | None, handovers: tuple[Handover, ...]
+) -> EstimatorInputs:
+    """The inputs without the resets that neither a start from a given state nor a handover is; the sets share them."""
+    if start is None and not handovers:
+        return inputs
+
+    def make() -> EstimatorInputs:
+        begun = inputs if start is None else without_first_resets(inputs, start.time_us)
+        return without_resets_at(begun, handovers)
+
+    key = ("without resets", start and start.time_us, tuple(one.time_us for one in handovers))
+    return inputs.memo.get(key, make)
 
 
 def _runs_of(inputs: EstimatorInputs, gap: Gap) -> tuple[int, int]:
@@ -156,10 +179,10 @@ def _continue_into_gap(course: Course, gap: Gap, first: int, last: int) -> GapRe
     """Replay the gap on a copy of the filter; None where the filter has not started, or the flight has no such time."""
     if not course.ekf["filter_initialised"][0]:
         return None
-    branch = course.branch()
-    branch.ekf["sensors"][gap.sensor]["withheld"] = True
+    branch = course.gap_branch(gap.sensor)
     start = int(branch.ekf["time_delayed_us"][0])
-    innovations, _, local_position, _ = joined([branch.run(*stretch) for stretch in branch.stretches(first, last)])
+    parts = [branch.run(*stretch, is_last=stretch[1] == last) for stretch in branch.stretches(first, last)]
+    innovations, _, local_position, _ = joined(parts)
     if not len(local_position):
         return None
     sources = [AID_SOURCE_NAMES.index(name) for name in WITHHOLDABLE[gap.sensor]]
@@ -175,32 +198,29 @@ class _Tally:
     """What is told of all rows, counted as they come."""
 
     def __init__(self) -> None:
-        self._horizons: list[np.ndarray] = []
-        self._diverged = False
         self._faults = 0
         self._resets = {name: 0 for name in LOCAL_POSITION_ROW.names or () if name.endswith("_reset_counter")}
 
     def add(self, rows: RecordArrays) -> None:
-        states, position = rows.states, rows.local_position
-        self._horizons.append(states["timestamp_sample"].copy())
-        self._diverged |= not (np.isfinite(states["states"]).all() and np.isfinite(states["covariances"]).all())
+        position = rows.local_position
         faults = [i for i, name in enumerate(FLAG_COLUMNS) if name.startswith("fs_")]
         bits = rows.flags["flags"][:, faults].astype(np.int64) << np.arange(len(faults))
         self._faults = max(self._faults, int(bits.sum(axis=1).max(initial=0)))
         if len(position):
             self._resets = {name: int(position[name][-1]) for name in self._resets}
 
-    def summary(self, course: Course, warm_start_us: int | None, gaps: Sequence[GapResult | None]) -> ReplaySummary:
-        time = np.concatenate([np.zeros(0, np.int64), *self._horizons])
+    def summary(
+        self, course: Course, first_run: int, warm_start_us: int | None, gaps: Sequence[GapResult | None]
+    ) -> ReplaySummary:
         return ReplaySummary(
             mode=course.inputs.mode,
             imu_samples=len(course.inputs.arrays.imu),
             updates=int(course.recorder["updates"][0]),
-            update_interval_us=float(np.median(np.diff(time))) if len(time) > 1 else 0.0,
+            update_interval_us=course.schedule.update_interval_us(first_run),
             origin=_origin(course.ekf["origin"][0]),
             resets=self._resets,
             filter_fault_flags_max=self._faults,
-            diverged=self._diverged,
+            diverged=bool(course.recorder["diverged"][0]),
             gaps=tuple(one for one in gaps if one is not None),
             warm_start_us=warm_start_us,
             levelled=bool(course.ekf["filter_initialised"][0]),

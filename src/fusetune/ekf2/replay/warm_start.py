@@ -25,8 +25,8 @@ from fusetune.px4.layouts.logged_state import LoggedState
 from fusetune.quaternions import conjugate, rotation_matrix
 
 CARRIED = (
-    "time_delayed_us", "time_latest_us", "imu_delayed", "imu_newest", "imu_updated", "dt_ekf_avg", "accel_lpf",
-    "gyro_lpf", "air_density", "sensors", "down_sampler", "buffers", "output", "drag", "range", "flow",
+    "time_delayed_us", "time_latest_us", "imu_delayed", "dt_ekf_avg", "air_density", "sensors", "buffers", "output",
+    "drag", "range", "flow",
 )  # fmt: skip
 """What belongs to the arrival of samples and not to the filter."""
 
@@ -84,7 +84,6 @@ def take_over(ekf: np.ndarray, fresh: np.ndarray, params: np.void, inputs: Estim
             ekf["sensors"][name][part] = fresh["sensors"][name][part]
     e = ekf[0]
     e["filter_initialised"] = True
-    e["is_first_imu_sample"] = False
     _set_state(e, params, inputs, state)
     _set_variances(e, params, state)
     _set_flags(e, params, state)

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from fusetune.ekf2.compiled.compilation import compile_and_record
+from fusetune.ekf2.compiled.compilation import compile_and_record, is_compiled
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.numerics.constants import ONE_G
@@ -25,6 +25,14 @@ def compile_kernels() -> None:
     """
     flight = Flight("warm_up", topics={("sensor_combined", 0): _imu_at_rest()})
     replay(build_inputs(canonical(flight)), complete({}, {}, None))
+
+
+def load_kernels() -> bool:
+    """Load the estimator where it is compiled; returns whether it is."""
+    if not is_compiled():
+        return False
+    compile_kernels()
+    return True
 
 
 def _imu_at_rest() -> TopicTable:

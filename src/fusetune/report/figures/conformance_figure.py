@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
 from fusetune.analyze.flight.manoeuvre_classes import CLASSES
-from fusetune.report.figures.drawing import new_figure
+from fusetune.report.figures.drawing import label_margins, new_figure
 
 Array = npt.NDArray[np.float64]
 Document = Mapping[str, Any]
@@ -34,6 +35,9 @@ _PLAN = "#444444"
 _MARKS = {"passed": ("o", "#1B7F3B"), "out of order": ("D", "#D98E04"), "missed": ("X", "#C62828")}
 _MOST_POINTS = 4000
 _LEVEL_M = 1.0
+_MARGINS = {"left": 0.085, "right": 0.985, "bottom": 0.06, "top": 0.935, "hspace": 0.16}
+_LEGEND_COLUMNS = 6
+"""Two rows fit into the margin above."""
 
 
 def draw_conformance(track: FlownTrack, document: Document) -> Figure:
@@ -47,19 +51,21 @@ def draw_conformance(track: FlownTrack, document: Document) -> Figure:
     flown = next((one for one in document["missions"] if one["mission"] == document["flown"]), None)
     home = flown["home"] if flown is not None else {"lat": track.lat[0], "lon": track.lon[0], "alt": 0.0}
     place = track.about(home["lat"], home["lon"], home["alt"])
-    figure = new_figure(9.0, 8.6)
-    grid = figure.add_gridspec(2, 1, height_ratios=(2.6, 1.0))
+    figure = new_figure(9.0, 8.6, layout=None)
+    grid = figure.add_gridspec(2, 1, height_ratios=(2.6, 1.0), **_MARGINS)
     above, beneath = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
     seconds = (track.time - document["start_us"]) * 1e-6
-    for kind, rows in _by_class(track.time, document["manoeuvres"]):
-        above.plot(place[rows, 1], place[rows, 0], color=CLASS_COLOURS[kind], linewidth=1.8, solid_capstyle="round")
-        beneath.plot(seconds[rows], -place[rows, 2], color=CLASS_COLOURS[kind], linewidth=1.8)
+    stretches = _by_class(track.time, document["manoeuvres"])
+    _draw_stretches(above, stretches, np.column_stack([place[:, 1], place[:, 0]]))
+    _draw_stretches(beneath, stretches, np.column_stack([seconds, -place[:, 2]]))
     if flown is not None:
         _plan(above, beneath, flown, document["start_us"])
     above.set(xlabel="east of home [m]" if flown else "east [m]", ylabel="north of home [m]" if flown else "north [m]")
     above.set_aspect("equal", adjustable="datalim")
     reference = "take-off" if track.is_above_takeoff else "home" if flown else "sea level"
     beneath.set(xlabel="time since the log began [s]", ylabel=f"height above\n{reference} [m]")
+    for axes in (above, beneath):
+        label_margins(axes, left=0.5)
     kinds = {one["kind"] for one in document["manoeuvres"]}
     _legend(figure, [kind for kind in CLASSES if kind in kinds], flown)
     return figure
@@ -78,24 +84,32 @@ def _by_class(time: npt.NDArray[np.int64], manoeuvres: Sequence[Document]) -> li
     return found
 
 
+def _draw_stretches(axes: Axes, stretches: Sequence[tuple[str, npt.NDArray[np.int64]]], points: Array) -> None:
+    """Each in the colour of its class, all as one object of the picture."""
+    lines = [points[rows] for _, rows in stretches]
+    colours = [CLASS_COLOURS[kind] for kind, _ in stretches]
+    axes.add_collection(LineCollection(lines, colors=colours, linewidths=1.8, capstyle="round", joinstyle="round"))
+    axes.autoscale_view()
+
+
 def _plan(above: Axes, beneath: Axes, flown: Document, start_us: int) -> None:
     """Legs dashed, waypoints with their numbers; beneath, the heights between which each level leg was flown."""
     corners = np.array([flown["legs"][0]["start_ned_m"], *(leg["end_ned_m"] for leg in flown["legs"])])
     above.plot(corners[:, 1], corners[:, 0], color=_PLAN, linewidth=0.9, linestyle="--", zorder=1.5)
     at_place: dict[tuple[float, float], list[str]] = {}
     for waypoint in flown["waypoints"]:
-        state = _state(waypoint)
-        marker, colour = _MARKS[state]
+        north, east, _ = waypoint["place_ned_m"]
+        at_place.setdefault((round(north, 1), round(east, 1)), []).append(str(waypoint["waypoint"] + 1))
+    for state, (marker, colour) in _MARKS.items():
+        of_state = [one for one in flown["waypoints"] if _state(one) == state]
         # over one that was passed at the same place another time
         size, order = (9.5, 4) if state == "missed" else (6.5, 3)
-        north, east, down = waypoint["place_ned_m"]
-        above.plot(east, north, marker, color=colour, markersize=size, markeredgecolor="white", zorder=order)
-        at_place.setdefault((round(north, 1), round(east, 1)), []).append(str(waypoint["waypoint"] + 1))
-        if waypoint["time_us"] is not None:
-            beneath.plot(
-                (waypoint["time_us"] - start_us) * 1e-6, -down, marker, color=colour, markersize=5.5,
-                markeredgecolor="white", zorder=3,
-            )  # fmt: skip
+        look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": colour, "markeredgecolor": "white"}
+        north, east, _ = np.reshape([one["place_ned_m"] for one in of_state], (-1, 3)).T
+        above.plot(east, north, markersize=size, zorder=order, **look)
+        timed = [one for one in of_state if one["time_us"] is not None]
+        after = [(one["time_us"] - start_us) * 1e-6 for one in timed]
+        beneath.plot(after, [-one["place_ned_m"][2] for one in timed], markersize=5.5, zorder=3, **look)
     for (north, east), numbers in at_place.items():
         above.annotate(
             ", ".join(numbers), (east, north), xytext=(5, 5), textcoords="offset points", fontsize=8, color=_PLAN
@@ -122,4 +136,6 @@ def _legend(figure: Figure, kinds: Sequence[str], flown: Document | None) -> Non
             for state, (marker, colour) in _MARKS.items()
             if state in states
         ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 6), fontsize=8)
+    figure.legend(
+        handles=handles, loc="upper center", ncols=min(len(handles), _LEGEND_COLUMNS), fontsize=8, borderaxespad=0.3
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS, OnboardSamples
 from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.report.figures.drawing import new_figure
+from fusetune.report.figures.drawing import decades, drawn_rows, label_margins, new_figure
 from fusetune.report.severity_words import SEVERITY_COLOURS
 
 AID_TOPICS = tuple(source.topic for source in MEASURED_SOURCES.values())
@@ -79,6 +80,7 @@ def draw_timeline(logged: Flight, bars: Sequence[Bar]) -> Figure:
     _ratios(panels[3], flight)
     for axes in panels[1:]:
         _shade(axes, flight, airborne, bars)
+        label_margins(axes)
     for axes in panels[:-1]:
         axes.tick_params(labelbottom=False)
     panels[-1].set_xlabel("time since the log began [s]")
@@ -127,9 +129,7 @@ def _height(axes: Axes, flight: Flight) -> None:
     if position is None or not position["timestamp"].size:
         _say(axes, "the log holds no local position")
         return
-    rows = _thinned(position["timestamp"].size)
-    time = (position["timestamp"].astype(np.int64)[rows] - flight.start_timestamp) * 1e-6
-    axes.plot(time, -position["z"].astype(np.float64)[rows], color="#0072B2")
+    _line(axes, flight, position["timestamp"], -position["z"].astype(np.float64), color="#0072B2")
 
 
 def _speed(axes: Axes, flight: Flight) -> None:
@@ -138,12 +138,15 @@ def _speed(axes: Axes, flight: Flight) -> None:
     if position is None or not position["timestamp"].size or "vx" not in position:
         _say(axes, "the log holds no velocity")
         return
-    rows = _thinned(position["timestamp"].size)
-    time = (position["timestamp"].astype(np.int64)[rows] - flight.start_timestamp) * 1e-6
-    east_north = [position[name].astype(np.float64)[rows] for name in ("vx", "vy")]
-    axes.plot(time, np.hypot(*east_north), color="#0072B2", label="horizontal")
-    axes.plot(time, -position["vz"].astype(np.float64)[rows], color="#E69F00", linewidth=0.9, label="up")
+    north, east, down = (position[name].astype(np.float64) for name in ("vx", "vy", "vz"))
+    _line(axes, flight, position["timestamp"], np.hypot(north, east), color="#0072B2", label="horizontal")
+    _line(axes, flight, position["timestamp"], -down, color="#E69F00", linewidth=0.9, label="up")
     axes.legend(loc="upper left", ncols=2, borderaxespad=0.2)
+
+
+def _line(axes: Axes, flight: Flight, time: npt.NDArray[Any], values: Array, **look: Any) -> None:
+    rows = drawn_rows(values)
+    axes.plot((time[rows].astype(np.int64) - flight.start_timestamp) * 1e-6, values[rows], **look)
 
 
 def _ratios(axes: Axes, flight: Flight) -> None:
@@ -161,8 +164,7 @@ def _ratios(axes: Axes, flight: Flight) -> None:
     if not axes.lines:
         _say(axes, "the log holds no innovations of the vehicle's own filter")
         return
-    axes.set_yscale("log")
-    axes.minorticks_off()
+    decades(axes)
     # room above for the legend
     axes.set_ylim(_SMALLEST_RATIO, 300.0 * largest)
     axes.axhline(1.0, color="#CC0000", linewidth=0.8, linestyle="--")
@@ -199,10 +201,6 @@ def _largest(samples: OnboardSamples, source: str) -> tuple[npt.NDArray[np.int64
     together = -(-ratio.size // _MOST_POINTS)
     starts = np.arange(0, ratio.size, together)
     return time[starts], np.clip(np.maximum.reduceat(ratio, starts), _SMALLEST_RATIO, _LARGEST_RATIO)
-
-
-def _thinned(size: int) -> slice:
-    return slice(None, None, max(1, size // _MOST_POINTS))
 
 
 def _say(axes: Axes, words: str) -> None:

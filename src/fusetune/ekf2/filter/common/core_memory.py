@@ -50,8 +50,8 @@ SCRATCH = np.dtype(
 
 CORE_FIELDS = [
     *fields("i8", "time_delayed_us", "time_latest_us"),
-    *fields(IMU_SAMPLE, "imu_delayed", "imu_newest"),
-    *fields("?", "imu_updated", "filter_initialised", "is_first_imu_sample"),
+    ("imu_delayed", IMU_SAMPLE),
+    ("filter_initialised", "?"),
     ("dt_ekf_avg", "f8"),
     ("q", "f8", (4,)),
     ("vel", "f8", (3,)),
@@ -78,7 +78,6 @@ CORE_FIELDS = [
     ("earth_rate_ned", "f8", (3,)),
     *fields("f8", "last_known_lat", "last_known_lon", "last_known_alt"),
     # low-pass filters
-    *fields("f8", "accel_lpf", "gyro_lpf", shape=(3,)),
     ("accel_horiz_lpf", "f8", (2,)),
     ("height_rate_lpf", "f8"),
     # IMU bias learning

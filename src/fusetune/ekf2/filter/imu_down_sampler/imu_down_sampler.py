@@ -37,18 +37,15 @@ FIRST_INTERVAL_US = 10_000.0
 def initialise_down_sampler(sampler):
     """Start with PX4's guess of the gyro interval, and an interval of the default length."""
     sampler.mean_dt = INITIAL_MEAN_DT
-    _start_interval(sampler, FIRST_INTERVAL_US)
+    reset_down_sampler(sampler, FIRST_INTERVAL_US)
 
 
 @kernel
-def reset_down_sampler(sampler, params):
-    """Start the next interval, of EKF2_PREDICT_US."""
-    _start_interval(sampler, params.EKF2_PREDICT_US)
+def reset_down_sampler(sampler, length_us):
+    """Start the next interval, of EKF2_PREDICT_US.
 
-
-@kernel
-def _start_interval(sampler, length_us):
-    """Empty the sum; the number of samples that fill it follows from the mean gyro interval seen so far."""
+    The sum is emptied; the number of samples that fill it follows from the mean gyro interval seen so far.
+    """
     sample = sampler.sample
     sample.time_us = 0
     sample.delta_ang[:] = 0.0
@@ -68,13 +65,13 @@ def _start_interval(sampler, length_us):
 
 @kernel
 def accumulate_imu(sampler, imu):
-    """Add one IMU sample; returns whether `sampler.sample` is complete."""
+    """Add one IMU sample, IMU_ROW or IMU_SAMPLE; returns whether `sampler.sample` is complete."""
     sample = sampler.sample
     sampler.mean_dt = np.float32(0.9) * sampler.mean_dt + np.float32(0.1) * np.float32(imu.delta_ang_dt)
     sample.time_us = imu.time_us
     sample.delta_ang_dt = np.float32(sample.delta_ang_dt) + np.float32(imu.delta_ang_dt)
     sample.delta_vel_dt = np.float32(sample.delta_vel_dt) + np.float32(imu.delta_vel_dt)
-    x, y, z = imu.delta_ang[0], imu.delta_ang[1], imu.delta_ang[2]
+    x, y, z = np.float64(imu.delta_ang[0]), np.float64(imu.delta_ang[1]), np.float64(imu.delta_ang[2])
     _carry_velocity(sample.delta_vel, imu.delta_vel, rotation_vector_to_quat(x, y, z))
     rotate_by_body_increment(sampler.rotation, x, y, z)
     for axis in range(3):
@@ -92,10 +89,11 @@ def accumulate_imu(sampler, imu):
 def _carry_velocity(accumulated, delta_vel, q):
     """Turn the accumulated velocity into the frame after rotation `q` and add the new increment at mid-rotation."""
     a0, a1, a2 = _rotate_inverse(q, accumulated[0], accumulated[1], accumulated[2])
-    b0, b1, b2 = _rotate_inverse(q, delta_vel[0], delta_vel[1], delta_vel[2])
-    accumulated[0] = a0 + 0.5 * (delta_vel[0] + b0)
-    accumulated[1] = a1 + 0.5 * (delta_vel[1] + b1)
-    accumulated[2] = a2 + 0.5 * (delta_vel[2] + b2)
+    x, y, z = np.float64(delta_vel[0]), np.float64(delta_vel[1]), np.float64(delta_vel[2])
+    b0, b1, b2 = _rotate_inverse(q, x, y, z)
+    accumulated[0] = a0 + 0.5 * (x + b0)
+    accumulated[1] = a1 + 0.5 * (y + b1)
+    accumulated[2] = a2 + 0.5 * (z + b2)
 
 
 @kernel

@@ -73,9 +73,11 @@ def initialise_output_predictor(ekf):
 
 
 @kernel
-def predict_output(ekf, params, imu):
-    """Integrate one IMU sample at the full rate (PX4: calculateOutputStates)."""
-    output = ekf.output
+def predict_output(output, params, imu, has_offset):
+    """Integrate one IMU sample, IMU_ROW, at the full rate (PX4: calculateOutputStates).
+
+    `has_offset` tells whether the IMU is away from the body's origin, or was until now.
+    """
     if output.time_last_update_us != 0:
         dt = min(max((imu.time_us - output.time_last_update_us) * 1e-6, MIN_DT_S), MAX_DT_S)
         output.dt_update_avg = 0.8 * output.dt_update_avg + 0.2 * dt
@@ -89,8 +91,22 @@ def predict_output(ekf, params, imu):
     rotate_by_body_increment(newest.q, corrected[0], corrected[1], corrected[2])
     quat_to_dcm(newest.q, output.R_to_earth)
     _integrate_velocity(output, imu)
-    if imu.delta_ang_dt > 0.001:
+    if has_offset and imu.delta_ang_dt > 0.001:
         _velocity_of_imu_offset(output, params, corrected, imu.delta_ang_dt)
+
+
+@kernel
+def has_imu_offset(output, params):
+    """Whether the IMU's place enters the published velocity."""
+    vel = output.vel_imu_rel_body
+    return (
+        params.EKF2_IMU_POS_X != 0.0
+        or params.EKF2_IMU_POS_Y != 0.0
+        or params.EKF2_IMU_POS_Z != 0.0
+        or vel[0] != 0.0
+        or vel[1] != 0.0
+        or vel[2] != 0.0
+    )
 
 
 @kernel

@@ -1,6 +1,7 @@
 """Mean of the specific force along body X and Y over a few IMU samples, as drag observation.
 
-Mirrors `setDragData` of PX4 v1.16's `estimator_interface.cpp`, which runs for every raw IMU sample.
+Mirrors `setDragData` of PX4 v1.16's `estimator_interface.cpp`, which runs for every raw IMU sample while
+EKF2_DRAG_CTRL asks for it.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
@@ -18,16 +19,12 @@ def _restart(drag):
 
 
 @kernel
-def accumulate_drag(ekf, params, imu, imu_buffer_length, obs_buffer_length):
-    """Take in one raw IMU sample; return whether `ekf.drag.produced` holds a new mean to be buffered.
+def accumulate_drag(drag, imu, imu_buffer_length, obs_buffer_length):
+    """Take in one raw IMU sample; return whether `drag.produced` holds a new mean to be buffered.
 
     A clipped sample discards what had been summed up. The mean carries the mean time of its samples (µs).
     """
-    if int(params.EKF2_DRAG_CTRL) <= 0:
-        return False
-    ekf.sensors.drag.exists = True
-    drag = ekf.drag
-    if imu.delta_vel_clipping[0] != 0 or imu.delta_vel_clipping[1] != 0 or imu.delta_vel_clipping[2] != 0:
+    if imu.delta_vel_clipping[0] or imu.delta_vel_clipping[1] or imu.delta_vel_clipping[2]:
         _restart(drag)
         return False
     drag.sample_count += 1

@@ -1,19 +1,21 @@
-"""What the drag aid source remembers between updates."""
+"""What the drag aid source remembers between updates, and the means that it observes."""
 
 import numpy as np
 
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
 
-DRAG_MEMORY = np.dtype(
+DRAG_MEMORY = np.dtype([("H", "f8", (2, ERROR_STATE_SIZE))], align=True)
+"""Sub-record `ekf.drag`: work space."""
+
+DRAG_ACCUMULATOR = np.dtype(
     [
         ("sample_count", "i8"),
         ("delta_vel_sum", "f8", (2,)),
         ("time_sum_us", "i8"),
         ("dt_sum", "f8"),
         ("produced", DRAG_SAMPLE),
-        ("H", "f8", (2, ERROR_STATE_SIZE)),
     ],
     align=True,
 )
-"""Sub-record `ekf.drag`: sums of the IMU samples since the last mean, that mean, and work space. Zero at start."""
+"""Sums of the IMU samples since the last mean, and that mean. Zero at start."""

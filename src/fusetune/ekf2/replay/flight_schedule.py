@@ -1,0 +1,256 @@
+"""The schedule of a replay: what of it no state of the filter enters, built once and shared.
+
+It follows from the flight and from few parameters (lengths of intervals and buffers, delays, which sensors are asked
+for). Replays of many sets, and all gaps of one, walk the same schedule; a set that differs in one delay needs that
+sensor's part alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fusetune.ekf2.feed.buffers import BUFFER_LENGTHS, RING
+from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, BIAS_RESETS, EstimatorInputs
+from fusetune.ekf2.feed.sample_arrival import NOTE, NOTED
+from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
+from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_ACCUMULATOR
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.common.parameters import taken_value
+from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
+from fusetune.ekf2.replay.loop import (
+    COMMAND,
+    EVENT,
+    RESET_ACCEL_BIAS,
+    RESET_GYRO_BIAS,
+    find_actions,
+    find_drag,
+    find_intervals,
+    find_updates,
+)
+from fusetune.ekf2.schedule.imu_intervals import IMU_INTERVAL
+from fusetune.ekf2.schedule.sensor_actions import ACTION, ARRIVED
+from fusetune.ekf2.schedule.taking_actions import DRAG, FLOW, SENSOR_NAMES
+from fusetune.ekf2.schedule.timeline import Steps, steps_of, timeline
+from fusetune.ekf2.schedule.updates import LEVELLING, NEVER, UPDATE
+from fusetune.px4.aid_sources import SENSORS
+from fusetune.px4.flight import ParameterChange
+
+Changes = Sequence[tuple[int, ParameterChange]]
+Rows = np.ndarray[Any, np.dtype[Any]]
+
+_NONE_FOLLOWS = np.iinfo(np.int32).max
+"""Update or run of the entry that ends a table, so that whoever walks it need not count."""
+
+_WANTED: dict[str, tuple[str, Callable[[float], float]]] = {
+    "mag": ("EKF2_MAG_TYPE", lambda value: float(int(value) != MAG_TYPE_NONE)),
+    "flow": ("EKF2_OF_CTRL", lambda value: float(int(value) == 1)),
+    "gnss": ("EKF2_GPS_CTRL", lambda value: float(int(value) != 0)),
+    "airspeed": ("EKF2_ARSP_THR", lambda value: float(value > 0.0)),
+    "drag": ("EKF2_DRAG_CTRL", lambda value: float(int(value) > 0)),
+}
+"""By which parameter the filter asks for a sensor's samples; the others are always asked for."""
+
+
+class ScheduleTables(NamedTuple):
+    """The tables that the compiled replay walks."""
+
+    intervals: Rows
+    updates: Rows
+    actions: Rows
+    drag: Rows
+    events: Rows
+    lengths: Rows
+    levelling: Rows
+
+
+@dataclass(frozen=True)
+class FlightSchedule:
+    """When the filter updates on a flight, with which samples."""
+
+    tables: ScheduleTables
+
+    @property
+    def started_run(self) -> int | None:
+        """The run from which the filter goes on with the state that it was given; None where it never comes to it."""
+        run = int(self.tables.levelling["started_run"][0])
+        return run if run >= 0 else None
+
+    def updates_until(self, run: int) -> int:
+        """How many updates there are before a run."""
+        return int(np.searchsorted(self._update_runs, run))
+
+    @cached_property
+    def _update_runs(self) -> Rows:
+        return np.ascontiguousarray(self.tables.updates["run"])
+
+    def update_interval_us(self, run: int) -> float:
+        """Median time (µs) between the updates from a run on; 0 with fewer than two."""
+        if run not in self._median_intervals:
+            updates = self.tables.updates["delayed"][self.updates_until(run) :]
+            steps = np.diff(self.tables.intervals["time_us"][updates])
+            self._median_intervals[run] = float(np.median(steps)) if len(steps) else 0.0
+        return self._median_intervals[run]
+
+    @cached_property
+    def _median_intervals(self) -> dict[int, float]:
+        return {}
+
+    @cached_property
+    def _horizons(self) -> tuple[Rows, Rows, Rows]:
+        """Runs at which the horizon moves, to what time, and the latest of these so far."""
+        newest = np.arange(len(self.tables.intervals))
+        oldest = np.maximum(newest - int(self.tables.lengths["imu_length"][0]) + 1, 0)
+        times = self.tables.intervals["time_us"][oldest]
+        return np.ascontiguousarray(self.tables.intervals["run"]), times, np.maximum.accumulate(times)
+
+    def run_of_horizon(self, since: int, time_us: int) -> int | None:
+        """The first run, not before `since`, at which the horizon comes to a time; None for never."""
+        runs, times, latest = self._horizons
+        place = max(int(np.searchsorted(latest, time_us)), int(np.searchsorted(runs, since)))
+        while place < len(times) and times[place] < time_us:
+            place += 1
+        return int(runs[place]) if place < len(times) else None
+
+
+def flight_schedule(
+    inputs: EstimatorInputs, params: np.void, changes: Changes, start_us: int | None = None
+) -> FlightSchedule:
+    """The schedule of a flight for some parameters; built on the first call, shared by the others.
+
+    Parameters
+    ----------
+    params : EKF2_PARAMETERS record at the start
+    changes : changes in flight that are in effect
+    start_us : the filter is given a state once the horizon has come to this time
+    """
+
+    def steps(name: str, meaning: Callable[[float], float] = float) -> Steps:
+        changed = [(run, taken_value(name, change.value)) for run, change in changes if change.name == name]
+        return steps_of(float(params[name]), changed, meaning)
+
+    delay_max = [value for run, value in steps("EKF2_DELAY_MAX") if run == 0][-1]
+    clock = (steps("EKF2_PREDICT_US"), delay_max, NEVER if start_us is None else start_us)
+    told = {}
+    for sensor in SENSOR_NAMES:
+        delay = SENSORS[sensor].delay_parameter if sensor in SENSORS else None
+        wanted = steps(*_WANTED[sensor]) if sensor in _WANTED else ((0, 1.0),)
+        told[sensor] = (steps(delay) if delay else ((0, 0.0),), wanted)
+    memo = inputs.memo
+    key = ("schedule", clock, tuple(told.values()))
+    return memo.get(key, lambda: _Builder(inputs, clock).schedule(told), lambda made: _bytes(made.tables))
+
+
+def notes_of(params: np.void, changes: Changes) -> Rows:
+    """What the parameters that act on samples as they arrive say, from which run on."""
+    rows = [(0, *(params[name] for name in NOTED))]
+    for run, change in sorted(changes, key=lambda one: one[0]):
+        if change.name in NOTED:
+            place = 1 + list(NOTED).index(change.name)
+            rows.append((run, *rows[-1][1:place], taken_value(change.name, change.value), *rows[-1][place + 1 :]))
+    return np.array(rows, NOTE)
+
+
+def _size(rows: Rows) -> int:
+    return rows.nbytes
+
+
+def _bytes(arrays: Sequence[Rows]) -> int:
+    return sum(array.nbytes for array in arrays)
+
+
+class _Builder:
+    """Builds the parts of schedules of one flight that share intervals and updates."""
+
+    def __init__(self, inputs: EstimatorInputs, clock: tuple[Steps, float, int]) -> None:
+        self.inputs, self.imu, self.clock = inputs, inputs.arrays.imu, clock
+        predict_us, _, _ = clock
+        self.predict_us = timeline(predict_us)
+        self.intervals = inputs.memo.get(("intervals", predict_us), self._intervals, _size)
+        self.updates, self.lengths, self.levelling = inputs.memo.get(("updates", clock), self._updates, _bytes)
+
+    def _intervals(self) -> Rows:
+        intervals, sampler = np.zeros(len(self.imu), IMU_INTERVAL), np.zeros(1, DOWN_SAMPLER_MEMORY)
+        return _shortened(intervals, find_intervals(self.imu, self.predict_us, sampler, intervals))
+
+    def _updates(self) -> tuple[Rows, Rows, Rows]:
+        _, delay_max, start_us = self.clock
+        updates, lengths = np.zeros(len(self.intervals), UPDATE), np.zeros(1, BUFFER_LENGTHS)
+        levelling = np.zeros(1, LEVELLING)
+        count = find_updates(
+            self.intervals, self.imu, self.predict_us, delay_max, start_us, lengths, levelling, updates
+        )
+        return _shortened(updates, count), lengths, levelling
+
+    def schedule(self, told: dict[str, tuple[Steps, Steps]]) -> FlightSchedule:
+        memo, drag = self.inputs.memo, np.zeros(0, DRAG_SAMPLE)
+        parts = []
+        for number, (name, values) in enumerate(told.items()):
+            key = (name, self.clock, values)
+            if number == DRAG:
+                drag, actions = memo.get(key, partial(self._drag, values[1]), _bytes)
+            else:
+                actions = memo.get(key, partial(self._actions, number, *values), _size)
+            parts.append(actions)
+        end = np.zeros(1, ACTION)
+        end["update"] = _NONE_FOLLOWS
+        actions = np.concatenate([*parts, end])
+        actions = actions[np.argsort(actions["update"], kind="stable")]
+        tables = ScheduleTables(
+            self.intervals, self.updates, actions, drag, self._events(), self.lengths, self.levelling
+        )
+        return FlightSchedule(tables)
+
+    def _actions(self, number: int, delay_ms: Steps, wanted: Steps) -> Rows:
+        name = SENSOR_NAMES[number]
+        arrived = _arrived(self.inputs, name)
+        times = np.ascontiguousarray(getattr(self.inputs.arrays, name)["time_us"])
+        places = "imu_length" if number == FLOW else "observation_length"
+        actions = np.zeros(2 * len(arrived), ACTION)
+        count = find_actions(
+            arrived, times, timeline(delay_ms), timeline(wanted), self.imu, self.intervals, self.updates,
+            self.lengths, np.zeros(1, RING), int(self.lengths[places][0]), actions,
+        )  # fmt: skip
+        actions["sensor"] = number
+        return _shortened(actions, count)
+
+    def _drag(self, enabled: Steps) -> tuple[Rows, Rows]:
+        # called where it finds nothing, too: what a replay at rest compiles is all that there is to compile
+        imu = self.imu if any(value for _, value in enabled) else self.imu[:0]
+        samples, arrived = np.zeros(len(imu), DRAG_SAMPLE), np.zeros(len(imu), ARRIVED)
+        actions = np.zeros(len(imu) + 1, ACTION)
+        made, count = find_drag(
+            timeline(enabled), imu, self.intervals, self.updates, self.lengths, np.zeros(1, DRAG_ACCUMULATOR),
+            np.zeros(1, RING), arrived, samples, actions,
+        )  # fmt: skip
+        actions["sensor"] = DRAG
+        return _shortened(samples, made), _shortened(actions, count)
+
+    def _events(self) -> Rows:
+        arrivals = self.inputs.arrays.arrivals
+        what = ("command", COMMAND), *zip(BIAS_RESETS, (RESET_ACCEL_BIAS, RESET_GYRO_BIAS), strict=True)
+        fields = {ARRIVAL_FIELDS.index(name): number for name, number in what}
+        here = arrivals[np.isin(arrivals["field"], list(fields))]
+        events = np.zeros(len(here) + 1, EVENT)
+        events["run"][:-1], events["position"][:-1] = here["run"], here["position"]
+        events["what"][:-1] = [fields[field] for field in here["field"].tolist()]
+        events["run"][-1] = _NONE_FOLLOWS
+        return np.sort(events, order=["run", "what"])
+
+
+def _arrived(inputs: EstimatorInputs, name: str) -> Rows:
+    arrivals = inputs.arrays.arrivals
+    here = arrivals[arrivals["field"] == ARRIVAL_FIELDS.index(name)]
+    arrived = np.zeros(len(here), ARRIVED)
+    arrived["run"], arrived["slot"] = here["run"], here["position"]
+    return arrived
+
+
+def _shortened(rows: Rows, count: int) -> Rows:
+    """The first rows of an array that nobody else has; the room of the others is given back."""
+    rows.resize(count, refcheck=False)
+    return rows

@@ -1,0 +1,131 @@
+"""Carry out what a schedule has for the sensors before an update: samples arrive, others are due.
+
+`inputs` is the named tuple of sample arrays that `fusetune.ekf2.feed.inputs` builds. What arrives can change what the
+estimator knows of the sensor at once; PX4's `EKF2.cpp` does that where it reads the message.
+"""
+
+import math
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.sample_arrival import apply_antenna_yaw_offset, apply_vision_noise
+from fusetune.ekf2.feed.sensors import SENSOR_MEMORIES
+from fusetune.ekf2.schedule.sensor_actions import BUFFERED, DUE
+from fusetune.ekf2.schedule.timeline import place_at
+
+SENSOR_NAMES = tuple(SENSOR_MEMORIES)
+"""In the order of their numbers in an ACTION."""
+
+(GNSS, MAG, BARO, RANGE, FLOW, EV, AIRSPEED, AUXVEL, DRAG, SYSTEM_FLAGS) = range(len(SENSOR_NAMES))
+
+
+@kernel
+def nothing_is_due(sensors):
+    """What was due at the last update no longer is."""
+    sensors.gnss.data_ready = False
+    sensors.mag.data_ready = False
+    sensors.baro.data_ready = False
+    sensors.range.data_ready = False
+    sensors.flow.data_ready = False
+    sensors.ev.data_ready = False
+    sensors.airspeed.data_ready = False
+    sensors.auxvel.data_ready = False
+    sensors.drag.data_ready = False
+    sensors.system_flags.data_ready = False
+
+
+@kernel
+def take_actions(ekf, inputs, drag, actions, place, update, from_run, stop_run, with_due, notes):
+    """Carry out the actions before an update, from index `place` on; return the index of the first of a later one.
+
+    Parameters
+    ----------
+    drag : DRAG_SAMPLE, which stand in no input
+    from_run, stop_run : only what arrives at the runs between is carried out
+    with_due : whether samples that are due are taken
+    notes : NOTE, what the parameters said since when
+    """
+    while actions[place].update == update:
+        action = actions[place]
+        if action.what == DUE:
+            if with_due:
+                _take_due(ekf.sensors, inputs, drag, action, notes)
+        elif from_run <= action.run < stop_run:
+            _arrive(ekf, inputs, action)
+        place += 1
+    return place
+
+
+@kernel
+def _arrive(ekf, inputs, action):
+    sensors, slot, sensor = ekf.sensors, action.slot, action.sensor
+    if sensor == MAG:
+        _note_arrival(sensors.mag, action)
+    elif sensor == BARO:
+        ekf.air_density = inputs.air_density[slot]
+        _note_arrival(sensors.baro, action)
+    elif sensor == GNSS:
+        _note_arrival(sensors.gnss, action)
+        if action.what == BUFFERED and math.isfinite(inputs.gnss[slot].yaw):
+            sensors.gnss.newest_yaw_time_us = action.time_us
+    elif sensor == RANGE:
+        ekf.range.sensor_min_distance = inputs.range_limits[slot, 0]
+        ekf.range.sensor_max_distance = inputs.range_limits[slot, 1]
+        _note_arrival(sensors.range, action)
+    elif sensor == FLOW:
+        ekf.flow.max_rate = inputs.flow_limits[slot, 0]
+        ekf.flow.min_distance = inputs.flow_limits[slot, 1]
+        ekf.flow.max_distance = inputs.flow_limits[slot, 2]
+        _note_arrival(sensors.flow, action)
+    elif sensor == EV:
+        if action.what == BUFFERED:
+            ekf.ev.newest_quality = inputs.ev[slot].quality
+        _note_arrival(sensors.ev, action)
+    elif sensor == AIRSPEED:
+        _note_arrival(sensors.airspeed, action)
+    elif sensor == AUXVEL:
+        _note_arrival(sensors.auxvel, action)
+    elif sensor == DRAG:
+        _note_arrival(sensors.drag, action)
+    else:
+        _note_arrival(sensors.system_flags, action)
+
+
+@kernel
+def _note_arrival(sensor, action):
+    sensor.exists = True
+    if action.what == BUFFERED:
+        sensor.newest_time_us = action.time_us
+
+
+@kernel
+def _take_due(sensors, inputs, drag, action, notes):
+    sensor = action.sensor
+    if sensor == MAG:
+        _take(sensors.mag, inputs.mag, action)
+    elif sensor == BARO:
+        _take(sensors.baro, inputs.baro, action)
+    elif sensor == GNSS:
+        _take(sensors.gnss, inputs.gnss, action)
+        apply_antenna_yaw_offset(sensors.gnss.sample, notes[place_at(notes, action.run)])
+    elif sensor == RANGE:
+        _take(sensors.range, inputs.range, action)
+    elif sensor == FLOW:
+        _take(sensors.flow, inputs.flow, action)
+    elif sensor == EV:
+        _take(sensors.ev, inputs.ev, action)
+        apply_vision_noise(sensors.ev.sample, notes[place_at(notes, action.run)])
+    elif sensor == AIRSPEED:
+        _take(sensors.airspeed, inputs.airspeed, action)
+    elif sensor == AUXVEL:
+        _take(sensors.auxvel, inputs.auxvel, action)
+    elif sensor == DRAG:
+        _take(sensors.drag, drag, action)
+    else:
+        _take(sensors.system_flags, inputs.system_flags, action)
+
+
+@kernel
+def _take(sensor, samples, action):
+    sensor.data_ready = True
+    sensor.sample = samples[action.slot]
+    sensor.sample.time_us = action.time_us

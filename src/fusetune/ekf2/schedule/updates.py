@@ -1,0 +1,101 @@
+"""At which runs the filter updates, and over which interval: from levelling on, whenever the horizon moves.
+
+Levelling waits until the filtered specific force is close to 1 g and the vehicle hardly turns. It looks at every run,
+also at those that complete no interval, so the first update may come between two intervals; PX4 does the same.
+
+Mirrors `Ekf::initialiseFilter` of PX4 v1.16 `EKF/ekf.cpp`.
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
+from fusetune.ekf2.schedule.timeline import value_at
+
+LPF_ALPHA = 0.1
+MIN_SPECIFIC_FORCE = 0.8 * ONE_G
+MAX_SPECIFIC_FORCE = 1.2 * ONE_G
+MAX_RATE = math.radians(15.0)
+MIN_IMU_INTERVAL_S = 1e-4
+
+INITIAL_INTERVAL_S = 0.01
+NEVER = np.iinfo(np.int64).max
+
+UPDATE = np.dtype([*fields("i4", "run", "delayed"), ("average_dt", "f8")], align=True)
+"""The run of an update, the index of its interval, and the mean interval (s) when it is over."""
+
+LEVELLING = np.dtype([*fields("f8", "accel", "gyro", shape=(3,)), ("begun", "?"), ("started_run", "i8")], align=True)
+"""Filtered specific force (m/s²) and rate (rad/s), body; the run from which a given state is the filter's, or -1."""
+
+
+@kernel
+def schedule_updates(intervals, imu, predict_us, imu_length, start_us, levelling, updates):
+    """Fill `updates`; return how many there are.
+
+    Parameters
+    ----------
+    intervals, predict_us : as `down_sample` has them
+    imu : IMU_ROW of every run
+    imu_length : of the IMU buffer
+    start_us : the filter is given a state once the horizon has come to this time; NEVER for not at all
+    levelling : LEVELLING record of zeros; holds the specific force by which the filter is levelled
+    updates : UPDATE, as many as there are intervals
+    """
+    levelling.started_run = -1
+    runs, count, newest = len(imu), 0, -1
+    levelled, is_waiting = False, False
+    average = INITIAL_INTERVAL_S
+    run = 0
+    while run < runs:
+        if newest + 1 < len(intervals) and intervals[newest + 1].run == run:
+            newest += 1
+            is_waiting = True
+        delayed = oldest_buffered(newest, imu_length)
+        if not levelled and newest >= 0:
+            levelled = _is_level(intervals[newest], levelling)
+        if levelled and is_waiting:
+            is_waiting = False
+            average = averaged_interval(intervals[delayed], average, value_at(predict_us, run))
+            updates[count].run = run
+            updates[count].delayed = delayed
+            updates[count].average_dt = average
+            count += 1
+        if levelling.started_run < 0:
+            horizon_us = intervals[delayed].time_us if newest >= 0 else imu[0].time_us
+            if horizon_us >= start_us:
+                levelling.started_run = run + 1
+                levelled = True
+        run += 1
+        # the horizon stays between two intervals, so that there is nothing to do for a filter that runs
+        if levelled and not is_waiting:
+            run = intervals[newest + 1].run if newest + 1 < len(intervals) else runs
+    return count
+
+
+@kernel
+def averaged_interval(interval, average, predict_us):
+    """Average the estimator interval (s), in single precision since PX4 derives time stamps (µs) from it."""
+    mean = np.float32(0.5) * (np.float32(interval.delta_vel_dt) + np.float32(interval.delta_ang_dt))
+    nominal = np.float32(1e-6) * np.float32(predict_us)
+    limited = min(max(mean, np.float32(0.5) * nominal), np.float32(2.0) * nominal)
+    return float(np.float32(0.99) * np.float32(average) + np.float32(0.01) * limited)
+
+
+@kernel
+def _is_level(interval, levelling):
+    """Filter what the newest interval measured once more, and judge it."""
+    if interval.delta_vel_dt < MIN_IMU_INTERVAL_S or interval.delta_ang_dt < MIN_IMU_INTERVAL_S:
+        return False
+    accel, gyro = levelling.accel, levelling.gyro
+    alpha = LPF_ALPHA if levelling.begun else 1.0
+    levelling.begun = True
+    for i in range(3):
+        accel[i] += alpha * (interval.delta_vel[i] / interval.delta_vel_dt - accel[i])
+        gyro[i] += alpha * (interval.delta_ang[i] / interval.delta_ang_dt - gyro[i])
+    specific_force = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
+    rate = math.sqrt(gyro[0] ** 2 + gyro[1] ** 2 + gyro[2] ** 2)
+    return not (specific_force < MIN_SPECIFIC_FORCE or specific_force > MAX_SPECIFIC_FORCE or rate > MAX_RATE)
