@@ -45,7 +45,9 @@ def write_document(
     def text_of(value: Any, lines: int, indent: int | None = None) -> str:
         if lines and isinstance(value, Mapping) and value:
             entries = sorted(value.items()) if sort_keys else value.items()
-            return "{\n" + ",\n".join(f"{json.dumps(str(key))}: {text_of(one, lines - 1)}" for key, one in entries) + "\n}"
+            return (
+                "{\n" + ",\n".join(f"{json.dumps(str(key))}: {text_of(one, lines - 1)}" for key, one in entries) + "\n}"
+            )
         return json.dumps(value, indent=indent, sort_keys=sort_keys, ensure_ascii=False, allow_nan=allow_nan)
 
     text = text_of(document, lines, None if lines else 1).removesuffix("\n}")
