@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from fusetune.analyze.delays.flight_delays import write_delays
+from fusetune.analyze.diagnose_flight import estimate_delays
 from fusetune.analyze.replaying.replay_flight import replay_saved_flight
 from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings, WithholdingSettings
 from fusetune.analyze.scoring.score_flight import score_saved_flight
@@ -127,7 +127,7 @@ def _fly_and_score(files: StudyFiles, folders: Folders, world: str, number: int)
         settings = replay_settings(files.worlds_by_name()[world])
         replay_saved_flight(saved, sets, analyzed, settings)
         score_saved_flight(saved, analyzed, list(sets), present=PRESENT)
-        write_delays(saved, analyzed, {}, settings)
+        estimate_delays(saved, analyzed, sets[PRESENT], replay=settings)
         for name in KEPT:
             shutil.copy(analyzed / name, target / name)
         if raw is not None:

@@ -28,6 +28,10 @@ if MENDS_DELAYS:
             "../scripts/join_delays.py"
 
 
+# Where cores are more than flights, a flight has several, for its sets are worked on side by side. No figure depends on it.
+THREADS_OF_A_FLIGHT = max(1, min(MOST_THREADS_OF_A_FLIGHT, (workflow.cores or 1) // max(1, len(LOGS))))
+
+
 # All sets of a flight are one job's work. Of those that follow from what the flights show it is known too late that they
 # are, and of the others they may be thousands: only the files of the two that others read are asked for by name. What
 # of a set is out of date the job looks up in a record of its own, and leaves all else as it is.
@@ -41,17 +45,22 @@ rule analyze_flight:
         effects=ancient("results/analyze/effects.json") if MENDS_DELAYS else [],
         found="results/search/found.json" if SEARCH else [],
     output:
-        update(replay_files([PRESENT, AS_FLOWN])),
-        expand("results/analyze/{{flight}}/{part}", part=FLIGHT_FILES),
+        update(REPLAYED_FILES),
+        SCORED_FILES,
     log:
         "results/logs/analyze/{flight}.log",
     # so that pictures are drawn while the decision, which needs all scores, is on its way
     priority: 1
     conda:
         "../envs/fusetune.yaml"
+    threads: THREADS_OF_A_FLIGHT
     # around the present values each parameter makes two sets at the most
     resources:
-        **replay_resources(len(SETS.replayed) + 2 * len(SETS.around), len(SETS.scored) + 2 * len(SETS.around)),
+        **replay_resources(
+            len(SETS.replayed) + 2 * len(SETS.around),
+            len(SETS.scored) + 2 * len(SETS.around),
+            THREADS_OF_A_FLIGHT,
+        ),
     params:
         sets=sets_of_analysis,
         replay=asdict(SETTINGS.replay),

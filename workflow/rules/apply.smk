@@ -8,7 +8,7 @@ rule decide:
         listed="results/save/flights.csv",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
         # asked for so that a file that was taken away is made again
-        replays=of_replayable_flights(ANALYZED_FILES),
+        tables=of_replayable_flights(SCORED_FILES),
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
         effects="results/analyze/effects.json" if MENDS_DELAYS else [],
         diagnoses=of_replayable_flights("results/analyze/{flight}/diagnosis.json"),

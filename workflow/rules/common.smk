@@ -16,16 +16,11 @@ from fusetune.save import read_present
 from fusetune.save.discovery import printable
 
 
-def replay_files(names):
-    """Files of the replays of some sets on a flight."""
-    return expand("results/analyze/{{flight}}/{pset}.{part}", pset=names, part=PARTS)
+REPLAYED_FILES = [f"results/analyze/{{flight}}/{pset}.{part}" for pset in (PRESENT, AS_FLOWN) for part in PARTS]
+"""The replays that are kept of a flight."""
 
-
-ANALYZED_FILES = [
-    *(f"results/analyze/{{flight}}/{pset}.{part}" for pset in (PRESENT, AS_FLOWN) for part in PARTS),
-    *(f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES),
-]
-"""What the analysis of a flight leaves that others read."""
+SCORED_FILES = [f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES]
+"""What the analysis of a flight leaves beside them."""
 
 
 MENDS_DELAYS = SETTINGS.delays.mend

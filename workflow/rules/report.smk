@@ -50,11 +50,14 @@ rule flight_page:
         track="results/analyze/{flight}/track.parquet",
         conformance="results/analyze/{flight}/conformance.json",
     output:
-        report(
-            "results/report/flights/{flight}.html",
-            caption="../report/flight_page.rst",
-            category="Flights",
-            labels={"flight": "{flight}"},
+        # told again is not told otherwise: the job looks up whether what it draws is as it was
+        update(
+            report(
+                "results/report/flights/{flight}.html",
+                caption="../report/flight_page.rst",
+                category="Flights",
+                labels={"flight": "{flight}"},
+            )
         ),
     log:
         "results/logs/flight_page/{flight}.log",
@@ -65,6 +68,7 @@ rule flight_page:
         runtime=of_its_logs(5, 0.05),
     params:
         code=DIGEST["report"],
+        save_code=DIGEST["save"],
     message:
         "Report: the page of {wildcards.flight}"
     script:
@@ -144,6 +148,7 @@ rule fleet_page:
         runtime=of_its_logs(10, 0.01),
     params:
         code=DIGEST["report"],
+        save_code=DIGEST["save"],
     message:
         "Report: the page of all flights"
     script:

@@ -6,6 +6,8 @@ import os
 KERNELS_MB = 350  # Python, its libraries and the compiled estimator
 LIBRARIES_MB = 200
 DIAGNOSED_MB_PER_MB = 11.0  # of a flight that is diagnosed, for each MB of its log
+THREAD_MB_PER_MB = 1.0  # of a set that is replayed and scored beside others
+MOST_THREADS_OF_A_FLIGHT = 8
 SEARCHED_MB_PER_MB = 8.0  # of a flight on which sets are tried in memory, for each MB of its log
 MOST_PREPARED = 12  # flights that a process of a search holds
 SIMULATED_LOG_MB = 10.0  # of a flight that is not simulated yet
@@ -42,9 +44,9 @@ def of_several_logs(threads):
     )
 
 
-def replay_resources(replayed, scored=0):
+def replay_resources(replayed, scored=0, threads=1):
     """Memory, MB, and time, minutes, of a job that replays some sets and scores some."""
     return {
-        "mem_mb": of_its_logs(KERNELS_MB, 5.0 + 0.03 * scored),
+        "mem_mb": of_its_logs(KERNELS_MB, 5.0 + 0.03 * scored + THREAD_MB_PER_MB * (threads - 1)),
         "runtime": of_its_logs(10, 0.02 * (replayed + scored)),
     }

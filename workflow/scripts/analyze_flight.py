@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from threadpoolctl import threadpool_limits
+
 from fusetune.analyze.analyze_flight import AnalysisSettings, MadeWith, analyze_flight
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.settings import ScoringSettings
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
     snakemake: Any
 
 keep_out("pandas")
-with logged_job(snakemake.log[0]):
+# Snakemake lets numerics have as many threads as the job: for small matrices they cost time, and change the last bits
+with logged_job(snakemake.log[0]), threadpool_limits(1):
     params = snakemake.params
     flight, folder = Path(snakemake.input.flight), Path(snakemake.output[0]).parent
     found = read_document(snakemake.input.found)["on_flights"].get(flight.name) if snakemake.input.found else None

@@ -80,6 +80,9 @@ def diagnose_flight(
     observed = _observed(logged, replay)
     documents, found, track = _told(observed, metadata, health)
     if present is not None:
+        if is_replayable and not observed.flew_with(present):
+            # two replays at once would be twice the memory
+            observed = observed.without_replay()
         documents[DELAYS_FILE] = _delays(observed, present if is_replayable else None)
     _write(Path(output_folder), documents)
     write_track(Path(output_folder) / TRACK_FILE, track)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from fusetune.analyze.delays.delayed_series import measured_airspeed
 from fusetune.analyze.diagnosis.motion import Motion
 from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.metrics.grouping import distinct, rows_of
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
@@ -54,15 +55,14 @@ def airspeed_signs(flight: Flight, motion: Motion, airborne: tuple[Interval, ...
     along = north * velocity[:, 0] + east * velocity[:, 1] + forward[:, 2] * velocity[:, 2]
     design = np.column_stack([speed, north, east])
     block = ((time - time[0]) * 1e-6 / BLOCK_S).astype(np.int64)
-    blocks = np.unique(block)
+    blocks = distinct(block)
     if blocks.size < FEWEST_BLOCKS:
         return None
     normal, moment = design.T @ design, design.T @ along
     normal += np.diag([0.0, *[(SPEED_NOISE_M_S / WIND_M_S) ** 2] * 2])
     solution = np.linalg.solve(normal, moment)
     without = []
-    for one in blocks:
-        own = block == one
+    for own in rows_of(block, blocks):
         part = design[own]
         without.append(np.linalg.lstsq(normal - part.T @ part, moment - part.T @ along[own], rcond=None)[0][0])
     error = float(np.sqrt((blocks.size - 1) / blocks.size * np.sum((np.array(without) - np.mean(without)) ** 2)))

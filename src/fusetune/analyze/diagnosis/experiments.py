@@ -21,6 +21,7 @@ from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
+from fusetune.ekf2.replay.recording import SCORING
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows
 
@@ -243,7 +244,8 @@ def _replayed(prepared: PreparedFlight, experiment: Experiment) -> ReplayedSet:
         known = {name: rows for name, rows in logged.items() if rows.size == row_count(edited.topics[name, 0])}
         stream = dataclasses.replace(prepared.reconstructed, flight=edited, measured=known)
         prepared = prepared.with_stream(stream)
-    return replay_set(prepared, "experiment", experiment.overrides)
+    # innovations alone are compared
+    return replay_set(prepared, "experiment", experiment.overrides, SCORING)
 
 
 def _shared(

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from fusetune.analyze.diagnosis.lagged_regression import LaggedFit, about_down, lagged_fit, turned_by
 from fusetune.analyze.diagnosis.motion import Motion
 from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.metrics.grouping import distinct, rows_of
 from fusetune.px4.flight import TopicTable
 
 Array = npt.NDArray[np.float64]
@@ -113,9 +114,9 @@ def _bias_down(at: Times, measured: Array, motion: Motion) -> tuple[float, float
     whole = float(np.polyfit(since_s, gained, 1)[0])
     piece = (since_s / PIECE_S).astype(np.int64)
     slopes = [
-        float(np.polyfit(since_s[piece == one], gained[piece == one], 1)[0])
-        for one in np.unique(piece)
-        if np.count_nonzero(piece == one) >= FEWEST_IN_PIECE
+        float(np.polyfit(since_s[own], gained[own], 1)[0])
+        for own in rows_of(piece, distinct(piece))
+        if own.size >= FEWEST_IN_PIECE
     ]
     return whole, float(np.std(slopes) / np.sqrt(len(slopes))) if len(slopes) > 1 else float("inf")
 

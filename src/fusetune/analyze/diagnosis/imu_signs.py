@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval, duration, inside
+from fusetune.analyze.metrics.grouping import distinct, rows_of
 from fusetune.analyze.replaying.replayed_set import ReplayedSteps
 from fusetune.px4.flight import Flight, TopicTable, select_rows, stacked
 
@@ -232,10 +233,8 @@ def _estimated(steps: ReplayedSteps | None, airborne: tuple[Interval, ...]) -> t
         return np.zeros(0), np.zeros((0, 3))
     time, bias = steps.time[rows] * 1e-6, steps.gyro_bias[rows]
     block = ((time - time[0]) / BIAS_OVER_S).astype(np.int64)
-    ones = np.unique(block)
-    return np.array([time[block == one].mean() for one in ones]), np.array(
-        [np.median(bias[block == one], axis=0) for one in ones]
-    )
+    parts = list(rows_of(block, distinct(block)))
+    return np.array([time[own].mean() for own in parts]), np.array([np.median(bias[own], axis=0) for own in parts])
 
 
 REST_MARGIN_US, SETTLED_US = 1_500_000, 10_000_000

@@ -16,6 +16,7 @@ from scipy.special import stdtrit
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.told import refused
 from fusetune.analyze.flight.intervals import inside
+from fusetune.analyze.metrics.grouping import distinct
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 
 Array = npt.NDArray[np.float64]
@@ -40,7 +41,7 @@ def estimate_output_predictor(observed: ObservedFlight) -> Effect:
     errors = np.column_stack([np.asarray(table[f"output_tracking_error[{one}]"], np.float64) for one in range(3)])
     rows &= np.isfinite(errors).all(axis=1)
     block = np.floor(time / (_BLOCK_S * 1e6)).astype(np.int64)[rows]
-    if np.unique(block).size < _FEWEST_BLOCKS:
+    if distinct(block).size < _FEWEST_BLOCKS:
         return refused(name, "too short a time in the air away from the ground; fly for a minute")
     if not np.any(errors[rows]):
         return refused(name, "the tracking error is 0 throughout: the log does not come from a flying vehicle")
@@ -62,7 +63,7 @@ def estimate_output_predictor(observed: ObservedFlight) -> Effect:
 
 def _median(values: Array, block: npt.NDArray[np.int64]) -> tuple[float, float, float]:
     """Median, half of its interval and standard error, by the jackknife over blocks."""
-    blocks = np.unique(block)
+    blocks = distinct(block)
     without = np.array([float(np.median(values[block != one])) for one in blocks])
     error = float(np.sqrt((blocks.size - 1) * np.var(without)))
     return float(np.median(values)), float(stdtrit(blocks.size - 1, 0.975)) * error, error

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 from scipy.special import stdtrit
 
-from fusetune.analyze.metrics.whitened_regression import rows_of_blocks
+from fusetune.analyze.metrics.grouping import distinct, rows_of
 from fusetune.analyze.smoothing.smoothed_velocity import NORMAL_QUARTILE
 
 Array = npt.NDArray[np.float64]
@@ -43,6 +43,8 @@ UNCERTAINTY = 1.25
 """Factor on all standard errors: ratio and memory are taken as known, and on made flights with known truth errors were
 by so much larger than promised (docs/effects.md)."""
 _ROUNDS = 2
+_ROWS_AT_ONCE = 10_000
+"""What is worked out for them takes some kilobytes each."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,7 @@ class _Equations:
         if rows.target.size < rows.design.shape[1] + 10:
             return None
         block = np.floor((rows.time_s - rows.time_s.min()) / BLOCK_S).astype(np.int64)
-        if np.unique(block).size < FEWEST_BLOCKS:
+        if distinct(block).size < FEWEST_BLOCKS:
             return None
         begin, end = float(rows.time_s.min()), float(rows.time_s.max())
         pieces = max(1, math.ceil((end - begin) / rows.knots_s))
@@ -323,8 +325,13 @@ class _Solved:
 
         def seen(values: Array) -> Array:
             flat = values.reshape(values.shape[0], states, -1)
-            between = left[:, :, None] * flat[given.left] + right[:, :, None] * flat[given.left + 1]
-            return np.asarray(np.einsum("ns,nsp->np", rows.walking, between))
+            found: Array = np.empty((given.left.size, flat.shape[2]))
+            for first in range(0, given.left.size, _ROWS_AT_ONCE):
+                some = slice(first, first + _ROWS_AT_ONCE)
+                knot = given.left[some]
+                between = left[some, :, None] * flat[knot] + right[some, :, None] * flat[knot + 1]
+                found[some] = np.einsum("ns,nsp->np", rows.walking[some], between)
+            return found
 
         net = rows.design + seen(takes)
         residual = rows.target - rows.design @ self.constants - seen(course)[:, 0]
@@ -338,7 +345,7 @@ class _Solved:
         later = given.knot_s[1:] - given.knot_s[0]
         of_steps = np.repeat(np.floor(later / BLOCK_S).astype(np.int64), self.states)
         block = np.concatenate([given.block, np.minimum(of_steps, given.block.max())])
-        parts = [(net[own], residual[own]) for own in rows_of_blocks(block, np.unique(given.block))]
+        parts = [(net[own], residual[own]) for own in rows_of(block, distinct(given.block))]
         without = np.linalg.pinv(np.stack([self.normal - part.T @ part for part, _ in parts]), hermitian=True)
         changes = [one @ (part.T @ left) for one, (part, left) in zip(without, parts, strict=True)]
         count = len(changes)

@@ -14,6 +14,7 @@ from fusetune.analyze.health.over_time import Stretch, longest_between, silences
 from fusetune.analyze.health.ratio_figures import ratio_rows
 from fusetune.analyze.health.settings import REJECTED_RATIO, Levels
 from fusetune.analyze.health.subject import Subject
+from fusetune.analyze.metrics.grouping import distinct
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.px4.aid_sources import MEASURED_SOURCES, AidSource
 from fusetune.px4.flight import TopicTable
@@ -58,7 +59,7 @@ def told_windows(health: JudgedHealth, samples: Samples, origin: Origin) -> tupl
         return health.airborne
     times = [samples[key].timestamp_sample for key in samples if not key[1]]
     edges = np.array(health.airborne, np.int64).reshape(-1)
-    return subtract(health.airborne, silences(np.unique(np.concatenate([edges, *times])), _SILENT_S)) if times else ()
+    return subtract(health.airborne, silences(distinct(np.concatenate([edges, *times])), _SILENT_S)) if times else ()
 
 
 def _source_rows(
@@ -153,7 +154,7 @@ def _unfused_row(
     """Longest time in flight, after the first fusion, without a sample fused in any way."""
     subject = Subject(source.name, health.name_of(source.label, instance), GROUP, instance, origin)
     ways = [one for one in (source.name, _OTHER_WAYS.get(source.name, "")) if (one, 0) in samples]
-    fused = np.unique(np.concatenate([_fused_times(samples[one, 0]) for one in ways]))
+    fused = distinct(np.concatenate([_fused_times(samples[one, 0]) for one in ways]))
     if not fused.size:
         return subject.lacking("longest_unfused_s", "never fused")
     within = tuple((max(start, int(fused[0])), stop) for start, stop in told if stop > fused[0])

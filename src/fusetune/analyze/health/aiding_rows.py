@@ -14,6 +14,7 @@ from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.over_time import time_set
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
+from fusetune.analyze.metrics.grouping import distinct
 from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 from fusetune.px4.flight import TopicTable
 
@@ -39,8 +40,8 @@ def aiding_rows(
     if not fused or not health.airborne:
         yield subject.lacking("longest_unaided_s", "no source of velocity or position was fused in flight")
         return
-    time = np.unique(np.concatenate([one.timestamp_sample[one.fused] for one in fused]))
-    every = np.unique(np.concatenate([one.timestamp_sample for one in fused]))
+    time = distinct(np.concatenate([one.timestamp_sample[one.fused] for one in fused]))
+    every = distinct(np.concatenate([one.timestamp_sample for one in fused]))
     within = tuple(
         (max(start, int(time[0])), stop) for start, stop in told_windows(health, samples, origin) if stop > time[0]
     )

@@ -14,6 +14,7 @@ from fusetune.analyze.health.judged_health import JudgedHealth
 from fusetune.analyze.health.over_time import longest_between
 from fusetune.analyze.health.settings import Levels
 from fusetune.analyze.health.subject import Subject
+from fusetune.analyze.metrics.grouping import distinct
 from fusetune.px4.estimator_samples import taken_times
 from fusetune.px4.flight import TopicTable, field_names, row_count, select_rows
 from fusetune.px4.layouts.logged_state import MIN_FIX_TYPE
@@ -153,7 +154,7 @@ def _rate_row(health: JudgedHealth, aid: Aid, table: TopicTable) -> HealthRow:
     subject = Subject(aid.name, aid.label, GROUP)
     taken = taken_times(health.flight, aid.topic)
     told = taken is not None and taken.size >= _FEWEST
-    times = taken if told and taken is not None else np.unique(measurement_time(aid.topic, table))
+    times = taken if told and taken is not None else distinct(measurement_time(aid.topic, table))
     steps = np.diff(times)
     rate = 1e6 / float(np.median(steps)) if steps.size else np.nan
     least = health.limits.min_mag_rate_hz if aid.name == "mag" else None
@@ -186,7 +187,7 @@ def _height_row(health: JudgedHealth, rates: dict[str, float]) -> HealthRow:
 
 
 def _gap_row(health: JudgedHealth, subject: Subject, aid: Aid, table: TopicTable) -> HealthRow:
-    time = np.unique(measurement_time(aid.topic, table))
+    time = distinct(measurement_time(aid.topic, table))
     flying = inside(time, health.airborne)
     if flying.sum() < _FEWEST:
         return subject.lacking("longest_gap_s", "not in flight")

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.metrics.grouping import distinct, rows_of
 from fusetune.analyze.metrics.likelihood import NORMAL_CONSISTENCY
 
 Array = npt.NDArray[np.float64]
@@ -66,12 +67,12 @@ class Fit:
         """Of each element of the solution, (P,), and the number of blocks behind them; None where there are too few."""
         scaled, target = self.design * self.weight[:, None], self.residual * self.weight
         block = np.floor((self.when - self.when.min()) / BLOCK_S).astype(np.int64)
-        blocks = np.unique(block)
+        blocks = distinct(block)
         if blocks.size < FEWEST_BLOCKS:
             return None
         normal, moment = scaled.T @ scaled, scaled.T @ target
         without = []
-        for own in rows_of_blocks(block, blocks):
+        for own in rows_of(block, blocks):
             part, rest = scaled[own], target[own]
             without.append(np.linalg.lstsq(normal - part.T @ part, moment - part.T @ rest, rcond=None)[0])
         spread = np.sum((np.array(without) - np.mean(without, axis=0)) ** 2, axis=0)
@@ -84,13 +85,6 @@ class Fit:
         left = target - scaled @ self.solution
         variance = float(left @ left) / max(left.size - self.solution.size, 1)
         return np.asarray(np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(scaled.T @ scaled)), 0.0)))
-
-
-def rows_of_blocks(block: npt.NDArray[np.int64], wanted: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
-    """Rows of each wanted block, ascending, where `block` (N,) says in which each row lies."""
-    order = np.argsort(block, kind="stable")
-    first, stop = (np.searchsorted(block[order], wanted, side) for side in ("left", "right"))
-    yield from (order[begin:end] for begin, end in zip(first.tolist(), stop.tolist(), strict=True))
 
 
 def generalised(rows: list[Rows], order: int) -> Fit:

@@ -94,13 +94,23 @@ class ObservedFlight:
         """Delay and place of the GNSS antenna; None where the flight does not tell them."""
         return velocity_place_of(self.replayed, "gnss", self.airborne)
 
+    def flew_with(self, overrides: Mapping[str, float]) -> bool:
+        """Whether a replay with these values of parameters is the one with those that flew."""
+        return self.prepared.course_of(overrides) == self.prepared.course_of({})
+
     def delays(self, overrides: Mapping[str, float]) -> tuple[SensorDelay, ...]:
         """Delays of the sensors, by a replay with other values of parameters; that which flew where it is the same."""
-        if not self.prepared.is_as_flown(overrides):
+        if not self.flew_with(overrides):
             return sensor_delays(self.prepared, replay_set(self.prepared, PRESENT, overrides))
         in_air = airborne_intervals(self.flight, self.replayed.flags)
         places = {"gnss": self.gnss_place} if in_air == self.airborne else {}
         return sensor_delays(self.prepared, self.replayed, motion=self.inertial, places=places)
+
+    def without_replay(self) -> ObservedFlight:
+        """The same flight, prepared, and none of what takes memory with the length of its replay."""
+        other = ObservedFlight(self.logged, self.settings)
+        other.__dict__.update(flight=self.flight, prepared=self.prepared)
+        return other
 
     def since_start_s(self, timestamp: int) -> float:
         """Seconds from the start of the log, for a time in µs since boot."""

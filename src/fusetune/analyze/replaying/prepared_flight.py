@@ -63,10 +63,6 @@ class PreparedFlight:
         changed = {change.name for _, change in self.inputs.parameter_changes}
         return (*sorted(params.items()), *sorted(changed - {*overrides}))
 
-    def is_as_flown(self, overrides: Mapping[str, float]) -> bool:
-        """Whether a set with these values is replayed as the parameters that flew are."""
-        return self.course_of(overrides) == self.course_of({})
-
     def replay(
         self,
         params: Mapping[str, float],

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval, inside
+from fusetune.analyze.metrics.grouping import distinct
 from fusetune.analyze.replaying.replayed_set import ReplayedSet, ReplayedSteps
 from fusetune.analyze.sensors.measurement_errors import VELOCITY_SOURCES
 from fusetune.analyze.smoothing.error_model import USUAL_WALK, ErrorModel, PositionErrors, likeliest_errors
@@ -231,7 +232,7 @@ def _reference(stretch: Stretch, course: Smoothed, fall: Smoothed, step_us: int)
     """
     sums, epoch = stretch.sums, stretch.epoch
     grid = np.arange(sums.time[epoch[0]], sums.time[epoch[-1]], step_us)
-    update = np.unique(np.searchsorted(sums.time, grid))
+    update = distinct(np.searchsorted(sums.time, grid))
     before = np.clip(np.searchsorted(epoch, update, side="right") - 1, 0, epoch.size - 2)
     velocity = np.column_stack([course.states[:, :2], fall.states[:, 0]])
 
