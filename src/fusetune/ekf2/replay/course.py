@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,25 +18,36 @@ from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.estimator import EKF
 from fusetune.ekf2.replay.flight_schedule import FlightSchedule, flight_schedule, notes_of
 from fusetune.ekf2.replay.handover import take_sensor_states
-from fusetune.ekf2.replay.loop import run_estimator
+from fusetune.ekf2.replay.loop import GAP_RUN, Estimator, run_estimator
 from fusetune.ekf2.replay.recording import (
     FULL,
     IS_FULL,
     IS_GAP,
     IS_SCORING,
-    RECORDER_MEMORY,
     RecordArrays,
     Recording,
     RecordRoom,
     allocate_records,
-    joined_rows,
+    copied_innovations,
+    joined,
+    new_recorder,
     views_of,
 )
 from fusetune.ekf2.replay.warm_start import take_over
+from fusetune.ekf2.schedule.taking_actions import SENSOR_NAMES
 from fusetune.px4.flight import ParameterChange
 from fusetune.px4.layouts.logged_state import LoggedState
 
 RUNS_PER_STRETCH = 8192
+
+
+class PlannedGap(NamedTuple):
+    """A gap by the updates of a schedule: the first, that after the last, sensor by number, its aid sources by bits."""
+
+    first_update: int
+    last_update: int
+    sensor: int
+    sources: int
 
 
 class Course:
@@ -49,22 +61,31 @@ class Course:
         handovers: Sequence[tuple[int, LoggedState]] = (),
         recording: Recording = FULL,
     ):
-        self.inputs, self.params, self.changes, self.handovers = inputs, params, changes, handovers
+        self.inputs, self.changes, self.handovers = inputs, changes, handovers
         self.notes = notes_of(params[0], changes)
         self.mode = IS_FULL if recording is FULL else IS_SCORING
-        self.ekf = np.zeros(1, EKF)
-        self.recorder = self._new_recorder()
+        self._main = _estimator(np.zeros(1, EKF), params, new_recorder(self.mode))
+        self._branch = self._main
+
+    @property
+    def ekf(self) -> np.ndarray:
+        """One record of the estimator's memory."""
+        return self._main.ekf
+
+    @property
+    def params(self) -> np.ndarray:
+        """One record of its parameters."""
+        return self._main.params
+
+    @property
+    def recorder(self) -> np.ndarray:
+        """One record of what the recorder knows."""
+        return self._main.recorder
 
     @cached_property
     def schedule(self) -> FlightSchedule:
         """When the filter updates, with which samples."""
         return flight_schedule(self.inputs, self.params[0], self.changes)
-
-    def _new_recorder(self) -> np.ndarray:
-        recorder = np.zeros(1, RECORDER_MEMORY)
-        recorder["mode"] = self.mode
-        recorder["published"]["is_kept"] = True
-        return recorder
 
     def start_from(self, state: LoggedState) -> tuple[int, int | None]:
         """Go on to the time of a logged state, so that sensors are known, and take it over.
@@ -84,7 +105,7 @@ class Course:
         for begin, end in self.stretches(1, run):
             self.advance(begin, end)
         take_over(self.ekf, fresh, self.params[0], self.inputs, state)
-        self.recorder = self._new_recorder()
+        self.recorder[:] = new_recorder(self.mode)
         return run, int(self.ekf["time_delayed_us"][0])
 
     def reach(self, run: int, time_us: int) -> int:
@@ -100,18 +121,29 @@ class Course:
     def branch(self) -> Course:
         """Another course that starts where this one is."""
         other = copy(self)
-        other.ekf, other.params, other.recorder = self.ekf.copy(), self.params.copy(), self.recorder.copy()
+        other._main = other._branch = _estimator(self.ekf.copy(), self.params.copy(), self.recorder.copy())
         return other
 
-    def gap_branch(self, sensor: str) -> Course:
-        """A branch from which a sensor is withheld; of what it records, innovations and the ends of the position."""
+    def without_samples(self) -> Course:
+        """A branch to which nothing arrives any more, and nothing that has is due."""
         other = self.branch()
-        other.ekf["sensors"][sensor]["withheld"] = True
-        other.mode = IS_GAP
-        other.recorder["mode"] = IS_GAP
-        other.recorder["has_position"] = False
-        other.recorder["published"]["is_kept"] = True
+        tables = self.schedule.tables
+        other.schedule = FlightSchedule(tables._replace(actions=tables.actions[-1:], events=tables.events[-1:]))
         return other
+
+    def gap_apart(self, gap: PlannedGap, start: int, stop: int) -> GapRows:
+        """Run through a gap of some runs on a branch, which changes what the log changes; updates are not asked for."""
+        other, name = self.branch(), SENSOR_NAMES[gap.sensor]
+        other.ekf["sensors"][name]["withheld"] = True
+        # in parts, so that the position of the last update is gone when it turns out to be the last
+        other.mode = IS_SCORING
+        other.recorder[:] = new_recorder(IS_SCORING)
+        other.recorder["sources"], other.recorder["last_sample"] = gap.sources, self.recorder["last_sample"]
+        start_us = int(other.ekf["time_delayed_us"][0])
+        started = bool(other.ekf["filter_initialised"][0])
+        parts = [other.run(*stretch, is_last=stretch[1] == stop)[0] for stretch in other.stretches(start, stop)]
+        rows = joined(parts)
+        return GapRows(start_us, rows.innovations, rows.local_position[: len(rows.local_position) * started])
 
     def stretches(self, first: int, last: int, cuts: Sequence[int] = ()) -> Iterator[tuple[int, int]]:
         """Split the runs; between the parts, change parameters and take over sensors where the log says so."""
@@ -126,36 +158,70 @@ class Course:
                     take_sensor_states(self.ekf[0], state)
             yield start, stop
 
-    def run(self, start: int, stop: int, is_last: bool = False) -> RecordArrays:
-        """Process some runs and hand over what they recorded; with the last, what was kept back."""
-        updates = self.schedule.updates_until(stop) - self.schedule.updates_until(start)
-        room = allocate_records(updates, self.mode)
-        self._process(start, stop, room, is_last)
+    def run(
+        self, start: int, stop: int, is_last: bool = False, gaps: Sequence[PlannedGap] = ()
+    ) -> tuple[RecordArrays, list[GapRows]]:
+        """Process some runs, and the gaps that begin at one of their updates.
+
+        Parameters
+        ----------
+        is_last : what was kept back for what might follow is recorded, too
+        gaps : in order of their first updates
+
+        Returns
+        -------
+        What was recorded on the way, and what in each gap that the filter had started for
+        """
+        first, last = self.schedule.updates_until(start), self.schedule.updates_until(stop)
+        room = allocate_records(last - first, self.mode)
+        found = self._process(start, stop, room, is_last, gaps)
         done = self.recorder[0]
         states = room.scored_states if self.mode == IS_SCORING else room.states
-        innovations = room.innovations[: done["innovation_rows"]]
-        return RecordArrays(
-            joined_rows([innovations], innovations.dtype),
+        rows = RecordArrays(
+            copied_innovations(room.innovations[: done["innovation_rows"]]),
             states[: done["state_rows"]],
             room.local_position[: done["position_rows"]],
             room.flags[: done["flag_rows"]].copy(),
         )
+        return rows, found
 
     def advance(self, start: int, stop: int) -> None:
         """Process some runs; what they record is lost."""
         updates = self.schedule.updates_until(stop) - self.schedule.updates_until(start)
-        self._process(start, stop, allocate_records(updates, self.mode), False)
+        self._process(start, stop, allocate_records(updates, self.mode), False, ())
 
-    def _process(self, start: int, stop: int, room: RecordRoom, is_last: bool) -> None:
+    def _process(
+        self, start: int, stop: int, room: RecordRoom, is_last: bool, gaps: Sequence[PlannedGap]
+    ) -> list[GapRows]:
         self.recorder[["innovation_rows", "state_rows", "position_rows", "flag_rows"]] = 0
+        planned = np.zeros(len(gaps), GAP_RUN)
+        if gaps:
+            planned[list(PlannedGap._fields)] = gaps
+            if self._branch is self._main:
+                self._branch = self.branch()._main
+            self._branch.recorder[:] = new_recorder(IS_GAP)
+        updates = sum(gap.last_update - gap.first_update for gap in gaps)
+        gap_room = allocate_records(updates, IS_GAP)
         run_estimator(
-            self.ekf[0], self.params[0], self.inputs.arrays, self.schedule.tables, self.notes, views_of(self.ekf),
-            self.recorder[0], room, start, stop, is_last,
+            self._main, self._branch, self.inputs.arrays, self.schedule.tables, self.notes, room, planned, gap_room,
+            start, stop, is_last,
         )  # fmt: skip
+        return [_gap_rows(gap, gap_room) for gap in planned]
 
-    def without_samples(self) -> Course:
-        """A branch to which nothing arrives any more, and nothing that has is due."""
-        other = self.branch()
-        tables = self.schedule.tables
-        other.schedule = FlightSchedule(tables._replace(actions=tables.actions[-1:], events=tables.events[-1:]))
-        return other
+
+class GapRows(NamedTuple):
+    """What was recorded in a gap: the horizon when it began, innovations of its sources, first and last position."""
+
+    start_us: int
+    innovations: np.ndarray
+    local_position: np.ndarray
+
+
+def _gap_rows(gap: np.void, room: RecordRoom) -> GapRows:
+    innovations = room.innovations[gap["innovations_from"] : gap["innovations_to"]]
+    position = room.local_position[gap["positions_from"] : gap["positions_to"]]
+    return GapRows(int(gap["start_us"]), copied_innovations(innovations), position.copy())
+
+
+def _estimator(ekf: np.ndarray, params: np.ndarray, recorder: np.ndarray) -> Estimator:
+    return Estimator(ekf, params, recorder, views_of(ekf))

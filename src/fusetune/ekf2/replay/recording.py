@@ -102,6 +102,8 @@ FLAG_COLUMNS = (
     + tuple(f"reject_{name}" for name in REJECTION_NAMES)
 )
 
+N_CONTROL, N_FAULT, N_REJECTION = len(CONTROL_STATUS_NAMES), len(FAULT_STATUS_NAMES), len(REJECTION_NAMES)
+
 FLAGS_ROW = np.dtype([("timestamp", "i8"), ("flags", "u1", (len(FLAG_COLUMNS),))], align=True)
 
 FLAGS_INTERVAL_US = 1_000_000
@@ -140,17 +142,18 @@ PUBLISHED_KEPT = 3
 
 RECORDER_MEMORY = np.dtype(
     [
-        ("mode", "i8"),
+        *fields("i8", "mode", "sources"),
         *fields("i8", "innovation_rows", "state_rows", "position_rows", "flag_rows", "updates"),
         ("last_sample", "i8", (len(AID_SOURCE_NAMES),)),
         ("last_flags", FLAGS_ROW),
         ("published", PUBLISHED, (PUBLISHED_KEPT,)),
         ("projection", PROJECTION),
-        *fields("?", "has_position", "diverged"),
+        ("diverged", "?"),
     ],
     align=True,
 )
-"""What the recorder knows between two updates; `published` holds that of the last three in turn."""
+"""What the recorder knows between two updates; `published` holds that of the last three in turn, `sources` a bit for
+each aid source that is recorded."""
 
 IS_FULL, IS_SCORING, IS_GAP = range(3)
 """What `mode` says: everything is kept, or what scores need, or of that what is told of a gap."""
@@ -212,17 +215,37 @@ def views_of(ekf: np.ndarray) -> EstimatorViews:
     )
 
 
+ALL_SOURCES = (1 << len(AID_SOURCE_NAMES)) - 1
+
+
+def new_recorder(mode: int) -> np.ndarray:
+    """A recorder that has seen nothing, of all sources."""
+    recorder = np.zeros(1, RECORDER_MEMORY)
+    recorder["mode"], recorder["sources"] = mode, ALL_SOURCES
+    # there is nothing of before the first update that could be kept
+    recorder["published"]["is_kept"] = True
+    return recorder
+
+
 def allocate_records(updates: int, mode: int) -> RecordRoom:
     """Room for as many updates, whatever they publish."""
     # a step has two rows before it, which may be of the stretch before; the last row may come after a step
     positions, flags = updates + PUBLISHED_KEPT, 0 if mode == IS_GAP else updates
     return RecordRoom(
-        _zero_rows(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW),
+        np.empty(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW),
         _zero_rows(updates if mode == IS_FULL else 0, STATE_ROW),
         _zero_rows(positions, LOCAL_POSITION_ROW),
         _zero_rows(flags, FLAGS_ROW),
         _zero_rows(updates if mode == IS_SCORING else 0, SCORED_STATE_ROW),
     )
+
+
+def copied_innovations(rows: np.ndarray) -> np.ndarray:
+    """A copy of rows out of the room for them, whose padding holds whatever was there."""
+    copied = joined_rows([rows], INNOVATION_ROW)
+    used = sum(INNOVATION_ROW[name].itemsize for name in INNOVATION_ROW.names or ())
+    copied.view(np.uint8).reshape(-1, INNOVATION_ROW.itemsize)[:, used:] = 0
+    return copied
 
 
 def _zero_rows(count: int, dtype: np.dtype) -> np.ndarray:
@@ -258,28 +281,44 @@ def record_update(ekf, params, views, recorder, records, timestamp):
     for source in range(len(aids)):
         if aids[source].timestamp_sample > recorder.last_sample[source]:
             recorder.last_sample[source] = aids[source].timestamp_sample
-            _record_innovations(aids[source], source, views.axes[source], recorder, records.innovations)
+            if (recorder.sources >> source) & 1:
+                _record_innovations(aids[source], source, views.axes[source], recorder, records.innovations)
+    if recorder.mode == IS_GAP:
+        if recorder.updates == 0:
+            _note_published(ekf, params, recorder.published[0], timestamp)
+            _record_position(recorder.published[0], recorder, records.local_position)
+        recorder.updates += 1
+        return
     now = recorder.published[recorder.updates % PUBLISHED_KEPT]
     _note_published(ekf, params, now, timestamp)
     if recorder.mode == IS_FULL:
         _record_states(ekf, records.states[recorder.state_rows], timestamp)
-        recorder.state_rows += 1
         _record_position(now, recorder, records.local_position)
     else:
-        _record_position_of_steps(recorder, records.local_position)
-    if recorder.mode == IS_SCORING:
         _record_scored_states(ekf, records.scored_states[recorder.state_rows])
-        recorder.state_rows += 1
-    if recorder.mode != IS_GAP:
-        recorder.diverged |= not _is_finite(ekf)
-        _record_flags(views, recorder, records.flags, timestamp)
+        _record_position_of_steps(recorder, records.local_position)
+    recorder.state_rows += 1
+    recorder.diverged |= not _is_finite(ekf)
+    _record_flags(views, recorder, records.flags, timestamp)
     recorder.updates += 1
 
 
 @kernel
-def finish_recording(recorder, records):
+def begin_gap_recording(recorder, sources):
+    """Keep innovations of some aid sources, one bit each, and the first and the last row of the local position."""
+    recorder.mode = IS_GAP
+    recorder.sources = sources
+    recorder.updates = 0
+
+
+@kernel
+def finish_recording(ekf, params, recorder, records):
     """Keep the last row of the local position, if it was not."""
-    if recorder.updates > 0:
+    if recorder.mode == IS_GAP:
+        if recorder.updates > 1:
+            _note_published(ekf, params, recorder.published[0], ekf.time_latest_us)
+            _record_position(recorder.published[0], recorder, records.local_position)
+    elif recorder.updates > 0:
         last = recorder.published[(recorder.updates - 1) % PUBLISHED_KEPT]
         if not last.is_kept:
             _record_position(last, recorder, records.local_position)
@@ -391,7 +430,7 @@ def _record_position_of_steps(recorder, rows):
     """Keep the first row, and around a step of a reset counter that of the step and the two before it."""
     published, n = recorder.published, recorder.updates
     now = published[n % PUBLISHED_KEPT]
-    if not recorder.has_position:
+    if n == 0:
         _record_position(now, recorder, rows)
         return
     before = published[(n - 1) % PUBLISHED_KEPT]
@@ -414,7 +453,6 @@ def _record_position_of_steps(recorder, rows):
 def _record_position(published, recorder, rows):
     row = rows[recorder.position_rows]
     recorder.position_rows += 1
-    recorder.has_position = True
     published.is_kept = True
     x, y = _local_position(published, recorder.projection)
     row.timestamp = published.timestamp
@@ -472,18 +510,22 @@ def _horizontal_accuracy(ekf):
 def _record_flags(views, recorder, rows, timestamp):
     """Keep the flags if any changed since they were last kept, or a second has passed."""
     last = recorder.last_flags
-    differences, column = 0, 0
-    for group in (views.cs, views.fs, views.reject):
-        for i in range(len(group)):
-            differences += group[i] != last.flags[column + i]
-        column += len(group)
+    flags = last.flags
+    differences = np.uint8(0)
+    for i in range(N_CONTROL):
+        differences |= views.cs[i] ^ flags[i]
+    for i in range(N_FAULT):
+        differences |= views.fs[i] ^ flags[N_CONTROL + i]
+    for i in range(N_REJECTION):
+        differences |= views.reject[i] ^ flags[N_CONTROL + N_FAULT + i]
     if differences == 0 and timestamp < last.timestamp + FLAGS_INTERVAL_US:
         return
-    column = 0
-    for group in (views.cs, views.fs, views.reject):
-        for i in range(len(group)):
-            last.flags[column + i] = group[i]
-        column += len(group)
+    for i in range(N_CONTROL):
+        flags[i] = views.cs[i]
+    for i in range(N_FAULT):
+        flags[N_CONTROL + i] = views.fs[i]
+    for i in range(N_REJECTION):
+        flags[N_CONTROL + N_FAULT + i] = views.reject[i]
     last.timestamp = timestamp
     rows[recorder.flag_rows] = last
     recorder.flag_rows += 1

@@ -14,9 +14,9 @@ import numpy as np
 
 from fusetune.ekf2.compiled.compilation import ensure_compiled
 from fusetune.ekf2.feed.inputs import EstimatorInputs
-from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.parameters import PARAMETER_NAMES, parameter_record
 from fusetune.ekf2.replay.course import Course
+from fusetune.ekf2.replay.gaps_ahead import GapsAhead
 from fusetune.ekf2.replay.handover import handover_runs, without_resets_at
 from fusetune.ekf2.replay.kept_rows import KeptRows
 from fusetune.ekf2.replay.recording import (
@@ -25,11 +25,9 @@ from fusetune.ekf2.replay.recording import (
     LOCAL_POSITION_ROW,
     RecordArrays,
     Recording,
-    joined,
 )
 from fusetune.ekf2.replay.results import Gap, GapResult, ReplayResult, ReplaySummary
 from fusetune.ekf2.replay.warm_start import without_first_resets
-from fusetune.px4.aid_sources import WITHHOLDABLE
 from fusetune.px4.layouts.logged_state import Handover, LoggedState
 
 
@@ -112,19 +110,16 @@ def replay_into(
     recording : Recording
         How much of the rows is handed on; what is, has the same figures either way.
     """
-    ranges = [_runs_of(inputs, gap) for gap in gaps]
     course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers, recording)
-    tally = _Tally()
-    found: list[GapResult | None] = [None] * len(gaps)
-    runs = len(inputs.arrays.imu)
-    for begin, end in course.stretches(first_run, runs, [first for first, _ in ranges]):
-        for number, (first, last) in enumerate(ranges):
-            if first == begin:
-                found[number] = _continue_into_gap(course, gaps[number], first, last)
-        rows = course.run(begin, end, is_last=end == runs)
+    tally, runs, ahead = _Tally(), len(inputs.arrays.imu), GapsAhead(course, gaps, first_run)
+    for begin, end in course.stretches(first_run, runs, ahead.cuts):
+        ahead.go_apart(begin)
+        numbers, planned = ahead.within(begin, end)
+        rows, found = course.run(begin, end, is_last=end == runs, gaps=planned)
+        ahead.take(numbers, found)
         tally.add(rows)
         take(rows)
-    return tally.summary(course, first_run, warm_start_us, found)
+    return tally.summary(course, first_run, warm_start_us, ahead.results())
 
 
 def begin_course(
@@ -170,30 +165,6 @@ def _without_resets(
     return inputs.memo.get(key, make)
 
 
-def _runs_of(inputs: EstimatorInputs, gap: Gap) -> tuple[int, int]:
-    first, last = np.searchsorted(inputs.arrays.imu["time_us"], (gap.start, gap.stop))
-    return int(first), int(last)
-
-
-def _continue_into_gap(course: Course, gap: Gap, first: int, last: int) -> GapResult | None:
-    """Replay the gap on a copy of the filter; None where the filter has not started, or the flight has no such time."""
-    if not course.ekf["filter_initialised"][0]:
-        return None
-    branch = course.gap_branch(gap.sensor)
-    start = int(branch.ekf["time_delayed_us"][0])
-    parts = [branch.run(*stretch, is_last=stretch[1] == last) for stretch in branch.stretches(first, last)]
-    innovations, _, local_position, _ = joined(parts)
-    if not len(local_position):
-        return None
-    sources = [AID_SOURCE_NAMES.index(name) for name in WITHHOLDABLE[gap.sensor]]
-    return GapResult(
-        gap=gap,
-        start=start,
-        innovations=innovations[np.isin(innovations["source"], sources)],
-        local_position=local_position[[0, -1]],
-    )
-
-
 class _Tally:
     """What is told of all rows, counted as they come."""
 
@@ -210,7 +181,7 @@ class _Tally:
             self._resets = {name: int(position[name][-1]) for name in self._resets}
 
     def summary(
-        self, course: Course, first_run: int, warm_start_us: int | None, gaps: Sequence[GapResult | None]
+        self, course: Course, first_run: int, warm_start_us: int | None, gaps: tuple[GapResult, ...]
     ) -> ReplaySummary:
         return ReplaySummary(
             mode=course.inputs.mode,
@@ -221,7 +192,7 @@ class _Tally:
             resets=self._resets,
             filter_fault_flags_max=self._faults,
             diverged=bool(course.recorder["diverged"][0]),
-            gaps=tuple(one for one in gaps if one is not None),
+            gaps=gaps,
             warm_start_us=warm_start_us,
             levelled=bool(course.ekf["filter_initialised"][0]),
         )
