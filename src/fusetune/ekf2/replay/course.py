@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from fusetune.ekf2.feed.inputs import EstimatorInputs
+from fusetune.ekf2.filter.common.core_memory import zeros_on_cache_lines
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.estimator import EKF
 from fusetune.ekf2.replay.handover import take_sensor_states
@@ -45,7 +46,7 @@ class Course:
         handovers: Sequence[tuple[int, LoggedState]] = (),
     ):
         self.inputs, self.params, self.changes, self.handovers = inputs, params, changes, handovers
-        self.ekf = np.zeros(1, EKF)
+        self.ekf = zeros_on_cache_lines(EKF)
         self.recorder = np.zeros(1, RECORDER_MEMORY)
         self.records = allocate_records(RUNS_PER_STRETCH)
 
@@ -83,7 +84,8 @@ class Course:
     def branch(self) -> Course:
         """Another course that starts where this one is."""
         other = copy(self)
-        other.ekf, other.params, other.recorder = self.ekf.copy(), self.params.copy(), self.recorder.copy()
+        other.ekf, other.params, other.recorder = zeros_on_cache_lines(EKF), self.params.copy(), self.recorder.copy()
+        other.ekf[:] = self.ekf
         return other
 
     def stretches(self, first: int, last: int, cuts: Sequence[int] = ()) -> Iterator[tuple[int, int]]:
