@@ -116,6 +116,12 @@ def _normalised(is_active, innovation, innovation_variance):
 
 
 @kernel
+def _is_far(innovation, innovation_variance):
+    """Whether a normalised innovation may exceed 3: tells the usual case without a root."""
+    return innovation > 0.0 and innovation * innovation > 8.9 * innovation_variance
+
+
+@kernel
 def estimate_inertial_nav_falling_likelihood(ekf):
     """How likely the inertial navigation falls away from the height and vertical velocity observations.
 
@@ -124,9 +130,17 @@ def estimate_inertial_nav_falling_likelihood(ekf):
     """
     cs, aid = ekf.cs, ekf.aid
     knows_gnss = not ekf.sensors.gnss.withheld
-    pressure = _normalised(
-        cs.baro_hgt and not ekf.sensors.baro.withheld, aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0]
-    )
+    knows_baro = not ekf.sensors.baro.withheld
+    if not (
+        (cs.baro_hgt and knows_baro and _is_far(aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0]))
+        or (cs.gps_hgt and knows_gnss and _is_far(aid.gnss_hgt.innovation[0], aid.gnss_hgt.innovation_variance[0]))
+        or (cs.gnss_vel and knows_gnss and _is_far(aid.gnss_vel.innovation[2], aid.gnss_vel.innovation_variance[2]))
+        or cs.rng_hgt
+        or cs.ev_hgt
+        or cs.ev_vel
+    ):
+        return FALLING_UNLIKELY
+    pressure = _normalised(cs.baro_hgt and knows_baro, aid.baro_hgt.innovation[0], aid.baro_hgt.innovation_variance[0])
     gnss = max(
         _normalised(cs.gps_hgt and knows_gnss, aid.gnss_hgt.innovation[0], aid.gnss_hgt.innovation_variance[0]),
         _normalised(cs.gnss_vel and knows_gnss, aid.gnss_vel.innovation[2], aid.gnss_vel.innovation_variance[2]),

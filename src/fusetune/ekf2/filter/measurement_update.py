@@ -148,8 +148,11 @@ def _raise_variances(P, index, low):
 @kernel
 def _raise_variances_of_group(P, index, low):
     """No variance of three states less than `low`, nor than 10⁻⁶ of the largest of them."""
-    largest = max(P[index, index], P[index + 1, index + 1], P[index + 2, index + 2])
-    _raise_variances(P, index, max(largest / VARIANCE_MAX_RATIO, low))
+    a, b, c = P[index, index], P[index + 1, index + 1], P[index + 2, index + 2]
+    smallest, largest = min(a, b, c), max(a, b, c)
+    # the usual case, without a division
+    if not (low <= smallest and largest < 0.999 * VARIANCE_MAX_RATIO * smallest):
+        _raise_variances(P, index, max(largest / VARIANCE_MAX_RATIO, low))
 
 
 @kernel

@@ -120,28 +120,38 @@ def _mirror_cross_covariances(P):
 
 @kernel
 def _multiply_from_right(ekf, dt, u):
-    """The block of the dynamic states times Fᵀ: position before velocity before attitude, which it is formed of.
+    """The block of the dynamic states times Fᵀ: position before velocity before attitude, of which it is formed.
 
-    Rows from the last to the first, so that what is mirrored below the diagonal falls into rows that are done.
+    Exact above the diagonal, and mirrored below it in the end.
     """
     P, R = ekf.P, ekf.R_to_earth
+    for i in range(DYNAMIC_STATES):
+        P[i, POS] += dt * P[i, VEL]
+        P[i, POS + 1] += dt * P[i, VEL + 1]
+        P[i, POS + 2] += dt * P[i, VEL + 2]
+    _multiply_velocity_from_right(ekf, THETA, dt, u)
+    _multiply_velocity_from_right(ekf, VEL, dt, u)
+    for i in range(3):
+        gx, gy, gz = P[i, GB], P[i, GB + 1], P[i, GB + 2]
+        for j in range(3):
+            P[i, THETA + j] -= R[j, 0] * dt * gx + R[j, 1] * dt * gy + R[j, 2] * dt * gz
+    for i in range(DYNAMIC_STATES):
+        for j in range(DYNAMIC_STATES):
+            if j > i:
+                P[j, i] = P[i, j]
+
+
+@kernel
+def _multiply_velocity_from_right(ekf, first, dt, u):
+    """The covariances with the velocity of three states from `first` on."""
+    P, R = ekf.P, ekf.R_to_earth
     un, ue, ud = u
-    for i in range(DYNAMIC_STATES - 1, -1, -1):
-        for j in range(max(i, POS), DYNAMIC_STATES):
-            P[i, j] += dt * P[i, j - 3]
-        if i < POS:
-            tn, te, td = P[i, THETA], P[i, THETA + 1], P[i, THETA + 2]
-            cross = (ud * te - ue * td, un * td - ud * tn, ue * tn - un * te)
-            for j in range(3):
-                if i <= VEL + j:
-                    r0, r1, r2 = R[j, 0] * dt, R[j, 1] * dt, R[j, 2] * dt
-                    P[i, VEL + j] = P[i, VEL + j] + cross[j] - (r0 * P[i, AB] + r1 * P[i, AB + 1] + r2 * P[i, AB + 2])
-        if i < VEL:
-            for j in range(i, 3):
-                r0, r1, r2 = R[j, 0] * dt, R[j, 1] * dt, R[j, 2] * dt
-                P[i, THETA + j] -= r0 * P[i, GB] + r1 * P[i, GB + 1] + r2 * P[i, GB + 2]
-        for j in range(i + 1, DYNAMIC_STATES):
-            P[j, i] = P[i, j]
+    for i in range(first, first + 3):
+        tn, te, td = P[i, THETA], P[i, THETA + 1], P[i, THETA + 2]
+        ax, ay, az = P[i, AB], P[i, AB + 1], P[i, AB + 2]
+        cross = (ud * te - ue * td, un * td - ud * tn, ue * tn - un * te)
+        for j in range(3):
+            P[i, VEL + j] = P[i, VEL + j] + cross[j] - (R[j, 0] * dt * ax + R[j, 1] * dt * ay + R[j, 2] * dt * az)
 
 
 @kernel

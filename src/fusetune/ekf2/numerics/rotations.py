@@ -129,13 +129,20 @@ def quat_multiply_inverse(a, b, out):
 
 
 @kernel
+def kept_unit_length(w, x, y, z):
+    """A quaternion of unit length but for rounding, such as a product of two, scaled by the first terms of a series."""
+    excess = w * w + x * x + y * y + z * z - 1.0
+    scale = 1.0 - excess * (0.5 - 0.375 * excess)
+    return w * scale, x * scale, y * scale, z * scale
+
+
+@kernel
 def unit_length(w, x, y, z):
-    """A quaternion scaled to unit length, by the first terms of a series where it is close to that already."""
+    """A quaternion scaled to unit length."""
     excess = w * w + x * x + y * y + z * z - 1.0
     if abs(excess) < SMALL_LENGTH_EXCESS:
-        scale = 1.0 - excess * (0.5 - 0.375 * excess)
-    else:
-        scale = 1.0 / math.sqrt(1.0 + excess)
+        return kept_unit_length(w, x, y, z)
+    scale = 1.0 / math.sqrt(1.0 + excess)
     return w * scale, x * scale, y * scale, z * scale
 
 

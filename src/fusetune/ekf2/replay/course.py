@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fusetune.ekf2.feed.inputs import EstimatorInputs
+from fusetune.ekf2.filter.common.core_memory import zeros_on_cache_lines
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.estimator import EKF
 from fusetune.ekf2.replay.flight_schedule import FlightSchedule, flight_schedule, notes_of
@@ -64,7 +65,7 @@ class Course:
         self.inputs, self.changes, self.handovers = inputs, changes, handovers
         self.notes = notes_of(params[0], changes)
         self.mode = IS_FULL if recording is FULL else IS_SCORING
-        self._main = _estimator(np.zeros(1, EKF), params, new_recorder(self.mode))
+        self._main = _estimator(zeros_on_cache_lines(EKF), params, new_recorder(self.mode))
         self._branch = self._main
 
     @property
@@ -121,7 +122,9 @@ class Course:
     def branch(self) -> Course:
         """Another course that starts where this one is."""
         other = copy(self)
-        other._main = other._branch = _estimator(self.ekf.copy(), self.params.copy(), self.recorder.copy())
+        ekf = zeros_on_cache_lines(EKF)
+        ekf[:] = self.ekf
+        other._main = other._branch = _estimator(ekf, self.params.copy(), self.recorder.copy())
         return other
 
     def without_samples(self) -> Course:

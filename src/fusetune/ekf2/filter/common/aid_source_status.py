@@ -67,8 +67,7 @@ def update_aid_source_status(ekf, aid, n_axes, time_us, gate):
         variance = aid.innovation_variance[i]
         test_ratio = innovation * innovation / (gate * gate * variance)
         if has_history:
-            limit = NORMALISED_INNOVATION_LIMIT * gate * math.sqrt(variance)
-            _filter_axis(aid, i, alpha, innovation, test_ratio, limit)
+            _filter_axis(aid, i, alpha, innovation, test_ratio, gate)
         else:
             aid.test_ratio_filtered[i] = test_ratio
             aid.innovation_filtered[i] = innovation
@@ -81,7 +80,7 @@ def update_aid_source_status(ekf, aid, n_axes, time_us, gate):
 
 
 @kernel
-def _filter_axis(aid, i, alpha, innovation, test_ratio, innovation_limit):
+def _filter_axis(aid, i, alpha, innovation, test_ratio, gate):
     """First-order filters of the signed test ratio and of the innovation, bounded while the test fails badly."""
     signed_ratio = test_ratio
     if innovation < 0.0:
@@ -97,6 +96,7 @@ def _filter_axis(aid, i, alpha, innovation, test_ratio, innovation_limit):
     else:
         aid.innovation_filtered[i] = innovation
     if test_ratio > TEST_RATIO_LIMIT:
+        innovation_limit = NORMALISED_INNOVATION_LIMIT * gate * math.sqrt(aid.innovation_variance[i])
         aid.test_ratio_filtered[i] = min(max(aid.test_ratio_filtered[i], -TEST_RATIO_LIMIT), TEST_RATIO_LIMIT)
         aid.innovation_filtered[i] = min(max(aid.innovation_filtered[i], -innovation_limit), innovation_limit)
 

@@ -51,6 +51,9 @@ SCRATCH = np.dtype(
 """
 
 CORE_FIELDS = [
+    # first, so that rows begin where cache lines do; see `zeros_on_cache_lines`
+    ("P", "f8", (ERROR_STATE_SIZE, ERROR_STATE_SIZE)),
+    ("scratch", SCRATCH),
     *fields("i8", "time_delayed_us", "time_latest_us"),
     ("imu_delayed", IMU_SAMPLE),
     ("filter_initialised", "?"),
@@ -62,8 +65,6 @@ CORE_FIELDS = [
     ("wind_vel", "f8", (2,)),
     ("terrain", "f8"),
     ("R_to_earth", "f8", (3, 3)),
-    ("P", "f8", (ERROR_STATE_SIZE, ERROR_STATE_SIZE)),
-    ("scratch", SCRATCH),
     ("cs", CONTROL_STATUS),
     ("cs_prev", CONTROL_STATUS),
     ("fs", FAULT_STATUS),
@@ -102,3 +103,15 @@ CORE_FIELDS = [
 
 CORE_MEMORY = np.dtype(CORE_FIELDS, align=True)
 """The core alone: enough for the kernels of prediction, measurement update and resets."""
+
+CACHE_LINE = 64
+
+
+def zeros_on_cache_lines(dtype: np.dtype) -> np.ndarray:
+    """A record of zeros, as an array of one, that begins with a cache line.
+
+    NumPy aligns to 16 bytes; covariance rows that straddle the lines make a scalar update 10 % slower.
+    """
+    memory = np.zeros(dtype.itemsize + CACHE_LINE, np.uint8)
+    start = -memory.ctypes.data % CACHE_LINE
+    return memory[start : start + dtype.itemsize].view(dtype)

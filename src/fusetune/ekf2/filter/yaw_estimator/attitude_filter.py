@@ -15,6 +15,7 @@ from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.rotations import (
     SMALL_ANGLE_SQUARED,
     dcm_to_quat,
+    kept_unit_length,
     quat_aligning_with_up,
     quat_product,
     quat_to_dcm,
@@ -135,7 +136,7 @@ def _correct_rotations(gsf, imu, gain):
         tilt_y = (down_z * force_x - down_x * along) * scale
         tilt_z = (down_x * side - down_y * force_x) * scale
 
-        learns = math.sqrt(rate_x * rate_x + rate_y * rate_y + rate_z * rate_z) < BIAS_LEARNING_SPIN_LIMIT
+        learns = rate_x * rate_x + rate_y * rate_y + rate_z * rate_z < BIAS_LEARNING_SPIN_LIMIT**2
         bias_x = _limited_bias(bias_x - tilt_x * GYRO_BIAS_GAIN * dt) if learns else bias_x
         bias_y = _limited_bias(bias_y - tilt_y * GYRO_BIAS_GAIN * dt) if learns else bias_y
         bias_z = _limited_bias(bias_z - tilt_z * GYRO_BIAS_GAIN * dt) if learns else bias_z
@@ -156,7 +157,7 @@ def _rotate_a_little(gsf):
             gsf.rotation[0, model], gsf.rotation[1, model], gsf.rotation[2, model], gsf.rotation_squared[model]
         )
         w, x, y, z = quat_product(attitude(gsf, model), turn)
-        set_attitude(gsf, model, unit_length(w, x, y, z))
+        set_attitude(gsf, model, kept_unit_length(w, x, y, z))
 
 
 @kernel
