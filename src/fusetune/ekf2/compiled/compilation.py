@@ -18,12 +18,13 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
+from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
-from numba.core import codegen, compiler, config, event, types
+from numba.core import codegen, compiler, config, event, typed_passes, types, untyped_passes
 
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
 from fusetune.ekf2.compiled.kernel_locator import KernelLocator
@@ -39,6 +40,24 @@ COMPILES = "fusetune.ekf2.replay.warm_up"
 CHILD_MARK = "FUSETUNE_COMPILING"
 LINKED_TOGETHER = 25
 """As many modules are linked before the result is linked to the entry: LLVM looks through all of that each time."""
+PASSES_FOR_OTHERS = (
+    untyped_passes.WithLifting,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.RewriteSemanticConstants,
+    untyped_passes.DeadBranchPrune,
+    untyped_passes.RewriteDynamicRaises,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.InlineInlinables,
+    untyped_passes.FindLiterallyCalls,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+    typed_passes.NopythonRewrites,
+    typed_passes.DumpParforDiagnostics,
+)
+"""Passes of Numba for closures, lists, array expressions, exceptions and the like, of which kernels have none.
+
+What these would simplify besides, branches that a constant decides, LLVM simplifies as well.
+"""
 PLAIN = "--plain"
 NOT_IN_ONE_PIECE = (
     f"Numba {numba.__version__} does not compile the estimator in one piece: it is done function by function, "
@@ -131,7 +150,23 @@ def joined_without_optimising() -> Iterator[None]:
     library, native = codegen.JITCodeLibrary, codegen.JITCPUCodegen
     finalize, pointer, set_env = library.finalize, library.get_pointer_to_function, native.set_env
     add_module, compile_function = library.add_llvm_module, compiler.CompilerBase.compile_extra
+    passes, call_type = compiler.DefaultPassBuilder.define_nopython_pipeline, types.BaseFunction.get_call_type
     depth = 0
+    call_types: dict[Any, Any] = {}
+
+    def passes_that_act(state, name="nopython"):  # type: ignore[no-untyped-def]
+        manager = compiler.PassManager(name)
+        for compiler_pass, description in passes(state, name).passes:
+            if compiler_pass not in PASSES_FOR_OTHERS:
+                manager.add_pass(compiler_pass, description)
+        manager.finalize()
+        return manager
+
+    def remembered_call_type(self, context, arguments, named):  # type: ignore[no-untyped-def]
+        call = (self, context, arguments, tuple(named.items()))
+        if call not in call_types:
+            call_types[call] = call_type(self, context, arguments, named)
+        return call_types[call]
 
     def compile_without_wrappers(self, function):  # type: ignore[no-untyped-def]
         nonlocal depth
@@ -176,10 +211,12 @@ def joined_without_optimising() -> Iterator[None]:
         (library, "get_pointer_to_function", pointer_if_translated),
         (native, "set_env", set_env_if_translated),
         (compiler.CompilerBase, "compile_extra", compile_without_wrappers),
+        (compiler.DefaultPassBuilder, "define_nopython_pipeline", staticmethod(passes_that_act)),
+        (types.BaseFunction, "get_call_type", remembered_call_type),
         (event, "broadcast", _tell_nobody),
         (types.Record, "__repr__", _short_repr),
     )
-    originals = [getattr(owner, name) for owner, name, _ in patches]
+    originals = [getattr_static(owner, name) for owner, name, _ in patches]
     try:
         for owner, name, replacement in patches:
             setattr(owner, name, replacement)
