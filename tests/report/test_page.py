@@ -1,6 +1,7 @@
 """The report of a made study: complete, self-contained, of the same bytes every time."""
 
 import re
+import shutil
 from pathlib import Path
 
 from PIL import Image
@@ -69,7 +70,16 @@ def test_figures_are_the_same_bytes_twice(made: tuple[Path, str], tmp_path: Path
     plot_summary(folders, root / "apply", tmp_path)
     for name in SUMMARY_FIGURES:
         assert (tmp_path / name).read_bytes() == (root / "report" / name).read_bytes(), name
-    plot_flight(root / "save" / "flight_0", folders[0], list(SETS), tmp_path / "flight.png")
+
+
+def test_the_picture_of_a_flight_is_the_same_where_other_sets_replays_are_gone(
+    made: tuple[Path, str], tmp_path: Path
+) -> None:
+    root, _ = made
+    others = [f"{name}.*" for name in SETS if name != "present"]
+    shutil.copytree(root / "analyze" / "flight_0", tmp_path / "kept", ignore=shutil.ignore_patterns(*others))
+    assert not list((tmp_path / "kept").glob("better.*"))
+    plot_flight(root / "save" / "flight_0", tmp_path / "kept", list(SETS), tmp_path / "flight.png")
     assert (tmp_path / "flight.png").read_bytes() == (root / "report" / "flights" / "flight_0.png").read_bytes()
 
 

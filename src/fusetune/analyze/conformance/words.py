@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fusetune.analyze.conformance.conformed_logs import ConformedLog
+if TYPE_CHECKING:
+    # pages need the words alone, and not what compares a log with missions
+    from fusetune.analyze.conformance.conformed_logs import ConformedLog
 
 Document = Mapping[str, Any]
 

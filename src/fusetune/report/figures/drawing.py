@@ -4,6 +4,7 @@ import gc
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -48,10 +49,15 @@ def figure_style() -> Iterator[None]:
     if threshold[0]:
         gc.set_threshold(max(_OBJECTS_OF_A_FIGURE, threshold[0]), *threshold[1:])
     try:
-        with matplotlib.rc_context(fname=STYLE):
+        with matplotlib.rc_context(_style()):
             yield
     finally:
         gc.set_threshold(*threshold)
+
+
+@cache
+def _style() -> matplotlib.RcParams:
+    return matplotlib.rc_params_from_file(STYLE, use_default_template=False)
 
 
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
@@ -136,15 +142,17 @@ def panel_grid(panels: int, names: Sequence[str], row_height: float, title: str)
     )
     for index, axes in enumerate(grid.flat):
         axes.set_visible(index < panels)
-        label_sets(axes, names)
-        axes.tick_params(labelleft=index % columns == 0, left=index % columns == 0)
+        label_sets(axes, names, is_named=index % columns == 0)
     figure.text(0.1 / width, 1.0 - 0.1 / height, title, ha="left", va="top", fontsize=9.5)
     return figure, list(grid.flat)[:panels]
 
 
-def label_sets(axes: Axes, sets: Sequence[str]) -> None:
+def label_sets(axes: Axes, sets: Sequence[str], *, is_named: bool = True) -> None:
     """One row per set, the first on top."""
-    axes.set_yticks(range(len(sets)), sets)
+    if is_named:
+        axes.set_yticks(range(len(sets)), sets)
+    else:
+        axes.set_yticks([])
     axes.set_ylim(len(sets) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
 

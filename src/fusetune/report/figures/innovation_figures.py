@@ -80,17 +80,18 @@ def boxes(results: Results, pooled: Sequence[PooledSamples], *, normalised: bool
 def _boxes(axes: Axes, samples: PooledSamples, results: Results, normalised: bool) -> None:
     values = samples.normalised if normalised else samples.innovation
     vetoed = {name for name in results.shown if results.is_ruled_out(name)}
-    reach = 0.0
-    for row, name in enumerate(results.shown):
-        if name not in values:
-            continue
-        low, q1, median, q3, high = np.percentile(values[name], _WHISKERS)
-        # A set that is not eligible may leave the plot; it must not squeeze the others.
-        reach = max(reach, 0.0 if name in vetoed else -low, 0.0 if name in vetoed else high, q3, -q1)
-        colour = status_colour(results, name)
-        axes.plot([low, high], [row, row], color=colour, linewidth=1.0)
-        axes.barh(row, q3 - q1, left=q1, height=0.6, color=colour, alpha=0.45, edgecolor=colour, linewidth=0.8)
-        axes.plot([median, median], [row - 0.3, row + 0.3], color=colour, linewidth=1.4)
+    rows = np.array([row for row, name in enumerate(results.shown) if name in values])
+    names = [results.shown[row] for row in rows]
+    low, q1, median, q3, high = np.array([np.percentile(values[name], _WHISKERS) for name in names]).T
+    colours = [status_colour(results, name) for name in names]
+    axes.hlines(rows, low, high, color=colours, linewidth=1.0)
+    boxes = axes.barh(rows, q3 - q1, left=q1, height=0.6, color=colours, edgecolor=colours, linewidth=0.8)
+    for box in boxes:
+        box.set_alpha(0.45)
+    axes.vlines(median, rows - 0.3, rows + 0.3, color=colours, linewidth=1.4)
+    # A set that is not eligible may leave the plot; it must not squeeze the others.
+    kept = np.array([name not in vetoed for name in names])
+    reach = float(max(0.0, q3.max(), -q1.min(), *high[kept], *-low[kept]))
     axes.axvline(0.0, color="#888888", linewidth=0.6)
     if normalised:
         for limit in (-1.64, 1.64):
@@ -169,13 +170,14 @@ def _break_panel(axes: Axes, results: Results, source: str) -> None:
     confidence = results.decision["rule"]["confidence"]
     for (metric, label), (colour, offset) in zip(_BREAK_METRICS.items(), _BREAK_STYLES, strict=True):
         pooled = _pooled_breaks(results, source, metric)
-        for row, name in enumerate(results.shown):
-            if name not in pooled:
-                continue
-            bounds = clopper_pearson(*pooled[name], confidence)
-            low, high = 100.0 * float(bounds.lower), 100.0 * float(bounds.upper)
-            axes.plot([low, high], [row + offset] * 2, color=colour, linewidth=1.6)
-            axes.plot(100.0 * float(bounds.value), row + offset, "o", color=colour, markersize=3, label="_")
+        bounds = [(row + offset, clopper_pearson(*pooled[name], confidence))
+                  for row, name in enumerate(results.shown) if name in pooled]  # fmt: skip
+        rows = [row for row, _ in bounds]
+        low, share, high = (
+            [100.0 * float(getattr(one, part)) for _, one in bounds] for part in ("lower", "value", "upper")
+        )
+        axes.hlines(rows, low, high, color=colour, linewidth=1.6)
+        axes.plot(share, rows, "o", color=colour, markersize=3, label="_")
         axes.plot([], [], "o-", color=colour, markersize=3, label=label)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.set_xlim(0.0, 110.0)

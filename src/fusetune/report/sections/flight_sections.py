@@ -120,7 +120,10 @@ def single_flights_section(results: Results, flight_figures: Mapping[str, AnyPat
         words = f"{summary['scored_s']:.0f} s scored" if decides else f"{_part(name, results)}: {results.reason(name)}"
         inside = [_cuts(summary), _set_troubles(summary)]
         if name in flight_figures:
-            caption = "Grey: not scored (ground, warm-up, cuts). The dashed line is the gate."
+            caption = (
+                "Grey: not scored (ground, warm-up, cuts). The dashed line is the gate. Of other sets than the present "
+                "one what is scored is drawn."
+            )
             inside.insert(0, figure(flight_figures[name], caption))
         parts.append(details(f"{name} – {words}", *inside, kind="good" if decides else "bad"))
     return section("Flight by flight", *parts) if parts else ""

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 import numpy as np
 import pyarrow as pa
 
-from fusetune.ekf2.replay.recording import joined_rows
 from fusetune.storage.files import AnyPath, atomic_path
 from fusetune.storage.parquet import table_writer
 
@@ -40,6 +39,9 @@ def written_in_groups(
     ------
     Takes the next rows.
     """
+    # what a replay wrote is the estimator's; pages, which come by here for other tables, need not load it
+    from fusetune.ekf2.replay.recording import joined_rows
+
     waiting: list[np.ndarray] = []
     schema = to_table(np.zeros(0, dtype)).schema
     with atomic_path(target) as path, table_writer(path, schema, **replay_table_options(schema)) as writer:
