@@ -91,7 +91,7 @@ def meaning_of(kind: type) -> str:
 
 
 @cache
-def _types_of(kind: type) -> Mapping[str, Any]:
+def _types_of(kind: Any) -> Mapping[str, Any]:
     """Field → its type, whose words Python evaluates anew each time it is asked."""
     return get_type_hints(kind)
 
