@@ -189,7 +189,8 @@ def decades(axes: Axes) -> None:
 
 
 def _power_of_ten(value: float, _: int | None = None) -> str:
-    return power_of_ten(round(math.log10(value)))
+    exponent = round(math.log10(value))
+    return power_of_ten(exponent) if math.isclose(value, 10.0**exponent) else f"{value:g}"
 
 
 def power_of_ten(exponent: int) -> str:
