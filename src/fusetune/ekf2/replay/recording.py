@@ -7,6 +7,7 @@ and position at every update; flags when they change, and once a second.
 import math
 from collections.abc import Sequence
 from enum import Enum
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -234,18 +235,27 @@ def allocate_records(updates: int, mode: int) -> RecordRoom:
     return RecordRoom(
         np.empty(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW),
         _zero_rows(updates if mode == IS_FULL else 0, STATE_ROW),
-        _zero_rows(positions, LOCAL_POSITION_ROW),
-        _zero_rows(flags, FLAGS_ROW),
+        _zero_rows(positions, LOCAL_POSITION_ROW) if mode == IS_FULL else np.empty(positions, LOCAL_POSITION_ROW),
+        np.empty(flags, FLAGS_ROW),
         _zero_rows(updates if mode == IS_SCORING else 0, SCORED_STATE_ROW),
     )
 
 
-def copied_innovations(rows: np.ndarray) -> np.ndarray:
-    """A copy of rows out of the room for them, whose padding holds whatever was there."""
-    copied = joined_rows([rows], INNOVATION_ROW)
-    used = sum(INNOVATION_ROW[name].itemsize for name in INNOVATION_ROW.names or ())
-    copied.view(np.uint8).reshape(-1, INNOVATION_ROW.itemsize)[:, used:] = 0
-    return copied
+def copied(rows: np.ndarray) -> np.ndarray:
+    """A copy of rows out of the room for them; what lies between their fields, whatever it was, is zero."""
+    whole = joined_rows([rows], rows.dtype)
+    for first, last in _paddings(rows.dtype):
+        whole.view(np.uint8).reshape(-1, rows.dtype.itemsize)[:, first:last] = 0
+    return whole
+
+
+@cache
+def _paddings(row: np.dtype) -> list[tuple[int, int]]:
+    """The bytes of a row that belong to no field."""
+    fields_of = [row.fields[name][:2] for name in row.names or ()] if row.fields else []
+    ends = [0, *(offset + kind.itemsize for kind, offset in fields_of)]
+    starts = [*(offset for _, offset in fields_of), row.itemsize]
+    return [(end, start) for end, start in zip(ends, starts, strict=True) if start > end]
 
 
 def _zero_rows(count: int, dtype: np.dtype) -> np.ndarray:
