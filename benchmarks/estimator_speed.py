@@ -2,9 +2,11 @@
 
     python benchmarks/estimator_speed.py LOG.ulg [REFERENCE_JSON]
 
-Prints CPU time per filter update and per IMU sample, flight seconds per CPU second, the shares of prediction, fusion
-and everything else, start-up of one replay process, and peak memory. With the JSON file of a reference replay of the
-same log, also the ratio to the CPU time per update of PX4's own estimator (another run of the same kind of machine).
+Prints CPU time per filter update and per IMU sample of a full and of a scoring recording, the latter of eight sets on
+one flight; the schedule of a flight, which sets share; flight seconds per CPU second; gaps by the second; the shares of
+prediction, fusion and everything else, start-up of one replay process, and peak memory. With the JSON file of a
+reference replay of the same log, also the ratios to the CPU time per update of PX4's own estimator (another run of the
+same kind of machine).
 """
 
 from __future__ import annotations
@@ -16,25 +18,31 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numba import njit
 
 from fusetune.ekf2.compiled.compilation import ensure_compiled
-from fusetune.ekf2.feed.inputs import build_inputs
+from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
 from fusetune.ekf2.filter.common.core_memory import CORE_MEMORY
 from fusetune.ekf2.filter.common.parameters import complete, parameter_record
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_kalman_gain
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
-from fusetune.ekf2.replay.replay import replay
+from fusetune.ekf2.replay.flight_schedule import flight_schedule
+from fusetune.ekf2.replay.recording import SCORING
+from fusetune.ekf2.replay.replay import replay, replay_into
+from fusetune.ekf2.replay.results import Gap
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
 
 REPEATS = 9
 LOOPS = 20_000
+SETS = 8
+GAP_US = 5_000_000
 
 
 @njit
@@ -86,6 +94,36 @@ def prediction_cost() -> float:
     return cpu_seconds(lambda: many_predictions(ekf[0], params[0], LOOPS)) / LOOPS
 
 
+def scoring_cost(inputs: EstimatorInputs, sets: Sequence[Mapping[str, float]]) -> float:
+    """CPU seconds of a scoring replay of one set, of some on a flight that was never replayed before."""
+
+    def replay_all() -> None:
+        fresh = replace(inputs)
+        for params in sets:
+            replay_into(lambda rows: None, fresh, params, recording=SCORING)
+
+    return cpu_seconds(replay_all) / len(sets)
+
+
+def schedule_cost(inputs: EstimatorInputs, params: Mapping[str, float]) -> float:
+    """CPU seconds of the schedule of a flight."""
+    record = parameter_record(params)[0]
+    return cpu_seconds(lambda: flight_schedule(replace(inputs), record, ()))
+
+
+def gap_cost(inputs: EstimatorInputs, params: Mapping[str, float]) -> float:
+    """CPU seconds of a second in a gap."""
+    first, last = inputs.arrays.imu["time_us"][[0, -1]].tolist()
+    gaps = [Gap("baro", start, start + GAP_US) for start in range(first, last - GAP_US, GAP_US)]
+    if not gaps:
+        return float("nan")
+
+    def with_gaps(some: Sequence[Gap]) -> float:
+        return cpu_seconds(lambda: replay_into(lambda rows: None, inputs, params, gaps=some, recording=SCORING))
+
+    return (with_gaps(gaps) - with_gaps(())) / (len(gaps) * GAP_US * 1e-6)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("log", type=Path)
@@ -103,10 +141,17 @@ def main() -> None:
     fusion = fused * fusion_cost()
     prediction = result.updates * prediction_cost()
     per_update = total / result.updates
+    overrides = [{"EKF2_BARO_NOISE": 2.0 + 0.5 * number} for number in range(SETS)]
+    sets = [complete(flight.parameters.initial, one, flight.release) for one in overrides]
+    scoring = scoring_cost(inputs, sets)
     print(f"{options.log.stem}: {result.updates} updates, {result.imu_samples} IMU samples, {span_s:.1f} s of flight")
     print(f"  per update            {per_update * 1e6:8.2f} µs")
     print(f"  per IMU sample        {total / result.imu_samples * 1e6:8.2f} µs")
     print(f"  flight s per CPU s    {span_s / total:8.0f}")
+    print(f"  scoring, of {SETS} sets    {scoring / result.updates * 1e6:8.2f} µs per update")
+    print(f"  ... flight s per CPU s{span_s / scoring:8.0f}")
+    print(f"  schedule, once        {schedule_cost(inputs, params) / result.updates * 1e6:8.2f} µs per update")
+    print(f"  a second in a gap     {gap_cost(inputs, params) * span_s / scoring:8.2f} of a second on the way")
     rest = 1.0 - (prediction + fusion) / total
     print(f"  prediction            {prediction / total:8.0%}")
     print(
@@ -116,7 +161,7 @@ def main() -> None:
     if options.reference:
         reference = json.loads(options.reference.read_text(encoding="utf-8"))
         ratio = per_update / (reference["cpu_s"] / reference["n_updates"])
-        print(f"  ratio to PX4's C++    {ratio:8.2f}")
+        print(f"  ratio to PX4's C++    {ratio:8.2f}, scoring {ratio * scoring / total:.2f}")
     print(f"  one process, warm     {process_seconds(options.log):8.2f} s wall (start, imports, kernels, log, replay)")
     print(f"  peak memory           {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:8.0f} MB")
 

@@ -29,7 +29,7 @@ from fusetune.ekf2.replay.recording import (
     Recording,
     RecordRoom,
     allocate_records,
-    copied_innovations,
+    copied,
     joined,
     new_recorder,
     views_of,
@@ -179,12 +179,13 @@ class Course:
         room = allocate_records(last - first, self.mode)
         found = self._process(start, stop, room, is_last, gaps)
         done = self.recorder[0]
+        position = room.local_position[: done["position_rows"]]
         states = room.scored_states if self.mode == IS_SCORING else room.states
         rows = RecordArrays(
-            copied_innovations(room.innovations[: done["innovation_rows"]]),
+            copied(room.innovations[: done["innovation_rows"]]),
             states[: done["state_rows"]],
-            room.local_position[: done["position_rows"]],
-            room.flags[: done["flag_rows"]].copy(),
+            position if self.mode == IS_FULL else copied(position),
+            copied(room.flags[: done["flag_rows"]]),
         )
         return rows, found
 
@@ -223,7 +224,7 @@ class GapRows(NamedTuple):
 def _gap_rows(gap: np.void, room: RecordRoom) -> GapRows:
     innovations = room.innovations[gap["innovations_from"] : gap["innovations_to"]]
     position = room.local_position[gap["positions_from"] : gap["positions_to"]]
-    return GapRows(int(gap["start_us"]), copied_innovations(innovations), position.copy())
+    return GapRows(int(gap["start_us"]), copied(innovations), copied(position))
 
 
 def _estimator(ekf: np.ndarray, params: np.ndarray, recorder: np.ndarray) -> Estimator:

@@ -199,7 +199,7 @@ class _Builder:
         end = np.zeros(1, ACTION)
         end["update"] = _NONE_FOLLOWS
         actions = np.concatenate([*parts, end])
-        actions = actions[np.argsort(actions["update"], kind="stable")]
+        actions = actions[np.argsort(np.ascontiguousarray(actions["update"]), kind="stable")]
         tables = ScheduleTables(
             self.intervals, self.updates, actions, drag, self._events(), self.lengths, self.levelling
         )
@@ -243,11 +243,16 @@ class _Builder:
 
 
 def _arrived(inputs: EstimatorInputs, name: str) -> Rows:
-    arrivals = inputs.arrays.arrivals
-    here = arrivals[arrivals["field"] == ARRIVAL_FIELDS.index(name)]
-    arrived = np.zeros(len(here), ARRIVED)
-    arrived["run"], arrived["slot"] = here["run"], here["position"]
-    return arrived
+    """The samples of a sensor that arrive."""
+
+    def by_field() -> list[Rows]:
+        field = np.ascontiguousarray(inputs.arrays.arrivals["field"])
+        arrivals = inputs.arrays.arrivals[np.argsort(field, kind="stable")]
+        rows = np.zeros(len(arrivals), ARRIVED)
+        rows["run"], rows["slot"] = arrivals["run"], arrivals["position"]
+        return np.split(rows, np.cumsum(np.bincount(field, minlength=len(ARRIVAL_FIELDS)))[:-1])
+
+    return inputs.memo.get("arrived", by_field, _bytes)[ARRIVAL_FIELDS.index(name)]
 
 
 def _shortened(rows: Rows, count: int) -> Rows:

@@ -5,8 +5,10 @@ and position at every update; flags when they change, and once a second.
 """
 
 import math
+import threading
 from collections.abc import Sequence
 from enum import Enum
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -228,24 +230,52 @@ def new_recorder(mode: int) -> np.ndarray:
 
 
 def allocate_records(updates: int, mode: int) -> RecordRoom:
-    """Room for as many updates, whatever they publish."""
+    """Room for as many updates, whatever they publish.
+
+    Rows of states, and in a full recording those of the position, are the caller's. The others lie where the next call
+    of this thread for the same kind of recording puts its own: to ask the system for them anew takes longer than to
+    fill them.
+    """
     # a step has two rows before it, which may be of the stretch before; the last row may come after a step
-    positions, flags = updates + PUBLISHED_KEPT, 0 if mode == IS_GAP else updates
+    positions = updates + PUBLISHED_KEPT
     return RecordRoom(
-        np.empty(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW),
+        _shared_room(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW, mode == IS_GAP),
         _zero_rows(updates if mode == IS_FULL else 0, STATE_ROW),
-        _zero_rows(positions, LOCAL_POSITION_ROW),
-        _zero_rows(flags, FLAGS_ROW),
+        _zero_rows(positions, LOCAL_POSITION_ROW)
+        if mode == IS_FULL
+        else _shared_room(positions, LOCAL_POSITION_ROW, mode == IS_GAP),
+        _shared_room(updates, FLAGS_ROW, mode == IS_GAP),
         _zero_rows(updates if mode == IS_SCORING else 0, SCORED_STATE_ROW),
     )
 
 
-def copied_innovations(rows: np.ndarray) -> np.ndarray:
-    """A copy of rows out of the room for them, whose padding holds whatever was there."""
-    copied = joined_rows([rows], INNOVATION_ROW)
-    used = sum(INNOVATION_ROW[name].itemsize for name in INNOVATION_ROW.names or ())
-    copied.view(np.uint8).reshape(-1, INNOVATION_ROW.itemsize)[:, used:] = 0
-    return copied
+_rooms = threading.local()
+
+
+def _shared_room(count: int, row: np.dtype, of_gaps: bool) -> np.ndarray:
+    """Rows that hold whatever this thread left there; only what is touched takes memory."""
+    rooms = _rooms.__dict__.setdefault("by_kind", {})
+    room = rooms.get((row, of_gaps))
+    if room is None or len(room) < count:
+        room = rooms[row, of_gaps] = np.empty(count, row)
+    return room[:count]
+
+
+def copied(rows: np.ndarray) -> np.ndarray:
+    """A copy of rows out of the room for them; what lies between their fields, whatever it was, is zero."""
+    whole = joined_rows([rows], rows.dtype)
+    for first, last in _paddings(rows.dtype):
+        whole.view(np.uint8).reshape(-1, rows.dtype.itemsize)[:, first:last] = 0
+    return whole
+
+
+@cache
+def _paddings(row: np.dtype) -> list[tuple[int, int]]:
+    """The bytes of a row that belong to no field."""
+    fields_of = [row.fields[name][:2] for name in row.names or ()] if row.fields else []
+    ends = [0, *(offset + kind.itemsize for kind, offset in fields_of)]
+    starts = [*(offset for _, offset in fields_of), row.itemsize]
+    return [(end, start) for end, start in zip(ends, starts, strict=True) if start > end]
 
 
 def _zero_rows(count: int, dtype: np.dtype) -> np.ndarray:
