@@ -71,14 +71,14 @@ def _observe(ekf: np.void, flag: str, source: str, normalised: float, axis: int 
 def test_falling_is_unlikely_without_a_large_innovation():
     ekf = make_estimator()
     assert estimate_inertial_nav_falling_likelihood(ekf) == FALLING_UNLIKELY
-    _observe(ekf, "baro_hgt", "baro_hgt", 2.9)
-    _observe(ekf, "gps_hgt", "gnss_hgt", 2.9)
+    _observe(ekf, "baro_hgt", "baro_hgt", 2.999)
+    _observe(ekf, "gps_hgt", "gnss_hgt", 2.999)
     assert estimate_inertial_nav_falling_likelihood(ekf) == FALLING_UNLIKELY
 
 
 def test_falling_is_possible_by_one_kind_of_reference():
     ekf = make_estimator()
-    _observe(ekf, "gps_hgt", "gnss_hgt", 3.1)
+    _observe(ekf, "gps_hgt", "gnss_hgt", 3.001)
     _observe(ekf, "gnss_vel", "gnss_vel", 5.0, axis=2)
     assert estimate_inertial_nav_falling_likelihood(ekf) == FALLING_POSSIBLE
 

@@ -94,7 +94,10 @@ def reduce_variance(ekf, state_index):
 
 @kernel
 def _first_above(P, index, high):
-    """The first of three states whose variance exceeds `high`, or -1."""
+    """The first of three states whose variance exceeds `high`, or -1.
+
+    Written out: of a loop along the diagonal the compiler makes gathers and scatters, which take longer.
+    """
     if P[index, index] > high:
         return index
     if P[index + 1, index + 1] > high:

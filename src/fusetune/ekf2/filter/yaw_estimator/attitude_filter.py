@@ -99,7 +99,6 @@ def accel_fusion_gain(gsf):
 def predict_attitudes(gsf, imu, gain):
     """Propagate the attitudes of all models over an IMU sample; `gain` is `accel_fusion_gain`."""
     _correct_rotations(gsf, imu, gain)
-    # one after the other, for a sum of them would have to be formed in this order
     small = True
     for model in range(LANES):
         small = small and gsf.rotation_squared[model] < SMALL_ANGLE_SQUARED
