@@ -13,14 +13,15 @@ UV_PYTHON := $(if $(filter environment command,$(firstword $(origin PYTHON))),$(
 BIN := .venv/bin
 READY := .venv/.ready
 DEVELOPMENT := .venv/.with-dev
-# A lock is complete, so nothing is left to be resolved. They would make byte code of all that it installs, tests of the
-# libraries included, pip on one core: that is done below. Without it each job would compile its imports again.
+# A lock is complete, so nothing is left to be resolved. Byte code, without which each job would compile its imports again,
+# is made by all cores at the end: pip and uv would make it of the libraries' tests, too, and pip on one core.
 LOCKED := --quiet --no-deps --require-hashes
 # The package has no hash, so it is installed by itself, built with the locked setuptools.
 ITSELF := --quiet --no-deps --no-build-isolation -e .
 WITH_UV := uv pip install --no-compile --python $(BIN)/python
 WITH_PIP := $(BIN)/python -m pip --disable-pip-version-check install --no-compile
-BYTE_CODE := $(BIN)/python -m compileall -qq -j0 -x '/tests?/' .venv/lib
+# Few runs import scikit-learn, and matplotlib uses fontTools for formats that nothing here writes.
+BYTE_CODE := $(BIN)/python -m compileall -qq -j0 -x '/(tests?|sklearn|fontTools)/' .venv/lib
 LOCK := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet
 
 export PYTHONDONTWRITEBYTECODE :=

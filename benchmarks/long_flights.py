@@ -23,6 +23,7 @@ from typing import Any
 
 from benchmarks.save_speed import ROOT, peak_bytes, simulated
 
+import fusetune
 from fusetune.design.study import load_study
 from fusetune.running.job_environment import JOB_ENVIRONMENT
 from fusetune.save.flight_folder import read_metadata
@@ -94,7 +95,8 @@ def in_own_process(job: str, log: Path) -> dict[str, Any]:
 
 def _measured(job: str, log: Path) -> dict[str, Any]:
     """CPU time and peak memory of one job; of the analysis also the peak of each step."""
-    sys.path.insert(0, str(ROOT / "workflow" / "scripts"))
+    # those of the package at hand, which may be another revision's
+    sys.path.insert(0, str(Path(fusetune.__file__).resolve().parents[2] / "workflow" / "scripts"))
     from job import keep_out
 
     keep_out("pandas")
