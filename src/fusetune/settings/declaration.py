@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cache
 from types import NoneType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
 
 Settings = TypeVar("Settings")
 
@@ -116,7 +116,7 @@ def built(kind: type[Settings], values: Mapping[str, Any]) -> Settings:
 
     Lists become tuples, whole numbers floats where the field is one, texts days, and mappings dataclasses.
     """
-    types = _types_of(kind)
+    types = _types_of(cast(Any, kind))  # a type is hashable, which mypy does not know of one that varies
     return kind(**{name: _converted(types[name], value) for name, value in values.items()})
 
 
