@@ -131,6 +131,7 @@ class _SetsAtWork:
     def scores(self, names: Sequence[str], threads: int) -> Iterator[tuple[str, SetScores]]:
         """Scores of some sets, in their order."""
         self.yardstick.make()
+        give_back_freed_memory()
         if threads <= 1:
             yield from ((name, self._scores(name)) for name in names)
             return

@@ -98,7 +98,7 @@ def test_axes_that_share_their_times_are_together(tmp_path: Path) -> None:
     assert together.innovation.shape == (1, 3, 50)
     (limits,) = together.winsor_limits()
     np.testing.assert_array_equal(np.ravel(limits), [masks["gnss_vel", axis].winsor_limit for axis in range(3)])
-    assert {name: one.innovation.shape for name, one in found["gnss_vel"].groups.items()} == {
+    assert {name: one.innovation.shape for name, one in found["gnss_vel"].groups()} == {
         "horizontal": (2, 1, 50), "vertical": (1, 1, 50), "all": (3, 1, 50),
     }  # fmt: skip
 

@@ -19,7 +19,7 @@ def samples(*innovations: list[float]) -> AxesTogether:
 
 
 def _of_axis(axis: int, innovation: np.ndarray, time: np.ndarray) -> CountedSamples:
-    mask = SampleMask("gnss_vel", axis, time, 0.0, np.arange(time.size), innovation)
+    mask = SampleMask("gnss_vel", axis, time, 0.0, np.arange(time.size, dtype=np.int32), innovation)
     square = np.square(innovation)
     return CountedSamples(mask, innovation, np.ones(time.size), square / 25.0, square > 25.0)
 

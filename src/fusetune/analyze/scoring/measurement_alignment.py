@@ -26,6 +26,9 @@ from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES, AidSource
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""
 
+_FEW_SAMPLES = 50_000
+"""Of so few what groups of axes are made of is kept for the next who asks."""
+
 
 @dataclass(frozen=True, eq=False)
 class SampleMask:
@@ -43,7 +46,7 @@ class SampleMask:
     axis: int
     time: npt.NDArray[np.int64]
     tolerance: float
-    row: npt.NDArray[np.int64]
+    row: npt.NDArray[np.int32]
     innovation: npt.NDArray[np.float64]
 
     @cached_property
@@ -106,7 +109,7 @@ def sample_mask(record: ReplayedSet, key: SourceAxis, window: ScoringWindow) -> 
     if time.size < 2:
         return None
     scored = window.contains(time) & _is_usable(samples) & (time >= time[np.argmax(samples.fused)])
-    row = np.flatnonzero(scored)
+    row = np.flatnonzero(scored).astype(np.int32)
     if not row.size:
         return None
     tolerance = _TOLERANCE * float(np.median(np.diff(time)))
@@ -222,11 +225,18 @@ class AxesTogether:
         figures = [np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES]
         return _innovations(figures, [limits], self.confidence)
 
-    @cached_property
-    def groups(self) -> Mapping[str, Innovations]:
+    def groups(self) -> Iterable[tuple[str, Innovations]]:
         """Groups of axes (horizontal, vertical, all) that are all here, (D, 1, N), by name."""
-        groups = AID_SOURCES[self.source].groups
-        return {name: self._group(axes) for name, axes in groups if {*axes} <= {*self.axes}}
+        return self._groups.items() if self.time.size <= _FEW_SAMPLES else self._each_group()
+
+    @cached_property
+    def _groups(self) -> Mapping[str, Innovations]:
+        return dict(self._each_group())
+
+    def _each_group(self) -> Iterator[tuple[str, Innovations]]:
+        for name, axes in AID_SOURCES[self.source].groups:
+            if {*axes} <= {*self.axes}:
+                yield name, self._group(axes)
 
     def _group(self, axes: Sequence[int]) -> Innovations:
         members = [self.samples[self.axes.index(axis)] for axis in axes]

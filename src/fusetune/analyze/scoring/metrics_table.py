@@ -75,7 +75,7 @@ def add_innovation_metrics(
     axes = [AXES[axis] for axis in samples.axes]
     _add_figures(table, set_name, samples.source, axes, samples.innovations, metrics, prefix)
     of_groups = [metric for metric in metrics if metric.of_groups]
-    for group, given in samples.groups.items():
+    for group, given in samples.groups():
         _add_figures(table, set_name, samples.source, [group], given, of_groups, prefix)
 
 

@@ -83,7 +83,7 @@ def window_figures(samples: AxesTogether, edges: npt.NDArray[np.int64]) -> Itera
     parts = parts_of(samples.time, edges)
     axes = tuple(AXES[axis] for axis in samples.axes)
     yield WindowFigures(samples.source, axes, parts, _figures(samples.innovations, parts))
-    for name, given in samples.groups.items():
+    for name, given in samples.groups():
         yield WindowFigures(samples.source, (name,), parts, _figures(given, parts))
 
 
