@@ -28,6 +28,7 @@ _SCORED = (
     "analyze/reconstruction",
     "analyze/replaying",
     "analyze/scoring",
+    "analyze/scored_sets.py",
     "analyze/sensors",
     "analyze/smoothing",
     "analyze/trust",
