@@ -23,10 +23,10 @@ from benchmarks.speed.table import written
 from benchmarks.speed.workplace import ROOT
 
 REPEATS = {
-    "estimator": 5,
-    "scoring": 5,
+    "estimator": 3,
+    "scoring": 3,
     "start_up": 3,
-    "compiling": 2,
+    "compiling": 1,
     "demonstration": 1,
     "real_flights": 1,
     "pipeline": 1,

@@ -66,10 +66,10 @@ def measure(work: Workplace) -> Iterator[tuple[str, float]]:
     yield "fusion", parts.fusion_cost() * 1e6
 
 
-def cpu_of(work: Callable[[], object]) -> float:
+def cpu_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
     """CPU seconds of a piece of work that is warm, the fastest of some."""
     samples = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         begin = time.process_time()
         work()
         samples.append(time.process_time() - begin)
