@@ -95,7 +95,7 @@ def run_estimator(main, branch, inputs, schedule, notes, room, gaps, gap_room, s
 
     Parameters
     ----------
-    main, branch : ESTIMATOR, the estimator on its way, and one that is set up anew for every gap
+    main, branch : Estimator on its way, and one that is set up anew for every gap
     inputs, schedule, notes : samples of the flight, its schedule, and NOTE
     room, gap_room : RecordRoom for what is recorded on the way, and in all of the gaps
     gaps : GAP_RUN in order of their first updates
