@@ -26,7 +26,7 @@ class GapsAhead:
 
     def __init__(self, course: Course, gaps: Sequence[Gap], first_run: int) -> None:
         self._course, self._gaps = course, gaps
-        times, until = course.inputs.arrays.imu["time_us"], course.schedule.updates_until
+        until, times = course.schedule.updates_until, np.ascontiguousarray(course.inputs.arrays.imu["time_us"])
         edges = {until(run) for run, _ in (*course.changes, *course.handovers)}
         self._found: dict[int, GapRows] = {}
         self._apart: dict[int, list[tuple[int, int]]] = {}

@@ -24,10 +24,10 @@ from fusetune.ekf2.filter.output_predictor.output_predictor import (
 from fusetune.ekf2.replay.commands import handle_command
 from fusetune.ekf2.replay.recording import EstimatorViews, begin_gap_recording, finish_recording, record_update
 from fusetune.ekf2.replay.withholding import pretend_fused
-from fusetune.ekf2.schedule.imu_intervals import down_sample, last_completed, oldest_buffered
+from fusetune.ekf2.schedule.imu_intervals import down_sample, oldest_buffered
 from fusetune.ekf2.schedule.sensor_actions import schedule_drag, schedule_sensor
 from fusetune.ekf2.schedule.taking_actions import BARO, GNSS, nothing_is_due, take_actions
-from fusetune.ekf2.schedule.timeline import value_at
+from fusetune.ekf2.schedule.timeline import first_at, value_at
 from fusetune.ekf2.schedule.updates import schedule_updates
 
 COMMAND, RESET_ACCEL_BIAS, RESET_GYRO_BIAS = range(3)
@@ -95,7 +95,7 @@ def run_estimator(main, branch, inputs, schedule, notes, room, gaps, gap_room, s
 
     Parameters
     ----------
-    main, branch : ESTIMATOR, the estimator on its way, and one that is set up anew for every gap
+    main, branch : Estimator on its way, and one that is set up anew for every gap
     inputs, schedule, notes : samples of the flight, its schedule, and NOTE
     room, gap_room : RecordRoom for what is recorded on the way, and in all of the gaps
     gaps : GAP_RUN in order of their first updates
@@ -103,8 +103,8 @@ def run_estimator(main, branch, inputs, schedule, notes, room, gaps, gap_room, s
     """
     ekf, params = main.ekf[0], main.params[0]
     updates, events = schedule.updates, schedule.events
-    number, last = _first_at(updates, start), _first_at(updates, stop)
-    event = _first_at(events, start)
+    number, last = first_at(updates, start), first_at(updates, stop)
+    event = first_at(events, start)
     if start == 0 and stop > 0:
         event = _handle_events(ekf, params, inputs, schedule, event, 0)
         _switch_on(ekf, params, schedule.lengths[0])
@@ -194,20 +194,8 @@ def _continue_into_gap(main, branch, inputs, schedule, notes, gap, room, place, 
 
 
 @kernel
-def _first_at(rows, run):
-    """Index of the first of rows at or after a run."""
-    low, high = 0, len(rows)
-    while low < high:
-        middle = (low + high) // 2
-        if rows[middle].run < run:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@kernel
 def _first_of_update(actions, update):
+    """Index of the first action of an update, or of a later one."""
     low, high = 0, len(actions)
     while low < high:
         middle = (low + high) // 2
@@ -258,7 +246,7 @@ def _set_clock(ekf, inputs, schedule, stop):
     if stop == 0:
         return
     ekf.time_latest_us = inputs.imu[stop - 1].time_us
-    newest = last_completed(schedule.intervals, stop - 1)
+    newest = first_at(schedule.intervals, stop) - 1
     if newest < 0:
         ekf.time_delayed_us = inputs.imu[0].time_us
         return

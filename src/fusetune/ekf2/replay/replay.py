@@ -1,8 +1,8 @@
 """Replay one flight through the estimator with one parameter set.
 
-The compiled loop does at every IMU sample what PX4's EKF2 module does in one run: take the IMU sample, the newest
-message of every aiding topic, the system flags; update the filter; publish. It works through the flight in stretches,
-so that what is recorded of one can be written before the next.
+The compiled loop does at every update of the filter what PX4's EKF2 module does in the runs that lead to it: take the
+IMU samples, the messages that have arrived, the system flags; update the filter; publish. It works through the flight
+in stretches, so that what is recorded of one can be written before the next.
 """
 
 from __future__ import annotations

@@ -64,19 +64,6 @@ def _keep(sample, length_us, interval):
 
 
 @kernel
-def last_completed(intervals, run):
-    """Index of the interval that was completed last when a run is over, -1 before the first."""
-    low, high = 0, len(intervals)
-    while low < high:
-        middle = (low + high) // 2
-        if intervals[middle].run <= run:
-            low = middle + 1
-        else:
-            high = middle
-    return low - 1
-
-
-@kernel
 def oldest_buffered(newest, imu_length):
     """Index of the interval at the fusion time horizon once that of index `newest` is buffered."""
     return max(newest - imu_length + 1, 0)

@@ -48,3 +48,16 @@ def place_at(steps, run):
 def value_at(steps, run):
     """The value in effect at a run."""
     return steps[place_at(steps, run)].value
+
+
+@kernel
+def first_at(rows, run):
+    """Index of the first of rows in order of their runs that is at or after a run."""
+    low, high = 0, len(rows)
+    while low < high:
+        middle = (low + high) // 2
+        if rows[middle].run < run:
+            low = middle + 1
+        else:
+            high = middle
+    return low
