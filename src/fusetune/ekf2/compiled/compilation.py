@@ -24,6 +24,7 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
+from llvmlite import ir
 from numba.core import codegen, compiler, config, event, typed_passes, types, untyped_passes
 
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
@@ -197,6 +198,10 @@ def joined_without_optimising() -> Iterator[None]:
         self._only_joined = True
         return None
 
+    def for_the_cache(self):  # type: ignore[no-untyped-def]
+        self._ensure_finalized()
+        return self.name, "object", (self._get_compiled_object(), _names_alone(self).as_bitcode())
+
     def pointer_if_translated(self, name):  # type: ignore[no-untyped-def]
         self._ensure_finalized()
         return 0 if getattr(self, "_only_joined", False) else pointer(self, name)
@@ -208,6 +213,7 @@ def joined_without_optimising() -> Iterator[None]:
     patches: tuple[tuple[Any, str, Any], ...] = (
         (library, "finalize", join),
         (library, "add_llvm_module", add_unoptimised),
+        (library, "serialize_using_object_code", for_the_cache),
         (library, "get_pointer_to_function", pointer_if_translated),
         (native, "set_env", set_env_if_translated),
         (compiler.CompilerBase, "compile_extra", compile_without_wrappers),
@@ -245,6 +251,15 @@ def _link_all_called(entry: Any) -> None:
         entry._final_module.get_function(name).linkage = llvm.Linkage.internal
 
 
+def _names_alone(entry: Any) -> Any:
+    """A module for the cache in place of the entry's own, which nobody links there: it tells what the code defines."""
+    stub, module = entry._codegen._create_empty_module(entry.name), entry._final_module
+    for value in (*module.functions, *module.global_variables):
+        if not value.is_declaration and value.linkage not in (llvm.Linkage.internal, llvm.Linkage.private):
+            ir.GlobalVariable(stub, ir.IntType(8), value.name).initializer = ir.IntType(8)(0)
+    return llvm.parse_assembly(str(stub))
+
+
 def _with_all_they_call(libraries: Iterable[Any], found: dict[Any, None] | None = None) -> dict[Any, None]:
     """Libraries and those that they link, and so on, each once."""
     found = {} if found is None else found
@@ -272,7 +287,7 @@ def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = 
     options : of the command line; with `PLAIN` Numba compiles its own way
     """
     os.environ[CHILD_MARK] = "1"
-    gc.disable()  # what compiling leaves is gone with the process
+    gc.set_threshold(200_000)  # hardly anything of what compiling makes is ever let go
     with nullcontext() if PLAIN in options else joined_without_optimising():
         call_entry()
     folder = kernel_folder()
