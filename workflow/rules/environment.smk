@@ -42,7 +42,7 @@ from fusetune.storage.content import ContentDigests
 from fusetune.errors import UserError, demand_room, write_error
 from fusetune.running.job_environment import use_job_environment
 from fusetune.running.job_server import start_job_server
-from fusetune.running.job_sources import JOB_SOURCES, job_digest
+from fusetune.running.job_sources import job_digests
 from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 from fusetune.running.recovery import (
     belong_together,
@@ -178,7 +178,7 @@ if not workflow.is_main_process:
         told_and_ended(error)
 
 # Changed sources run again what depends on them.
-DIGEST = {kind: job_digest(kind) for kind in JOB_SOURCES}
+DIGEST = job_digests()
 
 # Kernels are compiled once by a rule; the folder is named by the state of their sources.
 KERNELS_READY = os.path.join(use_kernel_cache(inherit=not workflow.is_main_process), "ready.json")

@@ -6,7 +6,7 @@ A test compares these lists with what the scripts of the jobs import.
 
 from __future__ import annotations
 
-from fusetune.storage.digest import source_digest
+from fusetune.storage.digest import source_digests
 
 BASE = (
     "check.py",
@@ -103,6 +103,6 @@ JOB_SOURCES = {
 """Kind of job → files and folders of the package."""
 
 
-def job_digest(kind: str) -> str:
-    """One figure for the state of the sources of a kind of job, one of `JOB_SOURCES`."""
-    return source_digest(*JOB_SOURCES[kind])
+def job_digests() -> dict[str, str]:
+    """One figure for the state of the sources of each kind of job."""
+    return source_digests(JOB_SOURCES)

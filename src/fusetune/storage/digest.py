@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
@@ -23,12 +24,25 @@ def source_digest(*parts: str) -> str:
     FileNotFoundError
         A part does not exist.
     """
-    digest = hashlib.sha256()
-    for file in sorted({file for part in parts for file in _source_files(part)}):
-        name, content = file.relative_to(_PACKAGE_FOLDER).as_posix(), file.read_bytes()
-        digest.update(f"{name}\0{len(content)}\0".encode())
-        digest.update(content)
-    return digest.hexdigest()
+    return source_digests({"these": parts})["these"]
+
+
+def source_digests(kinds: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """`source_digest` of several lists of parts; each file is read once."""
+    files = {part: _source_files(part) for part in {part for parts in kinds.values() for part in parts}}
+    read = {file: _named(file) for file in {file for of_part in files.values() for file in of_part}}
+    digests = {}
+    for kind, parts in kinds.items():
+        digest = hashlib.sha256()
+        for file in sorted({file for part in parts for file in files[part]}):
+            digest.update(read[file])
+        digests[kind] = digest.hexdigest()
+    return digests
+
+
+def _named(file: Path) -> bytes:
+    name, content = file.relative_to(_PACKAGE_FOLDER).as_posix(), file.read_bytes()
+    return f"{name}\0{len(content)}\0".encode() + content
 
 
 def _source_files(part: str) -> list[Path]:
