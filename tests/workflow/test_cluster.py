@@ -67,9 +67,12 @@ def test_a_changed_present_replays_only_the_present_set_and_jobs_elsewhere_find_
         for name in ("tell/first.log", "analyze/first.log")
     }
     assert replayed["tell/first.log"] == "told: delays"
-    # two flights measure what the vehicle is told otherwise: config/vehicles/quadrotor.yaml has less ground effect than
+    # by the present set all others are measured; what flew is replayed as it was.
+    # Two flights measure what the vehicle is told otherwise: config/vehicles/quadrotor.yaml has less ground effect than
     # PX4's default of 4 m
-    assert replayed["analyze/first.log"] == "replayed or scored: present, ground_effect_mended; up to date: 3"
+    assert (
+        replayed["analyze/first.log"] == "replayed or scored: present, low, high, ground_effect_mended; up to date: 1"
+    )
     decision = json.loads((results / "apply" / "decision.json").read_text(encoding="utf-8"))
     assert "ground_effect_mended" in {one["set"] for one in decision["sets"]}
     assert "effect.ground_effect" in {one["id"] for one in decision["findings"]}

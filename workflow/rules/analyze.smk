@@ -43,6 +43,7 @@ rule analyze_flight:
         kernels=KERNELS_READY,
         delays=ancient("results/analyze/delays.json") if MENDS_DELAYS else [],
         effects=ancient("results/analyze/effects.json") if MENDS_DELAYS else [],
+        joined=when_delays_are_joined,
         found="results/search/found.json" if SEARCH else [],
     output:
         update(REPLAYED_FILES),

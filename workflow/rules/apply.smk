@@ -9,6 +9,7 @@ rule decide:
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
         # asked for so that a file that was taken away is made again
         tables=of_replayable_flights(SCORED_FILES),
+        joined=when_delays_are_joined,
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
         effects="results/analyze/effects.json" if MENDS_DELAYS else [],
         diagnoses=of_replayable_flights("results/analyze/{flight}/diagnosis.json"),

@@ -75,18 +75,34 @@ def sets_of_analysis(wildcards):
     return {**SETS.overrides(SETS.replayed, present.parameters), **around, **mended, **effect_overrides(wildcards)}
 
 
+def when_delays_are_joined(wildcards):
+    """Input function, which gives no file: Snakemake plans a job anew behind a checkpoint, and asks again for its
+    parameters, only where its input waits for that."""
+    if MENDS_DELAYS:
+        checkpoints.join_delays.get()
+    return []
+
+
+def read_joined(path):
+    """What all flights tell together; of a checkpoint that was planned and is then not run Snakemake would not say that it
+    is done, and begin jobs whose parameters are to be determined."""
+    if not os.path.exists(path):
+        checkpoints.join_delays.get()
+    return read_once(read_document, path)
+
+
 def mended_delays():
     """Parameters of delays that are proved wrong, with the values to set."""
     if not MENDS_DELAYS:
         return {}
-    return read_once(read_document, checkpoints.join_delays.get().output.delays)["mended"]
+    return read_joined("results/analyze/delays.json")["mended"]
 
 
 def effect_values():
     """Sets that take single effects as the flights measure them, with what they change."""
     if not MENDS_DELAYS or not SETTINGS.effects.try_measured:
         return {}
-    return read_once(read_document, checkpoints.join_delays.get().output.effects)["sets"]
+    return read_joined("results/analyze/effects.json")["sets"]
 
 
 def effects_are_mended():

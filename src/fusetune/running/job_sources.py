@@ -27,6 +27,7 @@ _SCORED = (
     "analyze/metrics",
     "analyze/reconstruction",
     "analyze/replaying",
+    "analyze/scored_sets.py",
     "analyze/scoring",
     "analyze/scored_sets.py",
     "analyze/sensors",
