@@ -15,7 +15,6 @@ from fusetune.storage.documents import read_document
 from fusetune.save import read_present
 from fusetune.save.discovery import printable
 
-
 REPLAYED_FILES = [f"results/analyze/{{flight}}/{pset}.{part}" for pset in (PRESENT, AS_FLOWN) for part in PARTS]
 """The replays that are kept of a flight."""
 
