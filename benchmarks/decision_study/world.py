@@ -15,7 +15,7 @@ from fusetune.apply.criteria import criteria, metrics_of, paper_entries
 from fusetune.apply.evidence import AimEvidence, AnalyzedFlight, FlightEvidence, read_flights
 from fusetune.apply.paper_mode import paper_ranking
 from fusetune.apply.settings import DecisionSettings
-from fusetune.apply.vetoes import vetoes
+from fusetune.apply.vetoes import break_rates, vetoes
 from fusetune.storage.documents import read_document
 
 from .old_rule import AIDED, UNAIDED, old_vetoes, read_old_aims, read_old_evidence
@@ -171,8 +171,8 @@ def read_world(
 def _vetoed(
     sets: Sequence[str], flights: Sequence[AnalyzedFlight], settings: DecisionSettings
 ) -> dict[str, Sequence[str]]:
-    metrics = metrics_of(flights)
-    reasons = {one: vetoes(one, sets[0], flights, metrics, settings) for one in sets[1:]}
+    rates = break_rates(metrics_of(flights))
+    reasons = {one: vetoes(one, sets[0], flights, rates, settings) for one in sets[1:]}
     return {one: why for one, why in reasons.items() if why}
 
 

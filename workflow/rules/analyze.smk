@@ -29,7 +29,7 @@ if MENDS_DELAYS:
 
 
 # Where cores are more than flights, a flight has several, for its sets are worked on side by side. No figure depends on it.
-THREADS_OF_A_FLIGHT = max(1, min(MOST_THREADS_OF_A_FLIGHT, (workflow.cores or 1) // max(1, len(LOGS))))
+THREADS_OF_A_FLIGHT = max(1, min(MOST_THREADS_OF_A_FLIGHT, CORES // max(1, len(LOGS))))
 
 
 # All sets of a flight are one job's work. Of those that follow from what the flights show it is known too late that they
@@ -82,6 +82,7 @@ rule join_conformance:
         conformance=expand("results/analyze/{flight}/conformance.json", flight=LOGS),
         listed="results/save/flights.csv",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        joined=when_delays_are_joined,
     output:
         legs="results/analyze/legs.parquet",
         missions="results/analyze/missions.json",

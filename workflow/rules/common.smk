@@ -22,6 +22,9 @@ SCORED_FILES = [f"results/analyze/{{flight}}/{name}" for name in FLIGHT_FILES]
 """What the analysis of a flight leaves beside them."""
 
 
+# `workflow.cores` is an error where jobs run elsewhere and nobody gave a number.
+CORES = workflow.resource_settings.cores or 1
+
 MENDS_DELAYS = SETTINGS.delays.mend
 
 TOLD_FILES = [*DIAGNOSED_FILES, TRACK_FILE, CONFORMANCE_FILE, *([DELAYS_FILE] if MENDS_DELAYS else [])]
@@ -75,8 +78,9 @@ def sets_of_analysis(wildcards):
 
 
 def when_delays_are_joined(wildcards):
-    """Input function, which gives no file: Snakemake plans a job anew behind a checkpoint, and asks again for its
-    parameters, only where its input waits for that."""
+    """Input function, which gives no file, of the job that scores and of all that read scores: Snakemake plans a job anew
+    behind a checkpoint, and asks again for its parameters, only where its input waits for that; what reads scores
+    would else begin before it is known that they have to be made anew."""
     if MENDS_DELAYS:
         checkpoints.join_delays.get()
     return []

@@ -17,6 +17,7 @@ rule plot_flight:
     input:
         flight="results/save/{flight}",
         scores="results/analyze/{flight}/scoring.json",
+        joined=when_delays_are_joined,
     output:
         report(
             "results/report/flights/{flight}.png",
@@ -158,6 +159,7 @@ rule fleet_page:
 rule plot_summary:
     input:
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        joined=when_delays_are_joined,
         decision="results/apply/decision.json",
         sensitivity="results/apply/sensitivity.json",
     output:
@@ -189,6 +191,7 @@ rule build_report:
     input:
         flights="results/save/flights.parquet",
         scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        joined=when_delays_are_joined,
         figures=of_replayable_flights("results/report/flights/{flight}.png"),
         summary=rules.plot_summary.output,
         decision="results/apply/decision.json",

@@ -2,7 +2,7 @@
 # follows from the study alone; those that a search does not need ask for nothing.
 from fusetune.apply.search.plan import planned_rounds
 
-SEARCH_THREADS = workflow.cores or 1 if SEARCH and not FLIGHT_BY_FLIGHT else 1
+SEARCH_THREADS = CORES if SEARCH and not FLIGHT_BY_FLIGHT else 1
 KEPT_PAIRS = "results/tried"
 
 

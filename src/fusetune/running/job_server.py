@@ -35,6 +35,7 @@ from pathlib import Path
 
 from fusetune.running import job_client
 from fusetune.running.worker_processes import end_with_parent
+from fusetune.storage.files import AnyPath
 
 HAND_OVER_WITHIN_S = 30.0
 LONGEST_ADDRESS = 100
@@ -67,7 +68,7 @@ class JobServer:
 
 
 def start_job_server(
-    shell: str | None, scripts: Path, ahead: Iterable[str], prepare: str, when: str
+    shell: str | None, scripts: AnyPath, ahead: Iterable[str], prepare: str, when: str
 ) -> JobServer | None:
     """Start a server for the jobs of this process.
 
@@ -103,7 +104,7 @@ def start_job_server(
             listening.bind(os.fspath(address))
             listening.listen(socket.SOMAXCONN)
             number = listening.fileno()
-            given = [str(number), str(folder), str(scripts), prepare, when, *ahead]
+            given = [str(number), str(folder), os.fspath(scripts), prepare, when, *ahead]
             command = [sys.executable, "-P", "-m", __name__, *given]
             # so many threads as Snakemake lets a job of one core have
             environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
@@ -179,7 +180,7 @@ class Server:
         As of `start_job_server`.
     """
 
-    def __init__(self, listening: socket.socket, ahead: Iterable[Path], prepare: str, when: str) -> None:
+    def __init__(self, listening: socket.socket, ahead: Iterable[AnyPath], prepare: str, when: str) -> None:
         self.listening = listening
         self.prepare, self.when = prepare, when
         self.is_prepared = False
@@ -187,7 +188,7 @@ class Server:
         self.at_work: dict[socket.socket, _Copy] = {}
         self.imported: set[str] = set()
         self.learned: dict[frozenset[str], list[str]] = {}
-        self.ahead = [name for script in ahead for name in sorted(imports_of(script.read_bytes()))]
+        self.ahead = [name for script in ahead for name in sorted(imports_of(Path(script).read_bytes()))]
         # what jobs do when somebody presses Ctrl-C; the server itself ends with its run
         self.interrupt = signal.getsignal(signal.SIGINT)
         signal.signal(signal.SIGINT, signal.SIG_IGN)

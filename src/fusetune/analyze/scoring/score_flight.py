@@ -70,8 +70,8 @@ def read_onboard(analyze_folder: AnyPath) -> Mapping[SourceAxis, AxisSamples]:
 class ScoresWriter:
     """Takes the scores of one set after the other; `scores_writer` makes one."""
 
-    def __init__(self, folder: Path, takers: Mapping[str, Any]) -> None:
-        self._folder, self._takers = folder, takers
+    def __init__(self, folder: AnyPath, takers: Mapping[str, Any]) -> None:
+        self._folder, self._takers = Path(folder), takers
         self._summaries: dict[str, dict[str, Any]] = {}
 
     def take(self, name: str, scores: SetScores) -> None:
