@@ -146,7 +146,9 @@ def _analysis(saved: Path, analysis: Path, steps: dict[str, int]) -> Callable[[]
     sets = FlightSets({pset.name: pset.overrides for pset in load_study(STUDY).sets})
     present = {name: values[name] for name in sets.varied if name in values}
     replayed = sets.overrides(sets.replayed, present)
-    return lambda: room.analyze_flight(saved, analysis, replayed, sets.scored)
+    # as in the workflow, which keeps what was made of the same; without, all scores would stay in memory
+    made_with = {"made_with": room.MadeWith("", "")} if hasattr(room, "MadeWith") else {}
+    return lambda: room.analyze_flight(saved, analysis, replayed, sets.scored, **made_with)
 
 
 def _peak_of(work: Callable[[], object]) -> int:

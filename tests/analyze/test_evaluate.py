@@ -16,11 +16,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fusetune.analyze import scored_sets
+
 from fusetune.analyze.analyze_flight import AnalysisSettings, MadeWith, analyze_flight, grade_saved_flight
 from fusetune.analyze.evaluate import evaluate
 from fusetune.analyze.flight_files import FLIGHT_FILES, KEPT_SCORES_FILE, SAMPLES_FILE, SCORE_TABLES, SCORING_FILE
 from fusetune.analyze.reconstruction.reconstructed_flight import BARO, IMU, MAG
+from fusetune.analyze.replaying import prepared_flight
 from fusetune.analyze.replaying.prepared_flight import prepare_flight
 from fusetune.analyze.replaying.replay_flight import replay_set
 from fusetune.analyze.replaying.store.parts import TABLES, replay_files, table_file
@@ -137,7 +138,7 @@ def test_one_more_set_costs_only_its_own(
         return analyze_flight(saved, folder, sets, names, made_with=made_with, threads=threads)
 
     with monkeypatch.context() as long:
-        long.setattr(scored_sets, "MOST_IN_MEMORY", 0)
+        long.setattr(prepared_flight, "MOST_IN_MEMORY", 0)
         long.setattr(yardstick, "MOST_KEPT_STATES", 0)
         assert analyze(whole, list(SETS), threads=2) == ("present", "as_flown", "delayed", "narrow")
     assert any(source.startswith("truth_") for source in read_table(whole / "metrics.parquet")["source"].to_pylist())

@@ -148,6 +148,8 @@ class _FlightAtWork:
 
     def scored_flight(self) -> ScoredFlight:
         """What scores need of the flight; the grade must be written."""
+        self.forget_schedules()
+        give_back_freed_memory()
         flight = self.compared.flight.with_more(canonical(load_flight(self._flight_folder, topics=REFERENCE_TOPICS)))
         onboard = self._folder / ONBOARD_FILE
         if not onboard.exists():
@@ -155,9 +157,16 @@ class _FlightAtWork:
         scored = scored_flight(flight, self._settings.scoring, read_onboard(self._folder))
         # what is left of the log the replays of the other sets do not read
         del self.compared
-        self.prepared = self.prepared.with_flight(flight.with_topics({}))
+        self.prepared = self.prepared.for_replays_alone()
         give_back_freed_memory()
         return scored
+
+    def forget_schedules(self) -> None:
+        """Of a long flight, let go what its replays share: to work it out anew takes a tenth of a replay."""
+        if self.prepared.is_long:
+            self.prepared = self.prepared.without_schedules()
+            if "compared" in self.__dict__:
+                self.compared = self.prepared.with_flight(self.compared.flight)
 
     def scores_made_of(self) -> Any:
         """What the scores of any set follow from; None where they are not to be kept."""
@@ -199,7 +208,9 @@ class _FlightAtWork:
         key = key_of([self.scores_made_of(), asdict(self._settings.trust)])
         if self._made_with is not None and not anew and ledger.is_current(AS_FLOWN, key, files):
             return
+        self.forget_schedules()
         flight = self.compared.flight
+        give_back_freed_memory()
         write_onboard(self._folder / ONBOARD_FILE, onboard_samples(flight))
         flight = with_onboard_columns(flight, COMPARED_SOURCES)
         self.compared = prepared = self.compared.with_flight(flight)

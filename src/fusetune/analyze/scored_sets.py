@@ -30,9 +30,6 @@ from fusetune.storage.files import AnyPath
 from fusetune.storage.freed_memory import give_back_freed_memory
 from fusetune.storage.ledger import key_of
 
-MOST_IN_MEMORY = 150_000
-"""IMU samples of a flight, some ten minutes, up to which all that a replay records is kept in memory."""
-
 SCRATCH_PREFIX = ".scoring-"
 """Of folders for the replays of longer ones."""
 
@@ -44,6 +41,8 @@ class SavedFlight(Protocol):
     def prepared(self) -> PreparedFlight: ...
 
     def scored_flight(self) -> ScoredFlight: ...
+
+    def forget_schedules(self) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -133,13 +132,18 @@ class _SetsAtWork:
         self.yardstick.make()
         give_back_freed_memory()
         if threads <= 1:
-            yield from ((name, self._scores(name)) for name in names)
+            for name in names:
+                yield name, self._scores(name, alone=True)
             return
         with ThreadPoolExecutor(threads) as pool:
             yield from zip(names, pool.map(self._scores, names), strict=True)
 
-    def _scores(self, name: str) -> SetScores:
+    def _scores(self, name: str, alone: bool = False) -> SetScores:
         with self._record(name) as record:
+            if alone:
+                # where several are at work the others may be replayed with them
+                self._flight.forget_schedules()
+                give_back_freed_memory()
             scores = score_set(self.yardstick, record)
         give_back_freed_memory()
         return scores
@@ -151,15 +155,11 @@ class _SetsAtWork:
             yield present
         elif self._antenna is not None and name == self._antenna.name:
             yield self._antenna
-        elif recording is FULL and self._is_long:
+        elif recording is FULL and self._flight.prepared.is_long:
             with TemporaryDirectory(prefix=SCRATCH_PREFIX, dir=self._folder) as scratch:
                 yield self._replayed_on_disk(name, scratch)
         else:
             yield self._replayed(name, recording)
-
-    @property
-    def _is_long(self) -> bool:
-        return len(self._flight.prepared.inputs.arrays.imu) > MOST_IN_MEMORY
 
     def _replayed(self, name: str, recording: Recording) -> ReplayedSet:
         overrides = self._asked.sets[name]

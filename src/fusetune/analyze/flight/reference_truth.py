@@ -20,9 +20,10 @@ from fusetune.quaternions import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 
+GROUND_TRUTH_TOPICS = ("vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth")
+
 TRUTH_TOPICS = (
-    "vehicle_local_position_groundtruth",
-    "vehicle_attitude_groundtruth",
+    *GROUND_TRUTH_TOPICS,
     "vehicle_mocap_odometry",
     "vehicle_visual_odometry",
     "vehicle_gps_position",

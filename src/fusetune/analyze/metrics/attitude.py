@@ -7,6 +7,9 @@ from fusetune.quaternions import conjugate, multiply, rotation_vector
 
 Array = npt.NDArray[np.float64]
 
+_ROWS_AT_ONCE = 1 << 16
+"""Some minutes of flight: what is made on the way is several times as large as the result."""
+
 
 def interpolate(time: npt.NDArray[np.int64], values: Array, at: npt.NDArray[np.int64]) -> Array:
     """Linear interpolation of (N, D) values at times (M,), µs → (M, D)."""
@@ -40,4 +43,8 @@ def wrap(angle: Array) -> Array:
 
 def error_in_ned(quaternion: Array, true_quaternion: Array) -> Array:
     """Rotation vectors (N, 3), rad, in NED that turn the true attitude into the estimated one."""
-    return rotation_vector(multiply(quaternion, conjugate(true_quaternion)))
+    error = np.empty((len(quaternion), 3))
+    for first in range(0, len(quaternion), _ROWS_AT_ONCE):
+        part = slice(first, first + _ROWS_AT_ONCE)
+        error[part] = rotation_vector(multiply(quaternion[part], conjugate(true_quaternion[part])))
+    return error

@@ -26,6 +26,7 @@ from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.recording import FULL, RecordArrays, Recording
 from fusetune.ekf2.replay.replay import replay, replay_into
 from fusetune.ekf2.replay.results import Gap, ReplayResult, ReplaySummary
+from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.logged_state import Handover, logged_handovers
 from fusetune.px4.layouts.release_layouts import canonical
@@ -34,6 +35,9 @@ Summary = TypeVar("Summary", bound=ReplaySummary)
 
 REPLAY_TOPICS = (*dict.fromkeys((*RECONSTRUCTION_TOPICS, *START_TOPICS)),)
 """What a replay reads of a saved flight."""
+
+MOST_IN_MEMORY = 150_000
+"""IMU samples of a flight, some ten minutes, up to which all that its replays share and record is kept in memory."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,26 @@ class PreparedFlight:
     def with_flight(self, flight: Flight) -> PreparedFlight:
         """The same flight with other topics of its log which no replay reads."""
         return dataclasses.replace(self, flight=flight)
+
+    def for_replays_alone(self) -> PreparedFlight:
+        """The same flight without what of its log no replay reads once it is prepared."""
+        reconstructed, sensors = self.reconstructed, {sensor.topics[0].name for sensor in SENSORS.values()}
+        read = {
+            key: table
+            for key, table in reconstructed.flight.topics.items()
+            if key[0] in reconstructed.measured and key[0] in sensors
+        }
+        reconstructed = dataclasses.replace(reconstructed, flight=reconstructed.flight.with_topics(read))
+        return dataclasses.replace(self, flight=self.flight.with_topics({}), reconstructed=reconstructed)
+
+    def without_schedules(self) -> PreparedFlight:
+        """The same flight without what its replays have worked out so far and share: the next one works it out anew."""
+        return dataclasses.replace(self, inputs=dataclasses.replace(self.inputs))
+
+    @property
+    def is_long(self) -> bool:
+        """Whether what follows from it is too large to keep all in memory."""
+        return len(self.inputs.arrays.imu) > MOST_IN_MEMORY
 
     def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the summary of a replay: how it started and what was reconstructed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -44,21 +44,18 @@ def block_rows(flight: str, set_name: str, samples: AxesTogether, edges: npt.NDA
         "block": pa.array(np.tile(parts.number.astype(np.int32), axes)),
         "n": pa.array(np.tile(parts.counts.astype(np.int64), axes)),
     }
-    for name, scores in _scores(samples).items():
+    for name, scores in _scores(samples):
         columns[name] = pa.array(np.add.reduceat(scores, parts.starts, axis=1).ravel())
     return pa.table(columns, schema=BLOCK_SCHEMA)
 
 
-def _scores(samples: AxesTogether) -> Mapping[str, npt.NDArray[np.float64]]:
-    """Of each axis and sample, (A, N)."""
+def _scores(samples: AxesTogether) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
+    """Of each axis and sample, (A, N); one after the other, for each is as large as the innovations."""
     given = samples.innovations
     innovation, variance = given.innovation[0], given.innovation_variance[0]
-    clipped = winsorised(innovation, given.winsor_limits()[0])
-    return {
-        "sum_squared_innovation": np.square(innovation),
-        "sum_nis": np.square(innovation) / variance,
-        "sum_nis_winsorised": np.square(clipped) / variance,
-        "sum_log_variance": np.log(variance),
-        "sum_nll": gaussian_nll(innovation, variance),
-        "sum_nll_student_t": student_t_nll(innovation, variance),
-    }
+    yield "sum_squared_innovation", np.square(innovation)
+    yield "sum_nis", np.square(innovation) / variance
+    yield "sum_nis_winsorised", np.square(winsorised(innovation, given.winsor_limits()[0])) / variance
+    yield "sum_log_variance", np.log(variance)
+    yield "sum_nll", gaussian_nll(innovation, variance)
+    yield "sum_nll_student_t", student_t_nll(innovation, variance)

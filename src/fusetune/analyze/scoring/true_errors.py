@@ -56,11 +56,12 @@ def true_errors(
     """
     if truth.own_north:
         truth = _turned_north(truth, states, window)
-    outputs = _outputs(record, states, truth, window)
-    figures: list[ErrorFigure] = []
-    if outputs.time.size > 1:
-        figures += _position_figures(record, states, outputs, truth, confidence)
-    return figures + _state_figures(states, truth, window, confidence)
+    # one after the other, so that no two are in memory with what they are made of
+    return [
+        *_position_figures(record, states, _outputs(record, states, truth, window), truth, confidence),
+        *_velocity_figures(states, truth, window, confidence),
+        *_attitude_figures(states, truth, window, confidence),
+    ]
 
 
 def _outputs(record: ReplayedSet, states: FilterStates, truth: Truth, window: ScoringWindow) -> _Outputs:
@@ -91,6 +92,8 @@ def _position_figures(
 ) -> list[ErrorFigure]:
     time = outputs.time
     figures: list[ErrorFigure] = []
+    if time.size < 2:
+        return figures
     known = truth.velocity if truth.velocity.size else np.gradient(truth.position, truth.time * 1e-6, axis=0)
     true_velocity = interpolate(truth.time, known, time)
     if truth.velocity.size:
@@ -118,24 +121,30 @@ def _origin_offset(record: ReplayedSet, truth: Truth) -> Array | None:
     return np.array([north, east, altitude - origin["altitude_m"]])
 
 
-def _state_figures(states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float) -> list[ErrorFigure]:
-    time, figures = states.time, []
-    scored = window.contains(time)
-    rows = scored & truth.known_at(time)
-    if np.count_nonzero(rows) > 1 and truth.velocity.size:
-        velocity = states.velocity[rows]
-        if any(truth.lever_arm):
-            velocity = velocity + np.gradient(_arm(states, truth, time[rows]), time[rows] * 1e-6, axis=0)
-        error = velocity - interpolate(truth.time, truth.velocity, time[rows])
-        figures += nees_figures("velocity", "all", time[rows], error, states.velocity_variance[rows], confidence)
-    rows = scored & truth.known_at(time, attitude=True)
-    if np.count_nonzero(rows) > 1:
-        true_attitude = interpolate_quaternion(truth.attitude_time, truth.quaternion, time[rows])
-        figures += attitude_figures(states.quaternion[rows], true_attitude)
-        error = attitude_error(states.quaternion[rows], true_attitude)
-        variance = states.attitude_variance[rows]
-        figures += nees_figures("attitude", "all", time[rows], error, variance, confidence)
-    return figures
+def _velocity_figures(
+    states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
+) -> list[ErrorFigure]:
+    rows = window.contains(states.time) & truth.known_at(states.time)
+    if np.count_nonzero(rows) < 2 or not truth.velocity.size:
+        return []
+    time, velocity = states.time[rows], states.velocity[rows]
+    if any(truth.lever_arm):
+        velocity = velocity + np.gradient(_arm(states, truth, time), time * 1e-6, axis=0)
+    error = velocity - interpolate(truth.time, truth.velocity, time)
+    return nees_figures("velocity", "all", time, error, states.velocity_variance[rows], confidence)
+
+
+def _attitude_figures(
+    states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
+) -> list[ErrorFigure]:
+    rows = window.contains(states.time) & truth.known_at(states.time, attitude=True)
+    if np.count_nonzero(rows) < 2:
+        return []
+    time, attitude = states.time[rows], states.quaternion[rows]
+    true_attitude = interpolate_quaternion(truth.attitude_time, truth.quaternion, time)
+    figures = attitude_figures(attitude, true_attitude)
+    error = attitude_error(attitude, true_attitude)
+    return figures + nees_figures("attitude", "all", time, error, states.attitude_variance[rows], confidence)
 
 
 def _turned_north(truth: Truth, states: FilterStates, window: ScoringWindow) -> Truth:

@@ -6,7 +6,7 @@ So a set has the same scores whichever others there are, and one that is added c
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.flight.phases import airborne_intervals
-from fusetune.analyze.flight.reference_truth import Truth, read_references
+from fusetune.analyze.flight.reference_truth import GROUND_TRUTH_TOPICS, Truth, read_references
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
 from fusetune.analyze.scoring.ground_metrics import ground_window
@@ -159,3 +159,6 @@ class Yardstick:
         if self.window.intervals:
             _ = self.masks, self.gaps, self.whiteness, self.references, self.smoothed
         _ = self.ground_masks, self.present.first_fused, self.present.reset_times
+        # the references stand for it
+        rest = {key: table for key, table in self.flight.topics.items() if key[0] not in GROUND_TRUTH_TOPICS}
+        self.scored = replace(self.scored, flight=self.flight.with_topics(rest))

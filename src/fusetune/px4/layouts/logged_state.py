@@ -198,7 +198,8 @@ class _InstanceStates:
         if self._layout is None or self._local is None:
             return None
         flight, instance, layout, time = self._flight, self._instance, self._layout, int(self.horizons[row])
-        states, q = self._states[row], self._states[row, :4]
+        states = self._states[row].copy()  # those of the whole flight need not stay for one
+        q = states[:4]
         norm = float(np.linalg.norm(q))
         if not abs(norm - 1.0) < MAX_NORM_ERROR:
             return None
