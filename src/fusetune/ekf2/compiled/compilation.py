@@ -18,14 +18,29 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
-from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
-from numba.core import codegen, compiler, config, event, typed_passes, types, untyped_passes
+from numba.core import ir as numba_ir
+from numba.core import (
+    base,
+    codegen,
+    compiler,
+    config,
+    cpu,
+    event,
+    interpreter,
+    lowering,
+    postproc,
+    transforms,
+    typed_passes,
+    typeinfer,
+    types,
+    untyped_passes,
+)
 
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
 from fusetune.ekf2.compiled.kernel_locator import KernelLocator
@@ -152,8 +167,16 @@ def joined_without_optimising() -> Iterator[None]:
     finalize, pointer, set_env = library.finalize, library.get_pointer_to_function, native.set_env
     add_module, compile_function = library.add_llvm_module, compiler.CompilerBase.compile_extra
     passes, call_type = compiler.DefaultPassBuilder.define_nopython_pipeline, types.BaseFunction.get_call_type
+    size_of = base.BaseContext.get_abi_sizeof
     depth = 0
     call_types: dict[Any, Any] = {}
+    sizes: dict[str, int] = {}
+
+    def remembered_size(self, llvm_type):  # type: ignore[no-untyped-def]
+        name = str(llvm_type)
+        if name not in sizes:
+            sizes[name] = size_of(self, llvm_type)
+        return sizes[name]
 
     def passes_that_act(state, name="nopython"):  # type: ignore[no-untyped-def]
         manager = compiler.PassManager(name)
@@ -219,17 +242,29 @@ def joined_without_optimising() -> Iterator[None]:
         (compiler.CompilerBase, "compile_extra", compile_without_wrappers),
         (compiler.DefaultPassBuilder, "define_nopython_pipeline", staticmethod(passes_that_act)),
         (types.BaseFunction, "get_call_type", remembered_call_type),
-        (event, "broadcast", _tell_nobody),
+        (lowering.Lower, "delvar", _nothing),
+        (lowering, "new_error_context", _no_context),
+        (typeinfer, "new_error_context", _no_context),
+        (numba_ir.Inst, "_rec_list_vars", _variables_in),
+        (postproc.PostProcessor, "run", _canonicalize),
+        (interpreter, "peep_hole_delete_with_exit", _as_it_is),
+        (interpreter, "peep_hole_fuse_dict_add_updates", _as_it_is),
+        (cpu.CPUContext, "get_abi_sizeof", remembered_size),
+        (event, "start_event", _nothing),
+        (event, "end_event", _nothing),
         (types.Record, "__repr__", _short_repr),
     )
-    originals = [getattr_static(owner, name) for owner, name, _ in patches]
+    originals = [vars(owner).get(name) for owner, name, _ in patches]
     try:
         for owner, name, replacement in patches:
             setattr(owner, name, replacement)
         yield
     finally:
         for (owner, name, _), original in zip(patches, originals, strict=True):
-            setattr(owner, name, original)
+            if original is None:
+                delattr(owner, name)
+            else:
+                setattr(owner, name, original)
 
 
 def _link_all_called(entry: Any) -> None:
@@ -270,8 +305,57 @@ def _with_all_they_call(libraries: Iterable[Any], found: dict[Any, None] | None 
     return found
 
 
-def _tell_nobody(_: object) -> None:
-    """Numba times itself by some hundred thousand events, each told to every function that is being compiled."""
+def _nothing(*_: object, **__: object) -> None:
+    """Numba times itself by some hundred thousand events, and empties variables that own nothing when they end."""
+
+
+def _as_it_is(blocks: Any) -> Any:
+    """Kernels have no `with` and no dictionaries that could be simplified."""
+    return blocks
+
+
+NO_CONTEXT = nullcontext()
+
+
+def _no_context(*_: object, **__: object) -> nullcontext[None]:
+    """In place of what adds the lines of the source to an error; there is none when the usual way compiles."""
+    return NO_CONTEXT
+
+
+HOLD_NO_VARIABLES = frozenset((str, int, float, bool, type(None), numba_ir.Loc, numba_ir.Scope))
+
+
+def _variables_in(_: object, value: Any) -> list[Any]:
+    """Variables that Numba's own representation of a statement mentions, looked for without a call for every part."""
+    found: list[Any] = []
+    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else (value,):
+        kind = type(part)
+        if kind in HOLD_NO_VARIABLES:
+            continue
+        if kind is numba_ir.Var:
+            found.append(part)
+        elif isinstance(part, numba_ir.Inst):
+            found += part.list_vars()
+        elif isinstance(part, list | tuple | dict):
+            found += _variables_in(None, part)
+    return found
+
+
+def _canonicalize(processor: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """Bring the blocks of a function in order, without what generators need and without the ends of variables.
+
+    At the end of variables their references are counted down, and kernels have none. At their first `Del`, though,
+    Numba makes room for them, which those need that blocks pass to one another.
+    """
+    function = processor.func_ir
+    function.blocks = transforms.canonicalize_cfg(function.blocks)
+    function.variable_lifetime = postproc.VariableLifetime(function.blocks)
+    function.generator_info = None
+    if emit_dels:
+        passed_on = set().union(*function.variable_lifetime.usedefs.usemap.values())
+        first = function.blocks[min(function.blocks)]
+        for name in sorted(passed_on, reverse=True):
+            first.prepend(numba_ir.Del(name, loc=first.loc))
 
 
 def _short_repr(record: types.Record) -> str:
@@ -287,7 +371,7 @@ def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = 
     options : of the command line; with `PLAIN` Numba compiles its own way
     """
     os.environ[CHILD_MARK] = "1"
-    gc.set_threshold(200_000)  # hardly anything of what compiling makes is ever let go
+    gc.disable()  # hardly anything of what compiling makes is ever let go
     with nullcontext() if PLAIN in options else joined_without_optimising():
         call_entry()
     folder = kernel_folder()
