@@ -16,7 +16,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-
 from fusetune.analyze.analyze_flight import AnalysisSettings, MadeWith, analyze_flight, grade_saved_flight
 from fusetune.analyze.evaluate import evaluate
 from fusetune.analyze.flight_files import FLIGHT_FILES, KEPT_SCORES_FILE, SAMPLES_FILE, SCORE_TABLES, SCORING_FILE

@@ -11,6 +11,7 @@ Array = npt.NDArray[np.float64]
 
 LJUNG_BOX_LAGS = 10
 MAXIMUM_LAGS = 50
+_MOST_AT_ONCE = 300_000
 
 
 def autocorrelation(values: Array, lags: int) -> Array:
@@ -25,6 +26,10 @@ def autocorrelation(values: Array, lags: int) -> Array:
     -------
     (..., lags) array; 0 where the values do not vary
     """
+    if values.ndim > 1 and values.size > _MOST_AT_ONCE:
+        # the spectra of an hour's axes need not be in memory at once
+        rows = [autocorrelation(row, lags) for row in values.reshape(-1, values.shape[-1])]
+        return np.stack(rows).reshape(*values.shape[:-1], lags)
     centred = values - mean_of_samples(values)[..., None]
     power = np.sum(np.square(centred), axis=-1)
     # Sums of products at all lags at once: the transform of the power spectrum, padded so that nothing wraps around.

@@ -34,6 +34,10 @@ from fusetune.analyze.scoring.window_scores import (
 )
 from fusetune.px4.aid_sources import MEASURED_SOURCES
 from fusetune.set_names import ONBOARD
+from fusetune.storage.freed_memory import give_back_freed_memory
+
+_MANY_SAMPLES = 300_000
+"""Of a source of an hour's flight: the C library keeps arrays of its figures when they are freed."""
 
 SAMPLES_SCHEMA = pa.schema(
     [
@@ -127,6 +131,11 @@ def score_samples(
             # of what is sampled at every update the samples would fill the disk, and no plot shows them
             if not MEASURED_SOURCES[together.source].every_update:
                 samples += together.samples
+            is_large = together.time.size > _MANY_SAMPLES
+            # with what its figures were made of: the next source's need the room
+            del together, compared
+            if is_large:
+                give_back_freed_memory()
     return SampleScores(
         pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
         window_rows(table.flight, set_name, windows, wide_edges),

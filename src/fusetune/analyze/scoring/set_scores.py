@@ -51,6 +51,7 @@ from fusetune.analyze.scoring.yardstick import Yardstick
 from fusetune.analyze.sensors.source_whiteness import source_whiteness
 from fusetune.analyze.sensors.told_noise import told_noises
 from fusetune.set_names import DELAY_MENDED
+from fusetune.storage.freed_memory import give_back_freed_memory
 
 TABLES = {
     "metrics": METRICS_SCHEMA,
@@ -98,6 +99,8 @@ def score_flight(yardstick: Yardstick) -> SetScores:
         add_onboard(table, yardstick.scored.onboard, window, yardstick.settings, present.parameters)
         states = yardstick.states
         moved = excitation(states.time, states.velocity, states.quaternion, window.intervals)
+        # to smooth the velocity takes as much again
+        del states
         smoothed = yardstick.smoothed
     summary["excitation"] = None if moved is None else moved.document()
     summary["smoothed_reference"] = None if smoothed is None else smoothed.reference.document
@@ -125,6 +128,8 @@ def score_set(yardstick: Yardstick, record: ReplayedSet) -> SetScores:
     found = _of_samples(table, yardstick, record, window)
     gaps = _gaps(yardstick, record, window)
     add_withheld_metrics(table, record.name, gaps)
+    # of a long flight the samples' arrays and those of the states are about as large
+    give_back_freed_memory()
     smoothed = _add_state_figures(table, yardstick, record, window)
     return SetScores(
         table.finished(),

@@ -90,20 +90,26 @@ def _arm(states: FilterStates, truth: Truth, at: npt.NDArray[np.int64]) -> Array
 def _position_figures(
     record: ReplayedSet, states: FilterStates, outputs: _Outputs, truth: Truth, confidence: float
 ) -> list[ErrorFigure]:
-    time = outputs.time
+    time, position, velocity = outputs.time, outputs.position, outputs.velocity
+    # of an hour's flight each of these is 10 MB: what has served goes
+    del outputs
     figures: list[ErrorFigure] = []
     if time.size < 2:
         return figures
     known = truth.velocity if truth.velocity.size else np.gradient(truth.position, truth.time * 1e-6, axis=0)
     true_velocity = interpolate(truth.time, known, time)
     if truth.velocity.size:
-        figures += vector_figures("velocity", outputs.velocity - true_velocity, true_velocity)
-    error = outputs.position - interpolate(truth.time, truth.position, time)
+        figures += vector_figures("velocity", velocity - true_velocity, true_velocity)
+    del known, velocity
+    error = position - interpolate(truth.time, truth.position, time)
+    del position
     offset = _origin_offset(record, truth)
     if offset is not None:
         figures += vector_figures("position", error + offset, true_velocity)
     centred = error - error.mean(axis=0)
+    del error
     figures += vector_figures("position_mean_removed", centred, true_velocity)
+    del true_velocity
     # The variance is that of the fusion horizon, some 0.1 s earlier, over which it hardly changes.
     variance = interpolate(states.time, states.position_variance[:, :2], time)
     return figures + nees_figures(
@@ -144,6 +150,7 @@ def _attitude_figures(
     true_attitude = interpolate_quaternion(truth.attitude_time, truth.quaternion, time)
     figures = attitude_figures(attitude, true_attitude)
     error = attitude_error(attitude, true_attitude)
+    del attitude, true_attitude
     return figures + nees_figures("attitude", "all", time, error, states.attitude_variance[rows], confidence)
 
 
