@@ -24,7 +24,6 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
-from numba.core import ir as numba_ir
 from numba.core import (
     base,
     codegen,
@@ -42,6 +41,7 @@ from numba.core import (
     typing,
     untyped_passes,
 )
+from numba.core import ir as numba_ir
 
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
 from fusetune.ekf2.compiled.kernel_locator import KernelLocator
