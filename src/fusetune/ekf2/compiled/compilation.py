@@ -24,7 +24,6 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
-from numba.core import ir as numba_ir
 from numba.core import (
     base,
     codegen,
@@ -39,8 +38,10 @@ from numba.core import (
     typed_passes,
     typeinfer,
     types,
+    typing,
     untyped_passes,
 )
+from numba.core import ir as numba_ir
 
 from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
 from fusetune.ekf2.compiled.kernel_locator import KernelLocator
@@ -167,10 +168,27 @@ def joined_without_optimising() -> Iterator[None]:
     finalize, pointer, set_env = library.finalize, library.get_pointer_to_function, native.set_env
     add_module, compile_function = library.add_llvm_module, compiler.CompilerBase.compile_extra
     passes, call_type = compiler.DefaultPassBuilder.define_nopython_pipeline, types.BaseFunction.get_call_type
-    size_of = base.BaseContext.get_abi_sizeof
+    size_of, has_loc, type_of_attribute = base.BaseContext.get_abi_sizeof, base._has_loc, typing.Context.resolve_getattr
     depth = 0
     call_types: dict[Any, Any] = {}
     sizes: dict[str, int] = {}
+    with_loc: dict[Any, bool] = {}
+    fields: dict[tuple[types.Record, str], Any] = {}
+
+    def remembered_has_loc(implementation):  # type: ignore[no-untyped-def]
+        code = getattr(implementation, "__code__", None)
+        if code is None or hasattr(implementation, "__wrapped__"):
+            return has_loc(implementation)
+        if code not in with_loc:
+            with_loc[code] = has_loc(implementation)
+        return with_loc[code]
+
+    def remembered_field(self, owner, name):  # type: ignore[no-untyped-def]
+        if not isinstance(owner, types.Record):
+            return type_of_attribute(self, owner, name)
+        if (owner, name) not in fields:
+            fields[owner, name] = type_of_attribute(self, owner, name)
+        return fields[owner, name]
 
     def remembered_size(self, llvm_type):  # type: ignore[no-untyped-def]
         name = str(llvm_type)
@@ -235,6 +253,7 @@ def joined_without_optimising() -> Iterator[None]:
 
     patches: tuple[tuple[Any, str, Any], ...] = (
         (library, "finalize", join),
+        (library, "_optimize_final_module", _optimize_once),
         (library, "add_llvm_module", add_unoptimised),
         (library, "serialize_using_object_code", for_the_cache),
         (library, "get_pointer_to_function", pointer_if_translated),
@@ -250,6 +269,9 @@ def joined_without_optimising() -> Iterator[None]:
         (interpreter, "peep_hole_delete_with_exit", _as_it_is),
         (interpreter, "peep_hole_fuse_dict_add_updates", _as_it_is),
         (cpu.CPUContext, "get_abi_sizeof", remembered_size),
+        (base, "_has_loc", remembered_has_loc),
+        (typing.Context, "resolve_getattr", remembered_field),
+        (numba_ir.Assign, "__str__", object.__repr__),
         (event, "start_event", _nothing),
         (event, "end_event", _nothing),
         (types.Record, "__repr__", _short_repr),
@@ -284,6 +306,12 @@ def _link_all_called(entry: Any) -> None:
         entry._final_module.link_in(part)
     for name in called:
         entry._final_module.get_function(name).linkage = llvm.Linkage.internal
+
+
+def _optimize_once(entry: Any) -> None:
+    """Optimise the entry's module, without a pass before that serves references, or one that found nothing to join."""
+    manager, builder = entry._codegen._module_pass_manager(slp_vectorize=False)
+    manager.run(entry._final_module, builder)
 
 
 def _names_alone(entry: Any) -> Any:
