@@ -81,8 +81,7 @@ rule join_conformance:
     input:
         conformance=expand("results/analyze/{flight}/conformance.json", flight=LOGS),
         listed="results/save/flights.csv",
-        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
-        joined=when_delays_are_joined,
+        scores=of_scored_flights("results/analyze/{flight}/scoring.json"),
     output:
         legs="results/analyze/legs.parquet",
         missions="results/analyze/missions.json",

@@ -6,10 +6,9 @@ rule decide:
         present="results/save/present.json",
         # what the input functions read: where it is missing, the checkpoint has to run again
         listed="results/save/flights.csv",
-        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
+        scores=of_scored_flights("results/analyze/{flight}/scoring.json"),
         # asked for so that a file that was taken away is made again
-        tables=of_replayable_flights(SCORED_FILES),
-        joined=when_delays_are_joined,
+        tables=of_scored_flights(SCORED_FILES),
         delays="results/analyze/delays.json" if MENDS_DELAYS else [],
         effects="results/analyze/effects.json" if MENDS_DELAYS else [],
         diagnoses=of_replayable_flights("results/analyze/{flight}/diagnosis.json"),

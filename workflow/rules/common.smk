@@ -86,6 +86,11 @@ def when_delays_are_joined(wildcards):
     return []
 
 
+def of_scored_flights(patterns):
+    """Input function: some files of every flight's scores, as soon as it is known whether these have to be made anew."""
+    return lambda wildcards: when_delays_are_joined(wildcards) or of_replayable_flights(patterns)(wildcards)
+
+
 def read_joined(path):
     """What all flights tell together; of a checkpoint that was planned and is then not run Snakemake would not say that it
     is done, and begin jobs whose parameters are to be determined."""

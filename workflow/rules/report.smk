@@ -158,8 +158,7 @@ rule fleet_page:
 
 rule plot_summary:
     input:
-        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
-        joined=when_delays_are_joined,
+        scores=of_scored_flights("results/analyze/{flight}/scoring.json"),
         decision="results/apply/decision.json",
         sensitivity="results/apply/sensitivity.json",
     output:
@@ -190,8 +189,7 @@ rule plot_summary:
 rule build_report:
     input:
         flights="results/save/flights.parquet",
-        scores=of_replayable_flights("results/analyze/{flight}/scoring.json"),
-        joined=when_delays_are_joined,
+        scores=of_scored_flights("results/analyze/{flight}/scoring.json"),
         figures=of_replayable_flights("results/report/flights/{flight}.png"),
         summary=rules.plot_summary.output,
         decision="results/apply/decision.json",

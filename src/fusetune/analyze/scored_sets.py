@@ -64,7 +64,7 @@ class SetsToScore:
     def keys(self, folder: AnyPath) -> dict[str, str]:
         """What the scores of each set follow from, as a key."""
         antenna = {name: self._values(folder, name) for name in WITH_MEASURED_ANTENNA if name in self.sets}
-        common = [self.made_of, self.present, self._values(folder, self.present), antenna]
+        common = key_of([self.made_of, self.present, self._values(folder, self.present), antenna])
         return {name: key_of([common, name, self._values(folder, name)]) for name in self.sets}
 
     def _values(self, folder: AnyPath, name: str) -> Any:
@@ -150,14 +150,15 @@ class _SetsAtWork:
 
     @contextmanager
     def _record(self, name: str) -> Iterator[ReplayedSet]:
-        present, recording = self.yardstick.present, self.yardstick.recording
+        present, recording, overrides = self.yardstick.present, self.yardstick.recording, self._asked.sets[name]
         if name == present.name:
             yield present
         elif self._antenna is not None and name == self._antenna.name:
             yield self._antenna
-        elif recording is FULL and self._flight.prepared.is_long:
+        elif overrides is not None and recording is FULL and self._flight.prepared.is_long:
             with TemporaryDirectory(prefix=SCRATCH_PREFIX, dir=self._folder) as scratch:
-                yield self._replayed_on_disk(name, scratch)
+                write_replay(self._flight.prepared, name, overrides, scratch)
+                yield read_set(scratch, name)
         else:
             yield self._replayed(name, recording)
 
@@ -166,10 +167,3 @@ class _SetsAtWork:
         if overrides is None:
             return read_set(self._folder, name, self._spool)
         return replay_set(self._flight.prepared, name, overrides, recording)
-
-    def _replayed_on_disk(self, name: str, folder: AnyPath) -> ReplayedSet:
-        overrides = self._asked.sets[name]
-        if overrides is None:
-            return read_set(self._folder, name, self._spool)
-        write_replay(self._flight.prepared, name, overrides, folder)
-        return read_set(folder, name)

@@ -29,9 +29,9 @@ class Memo:
             if key not in self._kept:
                 value = make()
                 self._kept[key] = value, size(value)
+                while len(self._kept) > 1 and sum(held for _, held in self._kept.values()) > self._most_bytes:
+                    self._kept.popitem(last=False)
             self._kept.move_to_end(key)
-            while len(self._kept) > 1 and sum(held for _, held in self._kept.values()) > self._most_bytes:
-                self._kept.popitem(last=False)
             return cast(Value, self._kept[key][0])
 
     def __reduce__(self) -> tuple[type[Memo], tuple[int]]:
