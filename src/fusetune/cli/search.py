@@ -31,14 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Search, and tell what was found; always `DONE`."""
-    import os
-
     from fusetune.apply.search.answer import answer_lines
     from fusetune.apply.search.log_search import search_logs
     from fusetune.cli.lines import Lines
     from fusetune.design.search_settings import SearchSettings
     from fusetune.report.search_page import build_search_page
     from fusetune.report.search_results import read_search
+    from fusetune.running.worker_processes import all_cores
     from fusetune.settings.checking import checked
     from fusetune.settings.yaml_reader import read_yaml
 
@@ -46,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     document |= {name: value for name in ("evaluations", "seed") if (value := getattr(options, name)) is not None}
     asked_in = options.parameters or "the command line"
     settings = checked(SearchSettings, document, asked_in)
-    processes = options.cores or os.cpu_count() or 1
+    processes = options.cores or all_cores()
     lines = Lines()
     try:
         search_logs(options.logs, options.out, settings, processes=processes, told=lines.tell, asked_in=asked_in)
