@@ -13,4 +13,5 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
     folders = [Path(file).parent for file in snakemake.input.noise]
-    build_pooled_sensor_page(folders, figures, snakemake.output[0], {"All flights": "results/fleet.html"})
+    page = Path(snakemake.output[0])
+    build_pooled_sensor_page(folders, figures, page, {"All flights": page.parents[1] / "fleet.html"})

@@ -1,5 +1,6 @@
 """Draw the figures of all flights, and write their page."""
 
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
@@ -17,5 +18,5 @@ with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
         figures,
         snakemake.output[0],
         list(snakemake.input.pages),
-        {"The decision": "results/report.html"},
+        {"The decision": Path(snakemake.output[0]).with_name("report.html")},
     )

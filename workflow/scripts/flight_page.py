@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
     given, page = snakemake.input, Path(snakemake.output[0])
+    results = page.parents[2]
     ledger = Ledger(page.with_name(f".{page.stem}.made.json"))
     # which log it was, and what is said of it, stand in its metadata
     drawn = [Path(given.flight, METADATA_FILE), *given.told, given.track, given.conformance]
@@ -28,6 +29,6 @@ with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
             Path(given.diagnosis).parent,
             figures,
             page,
-            {"The decision": "results/report.html", "All flights": "results/fleet.html"},
+            {"The decision": results / "report.html", "All flights": results / "fleet.html"},
         )
         ledger.record(page.name, key, [page])

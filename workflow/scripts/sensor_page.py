@@ -17,5 +17,5 @@ with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
         Path(snakemake.input.noise).parent,
         figures,
         snakemake.output[0],
-        {"The flight": f"results/report/flights/{snakemake.wildcards.flight}.html"},
+        {"The flight": Path(snakemake.output[0]).parents[1] / "flights" / f"{snakemake.wildcards.flight}.html"},
     )
