@@ -68,5 +68,5 @@ def test_what_is_wrong_in_a_modules_configuration_is_told_by_its_name(workspace:
     path = repr(str(ROOT / "workflow" / "Snakefile"))
     snakefile = SNAKEFILE.format(snakefile=path).replace("config: config", 'config: {"studdy": "mine.yaml"}')
     (workspace.folder / "Snakefile").write_text(snakefile, encoding="utf-8")
-    told = snakemake(workspace, "--dry-run").stderr
+    told = snakemake(workspace, "--dry-run").stdout
     assert "config of the module fusetune: unknown key 'studdy' (did you mean 'study'?)" in told
