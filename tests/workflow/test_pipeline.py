@@ -28,7 +28,7 @@ def replay_times(workspace: Workspace, pattern: str) -> dict[str, int]:
 
 
 def read_flights(workspace: Workspace) -> dict[str, dict[str, str]]:
-    with open(workspace.folder / "results" / "save" / "flights.csv", encoding="utf-8", newline="") as file:
+    with open(workspace.folder / "results" / "save" / "flights.csv", encoding="utf-8-sig", newline="") as file:
         return {row["flight"]: row for row in csv.DictReader(file)}
 
 

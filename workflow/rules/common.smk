@@ -14,6 +14,8 @@ from fusetune.set_names import AS_FLOWN, mended_name
 from fusetune.storage.documents import read_document
 from fusetune.save import read_present
 from fusetune.save.discovery import printable
+from fusetune.save.flights_sheet import FLIGHTS_SHEET
+from fusetune.storage.sheet import table_row
 
 REPLAYED_FILES = [f"results/analyze/{{flight}}/{pset}.{part}" for pset in (PRESENT, AS_FLOWN) for part in PARTS]
 """The replays that are kept of a flight."""
@@ -31,14 +33,16 @@ TOLD_FILES = [*DIAGNOSED_FILES, TRACK_FILE, CONFORMANCE_FILE, *([DELAYS_FILE] if
 """What is told of a flight before any set is compared."""
 
 
-def read_csv(path):
+def read_flights(path):
+    """Rows of the table of flights."""
     check_checksum(path, RUN_AGAIN)
-    with open(path, encoding="utf-8", newline="") as file:
-        return [{as_it_was(name): as_it_was(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+    with open(path, encoding="utf-8-sig", newline="") as file:
+        cells = [{name: as_it_was(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+    return [table_row(FLIGHTS_SHEET, row) for row in cells]
 
 
 def replayable_flights():
-    rows = read_once(read_csv, checkpoints.list_flights.get().output.csv)
+    rows = read_once(read_flights, checkpoints.list_flights.get().output.csv)
     # What other flights left here is no answer to these; a dry run, which mends nothing, may meet it.
     return [row["flight"] for row in rows if row["status"] == "replayable" and row["flight"] in LOGS]
 
@@ -182,7 +186,7 @@ HISTORY = placed("results/history")
 @cache
 def changes_flown():
     """Of every flight that flew a change decided before: which, and the values before and after it."""
-    rows = read_once(read_csv, checkpoints.list_flights.get().output.csv)
+    rows = read_once(read_flights, checkpoints.list_flights.get().output.csv)
     if not os.path.isdir(HISTORY):
         return {}
     # it reads saved flights
@@ -203,7 +207,7 @@ def closing_words():
     )
     if not os.path.exists(table):
         return "Done."
-    statuses = [row["status"] for row in told_in_one_line(read_csv, table)]
+    statuses = [row["status"] for row in told_in_one_line(read_flights, table)]
     kind = "simulated flights" if DEMONSTRATED else "flights"
     refused = len(statuses) - statuses.count("replayable")
     flights = f"{len(statuses)} {kind}, {refused} refused (reasons: {table})."

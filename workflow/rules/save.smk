@@ -39,6 +39,12 @@ checkpoint list_flights:
             category="Flights",
             labels={"table": "verdicts"},
         ),
+        checks=report(
+            "results/save/checks.csv",
+            caption="../report/checks.rst",
+            category="Flights",
+            labels={"table": "checks"},
+        ),
     log:
         "results/logs/list_flights.log",
     localrule: True
