@@ -132,7 +132,7 @@ def fly(
 
 def run_pipeline(folder: Path, cores: int, *targets: str) -> None:
     """Run Snakemake as a user does, for some files or for all."""
-    snakefile = ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
+    snakefile = ["--snakefile", str(ROOT / "workflow" / "Snakefile"), "--directory", str(folder)]
     done = run([sys.executable, "-m", "snakemake", "--cores", str(cores), *snakefile, *targets])
     if done.returncode:
         raise SystemExit(done.stdout)

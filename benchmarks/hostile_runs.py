@@ -61,7 +61,7 @@ class Place:
     faults: list[str] = field(default_factory=list)
 
     def start(self, *arguments: str) -> subprocess.Popen[str]:
-        snakefile = ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(self.folder)]
+        snakefile = ["--snakefile", str(ROOT / "workflow" / "Snakefile"), "--directory", str(self.folder)]
         return subprocess.Popen(
             [sys.executable, "-m", "snakemake", *snakefile, *arguments],
             stdout=subprocess.PIPE,

@@ -74,7 +74,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 @pytest.fixture(scope="session")
 def project_root() -> Path:
-    """Folder that holds the Snakefile."""
+    """Top folder of the project."""
     return ROOT
 
 

@@ -6,6 +6,6 @@ import os
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-"""Folder that holds the Snakefile."""
+"""Top folder of the project."""
 
 SHARED = Path(os.environ.get("FUSETUNE_SHARED", ROOT.parent / "shared"))

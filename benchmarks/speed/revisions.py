@@ -41,7 +41,7 @@ def other(revision: str) -> Revision:
     if not commit:
         raise SystemExit(f"--against {revision}: this repository has no such revision")
     tree = KEPT / "revisions" / commit[:12]
-    if not (tree / "Snakefile").is_file():
+    if not (tree / "pyproject.toml").is_file():
         shutil.rmtree(tree, ignore_errors=True)
         unfinished = tree.with_suffix(".unfinished")
         shutil.rmtree(unfinished, ignore_errors=True)

@@ -91,7 +91,8 @@ class Workplace:
         """A folder in which the pipeline can run: the tree's configuration, links to logs, and settings of its own."""
         folder = self.folder()
         shutil.copytree(self.tree / "config", folder / "config")
-        shutil.copytree(self.tree / "profiles", folder / "profiles")
+        if (self.tree / FORMERLY_AT_THE_TOP[1]).exists():
+            shutil.copytree(self.tree / FORMERLY_AT_THE_TOP[1], folder / FORMERLY_AT_THE_TOP[1])
         (folder / "flights").mkdir()
         for name, log in logs.items():
             (folder / "flights" / f"{name}.ulg").symlink_to(log)
@@ -101,18 +102,30 @@ class Workplace:
 
     def pipeline(self, folder: Path, *arguments: str, tree: Path | None = None) -> Cost:
         """Run the pipeline there."""
-        snakefile = ["--snakefile", str((tree or self.tree) / "Snakefile"), "--directory", str(folder)]
+        snakefile = ["--snakefile", str(snakefile_of(tree or self.tree)), "--directory", str(folder)]
         command = [sys.executable, "-m", "snakemake", "--cores", str(self.cores), *snakefile, *arguments]
         return self.run(*command, tree=tree, cwd=folder)
 
     def copy_of_tree(self) -> Path:
         """The tree's files without anything that was compiled for them."""
         folder = self.folder()
-        for name in ("Snakefile", "pyproject.toml"):
-            shutil.copy(self.tree / name, folder / name)
-        for name in ("src", "workflow", "config", "profiles"):
-            shutil.copytree(self.tree / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        for name in ("pyproject.toml", *FORMERLY_AT_THE_TOP[:1]):
+            if (self.tree / name).exists():
+                shutil.copy(self.tree / name, folder / name)
+        for name in ("src", "workflow", "config", *FORMERLY_AT_THE_TOP[1:]):
+            if (self.tree / name).exists():
+                shutil.copytree(self.tree / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         return folder
+
+
+FORMERLY_AT_THE_TOP = ("Snakefile", "profiles")
+"""What older revisions have beside `workflow/`, and newer ones in it."""
+
+
+def snakefile_of(tree: Path) -> Path:
+    """The Snakefile of a revision."""
+    former = tree / FORMERLY_AT_THE_TOP[0]
+    return former if former.is_file() else tree / "workflow" / "Snakefile"
 
 
 def _cpu_of_children() -> float:

@@ -9,7 +9,7 @@ Imports only declarations, no numerics: the workflow reads the configuration whe
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Any, Literal
 
@@ -23,6 +23,7 @@ from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.ulog.reading_limits import ReadingLimits
+from fusetune.running.workflow_files import file_or_packaged
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.settings.checking import checked, read_checked, validate
 from fusetune.settings.declaration import section, setting
@@ -120,6 +121,28 @@ class Configuration:
         """What is done about a flight before it is replayed."""
         return ReplaySettings(self.withheld, self.reconstruction, self.start)
 
+    @property
+    def located(self) -> Configuration:
+        """The same, with files that the working folder lacks taken from those that come with the pipeline."""
+
+        def found(name: str | None) -> str | None:
+            return file_or_packaged(name) if name else name
+
+        demonstration = replace(
+            self.demonstration,
+            study=file_or_packaged(self.demonstration.study),
+            vehicle=file_or_packaged(self.demonstration.vehicle),
+        )
+        return replace(
+            self,
+            study=file_or_packaged(self.study),
+            mission=file_or_packaged(self.mission),
+            mission_vehicle=found(self.mission_vehicle),
+            missions_dir=found(self.missions_dir),
+            covariance_designs=tuple(map(file_or_packaged, self.covariance_designs)),
+            demonstration=demonstration,
+        )
+
     def problems(self) -> Iterator[str]:
         """Designs whose results would lie in the same folder."""
         names = [PurePath(file).stem for file in self.covariance_designs]
@@ -141,6 +164,11 @@ def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None
     given
         Keys of the command line, which count before those of the files.
 
+    Returns
+    -------
+    Configuration
+        Its files are those of the working folder, or where that has none those that come with the pipeline.
+
     Raises
     ------
     UserError
@@ -154,7 +182,8 @@ def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None
         asked = _joined(asked, read_checked(file, schema))
     if given:
         validate(given, schema, "--config")
-    return checked(Configuration, _joined(asked, given or {}), "--config" if given else files[-1])
+    settings = checked(Configuration, _joined(asked, given or {}), "--config" if given else files[-1])
+    return settings.located
 
 
 def _joined(values: Mapping[str, Any], others: Mapping[str, Any]) -> dict[str, Any]:

@@ -107,7 +107,7 @@ def test_nothing_but_the_command_uploads(project_root: Path) -> None:
     assert importers == {"fusetune.cli.upload"}
     assert graph.find_modules_that_directly_import("fusetune.cli.upload") == {"fusetune.cli.command_line"}
     workflow = project_root / "workflow"
-    rules = [project_root / "Snakefile", *workflow.rglob("*.smk"), *workflow.rglob("*.py")]
+    rules = [workflow / "Snakefile", *workflow.rglob("*.smk"), *workflow.rglob("*.py")]
     assert len(rules) > 10
     texts = [file.read_text(encoding="utf-8") for file in rules]
     assert not [text for text in texts if "upload" in text or "fusetune.cli" in text]

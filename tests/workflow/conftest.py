@@ -59,7 +59,7 @@ class Workspace:
 
     def command(self, *arguments: str) -> list[str]:
         """The command line of a run."""
-        snakefile = ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(self.folder)]
+        snakefile = ["--snakefile", str(ROOT / "workflow" / "Snakefile"), "--directory", str(self.folder)]
         return [sys.executable, "-m", "snakemake", *snakefile, *arguments]
 
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -11,7 +11,7 @@ HEAVY = ("numpy", "numba", "pandas", "pyarrow", "scipy")
 
 
 def test_what_the_rules_import_brings_no_numerics(project_root: Path) -> None:
-    files = [project_root / "Snakefile", *(project_root / "workflow/rules").glob("*.smk")]
+    files = [project_root / "workflow/Snakefile", *(project_root / "workflow/rules").glob("*.smk")]
     text = "\n".join(file.read_text(encoding="utf-8") for file in files)
     modules = sorted(set(re.findall(r"^from (fusetune[\w.]*) import", text, re.M)))
     assert "fusetune.analyze.replaying.store.parts" in modules

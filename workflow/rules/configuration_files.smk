@@ -1,7 +1,10 @@
 # The main configuration, checked before Snakemake reads it: Snakemake takes keys that stand twice, and runs what follows `__use_yte__`.
 from fusetune.configuration import read_configuration
+from fusetune.running.workflow_files import packaged_config
 
 DEFAULT_CONFIG_FILE = "config/config.yaml"
+if not os.path.exists(DEFAULT_CONFIG_FILE):
+    DEFAULT_CONFIG_FILE = str(packaged_config() / "config.yaml")
 
 
 def told_in_one_line(function, *arguments, **options):
@@ -14,8 +17,7 @@ def told_in_one_line(function, *arguments, **options):
 def configuration_files():
     """The default file, and those given with --configfile, whose values go before it."""
     given = [os.path.relpath(file) for file in workflow.overwrite_configfiles]
-    replaced = workflow.config_settings.replace_workflow_config or not os.path.exists(DEFAULT_CONFIG_FILE)
-    return given if given and replaced else [DEFAULT_CONFIG_FILE, *given]
+    return given if given and workflow.config_settings.replace_workflow_config else [DEFAULT_CONFIG_FILE, *given]
 
 
 SETTINGS = told_in_one_line(read_configuration, configuration_files(), workflow.config_settings.config)

@@ -7,7 +7,8 @@ import sys
 from functools import cache
 from pathlib import Path
 
-PROJECT = Path(workflow.basedir)
+WORKFLOW = Path(workflow.basedir)
+SOURCES = WORKFLOW.parent / "src"
 STATE = Path(".snakemake")
 RESULTS = Path("results")
 LONGEST_JOB_S = 600.0
@@ -31,9 +32,11 @@ def prepend_to_path_list(variable, folder):
     os.environ[variable] = os.pathsep.join([folder, *filter(None, [os.environ.get(variable)])])
 
 
-# Jobs inherit the environment: they import the package that lies beside this workflow, installed or not.
-sys.path.insert(0, str(PROJECT / "src"))
-prepend_to_path_list("PYTHONPATH", str(PROJECT / "src"))
+# Jobs inherit the environment: they import the package that lies beside this workflow, installed or not. An installed
+# package has its workflow within it.
+if SOURCES.is_dir():
+    sys.path.insert(0, str(SOURCES))
+    prepend_to_path_list("PYTHONPATH", str(SOURCES))
 from snakemake.exceptions import WorkflowError
 from snakemake.shell import shell
 
@@ -113,7 +116,7 @@ def job_server():
     """The process of which jobs that this one runs itself are copies, where there can be one."""
     server = start_job_server(
         shell.get_executable(),
-        PROJECT / "workflow" / "scripts",
+        WORKFLOW / "scripts",
         ahead=["save_flight.py", "tell_flight.py", "analyze_flight.py", "flight_page.py"],
         prepare="fusetune.ekf2.replay.warm_up:load_kernels",
         when="fusetune.ekf2.replay.loop",
@@ -181,7 +184,7 @@ if not workflow.is_main_process:
 DIGEST = job_digests()
 
 # Kernels are compiled once by a rule; the folder is named by the state of their sources.
-KERNELS_READY = os.path.join(use_kernel_cache(inherit=not workflow.is_main_process), "ready.json")
+KERNELS_READY = os.path.join(use_kernel_cache(), "ready.json")
 
 # What this workflow makes; and of that, what Snakemake takes for up to date when it has no memory of it. Replays are not
 # among it, nor is what a search tried: they are made from a saved flight, and keep a record of their own.

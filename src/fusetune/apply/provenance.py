@@ -7,6 +7,7 @@ from typing import Any
 import fusetune
 from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.errors import UserError
+from fusetune.running.workflow_files import pipeline_folder
 from fusetune.storage.files import AnyPath, sha256_of
 from fusetune.storage.parquet import read_table
 
@@ -51,5 +52,7 @@ def provenance(configuration_files: Sequence[AnyPath]) -> dict[str, Any]:
 
 
 def _label(path: Path) -> str:
-    """A name that does not depend on where the project lies on the disk."""
+    """A name that does not depend on where the project, or the package, lies on the disk."""
+    if path.is_relative_to(pipeline_folder()):
+        path = path.relative_to(pipeline_folder())
     return path.name if path.is_absolute() else path.as_posix()

@@ -1,16 +1,16 @@
 """Our own implementation of PX4's EKF2, behaviour of release v1.16, compiled with Numba.
 
-Importing it decides where compiled kernels are kept (see `compiled/kernel_cache.py`), unless NUMBA_CACHE_DIR says so.
+Importing it decides where compiled kernels are kept (see `compiled/kernel_cache.py`), unless who
+started this process did.
 """
 
 import os
 import sys
 
-from fusetune.ekf2.compiled.kernel_cache import LOCATOR, use_kernel_cache
+from fusetune.ekf2.compiled.kernel_cache import LOCATOR, kernel_folder_is_told, use_kernel_cache
 
-if "NUMBA_CACHE_DIR" not in os.environ:
+if not kernel_folder_is_told():
     use_kernel_cache()
-os.environ["NUMBA_CACHE_LOCATOR_CLASSES"] = LOCATOR
 if "numba" in sys.modules:
     from numba.core import config
 

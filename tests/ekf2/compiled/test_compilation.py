@@ -69,7 +69,8 @@ def test_a_copy_of_the_checkout_with_other_times_loads_what_was_compiled(kernels
     shutil.copytree(package, checkout / "src" / "fusetune", ignore=shutil.ignore_patterns("__pycache__"))
     for file in checkout.rglob("*.py"):
         os.utime(file, (2e9, 2e9))
-    (checkout / "Snakefile").touch()
+    (checkout / "workflow").mkdir()
+    (checkout / "workflow" / "Snakefile").touch()
     caches = Path(config.CACHE_DIR)
     place = checkout / ".cache" / "numba" / caches.name / kernels.relative_to(caches)
     shutil.copytree(kernels, place)

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from fusetune.ekf2.compiled import kernel_cache
-from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
+from fusetune.ekf2.compiled.kernel_cache import LOCATOR, use_kernel_cache
+from fusetune.running import workflow_files
 
 
 @pytest.fixture
@@ -16,8 +17,10 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "src" / "fusetune").mkdir(parents=True, mode=0o755)
     for path in (folder, folder / "src", folder / "src" / "fusetune"):
         path.chmod(0o755)
-    (folder / "Snakefile").touch()
-    monkeypatch.setattr(kernel_cache, "PACKAGE", folder / "src" / "fusetune")
+    (folder / "workflow").mkdir()
+    (folder / "workflow" / "Snakefile").touch()
+    for module in (kernel_cache, workflow_files):
+        monkeypatch.setattr(module, "PACKAGE", folder / "src" / "fusetune")
     monkeypatch.setenv("XDG_CACHE_HOME", str(home))
     for name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
         monkeypatch.setenv(name, "")
@@ -36,7 +39,7 @@ def test_otherwise_they_are_kept_in_the_users_cache(
     checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, why: str
 ) -> None:
     if why == "no checkout":
-        (checkout / "Snakefile").unlink()
+        (checkout / "workflow" / "Snakefile").unlink()
     elif why == "others may write to it":
         checkout.chmod(0o777)
     else:
@@ -44,13 +47,24 @@ def test_otherwise_they_are_kept_in_the_users_cache(
     assert use_kernel_cache().parent == tmp_path / "home" / "fusetune" / "numba"
 
 
-def test_a_job_keeps_to_the_cache_of_its_run_if_that_is_for_these_sources(
+def test_a_process_keeps_to_the_cache_of_who_started_it_if_that_is_for_these_sources(
     checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = use_kernel_cache()
     told = tmp_path / "elsewhere" / own.name
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(told))
-    assert use_kernel_cache(inherit=True) == told
+    assert use_kernel_cache() == told
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "of another version"))
     assert use_kernel_cache() == own
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "of another program"))
-    assert use_kernel_cache(inherit=True) == own
+
+
+def test_where_the_user_keeps_what_numba_compiles_a_folder_of_these_sources_is_taken(
+    checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numba itself would hand out kernels of other sources from a folder that serves all programs and versions."""
+    own = use_kernel_cache()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "of the user"))
+    monkeypatch.setenv("NUMBA_CACHE_LOCATOR_CLASSES", "")
+    assert use_kernel_cache() == tmp_path / "of the user" / "fusetune" / "numba" / own.name
+    assert os.environ["NUMBA_CACHE_LOCATOR_CLASSES"] == LOCATOR
+    assert use_kernel_cache() == tmp_path / "of the user" / "fusetune" / "numba" / own.name

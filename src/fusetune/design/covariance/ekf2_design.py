@@ -34,6 +34,7 @@ from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem
 from fusetune.ekf2.filter.common.state import ERROR_STATE_BLOCKS
 from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.running.workflow_files import file_or_packaged
 from fusetune.settings.checking import nearest, raise_problems, validate
 from fusetune.settings.declaration import built, required, setting
 from fusetune.settings.schema import schema_of
@@ -287,7 +288,9 @@ def ekf2_design(document: Mapping[str, Any], file: AnyPath) -> Ekf2Design:
         file=file,
         name=given.name,
         settings=Settings(given.sensors, typed_values(given.parameters)),
-        way=LoggedWay(given.log) if given.log else MissionWay(given.mission or "", given.vehicle or "", given.seed),
+        way=LoggedWay(given.log)
+        if given.log
+        else MissionWay(file_or_packaged(given.mission or ""), file_or_packaged(given.vehicle or ""), given.seed),
         settle_s=given.settle_s,
         judged=given.judged,
         variations=given.variations,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fusetune.running.workflow_files import file_or_packaged
 from fusetune.settings.yaml_reader import read_yaml
 from fusetune.storage.files import AnyPath
 
@@ -18,4 +19,4 @@ def files_of_design(path: AnyPath) -> tuple[str, ...]:
     """
     document = read_yaml(path)
     named = (document.get(name) for name in _NAMES)
-    return (str(path), *(name for name in named if isinstance(name, str) and name))
+    return (str(path), *(file_or_packaged(name) for name in named if isinstance(name, str) and name))

@@ -12,6 +12,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import platformdirs
+
+from fusetune.running.workflow_files import checkout
 from fusetune.running.write_access import others_may_write, others_may_write_below, take_write_access
 from fusetune.storage.digest import source_digest
 from fusetune.storage.files import AnyPath
@@ -26,25 +29,31 @@ def kernel_cache() -> Path:
     """Folder for the kernels of these sources: below the checkout, or in the user's cache.
 
     The user's cache serves where there is no checkout, where this user may not write there, and where more people may
-    than may write the package.
+    than may write the package. It lies where NUMBA_CACHE_DIR says, else where the system keeps caches
+    (XDG_CACHE_HOME or ~/.cache, on macOS ~/Library/Caches).
     """
-    checkout, below = PACKAGE.parents[1], Path("numba") / source_digest(*KERNEL_SOURCES)[:16]
-    folder = checkout / ".cache" / below
-    existing = next(part for part in (folder, *folder.parents) if part.exists())
-    ours = os.access(existing, os.W_OK | os.X_OK) and not others_may_write(checkout, PACKAGE)
-    if (checkout / "Snakefile").is_file() and ours:
-        return folder
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fusetune" / below
+    below = _below()
+    if os.environ.get("NUMBA_CACHE_DIR") and not kernel_folder_is_told():
+        return Path(os.environ["NUMBA_CACHE_DIR"]) / "fusetune" / below
+    top = checkout()
+    if top is not None:
+        folder = top / ".cache" / below
+        existing = next(part for part in (folder, *folder.parents) if part.exists())
+        if os.access(existing, os.W_OK | os.X_OK) and not others_may_write(top, PACKAGE):
+            return folder
+    return platformdirs.user_cache_path("fusetune", appauthor=False) / below
 
 
-def use_kernel_cache(inherit: bool = False) -> Path:
+def kernel_folder_is_told() -> bool:
+    """Whether NUMBA_CACHE_DIR comes from a process of ours, and so is the very folder; a user's is for all programs."""
+    return bool(os.environ.get("NUMBA_CACHE_DIR")) and os.environ.get("NUMBA_CACHE_LOCATOR_CLASSES") == LOCATOR
+
+
+def use_kernel_cache() -> Path:
     """Let this process and its children keep compiled kernels in `kernel_cache`; call it before Numba is imported.
 
-    Parameters
-    ----------
-    inherit
-        Keep to the folder of the process that started this one, if it told one for these sources: on a machine that may
-        not write there, this process would choose another.
+    The folder of the process that started this one is kept to, if it told one for these sources: on a machine that may
+    not write there, this process would choose another.
 
     Returns
     -------
@@ -53,7 +62,7 @@ def use_kernel_cache(inherit: bool = False) -> Path:
     """
     folder = kernel_cache()
     told = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
-    if inherit and told.name == folder.name:
+    if kernel_folder_is_told() and told.name == folder.name:
         folder = told
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     os.environ["NUMBA_CACHE_LOCATOR_CLASSES"] = LOCATOR
@@ -79,4 +88,8 @@ def keep_others_out(folder: AnyPath) -> None:
 def _top() -> Path:
     """The first folder on the way to the cache in use that is there for caches alone."""
     caches = Path(os.environ["NUMBA_CACHE_DIR"])
-    return caches.parents[1] if caches == kernel_cache() else caches
+    return caches.parents[1] if caches.parts[-2:] == _below().parts else caches
+
+
+def _below() -> Path:
+    return Path("numba") / source_digest(*KERNEL_SOURCES)[:16]
