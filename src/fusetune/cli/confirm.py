@@ -7,7 +7,10 @@ from pathlib import Path
 
 from fusetune.cli.command import DONE, REFUSED
 
-HELP = "read the log of PX4's own replay back: its parameters, its innovations, and whether they are as predicted"
+HELP = "tell whether PX4's own replay of a log saw what was predicted"
+EXAMPLES = (
+    ("fusetune confirm log.ulg replayed.ulg --asked results/apply/replay_params.txt", "did PX4 itself see what was predicted?"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

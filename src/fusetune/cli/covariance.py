@@ -12,7 +12,10 @@ from fusetune.cli.command import DONE
 if TYPE_CHECKING:
     from fusetune.design.covariance.evaluation import Evaluation
 
-HELP = "tell how well a sensing system knows its states, and which better sensor pays most, from covariances alone"
+HELP = "tell how well a sensing system knows its states, and which better sensor pays most"
+EXAMPLES = (
+    ("fusetune covariance config/covariance/ekf2_survey.yaml --out design", "how well EKF2 would know its states"),
+)
 
 LEAST_PERCENT = 0.05
 """What takes less off is not told."""

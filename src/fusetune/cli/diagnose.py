@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from fusetune.analyze.diagnosis.diagnosed_logs import DiagnosedLog
 
 HELP = "tell what is wrong with a vehicle from its logs, since when, how sure, and what to do"
+EXAMPLES = (
+    ("fusetune diagnose flights/*.ulg", "what is wrong, and what to do about it"),
+    ("fusetune diagnose ~/sdcard/log --json > findings.json", "for a script"),
+)
 WARNS = 1
 """Exit status where there is no worse than a warning; of a log that tells nothing it is `USER_ERROR`, between the
 two."""

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from fusetune.analyze.trust.fidelity import ReplayFidelity
 
 HELP = "compare replays with reference replays of the same flight"
+EXAMPLES = (
+    ("fusetune fidelity reference/flight_1 replays/flight_1", "how near a replay comes to PX4's own"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,6 +9,10 @@ from fusetune.cli.command import DONE
 from fusetune.errors import UserError
 
 HELP = "tell what was decided for a vehicle, when, and what it brought"
+EXAMPLES = (
+    ("fusetune history", "all vehicles"),
+    ("fusetune history PX4_FMU_V6X --json", "one of them, for a script"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from fusetune.design.missions.outlook import Outlook, PlannedVehicle
 
 HELP = "check a mission or make one: legs, duration, battery, plan for QGroundControl, map"
+EXAMPLES = (
+    ("fusetune mission config/missions/excite.yaml --out excite.plan --map excite.png", "check it, write the plan, draw the map"),
+    ("fusetune mission --for EKF2_GPS_DELAY --home 47.4,8.5,490 --out delay.plan", "a mission that tells a delay"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

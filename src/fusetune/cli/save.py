@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from fusetune.finding import Finding
 
 HELP = "turn logs into folders of tables, each with a verdict"
+EXAMPLES = (
+    ("fusetune save flights/*.ulg --out saved", "tables of each log, and whether it can be replayed"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

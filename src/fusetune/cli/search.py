@@ -8,6 +8,10 @@ from pathlib import Path
 from fusetune.cli.command import DONE
 
 HELP = "find the parameters that predict the flights of some logs best"
+EXAMPLES = (
+    ("fusetune search flights/*.ulg --out found", "600 sets over what the flights exercise"),
+    ("fusetune search flights/*.ulg --out found --evaluations 250 --cores 4", "sooner, with less"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

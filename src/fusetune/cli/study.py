@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from fusetune.design.parameter_sets import ParameterSet
 
 HELP = "make the parameter sets of a study, or around what a log's vehicle flies, and print them"
+EXAMPLES = (
+    ("fusetune study config/studies/paper_table11.yaml --out sets", "its sets, as a table and as files"),
+    ("fusetune study --around log.ulg --out sets", "steps up and down from what this vehicle flies"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
