@@ -81,8 +81,7 @@ def test_what_is_imported_is_declared(project_root: Path, folders: list[str], ex
     files = [file for folder in folders for file in (project_root / folder).rglob("*") if file.suffix in suffixes]
     if folders is not UPLOAD:
         files = [file for file in files if not file.relative_to(project_root).as_posix().startswith(UPLOAD)]
-    scripts = {file.stem for file in (project_root / "workflow" / "scripts").glob("*.py")}
-    ours = {"fusetune", "benchmarks", "tests", *scripts, *sys.stdlib_module_names}
+    ours = {"fusetune", "benchmarks", "tests", *sys.stdlib_module_names}
     files.append(project_root / "workflow" / "Snakefile")
     found = {
         name: file

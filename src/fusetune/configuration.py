@@ -154,7 +154,9 @@ RETIRED = {"sets_per_job": "no longer asked for, as one job takes all sets of a 
 """Keys of former releases → what is to be said of them."""
 
 
-def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None = None) -> Configuration:
+def read_configuration(
+    files: Sequence[AnyPath], given: Mapping[str, Any] | None = None, given_by: str = "--config"
+) -> Configuration:
     """Read the configuration from files and from the command line.
 
     Parameters
@@ -163,6 +165,8 @@ def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None
         Of keys that stand in several, the last counts; sections and other mappings are put together key by key.
     given
         Keys of the command line, which count before those of the files.
+    given_by
+        What gave them, for messages.
 
     Returns
     -------
@@ -181,8 +185,8 @@ def read_configuration(files: Sequence[AnyPath], given: Mapping[str, Any] | None
     for file in files:
         asked = _joined(asked, read_checked(file, schema))
     if given:
-        validate(given, schema, "--config")
-    settings = checked(Configuration, _joined(asked, given or {}), "--config" if given else files[-1])
+        validate(given, schema, given_by)
+    settings = checked(Configuration, _joined(asked, given or {}), given_by if given or not files else files[-1])
     return settings.located
 
 

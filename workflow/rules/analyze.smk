@@ -13,6 +13,7 @@ if MENDS_DELAYS:
             effects="results/analyze/effects.json",
         log:
             "results/logs/join_delays.log",
+        localrule: True
         conda:
             "../envs/fusetune.yaml"
         resources:
@@ -87,6 +88,7 @@ rule join_conformance:
         missions="results/analyze/missions.json",
     log:
         "results/logs/join_conformance.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:

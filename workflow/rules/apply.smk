@@ -15,7 +15,7 @@ rule decide:
         legs="results/analyze/legs.parquet",
         found="results/search/found.json" if SEARCH else [],
         matters="results/search/sensitivity.json" if SEARCH else [],
-        configuration=CONFIGURATION_FILES,
+        configuration=list(map(as_named, CONFIGURATION_FILES)),
     output:
         "results/apply/ranking.parquet",
         "results/apply/per_flight.parquet",
@@ -43,6 +43,7 @@ rule decide:
         search="results/search/search.json" if SEARCH else [],
     log:
         "results/logs/decide.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:

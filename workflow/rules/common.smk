@@ -103,14 +103,14 @@ def mended_delays():
     """Parameters of delays that are proved wrong, with the values to set."""
     if not MENDS_DELAYS:
         return {}
-    return read_joined("results/analyze/delays.json")["mended"]
+    return read_joined(placed("results/analyze/delays.json"))["mended"]
 
 
 def effect_values():
     """Sets that take single effects as the flights measure them, with what they change."""
     if not MENDS_DELAYS or not SETTINGS.effects.try_measured:
         return {}
-    return read_joined("results/analyze/effects.json")["sets"]
+    return read_joined(placed("results/analyze/effects.json"))["sets"]
 
 
 def effects_are_mended():
@@ -176,7 +176,7 @@ def tried_before(number):
 
 
 # What was decided is kept for good, and is no output: nothing of Snakemake's removes it.
-HISTORY = "results/history"
+HISTORY = placed("results/history")
 
 
 @cache
@@ -189,7 +189,7 @@ def changes_flown():
     from fusetune.apply.history.flown import flights_of_changes
 
     own = [row for row in rows if row["flight"] in LOGS]
-    return told_in_one_line(flights_of_changes, HISTORY, own, "results/save")
+    return told_in_one_line(flights_of_changes, HISTORY, own, placed("results/save"))
 
 
 def of_flights_after(pattern):
@@ -198,21 +198,24 @@ def of_flights_after(pattern):
 
 
 def closing_words():
-    if not os.path.exists("results/save/flights.csv"):
+    table, page, decision = map(
+        placed, ("results/save/flights.csv", "results/report.html", "results/apply/decision.json")
+    )
+    if not os.path.exists(table):
         return "Done."
-    statuses = [row["status"] for row in told_in_one_line(read_csv, "results/save/flights.csv")]
+    statuses = [row["status"] for row in told_in_one_line(read_csv, table)]
     kind = "simulated flights" if DEMONSTRATED else "flights"
     refused = len(statuses) - statuses.count("replayable")
-    flights = f"{len(statuses)} {kind}, {refused} refused (reasons: results/save/flights.csv)."
+    flights = f"{len(statuses)} {kind}, {refused} refused (reasons: {table})."
     changed = [printable(os.path.relpath(name)) for name in CONTENT.changed()]
     if changed:
         flights = f"Changed while the run was at work: {', '.join(changed)}. Run the pipeline again.\n{flights}"
-    if not os.path.exists("results/report.html"):
+    if not os.path.exists(page):
         return flights
-    words = f"{flights} The decision and its evidence: results/report.html"
+    words = f"{flights} The decision and its evidence: {page}"
     # a run for other targets leaves an older decision as it is, or none
-    if os.path.exists("results/apply/decision.json"):
-        for step in read_document("results/apply/decision.json").get("next_steps", ())[:1]:
+    if os.path.exists(decision):
+        for step in read_document(decision).get("next_steps", ())[:1]:
             words += f"\nNext: {step['text']}"
     return words
 
@@ -223,4 +226,4 @@ DESIGNS = {Path(file).stem: file for file in SETTINGS.covariance_designs}
 
 def design_files(wildcards):
     """Input function: the file of a covariance design, and those that it names."""
-    return told_in_one_line(files_of_design, DESIGNS[wildcards.design])
+    return [as_named(file) for file in told_in_one_line(files_of_design, DESIGNS[wildcards.design])]

@@ -6,7 +6,7 @@ from fusetune.inputs import check_demonstration, read_inputs
 from fusetune.save.present import PRESENT, FlightSets
 
 NO_FLIGHT = "(?!)"
-CONFIG_FILE = configuration_files()[-1]
+CONFIG_FILE = (configuration_files() or [GIVEN_NAME])[-1]
 
 INPUTS = told_in_one_line(read_inputs, SETTINGS, CONFIG_FILE)
 DEMONSTRATED = INPUTS.is_demonstration
@@ -30,6 +30,11 @@ if DEMONSTRATED:
 MISSION_VEHICLE = [SETTINGS.mission_vehicle] if SETTINGS.mission_vehicle else []
 if DEMONSTRATED and not MISSION_VEHICLE:
     MISSION_VEHICLE = [SETTINGS.demonstration.vehicle]
+
+
+def as_named(file):
+    """Input that lies where the configuration says, whatever prefix a workflow gives this one as a module."""
+    return local(str(file))
 
 
 def contents(*files):

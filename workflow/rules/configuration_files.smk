@@ -15,9 +15,13 @@ def told_in_one_line(function, *arguments, **options):
 
 
 def configuration_files():
-    """The default file, and those given with --configfile, whose values go before it."""
+    """The default file, and those given with --configfile, whose values go before it; none for a module with values."""
+    if workflow.modifier.skip_configfile:
+        return []
     given = [os.path.relpath(file) for file in workflow.overwrite_configfiles]
     return given if given and workflow.config_settings.replace_workflow_config else [DEFAULT_CONFIG_FILE, *given]
 
 
-SETTINGS = told_in_one_line(read_configuration, configuration_files(), workflow.config_settings.config)
+GIVEN_NAME = f"config of the module {__name__}" if workflow.modifier.skip_configfile else "--config"
+GIVEN_CONFIG = config if workflow.modifier.skip_configfile else workflow.config_settings.config
+SETTINGS = told_in_one_line(read_configuration, configuration_files(), GIVEN_CONFIG, GIVEN_NAME)

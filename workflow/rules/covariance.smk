@@ -1,7 +1,7 @@
 # Made when asked for, `snakemake covariances`: no decision rests on it.
 rule covariance_design:
     input:
-        design=lambda wildcards: DESIGNS[wildcards.design],
+        design=lambda wildcards: design_files(wildcards)[0],
         named=lambda wildcards: design_files(wildcards)[1:],
         kernels=KERNELS_READY,
     output:
@@ -25,6 +25,7 @@ rule covariance_design:
 rule covariances:
     input:
         expand("results/design/covariance/{design}", design=list(DESIGNS)),
+    localrule: True
     resources:
         mem_mb=LIBRARIES_MB,
         runtime=5,

@@ -1,7 +1,7 @@
 rule design:
     input:
-        study=INPUTS.study_file,
-        mission=SETTINGS.mission,
+        study=as_named(INPUTS.study_file),
+        mission=as_named(SETTINGS.mission),
         # what it says comes in as a parameter, so that only other sets make anything again; asked for by a function, as
         # Snakemake plans a job anew behind a checkpoint only where its input waits for that
         present=ancient(lambda wildcards: checkpoints.list_flights.get().output.present if SETS.around else []),
@@ -17,6 +17,7 @@ rule design:
         around=[directory("results/design/around_present")] if SETS.around else [],
     log:
         "results/logs/design.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:
@@ -27,15 +28,15 @@ rule design:
         around=lambda wildcards: asdict(present_found())["sets"] if SETS.around else (),
         code=DIGEST["design"],
     message:
-        "Design: write the mission plan and {INPUTS.study.name}'s parameter sets"
+        f"Design: write the mission plan and {INPUTS.study.name}'s parameter sets"
     script:
         "../scripts/design.py"
 
 
 rule mission_map:
     input:
-        mission=SETTINGS.mission,
-        vehicle=MISSION_VEHICLE,
+        mission=as_named(SETTINGS.mission),
+        vehicle=list(map(as_named, MISSION_VEHICLE)),
     output:
         map=report(
             f"results/design/{INPUTS.mission.name}.svg",
@@ -46,6 +47,7 @@ rule mission_map:
         outlook=f"results/design/{INPUTS.mission.name}.json",
     log:
         "results/logs/mission_map.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:

@@ -4,7 +4,7 @@
 rule tell_flight:
     input:
         flight="results/save/{flight}",
-        missions=list(INPUTS.mission_files),
+        missions=list(map(as_named, INPUTS.mission_files)),
         # what it says comes in as a parameter, so that only other values make anything again
         present=ancient(lambda wildcards: checkpoints.list_flights.get().output.present if MENDS_DELAYS else []),
         kernels=KERNELS_READY,
@@ -43,6 +43,7 @@ rule join_health:
         "results/analyze/health.parquet",
     log:
         "results/logs/join_health.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:
@@ -64,6 +65,7 @@ rule join_fleet:
         "results/apply/fleet.json",
     log:
         "results/logs/join_fleet.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:

@@ -7,10 +7,15 @@ import sys
 from functools import cache
 from pathlib import Path
 
-WORKFLOW = Path(workflow.basedir)
+# Where this file lies; a workflow that takes this one as a module lies elsewhere.
+WORKFLOW = Path(workflow.current_basedir.get_path_or_uri(secret_free=True)).parent
 SOURCES = WORKFLOW.parent / "src"
+IS_MODULE = not workflow.modifier.is_main_snakefile()
+RULES_OF_OTHERS = {*workflow.rules}
 STATE = Path(".snakemake")
-RESULTS = Path("results")
+# A module's results lie below the prefix that it is given. Snakemake puts that before what rules name; what is read or
+# written otherwise asks `placed`.
+RESULTS = Path(workflow.modifier.modify_path("results"))
 LONGEST_JOB_S = 600.0
 # With less, Snakemake's own notes cannot be written either, and what it says of that is hard to read.
 LEAST_FREE_BYTES = 20_000_000
@@ -28,6 +33,11 @@ if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, end_quietly)
 
 
+def placed(name):
+    """Where a file or folder lies that rules call `results/…`."""
+    return str(RESULTS / Path(name).relative_to("results"))
+
+
 def prepend_to_path_list(variable, folder):
     os.environ[variable] = os.pathsep.join([folder, *filter(None, [os.environ.get(variable)])])
 
@@ -39,6 +49,11 @@ if SOURCES.is_dir():
     prepend_to_path_list("PYTHONPATH", str(SOURCES))
 from snakemake.exceptions import WorkflowError
 from snakemake.shell import shell
+
+try:
+    import fusetune
+except ModuleNotFoundError:
+    raise WorkflowError("This workflow needs the package fusetune: install it beside Snakemake, with pip.") from None
 
 from fusetune.running.cluster_jobs import cancel_queued_jobs
 from fusetune.storage.content import ContentDigests
@@ -108,7 +123,7 @@ def tell_what_a_run_would_mend():
         who = holder_of(STATE) or "it said that it ended"
         print(f"Some files are unfinished: a run is at work here, or was interrupted ({who}).", file=sys.stderr)
     if RESULTS.exists() and not belong_together(STATE, RESULTS):
-        print("Nothing is known of how results/ was made; the next run makes it again.", file=sys.stderr)
+        print(f"Nothing is known of how {RESULTS}/ was made; the next run makes it again.", file=sys.stderr)
 
 
 @cache
@@ -145,12 +160,12 @@ def take_the_folder():
             for log in INPUTS.found.logs:
                 CONTENT.of(log.path)
             CONTENT.save()
-        if workflow.local_exec:
+        if workflow.local_exec and not IS_MODULE:
             # Snakemake 9.27 looks through all jobs again some time after each look where their rate is limited, so
             # with every job that ends it looks once a second more; here jobs begin no faster than others end.
             workflow.scheduling_settings.max_jobs_per_timespan = None
-        if not workflow.touch:
-            # it imports while Snakemake looks for what there is to do
+        # it imports while Snakemake looks for what there is to do; jobs of other workflows are none for it
+        if not workflow.touch and not IS_MODULE:
             job_server()
     except UserError as error:
         told_and_ended(error)

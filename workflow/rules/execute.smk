@@ -18,8 +18,8 @@ rule compile_kernels:
 
 rule simulate_flight:
     input:
-        mission=SETTINGS.mission,
-        vehicle=SETTINGS.demonstration.vehicle,
+        mission=as_named(SETTINGS.mission),
+        vehicle=as_named(SETTINGS.demonstration.vehicle),
         kernels=KERNELS_READY,
     output:
         "results/execute/{flight}.ulg",

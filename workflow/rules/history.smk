@@ -37,6 +37,7 @@ rule keep_history:
         "results/apply/history.json",
     log:
         "results/logs/keep_history.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:

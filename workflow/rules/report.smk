@@ -123,6 +123,7 @@ rule sensors:
     input:
         expand("results/report/sensors/{flight}.html", flight=LOGS),
         "results/report/all_sensors.html",
+    localrule: True
     resources:
         mem_mb=LIBRARIES_MB,
         runtime=5,
@@ -142,6 +143,7 @@ rule fleet_page:
         ),
     log:
         "results/logs/fleet_page.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:
@@ -173,6 +175,7 @@ rule plot_summary:
         ],
     log:
         "results/logs/plot_summary.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:
@@ -210,6 +213,7 @@ rule build_report:
         ),
     log:
         "results/logs/build_report.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:

@@ -41,6 +41,7 @@ checkpoint list_flights:
         ),
     log:
         "results/logs/list_flights.log",
+    localrule: True
     conda:
         "../envs/fusetune.yaml"
     resources:

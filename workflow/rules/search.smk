@@ -3,7 +3,7 @@
 from fusetune.apply.search.plan import planned_rounds
 
 SEARCH_THREADS = CORES if SEARCH and not FLIGHT_BY_FLIGHT else 1
-KEPT_PAIRS = "results/tried"
+KEPT_PAIRS = placed("results/tried")
 
 
 if SEARCH:

@@ -5,8 +5,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.flight_page.sensor_page import build_pooled_sensor_page
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -14,4 +13,5 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
     folders = [Path(file).parent for file in snakemake.input.noise]
-    build_pooled_sensor_page(folders, figures, snakemake.output[0], {"All flights": "results/fleet.html"})
+    page = Path(snakemake.output[0])
+    build_pooled_sensor_page(folders, figures, page, {"All flights": page.parents[1] / "fleet.html"})

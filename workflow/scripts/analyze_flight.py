@@ -9,11 +9,10 @@ from fusetune.analyze.analyze_flight import AnalysisSettings, MadeWith, analyze_
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.settings import TrustSettings
+from fusetune.running.job import keep_out, logged_job
 from fusetune.set_names import FOUND
 from fusetune.settings.declaration import built
 from fusetune.storage.documents import read_document
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

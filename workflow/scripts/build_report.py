@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.report.former_flights import remove_former_flights
 from fusetune.report.page import build_report
-
-from job import logged_job
+from fusetune.running.job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

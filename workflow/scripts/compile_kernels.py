@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import fusetune
 from fusetune.ekf2.replay.warm_up import compile_kernels
+from fusetune.running.job import logged_job
 from fusetune.storage.files import atomic_path
-
-from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

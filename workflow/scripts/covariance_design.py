@@ -3,8 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from fusetune.covariance_design import make_covariance_design
-
-from job import logged_job
+from fusetune.running.job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

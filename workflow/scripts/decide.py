@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.decide import decide
 from fusetune.apply.settings import DecisionSettings
+from fusetune.running.job import keep_out, logged_job
 from fusetune.save import read_present
 from fusetune.set_names import FOUND
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import atomic_path
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.design.outputs import write_design
 from fusetune.design.parameter_sets import ParameterSet
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -17,4 +16,4 @@ with logged_job(snakemake.log[0]):
         # also where the flights lead to no set
         Path(snakemake.output.around[0]).mkdir(parents=True, exist_ok=True)
     around = [ParameterSet(**one) for one in snakemake.params.around]
-    write_design(snakemake.input.mission, snakemake.input.study, "results/design", around)
+    write_design(snakemake.input.mission, snakemake.input.study, Path(snakemake.output.plan).parent, around)

@@ -1,11 +1,11 @@
 """Draw the figures of all flights, and write their page."""
 
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.fleet_page.page import build_fleet_page
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -18,5 +18,5 @@ with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
         figures,
         snakemake.output[0],
         list(snakemake.input.pages),
-        {"The decision": "results/report.html"},
+        {"The decision": Path(snakemake.output[0]).with_name("report.html")},
     )

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.conformance.mission_totals import write_mission_totals
 from fusetune.analyze.conformance.split_scores import write_legs
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

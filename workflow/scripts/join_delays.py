@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 from fusetune.analyze.delays.settings import DelaySettings
 from fusetune.analyze.delays.wrong_delays import write_joined
 from fusetune.analyze.effects.joined_effects import write_joined_effects
+from fusetune.running.job import keep_out, logged_job
 from fusetune.save import read_present
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

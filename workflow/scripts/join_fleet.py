@@ -3,8 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.fleet.fleet import write_fleet
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

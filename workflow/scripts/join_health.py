@@ -3,8 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.health.health_files import write_health_table
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.history.keep import keep_history
 from fusetune.apply.settings import DecisionSettings
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.trust.settings import TrustSettings, reaches
+from fusetune.running.job import keep_out, logged_job
 from fusetune.save import find_present, write_flights_table, write_present
 from fusetune.save.discovery import RefusedEntry
 from fusetune.settings.declaration import built
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

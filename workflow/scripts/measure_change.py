@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.apply.history.measure import measure_change
+from fusetune.running.job import keep_out, logged_job
 from fusetune.settings.declaration import built
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

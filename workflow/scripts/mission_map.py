@@ -7,9 +7,8 @@ from fusetune.design.missions.mission import load_mission
 from fusetune.design.missions.outlook import outlook
 from fusetune.execute.planned_vehicle import planned_vehicle
 from fusetune.report.figures.mission_figure import draw_mission
+from fusetune.running.job import logged_job
 from fusetune.storage.documents import write_document
-
-from job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -4,8 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.figures.flight_figures import plot_flight
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -4,8 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.figures.summary_figures import plot_summary
-
-from job import logged_job
+from fusetune.running.job import logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

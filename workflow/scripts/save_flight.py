@@ -4,10 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.errors import RUN_AGAIN
 from fusetune.px4.ulog.reading_limits import ReadingLimits
+from fusetune.running.job import keep_out, logged_job
 from fusetune.save import VerdictThresholds, save_log
 from fusetune.storage.checksum_file import check_checksum
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -4,8 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.search.round_files import write_round
 from fusetune.apply.search.searched_so_far import SearchedSoFar
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

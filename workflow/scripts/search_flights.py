@@ -9,11 +9,10 @@ from fusetune.apply.search.flights_to_search import flights_to_search
 from fusetune.apply.search.searched_flights import write_searched_flights
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.search_settings import SearchSettings
+from fusetune.running.job import keep_out, logged_job
 from fusetune.running.worker_processes import worker_processes
 from fusetune.save import read_present
 from fusetune.settings.declaration import built
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

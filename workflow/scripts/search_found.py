@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.apply.search.found_sets import write_found_sets
 from fusetune.apply.search.searched_so_far import SearchedSoFar
+from fusetune.running.job import keep_out, logged_job
 from fusetune.save import read_present
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -8,9 +8,8 @@ from fusetune.apply.search.round_files import read_round
 from fusetune.apply.search.searched_flights import read_searched_flights
 from fusetune.apply.search.tried_round import try_round
 from fusetune.apply.settings import DecisionSettings
+from fusetune.running.job import keep_out, logged_job
 from fusetune.settings.declaration import built
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -5,8 +5,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.flight_page.sensor_page import build_sensor_page
-
-from job import keep_out, logged_job
+from fusetune.running.job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -18,5 +17,5 @@ with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
         Path(snakemake.input.noise).parent,
         figures,
         snakemake.output[0],
-        {"The flight": f"results/report/flights/{snakemake.wildcards.flight}.html"},
+        {"The flight": Path(snakemake.output[0]).parents[1] / "flights" / f"{snakemake.wildcards.flight}.html"},
     )

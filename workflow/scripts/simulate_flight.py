@@ -6,9 +6,8 @@ from fusetune.design.missions.mission import load_mission
 from fusetune.execute import simulate
 from fusetune.execute.sensors.faults import parse_faults
 from fusetune.execute.vehicle import load_vehicle
+from fusetune.running.job import keep_out, logged_job
 from fusetune.storage.checksum_file import write_checksum
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

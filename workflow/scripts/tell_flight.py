@@ -7,9 +7,8 @@ from fusetune.analyze.conformance.settings import ConformanceSettings
 from fusetune.analyze.health.settings import HealthSettings
 from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.tell_flight import Asked, tell_flight
+from fusetune.running.job import keep_out, logged_job
 from fusetune.settings.declaration import built
-
-from job import keep_out, logged_job
 
 if TYPE_CHECKING:
     snakemake: Any

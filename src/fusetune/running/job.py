@@ -18,7 +18,8 @@ try:
 except ImportError:  # as on Windows
     resource = None  # type: ignore[assignment]
 
-LOGS, COSTS = Path("results/logs"), Path("results/benchmarks")
+LOGS, COSTS = "logs", "benchmarks"
+"""Folders below that of the results."""
 
 
 @contextmanager
@@ -53,12 +54,13 @@ def logged_job(log: str) -> Iterator[None]:
 
 def _write_cost(log: Path, wall_s: float) -> None:
     """Write what a job took, as Snakemake's `benchmark` would, had the job no parent that was there before it."""
-    if resource is None or not log.is_relative_to(LOGS):
+    results = next((folder for folder in log.parents if folder.name == LOGS), log).parent
+    if resource is None or results == log.parent:
         return
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     cpu_s = sum(one.ru_utime + one.ru_stime for one in used)
     rss_mb = max(one.ru_maxrss for one in used) / (1 << 20 if sys.platform == "darwin" else 1 << 10)
-    file = COSTS / log.relative_to(LOGS).with_suffix(".tsv")
+    file = results / COSTS / log.relative_to(results / LOGS).with_suffix(".tsv")
     with suppress(OSError):  # nothing rests on it
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(f"s\tmax_rss\tcpu_time\n{wall_s:.4f}\t{rss_mb:.2f}\t{cpu_s:.4f}\n", encoding="ascii")
