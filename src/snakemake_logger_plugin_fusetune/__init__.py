@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import signal
 import sys
 from typing import Any
 
@@ -40,15 +42,18 @@ def _flight(record: Any) -> str:
 class LogHandler(LogHandlerBase):
     """Writes events to standard error."""
 
+    _is_alone = False
+
     def emit(self, record: logging.LogRecord) -> None:
-        """Write one; where nobody reads any more, nothing is told."""
+        """Write one; who asked for the run and is gone takes it along."""
         event = event_told(record)
-        if event is not None:
+        if event is not None and not self._is_alone:
             try:
                 sys.stderr.write(line_of(event))
                 sys.stderr.flush()
-            except (OSError, ValueError):
-                return
+            except OSError:
+                self._is_alone = True
+                os.kill(os.getpid(), signal.SIGTERM)
 
     @property
     def writes_to_stream(self) -> bool:

@@ -167,9 +167,7 @@ def _told(results: ResultsFolder, decision: Mapping[str, Any]) -> dict[str, Any]
     }
 
 
-def _parameters(
-    one: Mapping[str, Any], other: Mapping[str, Any]
-) -> dict[str, tuple[float | None, float | None]]:
+def _parameters(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, tuple[float | None, float | None]]:
     values = [{change["name"]: float(change["value"]) for change in document["changes"]} for document in (one, other)]
     return {name: (values[0].get(name), values[1].get(name)) for name in sorted({*values[0], *values[1]})}
 

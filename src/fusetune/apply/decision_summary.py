@@ -18,7 +18,8 @@ class DecisionSummary:
     ----------
     status : `change`, `keep` or `no_evidence`
     sentence : the decision, with its size and how sure it is
-    parameters : name → value before and value after
+    parameters : name → value before and value after, by the names of the vehicle's own release
+    can_be_loaded : whether the parameter files hold them
     next_step : what to do now; empty where nothing is proposed
     """
 
@@ -27,6 +28,7 @@ class DecisionSummary:
     is_exploratory: bool
     sentence: str
     parameters: dict[str, tuple[float, float]]
+    can_be_loaded: bool
     next_step: str
 
     def document(self) -> dict[str, Any]:
@@ -39,20 +41,32 @@ class DecisionSummary:
             "parameters": [
                 {"name": name, "previous": before, "value": after} for name, (before, after) in self.parameters.items()
             ],
+            "can_be_loaded": self.can_be_loaded,
             "next_step": self.next_step,
         }
 
 
 def decision_summary(decision: Mapping[str, Any]) -> DecisionSummary:
     """The summary of what `decision.json` holds, also of one that another release wrote."""
-    changes = {one["name"]: (float(one["previous"]), float(one["value"])) for one in decision.get("changes", ())}
+    on_vehicle = decision.get("on_vehicle") or {}
+    refused = on_vehicle.get("refused") or ()
+    written = on_vehicle.get("parameters") or decision.get("changes", ())
+    changes = {one["name"]: (float(one["previous"]), float(one["value"])) for one in written}
     steps = decision.get("next_steps") or ({"text": ""},)
     exploratory = bool(decision.get("exploratory"))
     sentence = _sentence(decision, len(changes))
     if exploratory and decision["status"] != "no_evidence":
         sentence += f" Exploratory: {counted(decision['flights_scored'], 'flight')} cannot speak for the next one."
+    if refused:
+        sentence += f" Nothing of it can be loaded: {refused[0]['name']}: {refused[0]['reason']}."
     return DecisionSummary(
-        decision["status"], decision["chosen"], exploratory, sentence, changes, str(steps[0]["text"])
+        status=decision["status"],
+        chosen=decision["chosen"],
+        is_exploratory=exploratory,
+        sentence=sentence,
+        parameters=changes,
+        can_be_loaded=bool(changes) and not refused,
+        next_step=str(steps[0]["text"]),
     )
 
 

@@ -9,7 +9,10 @@ from fusetune.cli.command import DONE
 
 HELP = "write flight cards: which parameter set to fly when, to print"
 EXAMPLES = (
-    ("fusetune cards config/studies/paper_table11.yaml --flights 12 --out cards.html", "twelve flights, two of each set"),
+    (
+        "fusetune cards config/studies/paper_table11.yaml --flights 12 --out cards.html",
+        "twelve flights, two of each set",
+    ),
 )
 
 

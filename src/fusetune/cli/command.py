@@ -35,7 +35,10 @@ class Command(Protocol):
     """
 
     HELP: str
-    EXAMPLES: Sequence[tuple[str, str]]
+
+    @property
+    def EXAMPLES(self) -> Sequence[tuple[str, str]]:
+        """They are read only."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Say what it takes."""

@@ -156,9 +156,7 @@ def _parser() -> argparse.ArgumentParser:
         dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS, prog="fusetune"
     )
     for name, command in COMMANDS.items():
-        own = commands.add_parser(
-            name, help=command.HELP, description=_sentence(command.HELP), formatter_class=_Layout
-        )
+        own = commands.add_parser(name, help=command.HELP, description=_sentence(command.HELP), formatter_class=_Layout)
         command.add_arguments(own)
         own.epilog = "\n\n".join(filter(None, (_examples(command), own.epilog and _wrapped(own.epilog))))
     return parser

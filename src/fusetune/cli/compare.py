@@ -91,7 +91,7 @@ def _sets(found: ComparedResults, most: int | None) -> Iterator[str]:
     if not rows:
         yield f"Ranking: the same for all {len(found.sets)} sets."
         return
-    yield f"Ranking, change of the prediction error against what flies now: {len(rows)} of {len(found.sets)} sets differ"
+    yield f"Ranking, change of the prediction error: {len(rows)} of {len(found.sets)} sets differ"
     shown = [row for _, row in sorted(rows, key=lambda one: -one[0])[:most]]
     yield from table_lines([["set", "A", "B", "B − A", "rank", "status"], *shown], right=(1, 2, 3), indent="  ")
     yield from _more(len(rows), len(shown))
@@ -110,9 +110,9 @@ def _flights(found: ComparedResults, most: int | None) -> Iterator[str]:
     if not rows:
         yield f"Scores: the same on all {len(found.flights)} flights that both have."
         return
-    yield f"Scores: {len(rows)} of {len(found.flights)} flights differ; the largest difference of the prediction error, B − A"
+    yield f"Scores, largest difference of the prediction error: {len(rows)} of {len(found.flights)} flights differ"
     shown = [row for _, row in sorted(rows, key=lambda one: -one[0])[:most]]
-    yield from table_lines([["flight", "difference", "of set", ""], *shown], right=(1,), indent="  ")
+    yield from table_lines([["flight", "B − A", "of set", ""], *shown], right=(1,), indent="  ")
     yield from _more(len(rows), len(shown))
 
 

@@ -107,7 +107,10 @@ def _set(given: dict[str, Any], text: str) -> None:
     name, _, below = rest.partition(".")
     if below:
         # of the names of a mapping, which have dots of their own (gnss_vel.z), one is changed and the others stay
-        given[section] = {**given[section], name: {**given[section].get(name, {}), below: read_value(value, "--config")}}
+        given[section] = {
+            **given[section],
+            name: {**given[section].get(name, {}), below: read_value(value, "--config")},
+        }
     else:
         given[section] = {**given[section], name: read_value(value, "--config")}
 

@@ -9,7 +9,10 @@ from fusetune.cli.command import DONE
 
 HELP = "write a mission plan and the parameter files of a study"
 EXAMPLES = (
-    ("fusetune design --mission config/missions/survey.yaml --study config/studies/paper_table11.yaml --out design", "plan and parameter files"),
+    (
+        "fusetune design --mission config/missions/survey.yaml --study config/studies/paper_table11.yaml --out design",
+        "plan and parameter files",
+    ),
 )
 
 

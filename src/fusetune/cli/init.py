@@ -14,7 +14,9 @@ EXAMPLES = (("fusetune init tuning && cd tuning", "then copy logs into flights/ 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The folder."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="made where it does not exist; nothing is written over")
+    parser.add_argument(
+        "folder", type=Path, metavar="DIR", help="made where it does not exist; nothing is written over"
+    )
     add_json(parser)
 
 

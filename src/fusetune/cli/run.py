@@ -16,6 +16,7 @@ from fusetune.errors import UserError
 
 if TYPE_CHECKING:
     from fusetune.configuration import Configuration
+    from fusetune.running.workflow_events import Event
 
 HELP = "run the whole pipeline: from logs to the parameters to load, and the page that says why"
 EXAMPLES = (
@@ -72,13 +73,19 @@ def run(options: argparse.Namespace) -> int:
     made = _prepare(options, folder)
     if made and not (options.quiet or options.json):
         print(made, file=sys.stderr)
-    failures, display = RunFailures(folder), run_display(quiet=options.quiet, verbose=options.verbose or options.dry_run)
+    failures, display = (
+        RunFailures(folder),
+        run_display(quiet=options.quiet, verbose=options.verbose or options.dry_run),
+    )
     arguments = ["--cores", str(options.cores or all_cores()), *_asked(options)]
     decided_before = _decision_bytes(folder)
+
+    def take(told: Event | str) -> None:
+        failures.take(told)
+        display.take(told)
+
     try:
-        status = run_workflow(
-            workflow_file(), folder, arguments, lambda told: (failures.take(told), display.take(told))
-        )
+        status = run_workflow(workflow_file(), folder, arguments, take)
     finally:
         display.end()
     if status:
@@ -95,6 +102,9 @@ def _asked(options: argparse.Namespace) -> list[str]:
     asked = []
     if options.configfile is not None:
         asked += ["--configfile", os.path.abspath(options.configfile)]
+    for text in options.config:
+        if "=" not in text:
+            raise UserError("--config", f"{text!r} is not KEY=VALUE", "Put logs before --config, or behind --")
     config = [*options.config, *([f"study={os.path.abspath(options.study)}"] if options.study else [])]
     if config:
         asked += ["--config", *config]
@@ -117,7 +127,7 @@ def _prepare(options: argparse.Namespace, folder: Path) -> str:
     flights = folder / _settings(options, folder).flights_dir
     if not options.logs:
         is_default = Path(flights.name) == flights.relative_to(folder) if flights.is_relative_to(folder) else False
-        if not flights.exists() and is_default:
+        if is_default and not flights.exists():
             flights.mkdir()
         return ""
     if not Path(os.path.realpath(flights)).is_relative_to(os.path.realpath(folder)):
@@ -170,9 +180,14 @@ def _decision_bytes(folder: Path) -> bytes:
 def _tell_end(folder: Path, as_json: bool, *, is_same: bool) -> None:
     """The decision, the files, the next step."""
     results = folder / RESULTS
-    flights, refused = _flights(results)
+    rows = _flights(results)
     decision = results / "apply" / "decision.json"
-    document: dict[str, Any] = {"flights": flights, "refused": refused}
+    document: dict[str, Any] = {
+        "flights": len(rows),
+        "refused": sum(status != "replayable" for status in rows.values()),
+        # the demonstration's logs are made there
+        "simulated": bool(rows) and all((results / "execute" / f"{flight}.ulg").is_file() for flight in rows),
+    }
     if decision.is_file():
         from fusetune.apply.decision_summary import decision_summary
         from fusetune.storage.documents import read_document
@@ -183,23 +198,27 @@ def _tell_end(folder: Path, as_json: bool, *, is_same: bool) -> None:
     if as_json:
         print_document(document)
         return
+    from fusetune.cli.lines import Lines
+
+    lines = Lines()
     for line in _last_lines(document, results):
-        print(line)
+        lines.tell_below(line)
 
 
-def _flights(results: Path) -> tuple[int, int]:
-    """How many logs there are, and how many of them were refused."""
+def _flights(results: Path) -> dict[str, str]:
+    """Every log's verdict."""
     from fusetune.storage.parquet import read_table
 
     table = results / "save" / "flights.parquet"
-    statuses = read_table(table)["status"].to_pylist() if table.is_file() else []
-    return len(statuses), sum(one != "replayable" for one in statuses)
+    rows = read_table(table).select(["flight", "status"]).to_pylist() if table.is_file() else []
+    return {row["flight"]: row["status"] for row in rows}
 
 
 def _last_lines(document: dict[str, Any], results: Path) -> list[str]:
     from fusetune.apply.wording import counted
 
-    lines = [f"{counted(document['flights'], 'flight')}, {document['refused']} refused"]
+    kind = "simulated flight" if document["simulated"] else "flight"
+    lines = [f"{counted(document['flights'], kind)}, {document['refused']} refused"]
     if document["refused"]:
         lines[0] += f" (why: {results / 'save' / 'flights.csv'})"
     if "decision" not in document:
@@ -207,7 +226,7 @@ def _last_lines(document: dict[str, Any], results: Path) -> list[str]:
     lines.append(document["sentence"])
     for one in document["parameters"]:
         lines.append(f"  {one['name']}  {one['previous']:.6g} → {one['value']:.6g}")
-    if document["parameters"]:
+    if document["can_be_loaded"]:
         lines.append(f"To load: {document['files']['parameters']}")
     lines.append(f"Why:     {document['files']['report']}")
     if document["next_step"]:

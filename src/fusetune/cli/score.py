@@ -42,8 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cores", type=from_one, metavar="N", help="flights at a time (all cores)")
     add_json(parser)
     parser.epilog = (
-        "Figures are changes of the prediction error against the present set, what the newest log's vehicle flew: below "
-        "0 is better. Exit status: 0 all logs were scored; 1 a log has no say, and its reason is told."
+        "Figures are changes of the prediction error against the present set, what the newest log's vehicle flew: "
+        "below 0 is better. Exit status: 0 all logs were scored; 1 a log has no say, and its reason is told."
     )
 
 

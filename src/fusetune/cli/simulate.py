@@ -12,7 +12,10 @@ from fusetune.errors import UserError
 
 HELP = "fly a mission with a simulated vehicle and write its log"
 EXAMPLES = (
-    ("fusetune simulate --mission config/missions/survey.yaml --vehicle config/vehicles/quadrotor.yaml --out flight.ulg", "a log of a simulated flight"),
+    (
+        "fusetune simulate --mission survey.plan --vehicle config/vehicles/quadrotor.yaml --out flight.ulg",
+        "a log of a simulated flight",
+    ),
 )
 
 LARGEST_SEED = 2**53

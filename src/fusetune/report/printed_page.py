@@ -48,8 +48,8 @@ def print_page(page: AnyPath, output: AnyPath) -> None:
         raise UserError(
             page,
             "cannot be printed to PDF: there is no Chromium, Chrome or Edge on PATH",
-            "Install one (apt install chromium, brew install --cask chromium), or open the page in any browser and print "
-            "it from its menu (Ctrl+P, Save as PDF)",
+            "Install one (apt install chromium, brew install --cask chromium), or open the page in any browser and "
+            "print it from its menu (Ctrl+P, Save as PDF)",
         )
     with atomic_path(output) as temporary, tempfile.TemporaryDirectory(prefix="fusetune_print_") as profile:
         command = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 from fusetune.errors import UserError, write_error
@@ -19,8 +20,8 @@ _TEXT = """\
 
 1. Put flight logs (`.ulg`) into `flights/`, five flights or more; folders in it are searched, too.
 2. `fusetune run`, here. While `flights/` is empty, simulated flights show what it does.
-3. Open `results/report.html`. What it recommends is `results/apply/best_params.params`: load it in QGroundControl, or with
-   `fusetune upload results/apply/best_params.params --to VEHICLE`.
+3. Open `results/report.html`. What it recommends is `results/apply/best_params.params`: load it in QGroundControl, or
+   with `fusetune upload results/apply/best_params.params --to VEHICLE`.
 
 `fusetune run` again computes only what is new. `fusetune --help` lists all else.
 
@@ -53,7 +54,9 @@ def make_project_folder(folder: AnyPath) -> Path:
     for name in (CONFIG, FLIGHTS, README):
         there = folder / name
         if there.exists() or there.is_symlink():
-            raise UserError(there, "is there already, and nothing is written over", "Name a new folder, or move it away")
+            raise UserError(
+                there, "is there already, and nothing is written over", "Name a new folder, or move it away"
+            )
     try:
         _write(folder)
     except OSError as error:
@@ -76,7 +79,7 @@ def _write(folder: Path) -> None:
         temporary.write_text(_TEXT, encoding="utf-8")
 
 
-def _rewrite(file: Path, changed) -> None:
+def _rewrite(file: Path, changed: Callable[[str], str]) -> None:
     if file.is_file():
         text = changed(file.read_text(encoding="utf-8"))
         with atomic_path(file) as temporary:

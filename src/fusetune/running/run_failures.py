@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 from fusetune.running.workflow_events import Event, JobFailed, Told
 
-_SNAKEMAKE_PREFIX = re.compile(r'^(?:[A-Za-z]+(?:Error|Exception) in file "[^"]*"(?:, line \d+)?:|[A-Za-z]+(?:Error|Exception):)\s*')
+_SNAKEMAKE_PREFIX = re.compile(
+    r'^(?:[A-Za-z]+(?:Error|Exception) in file "[^"]*"(?:, line \d+)?:|[A-Za-z]+(?:Error|Exception):)\s*'
+)
 """How Snakemake begins what it says of an exception."""
 
 _TOLD_BY_SNAKEMAKE = (

@@ -81,15 +81,6 @@ class RunProgress:
         return len(self._flights.get("analyze_flight", ()))
 
     @property
-    def words(self) -> str:
-        """What is being done."""
-        if not self.now:
-            return ""
-        *others, last = self.now.values()
-        more = f", and {len(others)} more" if others else ""
-        return f"{last.words}{more}"
-
-    @property
     def share(self) -> float:
         """How much of the work is done, 0 … 1."""
         whole = sum(_cost(rule) * count for rule, count in self._expected.items())

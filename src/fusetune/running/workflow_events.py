@@ -1,7 +1,7 @@
 """What a run of the workflow tells of itself while it works, for the process that started it.
 
-Snakemake tells its logger plugin `fusetune` (the package `snakemake_logger_plugin_fusetune`); that writes each event as a
-line of JSON to standard error, behind a sign that no other line begins with (RFC 7464). So what jobs and the workflow
+Snakemake tells its logger plugin `fusetune` (the package `snakemake_logger_plugin_fusetune`); that writes each event as
+a line of JSON to standard error, behind a sign that no other line begins with (RFC 7464). So what jobs and the workflow
 print themselves comes in order with the events, through one pipe.
 """
 

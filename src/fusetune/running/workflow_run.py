@@ -42,7 +42,16 @@ def run_workflow(snakefile: AnyPath, folder: AnyPath, arguments: Sequence[str], 
         This process was interrupted; Snakemake and its jobs have ended.
     """
     # -P: the folder is the user's, and what lies there is no module
-    command = [sys.executable, "-P", "-m", "snakemake", "--snakefile", os.path.abspath(snakefile), "--logger", "fusetune"]
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "snakemake",
+        "--snakefile",
+        os.path.abspath(snakefile),
+        "--logger",
+        "fusetune",
+    ]
     with _asked_to_end_as_interrupted():
         process = subprocess.Popen(
             [*command, *arguments],

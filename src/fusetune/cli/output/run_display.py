@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 EVERY_S = 15.0
 """Where nothing is drawn, a line tells of the progress no more often."""
 
+MOST_JOBS_SHOWN = 3
+
 
 class RunDisplay(Protocol):
     """Takes what happens, and shows it on standard error."""
@@ -118,10 +120,21 @@ class _Bar:
 
         progress = self._progress
         row = Table.grid(padding=(0, 2))
-        bar = ProgressBar(total=1.0, completed=progress.share, width=30, pulse=not progress.total)
-        row.add_row(bar, Text(f"{100.0 * progress.share:3.0f} %", no_wrap=True), Text(", ".join(_figures(progress)[1:])))
-        words = progress.words or ("Look for what there is to do" if not progress.total else "")
-        return Group(row, Text(words, style="dim", no_wrap=True, overflow="ellipsis"))
+        bar = ProgressBar(total=1.0, completed=progress.share, width=30, complete_style="cyan", finished_style="cyan")
+        row.add_row(
+            bar, Text(f"{100.0 * progress.share:3.0f} %", no_wrap=True), Text(", ".join(_figures(progress)[1:]))
+        )
+        lines = _at_work(progress)
+        return Group(row, *(Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in lines))
+
+
+def _at_work(progress: RunProgress) -> list[str]:
+    """What is being done, a line for each of a few jobs."""
+    if not progress.total:
+        return ["Look for what there is to do"]
+    words = [job.words for job in progress.now.values()]
+    more = len(words) - MOST_JOBS_SHOWN
+    return [*words[:MOST_JOBS_SHOWN], f"and {more} more"] if more > 0 else words
 
 
 def _figures(progress: RunProgress) -> list[str]:
