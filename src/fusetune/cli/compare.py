@@ -42,8 +42,11 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print_document(found.document())
     else:
+        from fusetune.cli.lines import Lines
+
+        lines = Lines()
         for line in _lines(found, most=None if options.all else _MOST_ROWS):
-            print(line)
+            lines.tell(line)
     return DONE if found.are_equal else DIFFER
 
 
@@ -72,7 +75,7 @@ def _parameters(found: ComparedResults) -> Iterator[str]:
     rows = [[name, _value(one), _value(other)] for name, (one, other) in found.parameters.items() if one != other]
     if rows:
         yield "Parameters to load (– is left as it flies)"
-        yield from table_lines([["", "A", "B"], *rows], right=(1, 2), indent="  ")
+        yield from table_lines([["", "A", "B"], *rows], right=(1, 2), indent=" ")
 
 
 def _sets(found: ComparedResults, most: int | None) -> Iterator[str]:
@@ -93,7 +96,7 @@ def _sets(found: ComparedResults, most: int | None) -> Iterator[str]:
         return
     yield f"Ranking, change of the prediction error: {len(rows)} of {len(found.sets)} sets differ"
     shown = [row for _, row in sorted(rows, key=lambda one: -one[0])[:most]]
-    yield from table_lines([["set", "A", "B", "B − A", "rank", "status"], *shown], right=(1, 2, 3), indent="  ")
+    yield from table_lines([["set", "A", "B", "B − A", "rank", "status"], *shown], right=(1, 2, 3), indent=" ")
     yield from _more(len(rows), len(shown))
 
 
@@ -112,13 +115,13 @@ def _flights(found: ComparedResults, most: int | None) -> Iterator[str]:
         return
     yield f"Scores, largest difference of the prediction error: {len(rows)} of {len(found.flights)} flights differ"
     shown = [row for _, row in sorted(rows, key=lambda one: -one[0])[:most]]
-    yield from table_lines([["flight", "B − A", "of set", ""], *shown], right=(1,), indent="  ")
+    yield from table_lines([["flight", "B − A", "of set", ""], *shown], right=(1,), indent=" ")
     yield from _more(len(rows), len(shown))
 
 
 def _more(there: int, shown: int) -> Iterator[str]:
     if there > shown:
-        yield f"  … and {there - shown} more (--all)"
+        yield f" … and {there - shown} more (--all)"
 
 
 def _value(value: float | None) -> str:

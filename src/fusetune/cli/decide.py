@@ -65,10 +65,13 @@ def run(options: argparse.Namespace) -> int:
             }
         )
         return DONE
+    from fusetune.cli.lines import Lines
+
+    lines = Lines()
     for line in _lines(decision, now.sentence, before.sentence, {name: then.get(name) for name in changed}, changed):
-        print(line)
+        lines.tell(line)
     if options.out is not None:
-        print(f"Decision and parameter files: {options.out}")
+        lines.tell(f"Decision and parameter files: {options.out}")
     return DONE
 
 
@@ -138,7 +141,7 @@ def _lines(
                 one["status"],
             ]
         )
-    yield from table_lines(rows, right=(1, 2, 3))
+    yield from table_lines(rows, right=(1, 2, 3), indent=" ")
 
 
 def _interval(one: Mapping[str, Any]) -> str:

@@ -61,7 +61,11 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print_document(_document(found))
     else:
-        print(*_lines(found), sep="\n")
+        from fusetune.cli.lines import Lines
+
+        lines = Lines()
+        for line in _lines(found):
+            lines.tell(line)
     return DONE if all(found.flights["has_a_say"]) else REFUSED
 
 
@@ -127,7 +131,7 @@ def _lines(found: Comparison) -> Iterator[str]:
     rows.append(["all flights", *(percent(ranking[name]["change_percent"]) for name in names)])
     rows.append(["95 % interval", *(_interval(ranking[name]) for name in names)])
     rows.append(["better on", *(f"{ranking[name]['flights_better']} of {ranking[name]['flights']}" for name in names)])
-    yield from table_lines(rows, right=range(1, len(names) + 1))
+    yield from table_lines(rows, right=range(1, len(names) + 1), indent=" ")
     if missing:
         yield f"Scored on no flight: {', '.join(missing)}."
     for row in _rows(found.flights):

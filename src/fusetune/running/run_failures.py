@@ -7,10 +7,10 @@ from pathlib import Path
 
 from fusetune.running.workflow_events import Event, JobFailed, Told
 
-_SNAKEMAKE_PREFIX = re.compile(
-    r'^(?:[A-Za-z]+(?:Error|Exception) in file "[^"]*"(?:, line \d+)?:|[A-Za-z]+(?:Error|Exception):)\s*'
-)
-"""How Snakemake begins what it says of an exception."""
+_NAME_OF_EXCEPTION = re.compile(r"^[A-Za-z]*(?:Error|Exception)(?: in (?:rule|file) .*?)?(?:, line \d+)?:\s*")
+"""How Snakemake and Python begin what they say of an exception."""
+_PLACE = re.compile(r'^\s*File ".*", line \d+')
+_TRACEBACK = "Traceback (most recent call last)"
 
 _TOLD_BY_SNAKEMAKE = (
     "At least one job did not complete successfully",
@@ -53,7 +53,7 @@ class RunFailures:
         of_jobs = [self._of_job(job) for job in self._jobs]
         if of_jobs:
             return list(dict.fromkeys(of_jobs))
-        told = [_SNAKEMAKE_PREFIX.sub("", " ".join(one.split())) for one in self._told]
+        told = [_without_its_place(one) for one in self._told]
         told = [one for one in told if one and not one.startswith(_TOLD_BY_SNAKEMAKE)]
         # what ends the run by itself is printed, and then Snakemake has nothing to say
         return list(dict.fromkeys(told or self._printed[-1:] or ["Snakemake ended without a reason"]))
@@ -68,9 +68,18 @@ class RunFailures:
         what = f"{job.rule} of {job.flight}" if job.flight else job.rule
         if not lines:
             return f"{what} failed and left no word of why. Run again; if it stays so, tell the developers."
-        if any(line.startswith("Traceback (most recent call last)") for line in lines):
+        if any(line.startswith(_TRACEBACK) for line in lines):
             return (
                 f"{what} failed by a fault of fusetune's own ({lines[-1].strip()}). "
                 f"Tell the developers, with {job.log}; all else is as it was."
             )
         return lines[-1].strip()
+
+
+def _without_its_place(told: str) -> str:
+    """What Snakemake says of an exception, in a line, without the lines of code that it came from."""
+    lines = told.strip().splitlines()
+    if lines and lines[0].startswith(_TRACEBACK):
+        lines = lines[-1:]
+    kept = [_NAME_OF_EXCEPTION.sub("", line.strip()) for line in lines if not _PLACE.match(line)]
+    return " ".join(filter(None, kept))

@@ -136,31 +136,9 @@ def read_yaml(path: str | os.PathLike[str]) -> dict[str, Any]:
         The file is missing, no regular file, too large, no UTF-8 text, no YAML, holds a key twice or a number that can
         be read in two ways, repeats parts (``*name``) beyond bounds, or its top level is no mapping.
     """
-    document = _loaded(_text_of(path), path)
-    if not isinstance(document, dict):
-        reason = f"its top level is {describe(document)}; expected a mapping (keys and values)"
-        raise UserError(path, reason, _EXAMPLES)
-    return document
-
-
-def read_value(text: str, told_of: str) -> Any:
-    """Read a value that was typed, as it would be read in a file.
-
-    Parameters
-    ----------
-    told_of : where it was typed, for the error
-
-    Raises
-    ------
-    UserError
-        It is no YAML, or could be read in two ways.
-    """
-    return _loaded(text, told_of)
-
-
-def _loaded(text: str, path: str | os.PathLike[str]) -> Any:
+    text = _text_of(path)
     try:
-        return yaml.load(text, Loader=_Loader)
+        document = yaml.load(text, Loader=_Loader)
     except _Trouble as error:
         raise UserError(path, f"{error.place}: {error.reason}", error.remedy) from error
     except yaml.YAMLError as error:
@@ -170,6 +148,10 @@ def _loaded(text: str, path: str | os.PathLike[str]) -> Any:
         # what PyYAML lets through when a value does not fit its explicit tag, as `!!int ""`
         reason = f"is not valid YAML: a value does not fit its tag ({error})"
         raise UserError(path, reason, "Leave tags (!!) out") from error
+    if not isinstance(document, dict):
+        reason = f"its top level is {describe(document)}; expected a mapping (keys and values)"
+        raise UserError(path, reason, _EXAMPLES)
+    return document
 
 
 def _text_of(path: str | os.PathLike[str]) -> str:
