@@ -27,6 +27,7 @@ from fusetune.running.workflow_files import file_or_packaged
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.settings.checking import checked, read_checked, validate
 from fusetune.settings.declaration import section, setting
+from fusetune.settings.given_values import in_their_types, nested
 from fusetune.settings.schema import schema_of
 from fusetune.storage.files import AnyPath
 
@@ -164,7 +165,7 @@ def read_configuration(
     files
         Of keys that stand in several, the last counts; sections and other mappings are put together key by key.
     given
-        Keys of the command line, which count before those of the files.
+        Keys of the command line, which count before those of the files; `decision.draws` is one of the section.
     given_by
         What gave them, for messages.
 
@@ -184,9 +185,9 @@ def read_configuration(
     asked: dict[str, Any] = {}
     for file in files:
         asked = _joined(asked, read_checked(file, schema))
-    if given:
-        validate(given, schema, given_by)
-    settings = checked(Configuration, _joined(asked, given or {}), given_by if given or not files else files[-1])
+    given = in_their_types(nested(given or {}, schema, given_by), schema)
+    validate(given, schema, given_by)
+    settings = checked(Configuration, _joined(asked, given), given_by if given or not files else files[-1])
     return settings.located
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import struct
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -45,6 +46,10 @@ CONFIG = {
     # one test asks for these sets
     "effects": {"try_measured": False},
 }
+
+_NOTE = b"char[5] notenote2"
+ONE_MORE_MESSAGE = struct.pack("<HBB", len(_NOTE) + 1, ord("I"), len("char[5] note")) + _NOTE
+"""At the end of a log it makes another log of it; a plain copy would be refused as one."""
 
 
 @dataclass

@@ -6,12 +6,11 @@ import csv
 import json
 import os
 import signal
-import struct
 import subprocess
 import time
 from pathlib import Path
 
-from tests.workflow.conftest import STUDY, Workspace
+from tests.workflow.conftest import ONE_MORE_MESSAGE, STUDY, Workspace
 
 from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
@@ -77,11 +76,8 @@ def test_a_file_that_is_no_log_is_listed_with_its_reason_and_stops_nothing(flown
     assert (flown.folder / "results" / "report.html").exists()
 
     before = replay_times(flown, "first/*.json")
-    # One more message makes it another log; a plain copy would be refused as one.
-    note = b"char[5] notenote2"
-    message = struct.pack("<HBB", len(note) + 1, ord("I"), len("char[5] note")) + note
     log = (flown.folder / "flights" / "first.ulg").read_bytes()
-    (flown.folder / "flights" / "second.ulg").write_bytes(log + message)
+    (flown.folder / "flights" / "second.ulg").write_bytes(log + ONE_MORE_MESSAGE)
     of_flight = dict.fromkeys(("save_flight", "tell_flight", "flight_page"), 1)
     assert flown.planned_jobs() == {**of_flight, **SUMMARIES}
     flown.run_ok("--cores", "2", DECISION)

@@ -162,8 +162,10 @@ def _problems(error: jsonschema.ValidationError) -> list[str]:
     prefix = f"{place}: " if place else ""
     schema: dict[str, Any] = dict(error.schema) if isinstance(error.schema, Mapping) else {}
     if error.validator == "additionalProperties":
-        known = list(schema.get("properties", {}))
-        unknown = [str(key) for key in _keys(error.instance) if key not in known]
+        properties = schema.get("properties", {})
+        # what may not stand here, as a key of former releases, is no choice
+        known = [name for name in properties if "not" not in properties[name]]
+        unknown = [str(key) for key in _keys(error.instance) if key not in properties]
         return [
             f"{prefix}unknown key {describe(key)}{nearest(key, known)}; expected one of {', '.join(known)}"
             for key in unknown[:MOST_PROBLEMS_SHOWN]

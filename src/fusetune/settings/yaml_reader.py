@@ -154,6 +154,14 @@ def read_yaml(path: str | os.PathLike[str]) -> dict[str, Any]:
     return document
 
 
+def value_of_text(text: str) -> Any:
+    """What a text means where it is a value in a YAML file; one that is no YAML means itself."""
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except (_Trouble, yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError):
+        return text
+
+
 def _text_of(path: str | os.PathLike[str]) -> str:
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):
