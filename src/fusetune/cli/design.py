@@ -8,6 +8,12 @@ from pathlib import Path
 from fusetune.cli.command import DONE
 
 HELP = "write a mission plan and the parameter files of a study"
+EXAMPLES = (
+    (
+        "fusetune design --mission config/missions/survey.yaml --study config/studies/paper_table11.yaml --out design",
+        "plan and parameter files",
+    ),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,6 +11,12 @@ from fusetune.cli.command import DONE
 from fusetune.errors import UserError
 
 HELP = "fly a mission with a simulated vehicle and write its log"
+EXAMPLES = (
+    (
+        "fusetune simulate --mission survey.plan --vehicle config/vehicles/quadrotor.yaml --out flight.ulg",
+        "a log of a simulated flight",
+    ),
+)
 
 LARGEST_SEED = 2**53
 
