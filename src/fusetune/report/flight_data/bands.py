@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,12 @@ def bands(logged: Logged, replayed: TopicTable | None, scoring: Mapping[str, Any
     last = logged.flight.last_timestamp
     yield from _of_vehicle(logged, last)
     if scoring is not None:
-        cuts = (
-            one for one in from_documents(scoring.get("cuts")) if one.start_us is not None and one.stop_us is not None
-        )
-        yield from _band(
-            "not_scored", "not scored", [Span(one.start_us or 0, one.stop_us or 0, one.found) for one in cuts]
-        )
+        cuts = [
+            Span(one.start_us, one.stop_us, one.found)
+            for one in from_documents(scoring.get("cuts"))
+            if one.start_us is not None and one.stop_us is not None
+        ]
+        yield from _band("not_scored", "not scored", cuts)
     own = logged.status_flags
     flags = replayed if replayed is not None else own
     yield from _of_flags(flags, (*STATES, *ALARMS), last, "", "")
@@ -90,7 +91,7 @@ def _fewer(spans: Sequence[Span]) -> tuple[Span, ...]:
     """Of too many spans those nearest to each other joined, if they say the same."""
     found = list(spans)
     while len(found) > _MOST_SPANS:
-        gaps = np.array([right.start - left.stop for left, right in zip(found, found[1:], strict=False)])
+        gaps = np.array([right.start - left.stop for left, right in pairwise(found)])
         closed = gaps <= np.partition(gaps, len(gaps) - _MOST_SPANS)[len(gaps) - _MOST_SPANS]
         joined = [found[0]]
         for one, is_closed in zip(found[1:], closed.tolist(), strict=True):

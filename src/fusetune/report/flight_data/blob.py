@@ -35,7 +35,7 @@ MANTISSA_BITS = 16
 _LOST_BITS = 23 - MANTISSA_BITS
 _ALIGNED = 4
 _LEVEL = 4
-"""Of gzip: figures are noise in most of their bytes, of which a higher one makes little less in a multiple of the time."""
+"""Of gzip: figures are noise in most of their bytes, which a higher one packs no better in a multiple of the time."""
 
 _DTYPES: Mapping[str, np.dtype] = {
     "f4": np.dtype("<f4"),

@@ -1,4 +1,4 @@
-"""What happened on a flight at a time: resets, rejections begun, failsafes, messages of the firmware, parameters set."""
+"""What happened on a flight at a time: resets, rejections begun, failsafes, messages, parameters set."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from fusetune.report.flight_data.innovation_panels import (
 from fusetune.report.flight_data.logged import Logged, read_logged
 from fusetune.report.flight_data.marks import marks
 from fusetune.report.flight_data.replays import Replay, replays_of
-from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_set
+from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_sets
 from fusetune.report.flight_data.track_view import track_view
 from fusetune.report.flight_page.flight_results import read_flight_results
 from fusetune.set_names import AS_FLOWN, ONBOARD, PRESENT
@@ -73,7 +73,7 @@ def flight_content(
         duration_s=flight.duration_s,
         takeoff_s=_finite(results.times.take_off_s),
         landing_s=_finite(results.times.landing_s),
-        sets=tuple(shown_set(one.name, present, choice) for one in innovations),
+        sets=shown_sets([one.name for one in innovations], scoring, present, choice),
         panels=tuple(_panels(flight.start_timestamp, innovations)),
         bands=tuple(bands(logged, flags, scoring)),
         marks=tuple(marks(results)),

@@ -101,11 +101,7 @@ def split_by_axis(table: pa.Table) -> dict[SourceAxis, AxisInnovations]:
     """Rows with the columns of `<set>.innovations.parquet` by source and axis, in the order of the table."""
     if not table.num_rows:
         return {}
-    source = (
-        table["source"].combine_chunks()
-        if table["source"].num_chunks == 1
-        else table["source"].unify_dictionaries().combine_chunks()
-    )
+    source = table["source"].unify_dictionaries().combine_chunks()
     names = source.dictionary.to_pylist()
     key = (source.indices.to_numpy() * _AXES + table["axis"].to_numpy()).astype(np.int16)
     order = np.argsort(key, kind="stable")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fusetune.report.flight_data.content import Role, ShownSet
-from fusetune.report.flight_data.set_look import set_style
+from fusetune.report.set_styles import set_style, set_styles
 from fusetune.set_names import AS_FLOWN, ONBOARD
 
 MOST_SETS = 12
@@ -57,7 +57,19 @@ def replayed_sets(
     return names[: MOST_SETS + 1]
 
 
-def shown_set(name: str, present: str, choice: Choice) -> ShownSet:
-    """A set as the views show it."""
-    style = set_style(name, present)
-    return ShownSet(name, choice.role_of(name, present), style.index, style.marker)
+def shown_sets(
+    names: Sequence[str], scoring: Mapping[str, Any] | None, present: str, choice: Choice
+) -> tuple[ShownSet, ...]:
+    """The sets as the views show them.
+
+    Parameters
+    ----------
+    names : of those that have something to show, `onboard` and `as_flown` too
+    scoring : `scoring.json`: with the sets of the study, by which they are told apart; None as of `replayed_sets`
+    """
+    styles = set_styles(() if scoring is None else scoring["sets"], present, choice.chosen)
+    found = []
+    for name in names:
+        style = styles.get(name) or set_style(name, present)
+        found.append(ShownSet(name, choice.role_of(name, present), style.index, style.marker))
+    return tuple(found)

@@ -13,13 +13,15 @@ of a decision is read; a page that knows it puts it into a blob with `with_choic
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from fusetune.report.flight_data.blob import unpack, with_header
 from fusetune.report.flight_data.flight_content import flight_content
 from fusetune.report.flight_data.packing import LARGE_BUDGET_BYTES, SMALL_BUDGET_BYTES, pack_content
 from fusetune.report.flight_data.shown_sets import Choice
+from fusetune.report.set_styles import SetStyle
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
 from fusetune.storage.files import AnyPath, atomic_path
 
@@ -75,13 +77,16 @@ def write_blob(
     return content is not None
 
 
-def with_choice(blob: bytes, chosen: str | None, ruled_out: Collection[str] = ()) -> bytes:
-    """A blob whose sets have the parts that the decision gave them.
+def with_choice(
+    blob: bytes, chosen: str | None, ruled_out: Collection[str] = (), styles: Mapping[str, SetStyle] | None = None
+) -> bytes:
+    """A blob whose sets have the parts, and the looks, that the decision gave them.
 
     Parameters
     ----------
     chosen : the recommended set; None, or the present one, where that stays
     ruled_out : sets that cannot be chosen
+    styles : looks of the sets in all figures; those that it lacks keep theirs
 
     Raises
     ------
@@ -90,8 +95,14 @@ def with_choice(blob: bytes, chosen: str | None, ruled_out: Collection[str] = ()
     """
     sets = unpack(blob).header["sets"]
     present = next((one["name"] for one in sets if one["role"] == "present"), "")
-    choice = Choice(chosen, frozenset(ruled_out))
-    return with_header(blob, {"sets": [one | {"role": choice.role_of(one["name"], present)} for one in sets]})
+    choice, looks = Choice(chosen, frozenset(ruled_out)), styles or {}
+
+    def changed(one: dict[str, Any]) -> dict[str, Any]:
+        look = looks.get(one["name"])
+        style = {} if look is None else {"style": look.index, "marker": look.marker}
+        return one | {"role": choice.role_of(one["name"], present)} | style
+
+    return with_header(blob, {"sets": [changed(one) for one in sets]})
 
 
 def is_readable(flight_folder: AnyPath) -> bool:
