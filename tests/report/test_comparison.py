@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fusetune.report.comparison import percent_change, robust_reach, sign_counts
-from fusetune.report.figures.difference_figures import flight_labels, shortened
+from fusetune.report.short_names import flight_labels, shortened
 
 
 def test_a_difference_of_logarithms_is_a_percentage() -> None:

@@ -16,6 +16,7 @@ from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.apply.sensitivity.files import NOTHING_TOLD, SENSITIVITY_FILE, ToldSensitivity, read_sensitivity
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
 from fusetune.report.scored_samples import scored_samples
+from fusetune.report.set_styles import SetStyle, set_styles
 from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
@@ -78,6 +79,11 @@ class Results:
     def is_ruled_out(self, name: str) -> bool:
         """Whether a set cannot be chosen: vetoed, not scored, or worse than the present one in a kind of prediction."""
         return self.status(name) in OUT
+
+    @cached_property
+    def styles(self) -> dict[str, SetStyle]:
+        """The look of every set that was tried."""
+        return set_styles([*map(str, self.ranking["name"]), self.present], self.present, self.decision["chosen"])
 
     @cached_property
     def _ranked(self) -> dict[str, dict[Hashable, Any]]:

@@ -23,13 +23,13 @@ from fusetune.report.comparison import (
 from fusetune.report.figures.drawing import GOOD_COLOUR, PRESENT_COLOUR, empty_figure, label_sets, minus, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles, status_colour
 from fusetune.report.results import OUT, Results
+from fusetune.report.short_names import flight_labels, shortened
 
 Limits = tuple[float, float]
 
 NOTHING_TO_COMPARE = "Only the present set was scored: there is nothing to compare."
 
 _ANNOTATED_CELLS = 240
-_LONGEST_NAME = 30
 
 
 def differences(results: Results) -> Figure:
@@ -190,21 +190,3 @@ def _cross(axes: Axes, one: pd.Series, style: SetStyle, label: str, limits: tupl
     axes.plot([x, x], [one["lower_unaided"], one["upper_unaided"]], color=style.colour, linewidth=1.0, alpha=0.75)
     fill = "none" if one["status_aided"] in OUT else "full"
     axes.plot(x, y, style.marker, color=style.colour, markersize=6, fillstyle=fill, label=label, linestyle="none")
-
-
-def shortened(name: str, longest: int = _LONGEST_NAME) -> str:
-    """A name that leaves room for the plot: its middle goes, as flights often differ at the end."""
-    if len(name) <= longest:
-        return name
-    head = (longest - 1) // 3
-    return f"{name[:head]}…{name[-(longest - 1 - head) :]}"
-
-
-def flight_labels(names: list[str]) -> list[str]:
-    """Names of flights without the beginning that they share, where they are long."""
-    if max(map(len, names)) <= _LONGEST_NAME:
-        return names
-    # What the first and the last in alphabetical order share, all between them share.
-    first, last = min(names), max(names)
-    shared = next((i for i, pair in enumerate(zip(first, last, strict=False)) if pair[0] != pair[1]), 0)
-    return [shortened(f"…{name[shared:]}" if shared > 3 else name) for name in names]
