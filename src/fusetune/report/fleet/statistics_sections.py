@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from fusetune.apply.fleet.changes import FEWEST_A_SIDE, LEVEL
 from fusetune.apply.fleet.outliers import FALSE_SHARE, FEWEST_FLIGHTS
 from fusetune.report.counted import count_words, listed
 from fusetune.report.figure_words import figure_words
-from fusetune.report.fleet_page.change_points import change_points
-from fusetune.report.fleet_page.fleet_results import Document, FleetResults
-from fusetune.report.markup import Cell, details, figure, number, paragraph, section, table
-from fusetune.storage.files import AnyPath
+from fusetune.report.fleet.change_points import change_points
+from fusetune.report.fleet.fleet_results import Document, FleetResults
+from fusetune.report.markup import Cell, details, number, paragraph, section, table
 
 _MOST_NAMED_FIGURES = 6
 
 
-def changes_section(results: FleetResults, trends: AnyPath) -> str:
-    """Steps and drifts in tables, and the picture of the trends."""
+def changes_section(results: FleetResults) -> str:
+    """Steps and drifts in tables; empty where nothing changed."""
     parts = []
     for point in change_points(results):
         head = ("figure", "before", "after", "unit", "flights before", "after", "chance")
@@ -32,22 +30,13 @@ def changes_section(results: FleetResults, trends: AnyPath) -> str:
     if results.drifts:
         head = ("figure", "per ten flights", "interval", "unit", "flights", "vehicle", "chance")
         parts.append(table(head, [_drift_row(one) for one in results.drifts], "Drifts"))
-    if not parts:
-        few = f"A change takes {FEWEST_A_SIDE} flights before and after to show; to be sure of it, a dozen and more."
-        parts.append(paragraph(f"No figure changed over time beyond what the order of flights does by chance. {few}"))
-    else:
+    if parts:
         text = (
             f"Where nothing changes, a step or a drift is named in any figure in {100 * LEVEL:.0f} of 100 fleets each: "
             "the chances are corrected for the number of figures."
         )
         parts.append(paragraph(text, "note"))
-    if Path(trends).exists():
-        caption = (
-            "A dot per flight in the order of time, a colour per vehicle; ringed: beyond the limit, which is dashed "
-            "where it is near. Lines: medians between changes."
-        )
-        parts.append(figure(trends, caption))
-    return section("What changed, and when", *parts)
+    return section("What changed, and when", *parts, id="changes")
 
 
 def _change_row(one: Document) -> tuple[Cell | str, ...]:
@@ -80,8 +69,7 @@ def outliers_section(results: FleetResults) -> str:
     for one in results.outliers:
         by_flight[one["flight"]].append(one)
     if not by_flight:
-        few = f"Only vehicles with {FEWEST_FLIGHTS} flights and more have been asked."
-        return section("Flights that stand out", paragraph(f"No flight differs from the others of its vehicle. {few}"))
+        return ""
     text = (
         f"Compared with the other flights of the vehicle; at most {100 * FALSE_SHARE:.0f} % of what is named is "
         "chance. To be unlike the others is not to be wrong: the limits say that."
@@ -102,14 +90,14 @@ def outliers_section(results: FleetResults) -> str:
         ]
         words = listed([figure_words(one["id"]) for one in found], 2, "; ")
         parts.append(details(f"{flight}: {words}", table(head, rows)))
-    return section("Flights that stand out", *parts)
+    return section("Flights that stand out", *parts, id="outliers")
 
 
 def verdicts_section(results: FleetResults) -> str:
     """Flights that alone make the fleet's verdict worse, and behind a click each figure beyond its limit."""
     beyond = [one for one in results.figures if one["verdict"]["worst"] in ("warning", "fail")]
     if not beyond:
-        return section("What verdicts hang on", paragraph("On no flight does a figure lie beyond its limit."))
+        return ""
     text = (
         "Each flight was left out in turn. Without those named here, figures of the fleet would be judged otherwise: "
         "look at them first."
@@ -128,8 +116,6 @@ def verdicts_section(results: FleetResults) -> str:
         for flight, words in order
     ]
     parts = [paragraph(text, "note"), table(("flight", "figures", "which"), rows)] if rows else []
-    if not rows:
-        parts.append(paragraph("No single flight decides how a figure is judged."))
     head = ("figure", "worst", "typical", "flights", "fail", "warning", "hangs on")
     summary = f"{count_words(len(beyond), 'figure')} beyond the limit on some flight"
     return section(
@@ -160,26 +146,18 @@ def _judged_otherwise(verdict: Document) -> list[str]:
     return [driver["flight"] for driver in verdict["drivers"] if (driver["worst"], driver["typical"]) != told]
 
 
-def histograms_section(pictures: Sequence[AnyPath]) -> str:
-    """Histograms: those of figures beyond their limits on some flight, the rest behind a click."""
-    if not pictures:
-        return ""
-    caption = (
-        "Flights by value. Line: median; grey: the middle 90 %; dashed: the limit, where it is near. Bins are made for "
-        "the bulk, what lies far beyond is counted in the corner."
-    )
-    first, *others = (figure(one, caption) for one in pictures)
-    more = details("All other figures", *others) if others else ""
-    return section("How the figures are spread", first, more)
-
-
-def pooled_sensors_section(pictures: Sequence[AnyPath]) -> str:
-    """Sensors over all flights of a vehicle, each behind a click; empty where none was drawn."""
-    caption = "A box for each flight, the histogram of all together; Allan deviation of all times of standing still."
-    parts = [
-        details(Path(one).stem.removeprefix("pooled_").replace("_", " "), figure(one, caption)) for one in pictures
-    ]
-    return section("The sensors over all flights", *parts) if parts else ""
+def untold(results: FleetResults) -> list[str]:
+    """What there is nothing to say about, each in a line."""
+    lines = []
+    if not results.changes and not results.drifts:
+        few = f"a change takes {FEWEST_A_SIDE} flights before and after to show"
+        lines.append(f"No figure of a vehicle changed over time beyond chance ({few}).")
+    if not results.outliers:
+        few = f"only vehicles with {FEWEST_FLIGHTS} flights and more are asked"
+        lines.append(f"No flight differs from the others of its vehicle ({few}).")
+    if not any(one["verdict"]["worst"] in ("warning", "fail") for one in results.figures):
+        lines.append("On no flight does a figure lie beyond its limit.")
+    return lines
 
 
 def figures_section(results: FleetResults) -> str:
@@ -198,7 +176,7 @@ def figures_section(results: FleetResults) -> str:
             rows += [_spread_row(f"   {name}", "", spread, None, "quiet") for name, spread in by_vehicle]
         parts.append(details(f"{group[0].upper()}{group[1:]}: {count_words(len(found), 'figure')}", table(head, rows)))
     text = "All of it is one table, a line per figure and flight: results/analyze/health.parquet, for pandas or DuckDB."
-    return section("All figures", paragraph(text), *parts)
+    return section("All figures of health", *parts, paragraph(text, "note")) if parts else ""
 
 
 def _spread_row(

@@ -6,7 +6,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 from fusetune.report.counted import count_words
-from fusetune.report.fleet_page.fleet_results import Document, FleetResults
+from fusetune.report.fleet.fleet_results import Document, FleetResults
 
 
 @dataclass(frozen=True)

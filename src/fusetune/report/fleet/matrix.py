@@ -5,8 +5,8 @@ from __future__ import annotations
 from html import escape
 
 from fusetune.report.counted import count_words
-from fusetune.report.fleet_page.fleet_results import Document, FleetResults
-from fusetune.report.markup import details, link, paragraph, section
+from fusetune.report.fleet.fleet_results import Document, FleetResults
+from fusetune.report.markup import details, link, paragraph
 from fusetune.report.severity_words import SEVERITY_WORDS, cause_words, confidence_words, worst_of
 
 _MOST_CLEAN_SHOWN = 12
@@ -19,25 +19,24 @@ def matrix_section(results: FleetResults) -> str:
     clean = [one for one in flights if not results.has_trouble(one)]
     shown = [one for one in flights if one not in clean] if len(clean) > _MOST_CLEAN_SHOWN else list(flights)
     text = (
-        "A field is red where the flight must not be repeated like this, orange where something is to be mended, blue "
-        "where it is worth knowing; where the pointer rests it says how sure. Of a refused log little "
-        "or nothing can be told; its page says why. Beside: figures of the health table "
-        "beyond their limits."
+        "Red: the flight must not be repeated like this. Orange: something is to be mended. Blue: worth knowing. Where the "
+        "pointer rests it says how sure. Beside: how many figures of health lie beyond their limits, far (fail) and "
+        "near (warn). Of a refused log little or nothing can be told; its page says why."
     )
     parts = [paragraph(text, "note")]
     if shown:
         parts.append(_table(shown, results))
     if len(shown) < len(flights):
         parts.append(details(f"{count_words(len(clean), 'flight')} without any trouble", _table(clean, results)))
-    return section("Which flights have what", *parts)
+    return details("Which flights have what", *parts, id="matrix")
 
 
 def _table(flights: list[Document], results: FleetResults) -> str:
     causes = [one["id"] for one in results.causes]
-    titles = "<th>flight</th>"
-    titles += "".join(f'<th class="turned"><span>{escape(cause_words(one))}</span></th>' for one in causes)
-    titles += '<th class="number">fail</th><th class="number">warn</th>'
-    titles += "".join(f"<th>{title}</th>" for title in ("date", "vehicle", "firmware"))
+    titles = '<th scope="col">flight</th>'
+    titles += "".join(f'<th scope="col" class="turned"><span>{escape(cause_words(one))}</span></th>' for one in causes)
+    titles += '<th scope="col" class="number">fail</th><th scope="col" class="number">warn</th>'
+    titles += "".join(f'<th scope="col">{title}</th>' for title in ("date", "vehicle", "firmware"))
     rows = "".join(f"<tr>{_row(one, causes, results)}</tr>" for one in flights)
     return (
         f'<div class="scroll"><table class="matrix"><thead><tr>{titles}</tr></thead><tbody>{rows}</tbody></table></div>'
@@ -59,7 +58,7 @@ def _row(flight: Document, causes: list[str], results: FleetResults) -> str:
 
 
 def _count(count: int, severity: str) -> str:
-    return f'<td class="number {f"is-{severity}" if count else "quiet"}">{count}</td>'
+    return f'<td class="number is-{severity}">{count or ""}</td>'
 
 
 def _mark(finding: Document | None) -> str:
@@ -67,4 +66,5 @@ def _mark(finding: Document | None) -> str:
         return '<td class="mark"></td>'
     severity = worst_of([finding])
     hint = f"{finding['cause']} – {SEVERITY_WORDS[severity]}, {confidence_words(finding['confidence'])}"
-    return f'<td class="mark" title="{escape(hint)}"><span class="spot is-{severity}"></span></td>'
+    words = f'<span class="hidden">{escape(SEVERITY_WORDS[severity])}</span>'
+    return f'<td class="mark" title="{escape(hint)}"><span class="spot is-{severity}"></span>{words}</td>'

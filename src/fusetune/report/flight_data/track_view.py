@@ -1,0 +1,111 @@
+"""The track of a flight on a plain map, with the fixes of its receiver, its mission and what was flown when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
+from fusetune.px4.flight import Flight
+from fusetune.px4.local_map import EARTH_RADIUS_M
+from fusetune.report.flight_data.content import Figures, PlaneTrack, Span, TrackView
+
+_FIX_3D = 3
+
+
+def track_view(track: FlownTrack | None, conformance: Mapping[str, Any] | None, flight: Flight) -> TrackView | None:
+    """What is shown on the map; None where the flight has no track.
+
+    North and east are about the home of the mission that was flown, else about where the track begins.
+
+    Parameters
+    ----------
+    conformance : `conformance.json`; None where there is none
+    flight : canonical
+    """
+    if track is None or not track.time.size:
+        return None
+    told = conformance or {"missions": (), "flown": None, "manoeuvres": ()}
+    mission = next((one for one in told["missions"] if one["mission"] == told["flown"]), None)
+    manoeuvres = tuple(Span(one["start_us"], one["stop_us"], one["kind"]) for one in told["manoeuvres"])
+    if not track.has_place:
+        return TrackView(_local(track, flight), manoeuvres=manoeuvres)
+    home = (track.lat[0], track.lon[0]) if mission is None else (mission["home"]["lat"], mission["home"]["lon"])
+    flown = _parted(PlaneTrack(track.time, *plane(track.lat, track.lon, *home), track.height, track.heading))
+    fixes = _fixes(flight, home)
+    if fixes is not None and track.is_above_takeoff:
+        fixes = _above(fixes, flown)
+    return TrackView(flown, fixes, mission=_corners(mission), manoeuvres=manoeuvres)
+
+
+def plane(lat: Figures, lon: Figures, home_lat: float, home_lon: float) -> tuple[Figures, Figures]:
+    """North and east of a home, m: `fusetune.px4.local_map`, of arrays (N,) in degrees."""
+    phi, ref = np.radians(lat), np.radians(home_lat)
+    difference = np.radians(lon - home_lon)
+    north = np.cos(ref) * np.sin(phi) - np.sin(ref) * np.cos(phi) * np.cos(difference)
+    east = np.cos(phi) * np.sin(difference)
+    sine = np.hypot(north, east)
+    cosine = np.sin(ref) * np.sin(phi) + np.cos(ref) * np.cos(phi) * np.cos(difference)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = EARTH_RADIUS_M * np.where(sine > 0.0, np.arctan2(sine, cosine) / sine, 1.0)
+    return scale * north, scale * east
+
+
+def _local(track: FlownTrack, flight: Flight) -> PlaneTrack:
+    """By the local position of the vehicle, whose origin has no place on earth."""
+    table = flight.topic("vehicle_local_position")
+    if table is None:
+        nowhere = np.full(track.time.size, np.nan)
+        return _parted(PlaneTrack(track.time, nowhere, nowhere, track.height, track.heading))
+    time = table["timestamp"].astype(np.int64)
+    north, east, down = (table[name].astype(np.float64) for name in ("x", "y", "z"))
+    heading = table["heading"].astype(np.float64) if "heading" in table else np.full(time.size, np.nan)
+    return _parted(PlaneTrack(time, north, east, -down, heading))
+
+
+def _fixes(flight: Flight, home: tuple[float, float]) -> PlaneTrack | None:
+    table = flight.topic("vehicle_gps_position")
+    if table is None or not {"latitude_deg", "longitude_deg", "altitude_msl_m", "fix_type"} <= set(table):
+        return None
+    rows = table["fix_type"] >= _FIX_3D
+    if not rows.any():
+        return None
+    lat, lon, height = (
+        table[name][rows].astype(np.float64) for name in ("latitude_deg", "longitude_deg", "altitude_msl_m")
+    )
+    time = table["timestamp"][rows].astype(np.int64)
+    return PlaneTrack(time, *plane(lat, lon, *home), height, np.full(time.size, np.nan))
+
+
+def _above(fixes: PlaneTrack, flown: PlaneTrack) -> PlaneTrack:
+    """Fixes with heights above take-off: shifted by what lies between both tracks in the median."""
+    known = np.isfinite(flown.height)
+    inside = (fixes.time >= flown.time[0]) & (fixes.time <= flown.time[-1])
+    if not known.any() or not inside.any():
+        return fixes
+    height = np.interp(fixes.time[inside], flown.time[known], flown.height[known])
+    shift = float(np.median(fixes.height[inside] - height))
+    return PlaneTrack(fixes.time, fixes.north, fixes.east, fixes.height - shift, fixes.heading)
+
+
+def _parted(track: PlaneTrack) -> PlaneTrack:
+    """With a row of NaN where nothing is said of the track for long."""
+    behind = np.flatnonzero(np.diff(track.time) > LONGEST_GAP_US) + 1
+    if not behind.size:
+        return track
+
+    def column(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return np.insert(values.astype(np.float64), behind, np.nan)
+
+    time = np.insert(track.time, behind, track.time[behind - 1] + 100)
+    return PlaneTrack(time, *(column(one) for one in (track.north, track.east, track.height, track.heading)))
+
+
+def _corners(mission: Mapping[str, Any] | None) -> tuple[tuple[float, float], ...]:
+    if mission is None or not mission["legs"]:
+        return ()
+    places = [mission["legs"][0]["start_ned_m"], *(leg["end_ned_m"] for leg in mission["legs"])]
+    return tuple((round(north, 3), round(east, 3)) for north, east, _ in places)
