@@ -41,8 +41,8 @@ def build_flight_page(
     noise, conformance = (Path(analyze_folder) / name for name in (SENSOR_NOISE_FILE, CONFORMANCE_FILE))
     mount = f'<div class="{VIEWER_CLASS}" data-flight="{escape(results.flight)}"></div>'
     sections = (
-        answer_section(results),
-        causes_section(results),
+        answer_section(results, bool(blob)),
+        causes_section(results, bool(blob)),
         section("The flight over time", mount, id="viewer") if blob else "",
         conformance_section(read_document(conformance)) if conformance.exists() else "",
         effects_section(results),

@@ -46,7 +46,7 @@ def evidence_section(results: Results) -> str:
             "that the whole flight makes likely. How large a set says its uncertainty is does not count."
         ),
         differences_chart(results),
-        ranking_table(results),
+        details("The ranking in figures", ranking_table(results)),
         objections_table(results),
         details("All other criteria", criteria_table(results)),
         id="ranking",
@@ -75,8 +75,8 @@ def withheld_section(results: Results) -> str:
             "the estimator for some seconds while it flew on. What the sensor measured in the end shows how far the "
             "prediction had drifted: the better the estimator knew its velocity, attitude and biases, the less."
         ),
-        drift_chart(results),
-        pareto_chart(results),
+        details("How far it drifted", drift_chart(results)),
+        details("Two aims against each other", pareto_chart(results)),
         details("Figures of the drift", *told, _drift_note(results) if told[1] else "", *_shorter_gaps(results)),
     ]
     return section("Without a sensor", *parts, id="withheld")
