@@ -61,9 +61,11 @@ def _without_owner(name: str) -> str:
 def _common_start(names: list[str]) -> int:
     """How many characters all of several names begin with, up to the beginning of a word."""
     shared = len(os.path.commonprefix(names)) if len(names) > 1 else 0
-    return max((match.start() for match in _WORD_BEGINS.finditer(names[0]) if match.start() <= shared), default=0) if (
-        shared
-    ) else 0
+    return (
+        max((match.start() for match in _WORD_BEGINS.finditer(names[0]) if match.start() <= shared), default=0)
+        if (shared)
+        else 0
+    )
 
 
 def _fitted(name: str, common: int, taken: set[str]) -> str:

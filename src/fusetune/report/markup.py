@@ -184,7 +184,9 @@ def prose(text: str) -> str:
 
 def bullets(sentences: Sequence[str], kind: str = "") -> str:
     """A list of plain sentences."""
-    return f"<ul{_class(kind)}>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
+    return (
+        f"<ul{_class(kind)}>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
+    )
 
 
 def details(summary: str, *parts: str, kind: str = "", id: str = "") -> str:

@@ -7,6 +7,7 @@ from fusetune.analyze.flight.manoeuvre_classes import FLOWN_CLASSES
 from fusetune.report.flight_page.flight_results import Document
 from fusetune.report.markup import Cell, details, number, paragraph, section, signed, table
 
+
 def conformance_section(document: Document) -> str:
     """The verdict of each mission, manoeuvres, waypoints and legs in tables behind a click.
 

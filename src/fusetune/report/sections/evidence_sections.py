@@ -150,7 +150,9 @@ def holds_section(results: Results) -> str:
     return section(
         title,
         paragraph(_holds(results)),
-        details("Each flight", table(("flight left out", "best set of the others", "change of the error there %"), rows)),
+        details(
+            "Each flight", table(("flight left out", "best set of the others", "change of the error there %"), rows)
+        ),
         paragraph(
             "Each flight was left out in turn, the best eligible set chosen from the others and judged on the flight "
             "that had no part in choosing it. Below 0 is better than the present set. This shows how much hangs on "
@@ -217,7 +219,9 @@ def weights_section(results: Results) -> str:
     )
     unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
     note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")
-    return section("What counts how much", paragraph(text), details("On each flight", table(head, rows), note if unknown else ""))
+    return section(
+        "What counts how much", paragraph(text), details("On each flight", table(head, rows), note if unknown else "")
+    )
 
 
 def _white_shares(results: Results) -> pd.DataFrame:
@@ -256,4 +260,8 @@ def paper_section(results: Results) -> str:
         for one in mode["ranking"]
     ]
     head = ("set", "aggregate RMS", "NIS inside the χ² bounds", "break rate %")
-    return section("The paper's own rule", paragraph(text), details("Why, and its ranking", bullets(mode["why"]), table(head, rows)))
+    return section(
+        "The paper's own rule",
+        paragraph(text),
+        details("Why, and its ranking", bullets(mode["why"]), table(head, rows)),
+    )

@@ -14,7 +14,18 @@ from fusetune.finding import from_documents
 from fusetune.report.comparison import flight_changes
 from fusetune.report.counted import count_words
 from fusetune.report.flight_names import in_time_order
-from fusetune.report.markup import Cell, CellLike, Html, details, grouped_table, number, paragraph, section, signed, table
+from fusetune.report.markup import (
+    Cell,
+    CellLike,
+    Html,
+    details,
+    grouped_table,
+    number,
+    paragraph,
+    section,
+    signed,
+    table,
+)
 from fusetune.report.results import Results
 from fusetune.report.sections.trust_section import GRADE_KINDS
 from fusetune.report.severity_words import worst_of

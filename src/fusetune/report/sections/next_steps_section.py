@@ -23,7 +23,11 @@ def next_steps_section(results: Results) -> str:
         parts.append(details("What these flights cannot tell, and what would", told))
     power = decision["power"]
     if power:
-        parts.append(details("How many flights it takes", paragraph(_power_text(power)), power_chart(results), _power_table(power)))
+        parts.append(
+            details(
+                "How many flights it takes", paragraph(_power_text(power)), power_chart(results), _power_table(power)
+            )
+        )
     return section("What to do next", *parts, id="next-steps")
 
 
