@@ -5,6 +5,10 @@ import pandas as pd
 
 from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
 from fusetune.px4.aid_sources import AID_SOURCES
+from fusetune.report.charts.differences import differences_chart
+from fusetune.report.charts.drift import drift_chart
+from fusetune.report.charts.flights_by_sets import flights_by_sets_chart
+from fusetune.report.charts.pareto import pareto_chart
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, number, paragraph, section, signed, table
 from fusetune.report.results import Results
@@ -41,6 +45,7 @@ def evidence_section(results: Results) -> str:
             "they predicted: aided, one step ahead; unaided, after seconds without GNSS; smoothed, against the velocity "
             "that the whole flight makes likely. How large a set says its uncertainty is does not count."
         ),
+        differences_chart(results),
         ranking_table(results),
         objections_table(results),
         details("All other criteria", criteria_table(results)),
@@ -50,7 +55,10 @@ def evidence_section(results: Results) -> str:
 
 def flight_by_flight_section(results: Results) -> str:
     """Does it hold on each flight? Empty where no flight has a say."""
-    return section("On each flight", sign_table(results), id="each-flight") if results.flights else ""
+    if not results.flights:
+        return ""
+    figures = details("The figures", sign_table(results))
+    return section("On each flight", flights_by_sets_chart(results), figures, id="each-flight")
 
 
 def withheld_section(results: Results) -> str:
@@ -67,6 +75,8 @@ def withheld_section(results: Results) -> str:
             "the estimator for some seconds while it flew on. What the sensor measured in the end shows how far the "
             "prediction had drifted: the better the estimator knew its velocity, attitude and biases, the less."
         ),
+        drift_chart(results),
+        pareto_chart(results),
         details("Figures of the drift", *told, _drift_note(results) if told[1] else "", *_shorter_gaps(results)),
     ]
     return section("Without a sensor", *parts, id="withheld")

@@ -59,7 +59,7 @@ def interval_text(lower: float | None, upper: float | None) -> str:
     """Ends of an interval of score differences, in percent; "not known" where there is none."""
     if lower is None or upper is None or not (math.isfinite(lower) and math.isfinite(upper)):
         return NOT_KNOWN
-    return f"{signed(_percent(lower)).text} … {signed(_percent(upper)).text}"
+    return f"{signed(_percent(lower)).text} to {signed(_percent(upper)).text}"
 
 
 def _interval(one: Mapping[Hashable, Any], is_present: bool) -> Cell:

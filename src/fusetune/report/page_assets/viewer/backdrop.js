@@ -5,6 +5,7 @@
   const MARKER_EVERY_PX = 110;
   const MARKER_PX = 4;
   const CROSS_PX = 3.5;
+  const MOST_TINTED = 0.6; // of the flight: a finding about all of it tints nothing
 
   /* Draws in pixels of the canvas, within the plot. */
   function within(u, draw) {
@@ -28,7 +29,7 @@
       context.fillStyle = colours.sunk;
       for (const [t0, t1] of onGround(model)) fillSpan(context, u, box, t0, t1);
       for (const mark of model.marks) {
-        if (mark.t1 - mark.t0 > 0.9 * model.stop) continue;
+        if (mark.t1 - mark.t0 > MOST_TINTED * model.airTime()) continue;
         context.fillStyle = colours.severity[mark.severity] || colours.quiet;
         context.globalAlpha = 0.1;
         fillSpan(context, u, box, mark.t0, mark.t1, 2 * dpr);

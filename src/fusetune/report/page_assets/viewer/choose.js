@@ -47,7 +47,7 @@
     const chips = [...model.sets.values()].map((set) => {
       const role = model.roleOf(set.name);
       const button = h("button", { type: "button", class: "fv-chip", "data-set": set.name, onclick: () => toggle(set.name) },
-        viewer.swatch(set.style, set.marker), h("span", {}, set.name), role ? h("small", {}, role) : null);
+        viewer.swatch(set.style, set.marker), h("span", {}, model.labelOf(set.name)), role ? h("small", {}, role) : null);
       return { name: set.name, button };
     });
     const more = h("button", { type: "button", class: "fv-quiet-button", onclick: () => (closed = false, tell()) });

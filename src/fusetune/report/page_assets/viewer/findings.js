@@ -9,7 +9,7 @@
     const { h } = viewer;
     const findings = model.marks.map((mark) => h("li", {}, h("button", {
       type: "button", class: `fv-finding is-${mark.severity}`, "data-finding": mark.id, onclick: () => axis.jump(mark.t0, mark.t1),
-    }, h("b", {}, mark.severity), " ", mark.title, h("small", {}, whole(mark, model) ? "all of the log" : model.span(mark.t0, mark.t1)))));
+    }, h("b", {}, mark.severity), " ", mark.title, h("small", {}, whole(mark, model) ? "the whole flight" : model.span(mark.t0, mark.t1)))));
     const events = model.events.map((event) => h("li", {}, h("button", {
       type: "button", class: "fv-finding", onclick: () => axis.jump(event.t, event.t),
     }, event.title, h("small", {}, model.moment(event.t)))));
@@ -19,7 +19,7 @@
       events.length ? h("h4", {}, "Events") : null, list(events, "events"));
   };
 
-  const whole = (mark, model) => mark.t1 - mark.t0 > 0.95 * model.stop;
+  const whole = (mark, model) => mark.t1 - mark.t0 > 0.95 * model.airTime();
 
   function list(items, what) {
     const { h } = viewer;

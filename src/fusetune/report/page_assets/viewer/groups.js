@@ -6,6 +6,13 @@
   const NEAR = "300px 0px";
   const BY_SOURCE = ["Innovations", "Test ratios"];
 
+  /* What titles begin with alike: "GNSS velocity" of "GNSS velocity north" and "… east". */
+  function commonWords(titles) {
+    const [first, ...others] = titles.map((title) => title.split(",")[0].split(" "));
+    const same = first.filter((word, i) => others.every((words) => words.slice(0, i + 1).join(" ") === first.slice(0, i + 1).join(" ")));
+    return (same.length ? same : first).join(" ");
+  }
+
   viewer.makeGroups = (view, { changed }) => {
     const { model } = view;
     const { h } = viewer;
@@ -81,6 +88,7 @@
         if (sources.length > 1) parts.push(sourceChips(group, sources));
       }
       if (group.own.some((panel) => panel.series.some((series) => series.gate))) {
+        parts.push(h("span", { class: "fv-quiet" }, "shade: ±1 σ · dashed: gate · ×: rejected"));
         parts.push(checkbox("whole gate in view", () => view.showsGate(), (on) => changed({ gate: on ? "1" : null })));
       }
       if (group.own.some((panel) => panel.kind === "ratio")) {
@@ -93,7 +101,9 @@
     function sourceChips(group, sources) {
       group.filter = [null, ...sources].map((source) => ({
         source,
-        button: h("button", { type: "button", class: "fv-chip", onclick: () => changed({ source, axis: null }) }, source || "all sources"),
+        button: h("button", {
+          type: "button", class: "fv-chip", "data-source": source, onclick: () => changed({ source, axis: null }),
+        }, h("span", {}, source ? commonWords(group.own.filter((panel) => panel.source === source).map((panel) => panel.title)) : "all sources")),
       }));
       return h("span", { class: "fv-sources", role: "group", "aria-label": "Source" }, group.filter.map(({ button }) => button));
     }

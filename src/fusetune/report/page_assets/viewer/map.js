@@ -31,9 +31,9 @@
     const button = (label, text, act) => h("button", { type: "button", "aria-label": label, title: label, onclick: act }, text);
     const element = h("section", { class: "fv-panel fv-map-panel", "aria-label": "Map" },
       h("div", { class: "fv-panel-head" }, h("h4", {}, "Track from above"),
-        h("label", { for: colouring.id, class: "fv-quiet" }, "colour: "), colouring,
-        h("span", { class: "fv-buttons" }, button("Map closer", "+", () => zoomBy(1.6)),
-          button("Map wider", "−", () => zoomBy(1 / 1.6)), button("Whole track", "⤢", () => zoomBy(1e-6)))),
+        h("label", { for: colouring.id, class: "fv-quiet" }, "colour: "), colouring),
+      h("span", { class: "fv-map-buttons" }, button("Map closer", "+", () => zoomBy(1.6)),
+        button("Map wider", "−", () => zoomBy(1 / 1.6)), button("Whole track", "⤢", () => zoomBy(1e-6))),
       plot, legend);
 
     function projection(width, height) {

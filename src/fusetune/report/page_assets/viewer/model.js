@@ -6,7 +6,7 @@
     present: "flies now",
     chosen: "chosen",
     ruled_out: "ruled out",
-    onboard: "as the vehicle estimated it",
+    onboard: "logged",
     as_flown: "as it flew",
   };
 
@@ -61,13 +61,21 @@
     model.groups = [...new Set(model.panels.map((panel) => panel.group))];
     if (model.bands.length && !model.groups.includes("Flags")) model.groups.push("Flags");
 
+    const labels = new Map(model.panels.flatMap((panel) => panel.series).map((series) => [series.set, series.label]));
+    model.labelOf = (name) => labels.get(name) || name;
     model.roleOf = (name) => ROLES[sets.get(name)?.role] || "";
-    /* What is shown until the reader chooses: what flies now beside what was chosen, or the first others. */
+    /* What is shown until the reader chooses: what flies now and what was chosen. */
     model.usualSets = () => {
       const all = [...sets.values()];
-      const first = all.filter((set) => set.role === "present" || set.role === "chosen");
-      const rest = all.filter((set) => !first.includes(set) && set.role !== "ruled_out");
-      return (first.length >= 2 ? first : [...first, ...rest].slice(0, 2)).map((set) => set.name);
+      const usual = all.filter((set) => set.role === "present" || set.role === "chosen");
+      return (usual.length ? usual : all.slice(0, 1)).map((set) => set.name);
+    };
+    model.airTime = () => (model.landing ?? stop) - (model.takeoff ?? start);
+    /* What of a window counts for the scale of a panel: the part in the air, unless there is hardly any. On the ground
+       the filter aligns, and what it says then would press the flight flat. */
+    model.counts = (from, to) => {
+      const [first, last] = [Math.max(from, model.takeoff ?? start), Math.min(to, model.landing ?? stop)];
+      return last - first >= 0.2 * (to - from) ? [first, last] : [from, to];
     };
     model.data = (series) => ({
       times: model.array(series.time),

@@ -60,12 +60,13 @@
         },
         scales: {
           x: { time: false, range: () => [axis.from, axis.to] },
-          y: { distr: isLog ? 3 : 1, range: (_, least, most) => rangeOf(least, most) },
+          y: { distr: isLog ? 3 : 1, range: rangeOf },
         },
         axes: [
           { stroke: ink, grid, ticks: { ...grid, size: 4 }, font: FONT, size: 26, gap: 3, space: 64, incrs: INCREMENTS,
             splits: splitsFrom(model.origin), values: (_, at) => at.map((t) => timeTick(t - model.origin, model)) },
           { stroke: ink, grid, ticks: { ...grid, size: 4 }, font: FONT, size: viewer.GUTTER.left, gap: 4, space: 28,
+            splits: isLog ? decades : undefined,
             values: (_, at) => at.map((value) => (value === null ? "" : viewer.words.tick(value))) },
         ],
         series: [{}, ...all.map((series, k) => ({
@@ -105,15 +106,17 @@
       return i < 0 ? null : places[k - 1][i];
     }
 
-    function rangeOf(least, most) {
-      if (least === null || most === null) return isLog ? [0.01, 1] : [-1, 1];
+    function rangeOf() {
+      const [from, to] = model.counts(axis.from, axis.to);
+      const [least, most] = viewer.extremes(shown().flatMap((series) => seenOf(series, from, to, isLog)));
+      if (least > most) return isLog ? [0.01, 1] : [-1, 1];
       if (isLog) {
         const top = Math.max(most, panel.limit || 0) * 1.3;
         return [Math.max(Math.min(least, top / 100), top / LOG_SPAN), top];
       }
       let [low, high] = [least, most];
       for (const series of bounded()) {
-        const reach = largest(series, axis) * (view.showsGate() ? series.gate || 1 : 1);
+        const reach = largest(series, from, to) * (view.showsGate() ? series.gate || 1 : 1);
         if (!view.showsGate() && reach > 3 * Math.max(Math.abs(least), Math.abs(most))) continue;
         [low, high] = [Math.min(low, -reach), Math.max(high, reach)];
       }
@@ -140,8 +143,8 @@
     }
 
     function told(series, i) {
-      const { withUnit, figure } = viewer.words;
-      const sigmas = series.sigma && series.sigma[i] > 0 ? ` (${figure(series.values[i] / series.sigma[i])} σ)` : "";
+      const { withUnit } = viewer.words;
+      const sigmas = series.sigma && series.sigma[i] > 0 ? ` (${(series.values[i] / series.sigma[i]).toFixed(1).replace("-", "−")} σ)` : "";
       const out = series.rejected && series.rejected[i] ? " rejected" : "";
       return withUnit(series.values[i], panel.unit) + sigmas + out;
     }
@@ -230,9 +233,16 @@
     };
   }
 
-  /* Largest standard deviation in view. */
-  function largest({ times, sigma }, axis) {
-    const [first, last] = viewer.within(times, axis.from, axis.to);
+  /* Smallest and largest value between two times, neighbours included; on a logarithmic axis of those above zero. */
+  function seenOf({ times, values }, from, to, log) {
+    const [first, last] = viewer.within(times, from, to);
+    const seen = values.subarray(first, last + 1);
+    return viewer.extremes(log ? seen.filter((value) => value > 0) : seen).filter(Number.isFinite);
+  }
+
+  /* Largest standard deviation between two times. */
+  function largest({ times, sigma }, from, to) {
+    const [first, last] = viewer.within(times, from, to);
     let most = 0;
     for (let i = first; i <= last; i += 1) if (sigma[i] > most) most = sigma[i];
     return most;
@@ -245,6 +255,16 @@
       for (let k = Math.ceil((least - origin) / step - 1e-6); origin + k * step <= most + 1e-9; k += 1) found.push(origin + k * step);
       return found;
     };
+  }
+
+  /* Powers of ten; 2 and 5 between them where there is room. */
+  function decades(_, __, least, most) {
+    const factors = Math.log10(most / least) > 2 ? [1] : [1, 2, 5];
+    const found = [];
+    for (let power = Math.floor(Math.log10(least)); power <= Math.ceil(Math.log10(most)); power += 1) {
+      found.push(...factors.map((factor) => factor * 10 ** power).filter((value) => value >= least && value <= most));
+    }
+    return found;
   }
 
   function timeTick(since, model) {

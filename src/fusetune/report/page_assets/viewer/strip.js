@@ -13,6 +13,7 @@
     const { h, visible, fitted } = viewer;
     const modes = model.bands.find((band) => band.id === "nav_state");
     const rows = lay(modes, model);
+    const longFirst = [...model.marks].sort((a, b) => b.t1 - b.t0 - (a.t1 - a.t0)); // so that short ones stay visible
     const canvas = viewer.makeCanvas(rows.height, draw);
     const element = h("div", {
       class: "fv-strip", role: "slider", tabindex: "0", "aria-label": "moment of the flight",
@@ -27,7 +28,7 @@
       const scale = whole();
       drawProfile(context, scale, model, rows, colours);
       if (modes) drawModes(context, scale, modes.spans, rows.modes, colours);
-      for (const mark of model.marks) {
+      for (const mark of longFirst) {
         const place = visible(scale, mark.t0, mark.t1, 3);
         if (!place) continue;
         context.fillStyle = colours.severity[mark.severity] || colours.quiet;

@@ -18,7 +18,7 @@
       h("button", { type: "button", "aria-label": label, title: label, "data-act": label, onclick: act }, text);
     const range = h("span", { class: "fv-window" });
     const cursor = h("span", { class: "fv-cursor" });
-    const whole = button("Whole flight", "whole flight", () => axis.reset());
+    const whole = button("Whole flight", "all", () => axis.reset());
     const air = model.takeoff !== null
       ? button("From take-off to landing", "in the air", () => axis.setWindow(model.takeoff, model.landing ?? model.stop)) : null;
     const help = h("dl", { class: "fv-help" }, HELP.map(([what, does]) => [h("dt", {}, what), h("dd", {}, does)]));
