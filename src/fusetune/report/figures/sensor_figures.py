@@ -183,7 +183,7 @@ def _histogram(axes: Axes, counts: dict[str, Array]) -> None:
 
 def _normality(axes: Axes, noise: SensorNoise, character: SensorCharacter) -> None:
     """Quantiles against those of a normal distribution, and how many times more samples lie beyond three sigma."""
-    said = []
+    said: list[str] = []
     for label, intervals, parts, colour in (
         ("at rest", noise.still, character.at_rest, REST_COLOUR),
         ("in flight", noise.airborne, character.in_flight, FLIGHT_COLOUR),
