@@ -39,7 +39,6 @@ class Series:
     time : (N,) µs since boot, ascending
     values : (N,)
     set : whose it is; None of a sensor and the like
-    style : which colour it has where it is of no set
     sigma : (N,) standard deviation
     gate : the filter rejects what lies beyond so many of them; None where there is no gate
     rejected : (N,) what the filter rejected
@@ -50,7 +49,6 @@ class Series:
     time: Times
     values: Figures
     set: str | None = None
-    style: int = 0
     sigma: Figures | None = None
     gate: float | None = None
     rejected: npt.NDArray[np.bool_] | None = None

@@ -56,10 +56,10 @@ class AxisInnovations:
             return np.sqrt(self.variance)
 
     def gate(self, told: float) -> float | None:
-        """The gate by which the estimator tested: ratio = ν² / (gate² S); None where the samples have no single one.
+        """The gate by which the estimator tested: ratio = ν² / (gate² S); None where nothing tells it.
 
-        Some samples may have another: EKF2 takes part of the innovation of a barometer near the ground, and of later
-        axes of the magnetometer after it has tested them.
+        Some samples seem to have another: EKF2 takes part of a barometer's innovation near the ground, and those of
+        later axes of the magnetometer anew, after it has tested them.
 
         Parameters
         ----------
@@ -70,12 +70,11 @@ class AxisInnovations:
         # of a ratio that all but vanishes single precision keeps nothing
         clear = self.ratio > _LEAST_OF_ALL * np.nanmax(self.ratio, initial=0.0)
         found = found[clear & np.isfinite(found)].astype(np.float64)
-        if found.size:
-            middle = float(np.median(found))
-            if np.mean(np.abs(found / middle - 1.0) <= _SAME_GATE) < _MOSTLY:
-                return None
-            # the parameter is the exact figure, unless it was changed in flight
-            told = told if abs(told / middle - 1.0) <= _SAME_GATE else middle
+        middle = float(np.median(found)) if found.size else np.nan
+        is_shared = found.size > 0 and np.mean(np.abs(found / middle - 1.0) <= _SAME_GATE) >= _MOSTLY
+        # a parameter that was changed in flight, or a gate that is a constant
+        if is_shared and not abs(told / middle - 1.0) <= _SAME_GATE:
+            told = middle
         return float(f"{told:.5g}") if np.isfinite(told) else None
 
 
@@ -190,7 +189,7 @@ def _innovation_series(one: SetInnovations, source: str, axis: int, first: int) 
         samples.time, (samples.innovation, samples.sigma, samples.ratio, samples.rejected)
     )
     gate = samples.gate(gate_of(one.parameters, source))
-    return Series(one.label, time, innovation, one.name, 0, sigma, gate, rejected, peaks=ratio)
+    return Series(one.label, time, innovation, one.name, sigma, gate, rejected, peaks=ratio)
 
 
 def _ratio_series(one: SetInnovations, source: str, axes: int, first: int) -> Series | None:

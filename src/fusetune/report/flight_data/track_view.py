@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
 from fusetune.px4.flight import Flight
-from fusetune.px4.local_map import EARTH_RADIUS_M
-from fusetune.report.flight_data.content import Figures, PlaneTrack, Span, TrackView
+from fusetune.report.flight_data.content import PlaneTrack, Span, TrackView
+from fusetune.report.flight_data.local_plane import local_plane
 
 _FIX_3D = 3
 
@@ -34,24 +34,11 @@ def track_view(track: FlownTrack | None, conformance: Mapping[str, Any] | None, 
     if not track.has_place:
         return TrackView(_local(track, flight), manoeuvres=manoeuvres)
     home = (track.lat[0], track.lon[0]) if mission is None else (mission["home"]["lat"], mission["home"]["lon"])
-    flown = _parted(PlaneTrack(track.time, *plane(track.lat, track.lon, *home), track.height, track.heading))
+    flown = _parted(PlaneTrack(track.time, *local_plane(track.lat, track.lon, *home), track.height, track.heading))
     fixes = _fixes(flight, home)
     if fixes is not None and track.is_above_takeoff:
         fixes = _above(fixes, flown)
     return TrackView(flown, fixes, mission=_corners(mission), manoeuvres=manoeuvres)
-
-
-def plane(lat: Figures, lon: Figures, home_lat: float, home_lon: float) -> tuple[Figures, Figures]:
-    """North and east of a home, m: `fusetune.px4.local_map`, of arrays (N,) in degrees."""
-    phi, ref = np.radians(lat), np.radians(home_lat)
-    difference = np.radians(lon - home_lon)
-    north = np.cos(ref) * np.sin(phi) - np.sin(ref) * np.cos(phi) * np.cos(difference)
-    east = np.cos(phi) * np.sin(difference)
-    sine = np.hypot(north, east)
-    cosine = np.sin(ref) * np.sin(phi) + np.cos(ref) * np.cos(phi) * np.cos(difference)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scale = EARTH_RADIUS_M * np.where(sine > 0.0, np.arctan2(sine, cosine) / sine, 1.0)
-    return scale * north, scale * east
 
 
 def _local(track: FlownTrack, flight: Flight) -> PlaneTrack:
@@ -77,7 +64,7 @@ def _fixes(flight: Flight, home: tuple[float, float]) -> PlaneTrack | None:
         table[name][rows].astype(np.float64) for name in ("latitude_deg", "longitude_deg", "altitude_msl_m")
     )
     time = table["timestamp"][rows].astype(np.int64)
-    return PlaneTrack(time, *plane(lat, lon, *home), height, np.full(time.size, np.nan))
+    return PlaneTrack(time, *local_plane(lat, lon, *home), height, np.full(time.size, np.nan))
 
 
 def _above(fixes: PlaneTrack, flown: PlaneTrack) -> PlaneTrack:
