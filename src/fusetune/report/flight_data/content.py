@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -54,6 +54,12 @@ class Series:
     rejected: npt.NDArray[np.bool_] | None = None
     draw: Draw = "line"
     peaks: Figures | None = None
+
+    def rows(self, chosen: slice | npt.NDArray[Any]) -> Series:
+        """Some of its samples."""
+        columns = ("time", "values", "sigma", "rejected", "peaks")
+        kept = {name: getattr(self, name) for name in columns}
+        return replace(self, **{name: values[chosen] for name, values in kept.items() if values is not None})
 
 
 @dataclass(frozen=True)

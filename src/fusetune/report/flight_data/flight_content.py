@@ -27,7 +27,7 @@ from fusetune.report.flight_data.innovation_panels import (
 )
 from fusetune.report.flight_data.logged import Logged, read_logged
 from fusetune.report.flight_data.marks import marks
-from fusetune.report.flight_data.position_frame import position_frame
+from fusetune.report.flight_data.position_frame import PositionFrame, position_frame
 from fusetune.report.flight_data.replays import Replay, replays_of
 from fusetune.report.flight_data.sensor_panels import (
     output_tracking_panels,
@@ -38,6 +38,7 @@ from fusetune.report.flight_data.sensor_panels import (
 )
 from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_sets
 from fusetune.report.flight_data.state_panels import (
+    Teller,
     earth_field,
     inner_state_panels,
     inner_states,
@@ -80,7 +81,9 @@ def flight_content(
     present = PRESENT if scoring is None else scoring["present"]
     innovations = list(_innovations(folder, logged, scoring, replays, replayed_sets(scoring, sets, choice)))
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
-    panels = tuple(_panels(logged, replays, innovations, results.health))
+    frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
+    told = tellers(logged, replays, _LABELS, frame)
+    panels = tuple(_panels(logged, replays, innovations, told, frame, results.health))
     curves = (one.set for panel in panels for one in panel.series if one.set is not None)
     names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
     flight = logged.flight
@@ -96,7 +99,7 @@ def flight_content(
         bands=tuple(bands(logged, flags, scoring)),
         marks=tuple(marks(results)),
         events=tuple(events(logged, position, flags)),
-        track=track_view(_track(folder), _document(folder / CONFORMANCE_FILE), flight),
+        track=track_view(_track(folder), _document(folder / CONFORMANCE_FILE), flight, told, frame),
     )
 
 
@@ -104,15 +107,14 @@ def _panels(
     logged: Logged,
     replays: Sequence[Replay],
     innovations: Sequence[SetInnovations],
+    told: Sequence[Teller],
+    frame: PositionFrame,
     health: Sequence[Mapping[str, Any]],
 ) -> Iterator[Panel]:
     """In the order of `panel_names.GROUPS`."""
-    first = logged.flight.start_timestamp
-    yield from innovation_panels(innovations, first)
-    yield from ratio_panels(innovations, first)
+    yield from innovation_panels(innovations)
+    yield from ratio_panels(innovations)
     yield from status_ratio_panel(logged)
-    frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
-    told = tellers(logged, replays, _LABELS, frame)
     gnss = logged.topic("vehicle_gps_position")
     yield from motion_panels(told, gnss, round(_parameters(logged, replays)["EKF2_GPS_DELAY"] * 1e3), frame)
     inner = inner_states(logged, replays, _LABELS)
@@ -154,8 +156,8 @@ def _own_innovations(folder: Path, logged: Logged) -> Innovations:
     samples = onboard_samples(logged.flight)
     return {
         key: AxisInnovations(
-            one.timestamp_sample, one.innovation, one.innovation_variance, one.test_ratio, one.rejected
-        )
+            one.timestamp_sample, one.innovation, one.innovation_variance, one.test_ratio, one.rejected, one.fused
+        ).since_fused()
         for key in samples
         if (one := samples[key]).timestamp_sample.size
     }

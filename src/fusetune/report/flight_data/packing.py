@@ -188,6 +188,7 @@ class _Writer:
         }
 
     def _series(self, series: Series, buckets: int, style: int) -> dict[str, Any]:
+        series = self._in_order(series)
         peaks = () if series.peaks is None else (series.peaks,)
         rows = kept_rows(series.values, buckets, peaks, series.rejected)
         rejected = series.rejected
@@ -203,6 +204,14 @@ class _Writer:
             "draw": series.draw,
         }
 
+    def _in_order(self, series: Series) -> Series:
+        """By time, without what a log holds of before it began, as for a sensor's delay."""
+        if np.any(np.diff(series.time) < 0):
+            series = series.rows(np.argsort(series.time, kind="stable"))
+        if not series.time.size or series.time[0] >= self._start:
+            return series
+        return series.rows(slice(int(np.searchsorted(series.time, self._start)), None))
+
     def track(self, track: TrackView, buckets: Buckets) -> dict[str, Any]:
         written = self._plane(track.flown, buckets.main)
         if track.gnss is not None:
@@ -216,6 +225,7 @@ class _Writer:
 
     def _plane(self, track: PlaneTrack, buckets: int) -> dict[str, Any]:
         rows = _union(kept_rows(one, buckets) for one in (track.north, track.east, track.height))
+        rows = rows[track.time[rows] >= self._start]
         columns = {name: getattr(track, name)[rows] for name in ("north", "east", "height", "heading")}
         return {
             "time": self._times(track.time[rows]),
