@@ -130,6 +130,10 @@
     function fit() {
       const width = sticky.clientWidth;
       if (!width || gone) return;
+      // what sticks stands below the page's tabs, which stick as well, and above what sticks beside the panels
+      const tabs = document.querySelector(".tab-bar");
+      body.style.setProperty("--fv-below-tabs", `${tabs ? tabs.offsetHeight : 0}px`);
+      body.style.setProperty("--fv-below-strip", `${(tabs ? tabs.offsetHeight : 0) + sticky.offsetHeight}px`);
       strip.resize(width);
       if (map) map.draw(map.element.querySelector(".fv-plot").clientWidth);
       if (height) height.draw(height.element.querySelector(".fv-plot").clientWidth);
