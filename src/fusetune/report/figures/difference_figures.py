@@ -22,6 +22,7 @@ from fusetune.report.comparison import (
 )
 from fusetune.report.figures.drawing import GOOD_COLOUR, PRESENT_COLOUR, empty_figure, label_sets, minus, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles, status_colour
+from fusetune.report.flight_names import short_names
 from fusetune.report.results import OUT, Results
 
 Limits = tuple[float, float]
@@ -95,7 +96,7 @@ def flights_by_sets(results: Results) -> Figure:
     if changes.empty or not len(changes.columns):
         return empty_figure(NOTHING_TO_COMPARE)
     values = changes.to_numpy()
-    labels = flight_labels([str(name) for name in changes.index])
+    labels = list(short_names(map(str, changes.index)).values())
     numbered = [f"{label}  {i}" for i, label in enumerate(labels, start=1)]
     label_inches = 0.3 + 0.066 * max(map(len, numbered))
     # no narrower than its title
@@ -198,13 +199,3 @@ def shortened(name: str, longest: int = _LONGEST_NAME) -> str:
         return name
     head = (longest - 1) // 3
     return f"{name[:head]}…{name[-(longest - 1 - head) :]}"
-
-
-def flight_labels(names: list[str]) -> list[str]:
-    """Names of flights without the beginning that they share, where they are long."""
-    if max(map(len, names)) <= _LONGEST_NAME:
-        return names
-    # What the first and the last in alphabetical order share, all between them share.
-    first, last = min(names), max(names)
-    shared = next((i for i, pair in enumerate(zip(first, last, strict=False)) if pair[0] != pair[1]), 0)
-    return [shortened(f"…{name[shared:]}" if shared > 3 else name) for name in names]
