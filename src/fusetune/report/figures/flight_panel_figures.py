@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.figures.drawing import decades, drawn_rows, new_figure
 from fusetune.report.figures.plotted_flight import PlottedFlight
 from fusetune.report.figures.publication import INCH_MM
 from fusetune.report.figures.set_styles import PRINT_COLOURS
 from fusetune.report.flight_data.content import Panel, PlaneTrack, Series
+from fusetune.report.flight_data.flight_content import LABELS
 from fusetune.report.flight_data.panel_names import (
     ATTITUDE,
     BIASES,
@@ -37,6 +38,8 @@ _FLAG_MM = 3.6
 _MOST_ROWS = 6
 """Of a figure: what has more is drawn as several."""
 _SMALLEST_RATIO = 1e-4
+_NEAR_GATE = 4.0
+"""A gate that lies so many times farther than the innovations go would flatten them, and is left out."""
 _OTHER_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#b85a8d", "#c27c00", "#2f8fc9", "#8f8300")
 _OF_SETS = {ONBOARD: ("#666666", "--"), AS_FLOWN: ("#17202a", "-")}
 _REJECTED_COLOUR = "#b03a00"
@@ -115,7 +118,7 @@ def _stacked(flight: PlottedFlight, panels: Sequence[Panel]) -> Callable[[float]
         for axes, panel in zip(grid, panels, strict=True):
             _panel(axes, flight, panel)
         grid[-1].set_xlabel("time since the log began [s]")
-        _legend(figure, grid, width_mm)
+        _legend(figure, list(grid), width_mm)
         return figure
 
     return draw
@@ -146,50 +149,71 @@ def _series(axes: Axes, flight: PlottedFlight, panel: Panel, one: Series, place:
         values = np.maximum(values, _SMALLEST_RATIO)
     time = (one.time - flight.start_us) * 1e-6
     rows = drawn_rows(values)
-    if one.sigma is not None and _is_first_set(flight, one, place):
-        sigma = np.asarray(one.sigma, np.float64)
-        wide = drawn_rows(sigma)
-        axes.fill_between(time[wide], -sigma[wide], sigma[wide], color=colour, alpha=0.18, linewidth=0, label="±1σ")
-        for side in (-1.0, 1.0) if one.gate is not None else ():
-            gate = side * float(one.gate or 0.0) * sigma[wide]
-            label = "gate" if side > 0.0 else None
-            axes.plot(time[wide], gate, color=_REJECTED_COLOUR, linewidth=0.6, linestyle=":", label=label)
+    # bounds of one curve alone: several on each other nobody can read
+    if one.sigma is not None and place == 0:
+        _bounds(axes, time, values, one, colour, is_innovation=panel.kind == "innovation")
     if one.draw == "points":
         axes.plot(time[rows], values[rows], ".", color=colour, markersize=1.8, label=one.label)
     else:
         stepped = "steps-post" if one.draw == "step" else "default"
-        axes.plot(time[rows], values[rows], color=colour, linestyle=style, linewidth=0.7, drawstyle=stepped, label=one.label)
+        axes.plot(
+            time[rows], values[rows], color=colour, linestyle=style, linewidth=0.7, drawstyle=stepped, label=one.label
+        )
     if one.rejected is not None and bool(np.any(one.rejected)):
         wild = np.flatnonzero(one.rejected)
-        axes.plot(time[wild], values[wild], "x", color=_REJECTED_COLOUR, markersize=2.5, markeredgewidth=0.6, label="rejected")
+        axes.plot(
+            time[wild], values[wild], "x", color=_REJECTED_COLOUR, markersize=2.5, markeredgewidth=0.6, label="rejected"
+        )
 
 
-def _is_first_set(flight: PlottedFlight, one: Series, place: int) -> bool:
-    """Bounds of one set alone: several on each other nobody can read."""
-    return place == 0
+def _bounds(
+    axes: Axes, time: npt.NDArray[Any], values: Array, one: Series, colour: str, *, is_innovation: bool
+) -> None:
+    """±1σ, about zero where it is an innovation's, and the gate where the filter is not far more cautious than that."""
+    sigma = np.asarray(one.sigma, np.float64)
+    wide = drawn_rows(sigma)
+    middle = np.zeros_like(sigma) if is_innovation else values
+    low, high = middle[wide] - sigma[wide], middle[wide] + sigma[wide]
+    axes.fill_between(time[wide], low, high, color=colour, alpha=0.18, linewidth=0, label="±1σ")
+    if is_innovation and one.gate is not None and np.nanmedian(sigma) * one.gate < _NEAR_GATE * _reach(values):
+        for side in (-1.0, 1.0):
+            label = "gate" if side > 0.0 else None
+            bound = side * one.gate * sigma[wide]
+            axes.plot(time[wide], bound, color=_REJECTED_COLOUR, linewidth=0.6, linestyle=":", label=label)
+
+
+def _reach(values: Array) -> float:
+    """How far nearly all values go, so that single wild ones may leave the axes."""
+    known = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(known, 0.995)) if known.size else 0.0
 
 
 def _look(flight: PlottedFlight, one: Series, place: int) -> tuple[str, str]:
     """Colour and line of a curve: a set's own, or those of its place."""
-    if one.set in _OF_SETS:
-        return _OF_SETS[one.set]
-    told = next((shown for shown in flight.sets if shown.name == one.set), None)
+    return _set_look(flight, one.set, place)
+
+
+def _set_look(flight: PlottedFlight, name: str | None, place: int) -> tuple[str, str]:
+    if name in _OF_SETS:
+        return _OF_SETS[name]
+    told = next((shown for shown in flight.sets if shown.name == name), None)
     return (PRINT_COLOURS[told.style], "-") if told is not None else (_OTHER_COLOURS[place % len(_OTHER_COLOURS)], "-")
 
 
 def _limit_to_bulk(axes: Axes, panel: Panel) -> None:
     """The innovations and a few σ must be seen; single wild samples may leave the axes."""
-    known = [np.abs(np.asarray(one.values, np.float64)) for one in panel.series]
+    reach = max(_reach(np.asarray(one.values, np.float64)) for one in panel.series)
     sigma = [np.asarray(one.sigma, np.float64) for one in panel.series[:1] if one.sigma is not None]
-    reach = max((float(np.nanquantile(one, 0.995)) for one in known if np.isfinite(one).any()), default=1.0)
     claimed = max((float(np.nanmedian(one)) for one in sigma if np.isfinite(one).any()), default=0.0)
-    limit = 1.15 * max(reach, 1.5 * claimed)
+    gate = panel.series[0].gate
+    is_near = gate is not None and claimed * gate < _NEAR_GATE * _reach(np.asarray(panel.series[0].values, np.float64))
+    limit = 1.15 * max(reach, claimed * (gate if gate is not None and is_near else 1.5))
     if limit > 0.0:
         axes.set_ylim(-limit, limit)
 
 
 def _legend(figure: Figure, grid: Sequence[Axes], width_mm: float) -> None:
-    entries: dict[str, object] = {}
+    entries: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
         entries |= {label: handle for label, handle in zip(labels, handles, strict=True) if label not in entries}
@@ -230,20 +254,9 @@ def _track(flight: PlottedFlight, width_mm: float) -> Figure:
         axes.plot(track.gnss.east, track.gnss.north, ".", color="#d55e00", markersize=2.0, label="GNSS")
     shown: Mapping[str, PlaneTrack] = track.sets or {"estimate": track.flown}
     for place, (name, one) in enumerate(shown.items()):
-        told = next((each for each in flight.sets if each.name == name), None)
-        colour = PRINT_COLOURS[told.style] if told is not None else _OTHER_COLOURS[place % len(_OTHER_COLOURS)]
-        axes.plot(one.east, one.north, color=colour, linewidth=0.9, label=name)
+        colour, style = _set_look(flight, name, place)
+        axes.plot(one.east, one.north, color=colour, linestyle=style, linewidth=0.9, label=LABELS.get(name, name))
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="east [m]", ylabel="north [m]")
     axes.legend(loc="best")
     return figure
-
-
-def innovation_figures(names: Sequence[str], quantity: str) -> list[str]:
-    """Of names of figures those of the innovations of a quantity, as `position`."""
-    return [
-        name
-        for name in names
-        if name.startswith("innovations_")
-        and AID_SOURCES[name.removeprefix("innovations_")].quantity == quantity
-    ]

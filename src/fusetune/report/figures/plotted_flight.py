@@ -33,6 +33,7 @@ from fusetune.storage.files import AnyPath
 ASKED = "asked"
 """The set whose values the command line gives."""
 _ASKED_WORDS = 40
+_USUAL_ROLES = ("present", "chosen", "onboard", "as_flown")
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ class PlottedFlight:
     track: TrackView | None
     source: ObservedFlight | Path
     why_not_replayed: str = ""
+
+    @property
+    def usual_sets(self) -> tuple[str, ...]:
+        """What flies now, what is chosen, and the vehicle's own filter: more curves than these hide each other."""
+        return tuple(one.name for one in self.sets if one.role in _USUAL_ROLES)
 
     @cached_property
     def noise(self) -> SensorNoise:

@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 
 from fusetune.report.figures.drawing import figure_style
 from fusetune.storage.files import AnyPath, atomic_path
@@ -20,7 +21,7 @@ FORMATS = ("svg", "pdf", "png")
 INCH_MM = 25.4
 
 _DPI = 300
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
     "axes.labelsize": 8.0,
@@ -47,11 +48,30 @@ def publication_style() -> Iterator[None]:
 
 
 def fitted_to_column(figure: Figure, width_mm: float) -> Figure:
-    """A figure made no wider than a column, as high as it was."""
+    """A figure made no wider than a column, as high as it was; margins that are not sought keep their width."""
     width, height = (float(one) for one in figure.get_size_inches())
-    if width > width_mm / INCH_MM:
-        figure.set_size_inches(width_mm / INCH_MM, height)
+    narrower = width_mm / INCH_MM
+    if width <= narrower:
+        return figure
+    figure.set_size_inches(narrower, height)
+    if figure.get_layout_engine() is None:
+        _keep_margins(figure, width / narrower)
     return figure
+
+
+def _keep_margins(figure: Figure, ratio: float) -> None:
+    """Margins as wide in inches as before, of a figure that was so many times as wide."""
+    places = [(axes, place) for axes in figure.axes if (place := axes.get_subplotspec()) is not None]
+    grids = {
+        id(grid): grid
+        for _, place in places
+        if isinstance(grid := place.get_topmost_subplotspec().get_gridspec(), GridSpec)
+    }
+    for grid in grids.values():
+        margins = grid.get_subplot_params(figure)
+        grid.update(left=min(margins.left * ratio, 0.6), right=1.0 - (1.0 - margins.right) * ratio)
+    for axes, place in places:
+        axes.set_position(place.get_position(figure))
 
 
 def save_figure(figure: Figure, path: AnyPath) -> None:
