@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fusetune.report.flight_data.write_blob import write_blob
 from fusetune.report.flight_page.page import build_flight_page
+from fusetune.running.job import keep_out, logged_job
 from fusetune.save.flight_folder import METADATA_FILE
 from fusetune.storage.files import sha256_of
 from fusetune.storage.ledger import Ledger, key_of
