@@ -17,9 +17,10 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fusetune.report.flight_data.blob import unpack, with_header
+from fusetune.report.flight_data.blob import read_header, with_header
 from fusetune.report.flight_data.flight_content import flight_content
 from fusetune.report.flight_data.packing import LARGE_BUDGET_BYTES, SMALL_BUDGET_BYTES, pack_content
+from fusetune.report.flight_data.series_colours import coloured
 from fusetune.report.flight_data.shown_sets import Choice
 from fusetune.report.set_styles import SetStyle
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
@@ -93,7 +94,8 @@ def with_choice(
     UserError
         It is no blob.
     """
-    sets = unpack(blob).header["sets"]
+    header = read_header(blob)
+    sets = header["sets"]
     present = next((one["name"] for one in sets if one["role"] == "present"), "")
     choice, looks = Choice(chosen, frozenset(ruled_out)), styles or {}
 
@@ -102,7 +104,8 @@ def with_choice(
         style = {} if look is None else {"style": look.index, "marker": look.marker}
         return one | {"role": choice.role_of(one["name"], present)} | style
 
-    return with_header(blob, {"sets": [changed(one) for one in sets]})
+    decided = [changed(one) for one in sets]
+    return with_header(blob, {"sets": decided, "panels": coloured(header["panels"], decided)})
 
 
 def is_readable(flight_folder: AnyPath) -> bool:
