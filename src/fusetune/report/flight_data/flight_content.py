@@ -12,7 +12,6 @@ from typing import Any
 from fusetune.analyze.conformance.track_file import read_track
 from fusetune.analyze.flight_files import CONFORMANCE_FILE, ONBOARD_FILE, SAMPLES_FILE, SCORING_FILE, TRACK_FILE
 from fusetune.analyze.replaying.onboard import onboard_samples
-from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.report.flight_data.bands import bands
 from fusetune.report.flight_data.content import FlightContent, Panel
 from fusetune.report.flight_data.events import events
@@ -115,20 +114,14 @@ def _panels(
     yield from innovation_panels(innovations)
     yield from ratio_panels(innovations)
     yield from status_ratio_panel(logged)
-    gnss = logged.topic("vehicle_gps_position")
-    yield from motion_panels(told, gnss, round(_parameters(logged, replays)["EKF2_GPS_DELAY"] * 1e3), frame)
+    gnss, parameters = logged.topic("vehicle_gps_position"), replays[0].parameters if replays else logged.parameters
+    yield from motion_panels(told, gnss, round(parameters["EKF2_GPS_DELAY"] * 1e3), frame)
     inner = inner_states(logged, replays, _LABELS)
     yield from inner_state_panels(inner)
     yield from output_tracking_panels(logged)
     yield from vibration_panels(logged, health)
-    yield from sensor_panels(logged, earth_field(inner))
+    yield from sensor_panels(logged, health, earth_field(inner))
     yield from reset_panel(logged)
-
-
-def _parameters(logged: Logged, replays: Sequence[Replay]) -> Mapping[str, float]:
-    """Of the present set, or of the log where nothing was replayed."""
-    flight = logged.flight
-    return replays[0].parameters if replays else complete(flight.parameters.initial, {}, flight.release)
 
 
 def _innovations(
@@ -139,7 +132,7 @@ def _innovations(
         yield SetInnovations(one.name, _LABELS.get(one.name, one.name), one.innovations, one.parameters)
     own = _own_innovations(folder, logged)
     if own:
-        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, _parameters(logged, ()))
+        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, logged.parameters)
     others = [name for name in sets if name not in {one.name for one in replays}]
     if scoring is not None and others:
         scored = scored_innovations(folder / SAMPLES_FILE, others)

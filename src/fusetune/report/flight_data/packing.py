@@ -53,9 +53,11 @@ def _levels() -> tuple[Buckets, ...]:
 _LEVELS = _levels()
 _SLOW_GROUPS = frozenset({BIASES, WIND_AND_FIELD, UNCERTAINTY, VIBRATION, SENSORS})
 _IMPORTANT = ("present", "chosen", "onboard")
+_NOT_WORTH = 2
+"""So few levels finer are not worth packing once more."""
 _AIMED = 0.98
 """Share of the budget: not every level takes what another one lets expect."""
-_BYTES_OF_FIGURE, _BYTES_OF_TIME, _BYTES_OF_SERIES = 2.7, 1.2, 30.0
+_BYTES_OF_FIGURE, _BYTES_OF_TIME, _BYTES_OF_SERIES = 1.95, 0.85, 22.0
 """What a kept point takes in the end, about; the first guess at a level is made of them."""
 
 
@@ -65,19 +67,24 @@ def pack_content(content: FlightContent, budget_bytes: int) -> bytes:
     Where even the coarsest takes more, that is what is given.
     """
     important = {one.name for one in content.sets if one.role in _IMPORTANT}
-    most = budget_bytes * 3 // 4
+    most = budget_bytes // 4 * 3
     guesses = [_guess(content.panels, important, one) for one in _LEVELS]
     number = _first_below(guesses, most)
     blob = _packed(content, important, _LEVELS[number])
     # what one level took says what the others take
     scale = len(blob) / guesses[number]
     better = _first_below(guesses, _AIMED * most / scale)
-    if better != number:
+    if len(blob) > most or better + _NOT_WORTH < number:
         number, blob = better, _packed(content, important, _LEVELS[better])
     while len(blob) > most and number + 1 < len(_LEVELS):
         number += 1
         blob = _packed(content, important, _LEVELS[number])
     return blob
+
+
+def fits(blob: bytes, budget_bytes: int) -> bool:
+    """Whether the base64 of a blob takes no more than a budget: four characters for three bytes."""
+    return -(-len(blob) // 3) * 4 <= budget_bytes
 
 
 def _first_below(guesses: Sequence[float], most: float) -> int:

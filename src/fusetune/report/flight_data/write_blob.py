@@ -19,7 +19,7 @@ from typing import Any
 
 from fusetune.report.flight_data.blob import read_header, with_header
 from fusetune.report.flight_data.flight_content import flight_content
-from fusetune.report.flight_data.packing import LARGE_BUDGET_BYTES, SMALL_BUDGET_BYTES, pack_content
+from fusetune.report.flight_data.packing import LARGE_BUDGET_BYTES, SMALL_BUDGET_BYTES, fits, pack_content
 from fusetune.report.flight_data.series_colours import coloured
 from fusetune.report.flight_data.shown_sets import Choice
 from fusetune.report.set_styles import SetStyle
@@ -69,12 +69,15 @@ def write_blob(
     -------
     Whether there is something to show.
     """
-    targets = [(small, SMALL_BUDGET_BYTES), *([] if large is None else [(large, LARGE_BUDGET_BYTES)])]
     content = flight_content(flight_folder, analyze_folder, sets) if is_readable(flight_folder) else None
-    for target, budget in targets:
-        blob = b"" if content is None else pack_content(content, budget)
-        with atomic_path(target) as path:
-            path.write_bytes(blob)
+    blob = b""
+    # what is not thinned for the larger one, and small, is the same for both
+    for target, budget in ((large, LARGE_BUDGET_BYTES), (small, SMALL_BUDGET_BYTES)):
+        if content is not None and (not blob or not fits(blob, budget)):
+            blob = pack_content(content, budget)
+        if target is not None:
+            with atomic_path(target) as path:
+                path.write_bytes(blob)
     return content is not None
 
 
