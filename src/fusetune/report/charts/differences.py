@@ -166,9 +166,7 @@ def differences_chart(results: Results) -> str:
         return ""
     charts = [_panel(results, aim, names) for aim in (SCORE, *told_aims(results))]
     confidence = results.decision["rule"]["confidence"]
-    title = (
-        f"Change of the prediction error against what flies now, mean over the flights with {confidence:.0%} interval"
-    )
+    title = f"Change of the prediction error against what flies now, mean over the flights with {confidence:.0%} interval"
     return chart_block(title, charts, _table(results, names))
 
 
@@ -179,10 +177,7 @@ def _panel(results: Results, aim: str, names: list[str]) -> str:
     rows = rows_of(names, HEAD + 4.0, _ROW, kinds=name_classes(results, names))
     panel = Panel(Linear(left, right, rows.room, NARROW - _RIGHT), Linear(len(names), 0.0, rows.bottom, rows.top))
     zero = panel.x.at(0.0)
-    parts = [
-        head(AIM_LABELS[aim][0].upper() + AIM_LABELS[aim][1:]),
-        rectangle(panel.left, panel.top, zero, panel.bottom, "better"),
-    ]
+    parts = [head(AIM_LABELS[aim][0].upper() + AIM_LABELS[aim][1:]), rectangle(panel.left, panel.top, zero, panel.bottom, "better")]
     parts += [x_axis(panel, "change of the error [%]; left is better", words=signed_figure), rows.labels()]
     parts.append(line(zero, panel.top, zero, panel.bottom, "zero"))
     said = []
@@ -194,18 +189,12 @@ def _panel(results: Results, aim: str, names: list[str]) -> str:
             said.append(f"{name} {words}")
             parts.append(_row(results, name, f"{name}: {words}", (change, lower, upper), panel, rows.y(row)))
     height = panel.bottom + TICK_ROOM + LABEL_ROOM
-    return svg(
-        "differences",
-        f"Every set against what flies now: {AIM_LABELS[aim]}",
-        "; ".join(said),
-        NARROW,
-        height,
-        parts,
-        "",
-    )
+    return svg("differences", f"Every set against what flies now: {AIM_LABELS[aim]}", "; ".join(said), NARROW, height, parts, "")
 
 
-def _row(results: Results, name: str, hint: str, told: tuple[float, float, float], panel: Panel, y: float) -> str:
+def _row(
+    results: Results, name: str, hint: str, told: tuple[float, float, float], panel: Panel, y: float
+) -> str:
     change, lower, upper = told
     low, high = max(panel.x.low, lower), min(panel.x.high, upper)
     known = math.isfinite(lower) and math.isfinite(upper) and low < high
