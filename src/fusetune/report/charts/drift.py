@@ -27,11 +27,11 @@ _DODGE = 0.6
 def drift_chart(results: Results) -> str:
     """Drift of horizontal position and velocity, mean over the flights, and its change against the present set; empty
     where GNSS was not withheld often enough."""
-    charts = []
+    charts: list[str] = []
     for withheld in (POSITION, VELOCITY):
         summary = drift_summary(results, withheld)
         if len(summary):
-            charts.append(_absolute(results, withheld, summary))
+            charts.append(_absolute(results, withheld, summary, with_legend=not charts))
             if len(results.shown) > 1:
                 charts.append(_relative(results, withheld, summary))
     return chart_block("Drift while GNSS was withheld, mean over the flights", charts)
@@ -52,7 +52,7 @@ def _curves(results: Results, summary: pd.DataFrame) -> dict[str, pd.DataFrame]:
     return {name: summary[names == name].droplevel("set").sort_index() for name in order if (names == name).any()}
 
 
-def _absolute(results: Results, withheld: Withheld, summary: pd.DataFrame) -> str:
+def _absolute(results: Results, withheld: Withheld, summary: pd.DataFrame, *, with_legend: bool) -> str:
     curves, horizons = _curves(results, summary), _horizons(summary)
     # A set that drifts so much further may leave the plot, and must not squeeze the others.
     present = curves.get(results.present)
@@ -81,7 +81,7 @@ def _absolute(results: Results, withheld: Withheld, summary: pd.DataFrame) -> st
         parts.append(set_group(results, name, words, path(x(one.index), down, kind), *marks))
     below = panel.bottom + TICK_ROOM + LABEL_ROOM + 4.0
     names = [name for name in results.shown if name in curves]
-    drawn, height = legend(set_entries(results, names, "thin"), below)
+    drawn, height = legend(set_entries(results, names, "thin") if with_legend else (), below)
     return svg("drift", _label(withheld), "; ".join(said), NARROW, below + height, [*parts, drawn], "")
 
 

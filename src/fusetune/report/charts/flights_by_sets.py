@@ -10,13 +10,13 @@ import numpy.typing as npt
 from fusetune.report.charts.blocks import chart_block, in_a_box
 from fusetune.report.charts.set_looks import set_class, set_marker
 from fusetune.report.charts.svg.axes import NARROW
-from fusetune.report.charts.svg.elements import group, hinted, rectangle, svg, text
-from fusetune.report.charts.svg.rows import rows_of
+from fusetune.report.charts.svg.elements import group, hinted, px, svg, text, title
+from fusetune.report.charts.svg.rows import Rows, rows_of
 from fusetune.report.charts.svg.scales import minus
 from fusetune.report.charts.svg.text_width import FONT_SIZE, fitted_names, text_width
 from fusetune.report.comparison import flight_changes
+from fusetune.report.flight_names import short_names
 from fusetune.report.results import Results
-from fusetune.report.short_names import flight_labels
 
 Array = npt.NDArray[np.float64]
 
@@ -30,13 +30,14 @@ _TITLE = "Change of the prediction error on each flight, percent of what flies n
 
 
 def flights_by_sets_chart(results: Results) -> str:
-    """A cell for each flight and set, the darker the larger the change; empty where nothing was compared.
+    """A cell for each flight, in the order of the results, and set; empty where nothing was compared.
 
-    The sign stands in each cell, so that it does not hang on the colour.
+    The darker, the larger the change. The sign stands in each cell, so that it does not hang on the colour.
     """
     changes = flight_changes(results)
     if changes.empty or not len(changes.columns):
         return ""
+    changes = changes.loc[[name for name in results.flights if name in changes.index]]
     values = changes.to_numpy(np.float64)
     flights, sets = [str(one) for one in changes.index], [str(one) for one in changes.columns]
     chart = _chart(results, values, flights, sets)
@@ -44,10 +45,10 @@ def flights_by_sets_chart(results: Results) -> str:
 
 
 def _chart(results: Results, values: Array, flights: list[str], sets: list[str]) -> str:
-    short = fitted_names(sets, _WIDEST_NAME)
+    short, names = fitted_names(sets, _WIDEST_NAME), short_names(results.scoring)
     lean = math.sin(math.radians(_SLANT))
     head_room = 26.0 + lean * max(text_width(name) for name in short)
-    rows = rows_of(flight_labels(flights), head_room, _ROW, 1.2 * NARROW)
+    rows = rows_of([names[one] for one in flights], head_room, _ROW, 1.2 * NARROW)
     reach = colour_reach(values)
     parts = [rows.labels()]
     for column, name in enumerate(sets):
@@ -57,12 +58,7 @@ def _chart(results: Results, values: Array, flights: list[str], sets: list[str])
         turned = f' transform="rotate(-{_SLANT:g} {x:.1f} {y:.1f})"'
         words = text(x, y, short[column], "", "start", turned)
         parts.append(words if short[column] == name else hinted(name, words))
-    for (row, column), value in np.ndenumerate(values):
-        left, top = rows.room + _COLUMN * column, rows.y(row) - 0.5 * _ROW
-        hint = f"{sets[column]} on {flights[row]}: {_in_words(value)}"
-        cell = rectangle(left + 1.0, top + 1.0, left + _COLUMN - 1.0, top + _ROW - 1.0, *_look(value, reach))
-        figure = text(left + 0.5 * _COLUMN, top + 0.5 * _ROW + 0.35 * FONT_SIZE, cell_words(value), "", "middle")
-        parts.append(hinted(hint, cell, figure))
+    parts.append(_cells(values, reach, rows, flights, sets))
     last = lean * text_width(short[-1]) - 0.5 * _COLUMN
     width = rows.room + _COLUMN * len(sets) + max(last, 0.0) + 6.0
     better = int(np.count_nonzero(values < 0.0)), int(np.count_nonzero(values > 0.0))
@@ -79,12 +75,31 @@ def colour_reach(values: Array) -> float:
     return max(float(np.nanquantile(shown, 0.9)), 1.0)
 
 
-def _look(value: float, reach: float) -> tuple[str, str]:
-    """Class of a cell and how dark it is."""
+def _cells(values: Array, reach: float, rows: Rows, flights: list[str], sets: list[str]) -> str:
+    """Cells of one colour as one path, and on each its figure, which tells more where the pointer rests."""
+    cells: dict[tuple[str, int], list[str]] = {}
+    figures = []
+    for (row, column), value in np.ndenumerate(values):
+        x, y = rows.room + _COLUMN * column, rows.y(row)
+        place = f"M{px(x + 1.0)} {px(y - 0.5 * _ROW + 1.0)}h{px(_COLUMN - 2.0)}v{px(_ROW - 2.0)}h{px(2.0 - _COLUMN)}z"
+        cells.setdefault(_look(value, reach), []).append(place)
+        hint = title(f"{sets[column]} on {flights[row]}: {_in_words(value)}")
+        middle = f'x="{px(x + 0.5 * _COLUMN)}" y="{px(y + 0.35 * FONT_SIZE)}"'
+        figures.append(f"<text {middle}>{cell_words(value)}{hint}</text>")
+    painted = [
+        f'<path class="{kind}" d="{"".join(places)}"'
+        + (f' fill-opacity="{_DARKEST * step / _STEPS:.2f}"/>' if step else "/>")
+        for (kind, step), places in sorted(cells.items())
+    ]
+    return "".join(painted) + group("middle", *figures)
+
+
+def _look(value: float, reach: float) -> tuple[str, int]:
+    """Class of a cell and how dark it is, in steps."""
     if not math.isfinite(value) or value == 0.0:
-        return "cell", ""
+        return "cell", 0
     step = min(max(math.ceil(_STEPS * abs(value) / reach), 1), _STEPS)
-    return f"cell {'good' if value < 0.0 else 'bad'}", f' fill-opacity="{_DARKEST * step / _STEPS:.2f}"'
+    return f"cell {'good' if value < 0.0 else 'bad'}", step
 
 
 def cell_words(value: float) -> str:

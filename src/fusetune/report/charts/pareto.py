@@ -1,4 +1,4 @@
-"""Two aims at once: accuracy with all sensors, and drift without GNSS; of the sets compared, and of those a search tried."""
+"""Accuracy with all sensors and drift without GNSS at once, of the sets compared and of those that a search tried."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fusetune.apply.trials import Trials
 from fusetune.report.charts.blocks import chart_block, figures_table
 from fusetune.report.charts.set_looks import set_entries, set_group, set_marker
 from fusetune.report.charts.svg.axes import LABEL_ROOM, NARROW, TICK_ROOM, Panel, x_axis, y_axis, y_room
-from fusetune.report.charts.svg.elements import group, hinted, line, path, rectangle, svg, text
+from fusetune.report.charts.svg.elements import crosses, dots, group, hinted, line, path, rectangle, svg, text
 from fusetune.report.charts.svg.legend import Entry, dot_symbol, legend, line_symbol, marker_symbol
 from fusetune.report.charts.svg.markers import marker
 from fusetune.report.charts.svg.scales import Linear, percent, signed_figure
@@ -49,7 +49,7 @@ def pareto_chart(results: Results) -> str:
     x_limits = robust_reach(*known_ends(both, "_aided"), able)
     y_limits = robust_reach(*known_ends(both, "_unaided"), able)
     panel = _panel(x_limits, y_limits)
-    parts = [*_ground(panel, _AIDED, better="left and down")]
+    parts = [*_ground(panel, _AIDED)]
     places = [(0.0, 0.0), *zip(both.loc[able, "change_aided"], both.loc[able, "change_unaided"], strict=True)]
     parts.append(_stairs(panel, np.array(places, np.float64)))
     said = []
@@ -69,7 +69,7 @@ def _panel(x_limits: Limits, y_limits: Limits) -> Panel:
     return Panel(Linear(*x_limits, y_room(y, signed_figure), NARROW - 10.0), y)
 
 
-def _ground(panel: Panel, accuracy: str, better: str) -> list[str]:
+def _ground(panel: Panel, accuracy: str) -> list[str]:
     """The quarter that is better in both, zero lines and axes."""
     x0, y0 = panel.x.at(0.0), panel.y.at(0.0)
     return [
@@ -136,7 +136,7 @@ def search_pareto_chart(trials: Trials | None, chosen: str | None = None, label:
         return ""
     differences, accuracy = two_aims(trials)
     changes = percent_change(differences)
-    known = np.isfinite(changes).all(axis=1)
+    known = np.asarray(np.isfinite(changes).all(axis=1))
     if not known.any():
         return ""
     able = known & trials.allowed.all(axis=1)
@@ -144,7 +144,7 @@ def search_pareto_chart(trials: Trials | None, chosen: str | None = None, label:
     on_front = pareto_front(places)
     front = places[on_front]
     panel = _panel(_reach(changes[known, 0], front[:, 0]), _reach(changes[known, 1], front[:, 1]))
-    parts = _ground(panel, _ACCURACY.get(accuracy, _MIXED), better="left and down")
+    parts = _ground(panel, _ACCURACY.get(accuracy, _MIXED))
     parts.append(group("quiet", _cloud(panel, changes[known & ~able], cross=True)))
     parts.append(group("quiet", _cloud(panel, places[:-1][~on_front[:-1]], cross=False)))
     parts.append(_stairs(panel, places))
@@ -174,18 +174,12 @@ def _hinted_place(panel: Panel, shape: str, x: float, y: float, radius: float, w
 
 
 def _cloud(panel: Panel, places: Array, *, cross: bool) -> str:
-    """Dots of what lies in the picture, one of those that would lie on each other."""
+    """Dots or crosses of what lies in the picture."""
     inside = [(x, y) for x, y in places.tolist() if panel.x.holds(x) and panel.y.holds(y)]
+    # of those that would lie on each other one is drawn
     step = _SIZE / _MOST_CELLS
-    drawn = {(round(panel.x.at(x) / step), round(panel.y.at(y) / step)) for x, y in inside}
-    marks = []
-    for across, down in sorted(drawn):
-        x, y = across * step, down * step
-        if cross:
-            marks.append(f"M{x - 2:.1f} {y - 2:.1f}l4 4m0-4l-4 4")
-        else:
-            marks.append(f"M{x - 1.6:.1f} {y:.1f}a1.6 1.6 0 1 0 3.2 0a1.6 1.6 0 1 0-3.2 0")
-    return f'<path class="{"thin" if cross else "dot"}" d="{"".join(marks)}"/>' if marks else ""
+    drawn = step * np.round(np.array([(panel.x.at(x), panel.y.at(y)) for x, y in inside]).reshape(-1, 2) / step)
+    return crosses(drawn[:, 0], drawn[:, 1], 2.0, "thin") if cross else dots(drawn[:, 0], drawn[:, 1], 1.6, "dot")
 
 
 def _search_title(front: Array) -> str:

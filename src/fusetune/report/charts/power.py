@@ -23,7 +23,7 @@ from fusetune.report.charts.svg.scales import Linear
 from fusetune.report.charts.svg.text_width import text_width
 from fusetune.report.results import Results
 
-_LOOKS = (("set-2", "triangle"), ("set-1", "square"), ("set-3", "diamond"), ("set-4", "circle"))
+_LOOKS = (("tone-0", "triangle"), ("tone-5", "square"), ("tone-1", "diamond"), ("tone-2", "circle"))
 _TOP, _HEIGHT, _LEFT = 38.0, 150.0, 34.0
 
 
@@ -43,13 +43,13 @@ def power_chart(results: Results) -> str:
     parts.append(y_axis(panel, "chance [%]", ticks=[0.0, 25.0, 50.0, 75.0, 100.0]))
     asked = panel.y.at(100.0 * power["chance_asked_for"])
     parts.append(line(panel.left, asked, panel.right, asked, "expected"))
-    parts.append(_now(panel, power["flights"]))
     entries: list[Entry] = []
     gains = sorted({float(one["gain_percent"]) for one in curves})
     for one in curves:
         kind, shape = _LOOKS[gains.index(float(one["gain_percent"])) % len(_LOOKS)]
         parts.append(group(kind, *_curve(panel, one, shape, power)))
         entries.append(_entry(one, kind, shape, power))
+    parts.append(_now(panel, power["flights"]))
     entries.append(Entry(line_symbol("ink", "expected"), f"asked for: {power['chance_asked_for']:.0%}"))
     drawn, height = legend(entries, panel.bottom + TICK_ROOM + LABEL_ROOM + 4.0)
     parts.append(drawn)
@@ -60,7 +60,9 @@ def power_chart(results: Results) -> str:
 def _now(panel: Panel, flights: int) -> str:
     place, words = panel.x.at(flights), f"now: {flights}"
     is_left = place + 5.0 + text_width(words) > panel.right
-    beside = text(place - 4.0 if is_left else place + 4.0, panel.top - 6.0, words, "", "end" if is_left else "start")
+    beside = text(
+        place - 4.0 if is_left else place + 4.0, panel.bottom - 5.0, words, "over", "end" if is_left else "start"
+    )
     return line(place, panel.top, place, panel.bottom, "now") + beside
 
 
@@ -96,4 +98,5 @@ def _in_words(curves: Sequence[dict[str, Any]], power: dict[str, Any]) -> str:
             found = zip(one["flights"], one["chance"], strict=True)
             enough = next((count for count, chance in found if chance >= power["chance_asked_for"]), None)
             said.append(f"a gain of {gain:g} % " + (f"takes {enough} flights" if enough else "takes more flights"))
-    return f"At {power['flights']} flights now; to be found with a chance of {power['chance_asked_for']:.0%}: {', '.join(said)}."
+    asked = f"to be found with a chance of {power['chance_asked_for']:.0%}"
+    return f"At {power['flights']} flights now; {asked}: {', '.join(said)}."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fusetune.report.charts.svg.elements import group, hinted
+from fusetune.report.charts.svg.elements import group, title
 from fusetune.report.charts.svg.legend import Entry, marker_symbol
 from fusetune.report.charts.svg.markers import marker
 from fusetune.report.results import Results
@@ -22,7 +22,7 @@ def set_marker(results: Results, name: str, x: float, y: float, radius: float = 
 
 def set_group(results: Results, name: str, hint: str, *parts: str) -> str:
     """Parts in the colour of a set that say something where the pointer rests."""
-    return group(set_class(results, name), hinted(hint, *parts))
+    return group(set_class(results, name), title(hint), *parts)
 
 
 def name_class(results: Results, name: str) -> str:

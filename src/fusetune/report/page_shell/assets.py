@@ -10,7 +10,7 @@ from pathlib import Path
 ASSETS = Path(__file__).parents[1] / "page_assets"
 
 STYLES = ("page.css", "charts.css")
-SCRIPTS = ("state.js", "theme.js", "tabs.js", "glossary.js")
+SCRIPTS = ("state.js", "theme.js", "tabs.js", "glossary.js", "scroll.js")
 """In this order: the first one makes what the others add to."""
 
 VIEWER_FOLDERS = ("vendor/uplot", "viewer")

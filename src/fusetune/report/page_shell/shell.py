@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from html import escape
+from pathlib import Path
 
+from fusetune.report.markup import link
 from fusetune.report.page_shell.assets import joined_assets
+from fusetune.report.page_shell.glossary import glossary_list, with_terms_marked
+from fusetune.report.page_shell.text_pass import with_short_names
 from fusetune.storage.files import AnyPath, atomic_path
 
 VIEWER_CLASS = "flight-viewer"
@@ -46,8 +51,28 @@ class FlightBlob:
     data: bytes
 
 
-def write_page(output: AnyPath, head: PageHead, tabs: Sequence[Tab], blobs: Sequence[FlightBlob] = ()) -> None:
-    """Write a page of one or several tabs; of a single one there is no tab bar."""
+def page_links(pages: Mapping[str, AnyPath], page: AnyPath) -> str:
+    """Links from one page to others, each relative to where that page lies, for `PageHead.links`."""
+    folder = Path(page).parent
+    return "".join(link(words, os.path.relpath(target, folder)) for words, target in pages.items())
+
+
+def write_page(
+    output: AnyPath,
+    head: PageHead,
+    tabs: Sequence[Tab],
+    blobs: Sequence[FlightBlob] = (),
+    names: Mapping[str, str] | None = None,
+) -> None:
+    """Write a page of one or several tabs; of a single one there is no tab bar.
+
+    The words of the field are marked where they first stand in a tab, and listed at the end of the last.
+
+    Parameters
+    ----------
+    names : flights whose names are shortened in the text: whole → short
+    """
+    tabs = _with_words(tabs, names or {})
     body = _tab_bar(tabs) + _main(tabs)
     assets = joined_assets(viewer=VIEWER_CLASS in body)
     page = (
@@ -59,6 +84,16 @@ def write_page(output: AnyPath, head: PageHead, tabs: Sequence[Tab], blobs: Sequ
     )
     with atomic_path(output) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _with_words(tabs: Sequence[Tab], names: Mapping[str, str]) -> list[Tab]:
+    used: set[str] = set()
+    told = [replace(tab, html=with_terms_marked(with_short_names(tab.html, names), used)) for tab in tabs]
+    words = glossary_list(used)
+    if words:
+        listed = f'<details class="words"><summary>Words of the field</summary>{words}</details>'
+        told[-1] = replace(told[-1], html=told[-1].html + listed)
+    return told
 
 
 def _header(head: PageHead) -> str:
@@ -86,7 +121,7 @@ def _main(tabs: Sequence[Tab]) -> str:
         return f"<main>{tabs[0].html}</main>"
     panels = "".join(
         f'<section role="tabpanel" class="tab-panel{"" if index else " is-open"}" id="panel-{tab.id}" '
-        f'aria-labelledby="tab-{tab.id}" tabindex="-1">{tab.html}</section>'
+        f'aria-labelledby="tab-{tab.id}" data-title="{escape(tab.title)}" tabindex="-1">{tab.html}</section>'
         for index, tab in enumerate(tabs)
     )
     return f"<main>{panels}</main>"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
-from fusetune.report.charts.svg.elements import group, line, path_steps, text
+from fusetune.report.charts.svg.elements import group, hinted, line, path_steps, text
 from fusetune.report.charts.svg.scales import Log, Scale, figure
-from fusetune.report.charts.svg.text_width import FONT_SIZE, text_width
+from fusetune.report.charts.svg.text_width import BOLDER, FONT_SIZE, ends_fitted, text_width
 
 NARROW, WIDE = 320.0, 720.0
 """Width of a chart on a phone or beside others, and of one that has a page for itself."""
@@ -51,9 +52,11 @@ class Panel:
         return max(self.y.start, self.y.stop)
 
 
-def head(words: str, x: float = 0.0, y: float = 12.0) -> str:
-    """Title of a panel."""
-    return text(x, y, words, "head")
+def head(words: str, width: float = NARROW) -> str:
+    """Title of a panel; what does not fit stands where the pointer rests."""
+    shown = ends_fitted(words, width / BOLDER)
+    drawn = text(0.0, 12.0, shown, "head")
+    return drawn if shown == words else hinted(words, drawn)
 
 
 def x_axis(
@@ -87,7 +90,7 @@ def fitting_ticks(scale: Scale, words: Words = figure) -> list[float]:
         found = scale.ticks(most)
         widest = max((text_width(words(one)) for one in found), default=0.0)
         places = sorted(scale.at(one) for one in found)
-        nearest = min((b - a for a, b in zip(places, places[1:], strict=False)), default=length)
+        nearest = min((b - a for a, b in pairwise(places)), default=length)
         if nearest >= widest + _BETWEEN:
             return found
     return scale.ticks(2)

@@ -25,7 +25,12 @@ def group(kind: str, *parts: str) -> str:
 
 def hinted(hint: str, *parts: str) -> str:
     """Parts that say something where the pointer rests on them."""
-    return f"<g><title>{escape(hint)}</title>{''.join(parts)}</g>"
+    return f"<g>{title(hint)}{''.join(parts)}</g>"
+
+
+def title(hint: str) -> str:
+    """First of the parts of a group: what it says where the pointer rests on it."""
+    return f"<title>{escape(hint)}</title>"
 
 
 def line(x1: float, y1: float, x2: float, y2: float, kind: str) -> str:
@@ -52,6 +57,36 @@ def path(x: npt.ArrayLike, y: npt.ArrayLike, kind: str) -> str:
     return f'<path class="{kind}" d="{steps}"/>' if (steps := path_steps(x, y)) else ""
 
 
+def boxed(low: float, q1: float, median: float, q3: float, high: float, y: float, half: float = 5.0) -> str:
+    """A lying box with whiskers and its median, as one path."""
+    whiskers = f"M{px(low)} {px(y)}H{px(q1)}M{px(q3)} {px(y)}H{px(high)}"
+    box = f"M{px(q1)} {px(y - half)}H{px(q3)}V{px(y + half)}H{px(q1)}Z"
+    return f'<path class="box" d="{whiskers}{box}M{px(median)} {px(y - half)}v{px(2.0 * half)}"/>'
+
+
+def dots(x: npt.ArrayLike, y: npt.ArrayLike, radius: float, kind: str) -> str:
+    """Many circles as one path, those that would lie on each other once; empty where there are none."""
+    places = np.round(np.column_stack(np.broadcast_arrays(np.ravel(x), np.ravel(y))).astype(np.float64), 1)
+    places = np.unique(places[np.isfinite(places).all(axis=1)], axis=0)
+    arc = f"a{px(radius)} {px(radius)} 0 1 0"
+    steps = "".join(
+        f"M{px(across - radius)} {px(down)}{arc} {px(2.0 * radius)} 0{arc} {px(-2.0 * radius)} 0"
+        for across, down in places.tolist()
+    )
+    return f'<path class="{kind}" d="{steps}"/>' if steps else ""
+
+
+def crosses(x: npt.ArrayLike, y: npt.ArrayLike, radius: float, kind: str) -> str:
+    """Many crosses as one path."""
+    places = np.round(np.column_stack(np.broadcast_arrays(np.ravel(x), np.ravel(y))).astype(np.float64), 1)
+    places = np.unique(places[np.isfinite(places).all(axis=1)], axis=0)
+    d = px(2.0 * radius)
+    steps = "".join(
+        f"M{px(across - radius)} {px(down - radius)}l{d} {d}m0-{d}l-{d} {d}" for across, down in places.tolist()
+    )
+    return f'<path class="{kind}" d="{steps}"/>' if steps else ""
+
+
 def area(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike, kind: str) -> str:
     """What lies between two lines over the same places; empty where nothing is known."""
     across, below, above = (np.asarray(one, np.float64) for one in (x, low, high))
@@ -66,7 +101,7 @@ def area(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike, kind: str) -
 def path_steps(x: npt.ArrayLike, y: npt.ArrayLike) -> str:
     """What a path does, to a tenth of a pixel."""
     tenths = np.round(10.0 * np.column_stack([np.ravel(x), np.ravel(y)]).astype(np.float64))
-    known = np.isfinite(tenths).all(axis=1)
+    known = np.asarray(np.isfinite(tenths).all(axis=1))
     # points that fall onto the one before are not seen
     repeated = np.zeros(len(tenths), bool)
     repeated[1:] = known[1:] & known[:-1] & (tenths[1:] == tenths[:-1]).all(axis=1)
@@ -80,18 +115,18 @@ def path_steps(x: npt.ArrayLike, y: npt.ArrayLike) -> str:
     )
 
 
-def svg(name: str, title: str, description: str, width: float, height: float, parts: Iterable[str], kind: str) -> str:
+def svg(name: str, heading: str, description: str, width: float, height: float, parts: Iterable[str], kind: str) -> str:
     """A chart that a page holds, as large as the page gives it room.
 
     Parameters
     ----------
     name : what the id begins with
-    title, description : what it shows, and what it says in words, for those who do not see it
+    heading, description : what it shows, and what it says in words, for those who do not see it
     width, height : of the view box; it is readable at this width
     kind : class beside "chart"
     """
     inside = "".join(parts)
-    told = f"<title>{escape(title)}</title>", f"<desc>{escape(description)}</desc>"
+    told = title(heading), f"<desc>{escape(description)}</desc>"
     # alike charts alone have the same id
     key = f"{name}-{crc32((inside + told[0] + told[1]).encode('utf-8', 'surrogatepass')):08x}"
     head = told[0].replace("<title>", f'<title id="{key}-t">'), told[1].replace("<desc>", f'<desc id="{key}-d">')

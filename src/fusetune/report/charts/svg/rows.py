@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 from fusetune.report.charts.svg.axes import NARROW
 from fusetune.report.charts.svg.elements import hinted, text
-from fusetune.report.charts.svg.text_width import FONT_SIZE, fitted_names, text_width
+from fusetune.report.charts.svg.text_width import BOLDER, FONT_SIZE, fitted_names, text_width
 
 _GAP = 8.0
-_BOLDER = 1.09
-"""By how much bold names are wider."""
 _WIDEST = 0.42
 """Share of a chart that names may take."""
 
@@ -47,7 +45,7 @@ class Rows:
     def labels(self) -> str:
         """The names, those that had to be shortened with all of them where the pointer rests."""
         parts = []
-        short = fitted_names(self.names, (self.room - _GAP) / _BOLDER)
+        short = fitted_names(self.names, (self.room - _GAP) / BOLDER)
         for place, (name, shown) in enumerate(zip(self.names, short, strict=True)):
             kind = self.kinds[place] if self.kinds else ""
             words = text(self.room - _GAP, self.y(place) + 0.35 * FONT_SIZE, shown, kind, "end")
@@ -58,4 +56,4 @@ class Rows:
 def rows_of(names: Sequence[str], top: float, height: float, width: float = NARROW, kinds: Sequence[str] = ()) -> Rows:
     """Rows with as much room for their names as they need, and less than half of the chart."""
     widest = max((text_width(name) for name in names), default=0.0)
-    return Rows(names, top, height, min(_BOLDER * widest + _GAP, _WIDEST * width), kinds)
+    return Rows(names, top, height, min(BOLDER * widest + _GAP, _WIDEST * width), kinds)

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 FONT_SIZE = 11.5
 """Of all words in a chart, in units of its view box, which are pixels at its natural width."""
 
+BOLDER = 1.09
+"""How many times as wide bold words are."""
+
 _WIDTHS = (
     *(32, 40, 46, 84, 64, 95, 78, 27, 39, 39, 50, 84, 32, 36, 32, 34),
     *(64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 34, 34, 84, 84, 84, 53),
