@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -45,13 +44,12 @@ from fusetune.report.flight_data.state_panels import (
     tellers,
 )
 from fusetune.report.flight_data.track_view import track_view
-from fusetune.report.flight_page.flight_results import read_flight_results
+from fusetune.report.flight_names import short_names
+from fusetune.report.flight_results import read_flight_results
 from fusetune.set_names import AS_FLOWN, ONBOARD, PRESENT
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
-_DATE_BEHIND = re.compile(r"[_-]\d{4}-\d{1,2}-\d{1,2}(-\d{1,2}){0,3}$")
-_OWNER_BEFORE = re.compile(r"^.*__")
 _LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
 
 
@@ -176,7 +174,7 @@ def flight_label(flight: str, date: str) -> str:
     ----------
     date : ISO 8601; empty where the log does not tell
     """
-    name = _OWNER_BEFORE.sub("", _DATE_BEHIND.sub("", flight)) or flight
+    (name,) = short_names([flight]).values()
     try:
         when = datetime.fromisoformat(date)
     except ValueError:
