@@ -163,6 +163,8 @@ class _Writer:
             "gate": series.gate,
             "rejected": None if rejected is None or not rejected.any() else self._arrays.flags(rejected[rows]),
             "draw": series.draw,
+            "samples": int(np.isfinite(series.values).sum()),
+            "rejected_samples": None if rejected is None else int(rejected.sum()),
         }
 
     def track(self, track: TrackView, buckets: Buckets) -> dict[str, Any]:
