@@ -42,14 +42,12 @@ localrules:
     list_flights,
     decide,
     keep_history,
-    plot_summary,
     build_report,
     join_health,
     join_fleet,
     join_conformance,
     sensors,
     covariances,
-    fleet_page,
 
 
 rule all:
@@ -60,7 +58,6 @@ rule all:
         rules.decide.output,
         rules.build_report.output,
         rules.join_health.output,
-        rules.fleet_page.output,
         # so that one that was taken away is made again; of files that a job asks for Snakemake keeps digests
         of_replayable_flights(REPLAYED_FILES),
 

@@ -14,4 +14,4 @@ if TYPE_CHECKING:
 keep_out("pandas")
 with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
     folders = [Path(file).parent for file in snakemake.input.noise]
-    build_pooled_sensor_page(folders, figures, snakemake.output[0], {"All flights": "results/fleet.html"})
+    build_pooled_sensor_page(folders, figures, snakemake.output[0], {"The decision": "results/report.html"})

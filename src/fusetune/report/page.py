@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fusetune.apply.flight_problems import OF_ALL_FLIGHTS
+from fusetune.report.charts.differences import answer_chart
 from fusetune.report.counted import count_words
 from fusetune.report.fleet.fleet_results import FleetResults, read_fleet_results
 from fusetune.report.fleet.matrix import matrix_section
@@ -16,6 +17,7 @@ from fusetune.report.fleet.statistics_sections import (
     untold,
     verdicts_section,
 )
+from fusetune.report.flight_data.write_blob import with_choice
 from fusetune.report.flight_names import short_names
 from fusetune.report.markup import bullets, details
 from fusetune.report.page_shell.shell import FlightBlob, PageHead, Tab, write_page
@@ -35,7 +37,7 @@ from fusetune.report.sections.first_screen import first_screen, heading
 from fusetune.report.sections.flights_section import Logs, flights_section, single_flights_section
 from fusetune.report.sections.health_section import health_answer, health_section
 from fusetune.report.sections.history_section import history_section
-from fusetune.report.sections.innovations_section import as_flown_section, innovations_section
+from fusetune.report.sections.innovations_section import innovations_section
 from fusetune.report.sections.mission_section import mission_section
 from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.provenance_section import provenance_section
@@ -129,14 +131,15 @@ def _read(given: ReportInput, output: AnyPath) -> _Read:
     order = {name: place for place, name in enumerate(logs.verdicts)}
     folders = sorted(map(Path, given.analyze_folders), key=lambda folder: order.get(folder.name, len(order)))
     fleet_file = Path(given.apply_folder) / "fleet.json"
+    results = read_results(folders, given.apply_folder)
     return _Read(
-        results=read_results(folders, given.apply_folder),
+        results=results,
         logs=logs,
         trust=sorted(trust, key=lambda one: order.get(one["flight"], len(order))),
         fleet=None if given.health_table is None else read_fleet_results(fleet_file, given.health_table, logs.pages),
         missions=[] if given.missions is None else read_document(given.missions)["missions"],
         mission=given.mission,
-        blobs=_blobs(given.blobs, order),
+        blobs=_blobs(given.blobs, order, results),
     )
 
 
@@ -145,13 +148,16 @@ def _of_single_flight(diagnosis: dict[str, Any]) -> dict[str, Any]:
     return diagnosis | {"diagnoses": [one for one in diagnosis["diagnoses"] if one["id"] not in OF_ALL_FLIGHTS]}
 
 
-def _blobs(files: Sequence[AnyPath], order: Mapping[str, int]) -> tuple[FlightBlob, ...]:
-    """Packed flights, the oldest first; none where they are too large together."""
+def _blobs(files: Sequence[AnyPath], order: Mapping[str, int], results: Results) -> tuple[FlightBlob, ...]:
+    """Packed flights, the oldest first, their sets as the decision has them; none where they are too large together."""
     paths = sorted(map(Path, files), key=lambda file: order.get(file.stem, len(order)))
     if sum(file.stat().st_size for file in paths) > MOST_BLOBS:
         return ()
     # an empty one is of a log that nothing could be read of
-    return tuple(FlightBlob(file.stem, file.read_bytes()) for file in paths if file.stat().st_size)
+    told = {file.stem: file.read_bytes() for file in paths if file.stat().st_size}
+    out = {str(name) for name in results.ranking["name"] if results.is_ruled_out(str(name))}
+    chosen = results.decision["chosen"]
+    return tuple(FlightBlob(name, with_choice(blob, chosen, out, results.styles)) for name, blob in told.items())
 
 
 def _joined(*sections: str) -> str:
@@ -163,7 +169,7 @@ def _decision_tab(read: _Read) -> str:
     # the last one is the next steps, which have a section of their own
     words = bullets(results.decision["paragraphs"][:-1])
     return _joined(
-        first_screen(results),
+        first_screen(results, answer_chart(results)),
         details("The decision in words", words),
         evidence_section(results),
         flight_by_flight_section(results),
@@ -185,8 +191,8 @@ def _untold_of_decision(results: Results) -> Iterator[str]:
 
 def _flights_tab(read: _Read) -> str:
     return _joined(
-        flights_section(read.results, read.logs),
-        viewer_section(read.blobs, read.logs),
+        flights_section(read.results, read.logs, [blob.flight for blob in read.blobs]),
+        viewer_section(read.blobs, read.logs, read.results.flights),
         conformance_section(read.results, read.missions),
         mission_section(read.mission),
         single_flights_section(read.results),
@@ -217,7 +223,6 @@ def _sensors_tab(read: _Read) -> str:
     return _joined(
         findings_section(read.results),
         innovations_section(read.results),
-        as_flown_section(read.results),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
 from zlib import crc32
 
 PRESENT_INDEX, CHOSEN_INDEX = 0, 1
@@ -18,7 +18,8 @@ _FREE_COLOURS = range(CHOSEN_INDEX + 1, COLOURS)
 _FREE_MARKERS = MARKERS[1:]
 
 
-class SetStyle(NamedTuple):
+@dataclass(frozen=True)
+class SetStyle:
     """Number of the colour in the style sheet, and what is drawn at a set's places."""
 
     index: int

@@ -94,8 +94,8 @@ def _told(results: Results, name: str, aim: str) -> _Told | None:
     one = changes.loc[name]
     by_flight = flight_changes(results, _COLUMNS[aim])
     flights = by_flight[name].to_numpy(np.float64) if name in by_flight and len(by_flight) > 1 else np.zeros(0)
-    values = (float(one["change"]), float(one["lower"]), float(one["upper"]))
-    return _Told(aim, *values, flights[np.isfinite(flights)])
+    change, lower, upper = (float(number) for number in one[["change", "lower", "upper"]].to_numpy(np.float64))
+    return _Told(aim, change, lower, upper, flights[np.isfinite(flights)])
 
 
 def _answer_reach(told: list[_Told]) -> tuple[float, float]:
@@ -160,15 +160,13 @@ def _interval(lower: float, upper: float) -> str:
 
 
 def differences_chart(results: Results) -> str:
-    """A panel for all together and for each kind of prediction, a row for each set; empty where nothing was compared."""
+    """A panel for all together and each kind of prediction, a row for each set; empty where nothing was compared."""
     names = [str(name) for name in aim_changes(results, SCORE).index if name in results.shown]
     if not names:
         return ""
     charts = [_panel(results, aim, names) for aim in (SCORE, *told_aims(results))]
     confidence = results.decision["rule"]["confidence"]
-    title = (
-        f"Change of the prediction error against what flies now, mean over the flights with {confidence:.0%} interval"
-    )
+    title = f"Prediction error against what flies now, mean over the flights with {confidence:.0%} interval"
     return chart_block(title, charts, _table(results, names))
 
 
@@ -225,10 +223,9 @@ def _table(results: Results, names: list[str]) -> str:
     for name in names:
         row: list[Cell | str] = [f"{name} (not eligible)" if results.status(name) == NOT_ELIGIBLE else name]
         for aim in aims:
-            one = changes[aim].loc[name]
-            ends = (float(one["lower"]), float(one["upper"]))
+            change, *ends = changes[aim].loc[name, ["change", "lower", "upper"]].to_numpy(np.float64).tolist()
             known = all(map(math.isfinite, ends))
-            row.append(signed(float(one["change"])))
+            row.append(signed(change))
             row.append(Cell(f"{signed(ends[0]).text} to {signed(ends[1]).text}" if known else "–", "short"))
         rows.append(row)
     titles = [words for aim in aims for words in (f"{AIM_LABELS[aim]} %", "interval")]

@@ -15,8 +15,8 @@ from fusetune.report.charts.svg.rows import Rows, rows_of
 from fusetune.report.charts.svg.scales import minus
 from fusetune.report.charts.svg.text_width import FONT_SIZE, fitted_names, text_width
 from fusetune.report.comparison import flight_changes
+from fusetune.report.flight_names import short_names
 from fusetune.report.results import Results
-from fusetune.report.short_names import flight_labels
 
 Array = npt.NDArray[np.float64]
 
@@ -30,13 +30,14 @@ _TITLE = "Change of the prediction error on each flight, percent of what flies n
 
 
 def flights_by_sets_chart(results: Results) -> str:
-    """A cell for each flight and set, the darker the larger the change; empty where nothing was compared.
+    """A cell for each flight, in the order of the results, and set; empty where nothing was compared.
 
-    The sign stands in each cell, so that it does not hang on the colour.
+    The darker, the larger the change. The sign stands in each cell, so that it does not hang on the colour.
     """
     changes = flight_changes(results)
     if changes.empty or not len(changes.columns):
         return ""
+    changes = changes.loc[[name for name in results.flights if name in changes.index]]
     values = changes.to_numpy(np.float64)
     flights, sets = [str(one) for one in changes.index], [str(one) for one in changes.columns]
     chart = _chart(results, values, flights, sets)
@@ -44,10 +45,10 @@ def flights_by_sets_chart(results: Results) -> str:
 
 
 def _chart(results: Results, values: Array, flights: list[str], sets: list[str]) -> str:
-    short = fitted_names(sets, _WIDEST_NAME)
+    short, names = fitted_names(sets, _WIDEST_NAME), short_names(results.scoring)
     lean = math.sin(math.radians(_SLANT))
     head_room = 26.0 + lean * max(text_width(name) for name in short)
-    rows = rows_of(flight_labels(flights), head_room, _ROW, 1.2 * NARROW)
+    rows = rows_of([names[one] for one in flights], head_room, _ROW, 1.2 * NARROW)
     reach = colour_reach(values)
     parts = [rows.labels()]
     for column, name in enumerate(sets):

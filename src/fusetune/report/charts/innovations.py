@@ -154,7 +154,10 @@ def consistency_chart(results: Results) -> str:
     if not found:
         return ""
     charts = [_consistency_panel(results, *one) for one in found]
-    title = "Mean NIS divided by what it should be, a mark for each flight, full within its bounds: left too cautious, right too sure"
+    title = (
+        "Mean NIS divided by what it should be, a mark for each flight, full within its bounds: left of the line the "
+        "filter is too cautious, right too sure"
+    )
     table: list[list[Cell | str]] = []
     for source, axis, rows in found:
         dimension = _dimension(source, axis)
@@ -163,8 +166,8 @@ def consistency_chart(results: Results) -> str:
             if len(own):
                 ratios = own["value"].to_numpy(np.float64) / dimension
                 inside = int(((own["lower"] <= own["value"]) & (own["value"] <= own["upper"])).sum())
-                table.append([AID_SOURCES[source].label, name, number(float(np.median(ratios))), number(float(ratios.min())),
-                              number(float(ratios.max())), f"{inside} of {len(own)}"])  # fmt: skip
+                spread = (float(np.median(ratios)), float(ratios.min()), float(ratios.max()))
+                table.append([AID_SOURCES[source].label, name, *map(number, spread), f"{inside} of {len(own)}"])
     words = ("source", "set", "median", "smallest", "largest", "flights within bounds")
     return chart_block(title, charts, figures_table(words, table))
 

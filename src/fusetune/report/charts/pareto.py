@@ -1,4 +1,4 @@
-"""Two aims at once, accuracy with all sensors and drift without GNSS, of the sets compared and of those a search tried."""
+"""Accuracy with all sensors and drift without GNSS at once, of the sets compared and of those that a search tried."""
 
 from __future__ import annotations
 

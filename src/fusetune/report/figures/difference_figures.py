@@ -22,14 +22,15 @@ from fusetune.report.comparison import (
 )
 from fusetune.report.figures.drawing import GOOD_COLOUR, PRESENT_COLOUR, empty_figure, label_sets, minus, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles, status_colour
+from fusetune.report.flight_names import short_names
 from fusetune.report.results import OUT, Results
-from fusetune.report.short_names import flight_labels, shortened
 
 Limits = tuple[float, float]
 
 NOTHING_TO_COMPARE = "Only the present set was scored: there is nothing to compare."
 
 _ANNOTATED_CELLS = 240
+_LONGEST_NAME = 30
 
 
 def differences(results: Results) -> Figure:
@@ -95,7 +96,7 @@ def flights_by_sets(results: Results) -> Figure:
     if changes.empty or not len(changes.columns):
         return empty_figure(NOTHING_TO_COMPARE)
     values = changes.to_numpy()
-    labels = flight_labels([str(name) for name in changes.index])
+    labels = list(short_names(map(str, changes.index)).values())
     numbered = [f"{label}  {i}" for i, label in enumerate(labels, start=1)]
     label_inches = 0.3 + 0.066 * max(map(len, numbered))
     # no narrower than its title
@@ -190,3 +191,11 @@ def _cross(axes: Axes, one: pd.Series, style: SetStyle, label: str, limits: tupl
     axes.plot([x, x], [one["lower_unaided"], one["upper_unaided"]], color=style.colour, linewidth=1.0, alpha=0.75)
     fill = "none" if one["status_aided"] in OUT else "full"
     axes.plot(x, y, style.marker, color=style.colour, markersize=6, fillstyle=fill, label=label, linestyle="none")
+
+
+def shortened(name: str, longest: int = _LONGEST_NAME) -> str:
+    """A name that leaves room for the plot: its middle goes, as flights often differ at the end."""
+    if len(name) <= longest:
+        return name
+    head = (longest - 1) // 3
+    return f"{name[:head]}…{name[-(longest - 1 - head) :]}"

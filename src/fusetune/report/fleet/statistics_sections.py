@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from fusetune.apply.fleet.changes import FEWEST_A_SIDE, LEVEL
 from fusetune.apply.fleet.outliers import FALSE_SHARE, FEWEST_FLIGHTS

@@ -14,7 +14,7 @@ from fusetune.finding import from_documents
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.flight_modes import ARMED, flight_mode
 from fusetune.report.flight_data.content import Band, Span
-from fusetune.report.flight_data.flag_words import ALARMS, FLAG_WORDS, STATES
+from fusetune.report.flight_data.flag_words import ALARMS, FLAG_WORDS, STATES, USUAL
 from fusetune.report.flight_data.logged import Logged
 
 _MOST_SPANS = 400
@@ -40,7 +40,9 @@ def bands(logged: Logged, replayed: TopicTable | None, scoring: Mapping[str, Any
         yield from _band("not_scored", "not scored", cuts)
     own = logged.status_flags
     flags = replayed if replayed is not None else own
-    yield from _of_flags(flags, (*STATES, *ALARMS), last, "", "")
+    for band in _of_flags(flags, (*STATES, *ALARMS), last, "", ""):
+        if band.id not in USUAL or len(band.spans) > 1 or not _holds(band.spans[0], logged):
+            yield band
     if flags is not own:
         yield from _of_flags(own, ALARMS, last, "onboard.", ", as flown")
 
@@ -58,6 +60,13 @@ def _of_vehicle(logged: Logged, last: int) -> Iterator[Band]:
         yield from _band("armed", "armed", _spans(time, status["arming_state"] == ARMED, last))
     if "failsafe" in status:
         yield from _band("failsafe", "failsafe", _spans(time, status["failsafe"].astype(bool), last))
+
+
+def _holds(span: Span, logged: Logged) -> bool:
+    """Whether it holds throughout the time in the air, or the log where that is not known."""
+    airborne = airborne_intervals(logged.flight, logged.status_flags or {})
+    edges = (airborne[0][0], airborne[-1][1]) if airborne else (logged.flight.start_timestamp, span.stop)
+    return span.start <= edges[0] and span.stop >= edges[1]
 
 
 def _of_flags(flags: TopicTable | None, names: Sequence[str], last: int, prefix: str, whose: str) -> Iterator[Band]:

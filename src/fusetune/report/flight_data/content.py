@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -39,7 +39,6 @@ class Series:
     time : (N,) µs since boot, ascending
     values : (N,)
     set : whose it is; None of a sensor and the like
-    style : which colour it has where it is of no set
     sigma : (N,) standard deviation
     gate : the filter rejects what lies beyond so many of them; None where there is no gate
     rejected : (N,) what the filter rejected
@@ -50,12 +49,17 @@ class Series:
     time: Times
     values: Figures
     set: str | None = None
-    style: int = 0
     sigma: Figures | None = None
     gate: float | None = None
     rejected: npt.NDArray[np.bool_] | None = None
     draw: Draw = "line"
     peaks: Figures | None = None
+
+    def rows(self, chosen: slice | npt.NDArray[Any]) -> Series:
+        """Some of its samples."""
+        columns = ("time", "values", "sigma", "rejected", "peaks")
+        kept = {name: getattr(self, name) for name in columns}
+        return replace(self, **{name: values[chosen] for name, values in kept.items() if values is not None})
 
 
 @dataclass(frozen=True)

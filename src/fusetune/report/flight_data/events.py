@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import islice
 
 import numpy as np
@@ -14,18 +14,12 @@ from fusetune.px4.layouts.estimator_instances import instance_switches
 from fusetune.report.flight_data.content import Event
 from fusetune.report.flight_data.flag_words import FLAG_WORDS
 from fusetune.report.flight_data.logged import Logged
+from fusetune.report.flight_data.panel_names import RESET_WORDS
 
 _MOST_OF_A_KIND = 60
 _LOUD = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING")
 _OF_FILTER = ("ekf", "gnss", "gps", "mag", "compass", "baro", "heading", "yaw", "estimat", "position", "velocity")
 """A message that speaks of one of these is told whatever its level."""
-_KIND_WORDS: Mapping[str, str] = {
-    "horizontal_position": "horizontal position",
-    "height": "height",
-    "horizontal_velocity": "horizontal velocity",
-    "vertical_velocity": "vertical velocity",
-    "heading": "heading",
-}
 
 
 def events(logged: Logged, replayed: TopicTable | None, flags: TopicTable | None) -> list[Event]:
@@ -56,7 +50,7 @@ def _resets(position: TopicTable | None, whose: str) -> Iterator[Event]:
             # a counter that jumps by many is told once
             times = np.unique(counter_steps(position["timestamp"], position[counter]))
             for time in times[:_MOST_OF_A_KIND].tolist():
-                yield Event(time, "reset", f"{_KIND_WORDS[kind]} reset, {whose}")
+                yield Event(time, "reset", f"{RESET_WORDS[kind]} reset, {whose}")
 
 
 def _begun(flags: TopicTable | None, whose: str) -> Iterator[Event]:

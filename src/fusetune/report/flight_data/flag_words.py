@@ -7,7 +7,6 @@ from collections.abc import Mapping
 _STATE_WORDS: Mapping[str, str] = {
     "cs_tilt_align": "tilt known",
     "cs_yaw_align": "heading known",
-    "cs_in_air": "in the air, as the filter takes it",
     "cs_vehicle_at_rest": "at rest",
     "cs_gnss_pos": "GNSS position fused",
     "cs_gnss_vel": "GNSS velocity fused",
@@ -81,6 +80,8 @@ _ALARM_WORDS: Mapping[str, str] = {
 
 STATES = tuple(_STATE_WORDS)
 """What the filter does."""
+USUAL = frozenset({"cs_tilt_align", "cs_yaw_align"})
+"""What says nothing where it holds throughout the flight."""
 ALARMS = tuple(_ALARM_WORDS)
 """What is wrong while it lasts."""
 FLAG_WORDS: Mapping[str, str] = {**_STATE_WORDS, **_ALARM_WORDS}

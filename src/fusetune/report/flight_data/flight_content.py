@@ -27,8 +27,24 @@ from fusetune.report.flight_data.innovation_panels import (
 )
 from fusetune.report.flight_data.logged import Logged, read_logged
 from fusetune.report.flight_data.marks import marks
+from fusetune.report.flight_data.position_frame import PositionFrame, position_frame
 from fusetune.report.flight_data.replays import Replay, replays_of
+from fusetune.report.flight_data.sensor_panels import (
+    output_tracking_panels,
+    reset_panel,
+    sensor_panels,
+    status_ratio_panel,
+    vibration_panels,
+)
 from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_sets
+from fusetune.report.flight_data.state_panels import (
+    Teller,
+    earth_field,
+    inner_state_panels,
+    inner_states,
+    motion_panels,
+    tellers,
+)
 from fusetune.report.flight_data.track_view import track_view
 from fusetune.report.flight_page.flight_results import read_flight_results
 from fusetune.set_names import AS_FLOWN, ONBOARD, PRESENT
@@ -65,6 +81,11 @@ def flight_content(
     present = PRESENT if scoring is None else scoring["present"]
     innovations = list(_innovations(folder, logged, scoring, replays, replayed_sets(scoring, sets, choice)))
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
+    frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
+    told = tellers(logged, replays, _LABELS, frame)
+    panels = tuple(_panels(logged, replays, innovations, told, frame, results.health))
+    curves = (one.set for panel in panels for one in panel.series if one.set is not None)
+    names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
     flight = logged.flight
     return FlightContent(
         flight=results.flight,
@@ -73,19 +94,41 @@ def flight_content(
         duration_s=flight.duration_s,
         takeoff_s=_finite(results.times.take_off_s),
         landing_s=_finite(results.times.landing_s),
-        sets=shown_sets([one.name for one in innovations], scoring, present, choice),
-        panels=tuple(_panels(flight.start_timestamp, innovations)),
+        sets=shown_sets(names, scoring, present, choice),
+        panels=panels,
         bands=tuple(bands(logged, flags, scoring)),
         marks=tuple(marks(results)),
         events=tuple(events(logged, position, flags)),
-        track=track_view(_track(folder), _document(folder / CONFORMANCE_FILE), flight),
+        track=track_view(_track(folder), _document(folder / CONFORMANCE_FILE), flight, told, frame),
     )
 
 
-def _panels(first: int, innovations: Sequence[SetInnovations]) -> Iterator[Panel]:
+def _panels(
+    logged: Logged,
+    replays: Sequence[Replay],
+    innovations: Sequence[SetInnovations],
+    told: Sequence[Teller],
+    frame: PositionFrame,
+    health: Sequence[Mapping[str, Any]],
+) -> Iterator[Panel]:
     """In the order of `panel_names.GROUPS`."""
-    yield from innovation_panels(innovations, first)
-    yield from ratio_panels(innovations, first)
+    yield from innovation_panels(innovations)
+    yield from ratio_panels(innovations)
+    yield from status_ratio_panel(logged)
+    gnss = logged.topic("vehicle_gps_position")
+    yield from motion_panels(told, gnss, round(_parameters(logged, replays)["EKF2_GPS_DELAY"] * 1e3), frame)
+    inner = inner_states(logged, replays, _LABELS)
+    yield from inner_state_panels(inner)
+    yield from output_tracking_panels(logged)
+    yield from vibration_panels(logged, health)
+    yield from sensor_panels(logged, earth_field(inner))
+    yield from reset_panel(logged)
+
+
+def _parameters(logged: Logged, replays: Sequence[Replay]) -> Mapping[str, float]:
+    """Of the present set, or of the log where nothing was replayed."""
+    flight = logged.flight
+    return replays[0].parameters if replays else complete(flight.parameters.initial, {}, flight.release)
 
 
 def _innovations(
@@ -96,9 +139,7 @@ def _innovations(
         yield SetInnovations(one.name, _LABELS.get(one.name, one.name), one.innovations, one.parameters)
     own = _own_innovations(folder, logged)
     if own:
-        flight = logged.flight
-        told = complete(flight.parameters.initial, {}, flight.release)
-        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, told)
+        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, _parameters(logged, ()))
     others = [name for name in sets if name not in {one.name for one in replays}]
     if scoring is not None and others:
         scored = scored_innovations(folder / SAMPLES_FILE, others)
@@ -115,8 +156,8 @@ def _own_innovations(folder: Path, logged: Logged) -> Innovations:
     samples = onboard_samples(logged.flight)
     return {
         key: AxisInnovations(
-            one.timestamp_sample, one.innovation, one.innovation_variance, one.test_ratio, one.rejected
-        )
+            one.timestamp_sample, one.innovation, one.innovation_variance, one.test_ratio, one.rejected, one.fused
+        ).since_fused()
         for key in samples
         if (one := samples[key]).timestamp_sample.size
     }

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +28,7 @@ _COLUMNS = (
     "innovation_variance",
     "test_ratio",
     "innovation_rejected",
+    "fused",
 )
 _MEASURED = "measured"
 _AXES = 8
@@ -41,13 +43,23 @@ _LEAST_OF_ALL = 1e-3
 
 @dataclass(frozen=True)
 class AxisInnovations:
-    """Innovations of one axis of a source in order of time, (N,) each; of samples that are not known, NaN."""
+    """Innovations of one axis of a source in order of time, (N,) each."""
 
     time: Times
     innovation: Figures
     variance: Figures
     ratio: Figures
     rejected: npt.NDArray[np.bool_]
+    fused: npt.NDArray[np.bool_]
+
+    def since_fused(self) -> AxisInnovations:
+        """From the first that was fused on: before, the filter may have no origin. All of them where none ever was."""
+        first = int(np.argmax(self.fused)) if self.fused.size else 0
+        return self.rows(slice(first, None)) if first else self
+
+    def rows(self, chosen: slice | npt.NDArray[Any]) -> AxisInnovations:
+        """Some of them."""
+        return AxisInnovations(*(getattr(self, one.name)[chosen] for one in fields(self)))
 
     @property
     def sigma(self) -> Figures:
@@ -56,10 +68,10 @@ class AxisInnovations:
             return np.sqrt(self.variance)
 
     def gate(self, told: float) -> float | None:
-        """The gate by which the estimator tested: ratio = ν² / (gate² S); None where the samples have no single one.
+        """The gate by which the estimator tested: ratio = ν² / (gate² S); None where nothing tells it.
 
-        Some samples may have another: EKF2 takes part of the innovation of a barometer near the ground, and of later
-        axes of the magnetometer after it has tested them.
+        Some samples seem to have another: EKF2 takes part of a barometer's innovation near the ground, and those of
+        later axes of the magnetometer anew, after it has tested them.
 
         Parameters
         ----------
@@ -70,12 +82,11 @@ class AxisInnovations:
         # of a ratio that all but vanishes single precision keeps nothing
         clear = self.ratio > _LEAST_OF_ALL * np.nanmax(self.ratio, initial=0.0)
         found = found[clear & np.isfinite(found)].astype(np.float64)
-        if found.size:
-            middle = float(np.median(found))
-            if np.mean(np.abs(found / middle - 1.0) <= _SAME_GATE) < _MOSTLY:
-                return None
-            # the parameter is the exact figure, unless it was changed in flight
-            told = told if abs(told / middle - 1.0) <= _SAME_GATE else middle
+        middle = float(np.median(found)) if found.size else np.nan
+        is_shared = found.size > 0 and np.mean(np.abs(found / middle - 1.0) <= _SAME_GATE) >= _MOSTLY
+        # a parameter that was changed in flight, or a gate that is a constant
+        if is_shared and not abs(told / middle - 1.0) <= _SAME_GATE:
+            told = middle
         return float(f"{told:.5g}") if np.isfinite(told) else None
 
 
@@ -112,7 +123,7 @@ def split_by_axis(table: pa.Table) -> dict[SourceAxis, AxisInnovations]:
     for start, stop in zip(starts, [*starts[1:], key.size], strict=True):
         name, axis = names[key[start] // _AXES], int(key[start] % _AXES)
         if name in MEASURED_SOURCES:
-            found[name, axis] = AxisInnovations(*(one[start:stop] for one in columns))
+            found[name, axis] = AxisInnovations(*(one[start:stop] for one in columns)).since_fused()
     return found
 
 
@@ -136,7 +147,8 @@ def _joined(parts: Sequence[tuple[npt.NDArray, ...]]) -> AxisInnovations:
         np.concatenate(columns) if len(columns) > 1 else columns[0] for columns in zip(*parts, strict=True)
     )
     # what is scored was tested, but a set's own test may have thrown it out
-    return AxisInnovations(time, innovation, variance, ratio, ratio > 1.0)
+    rejected = ratio > 1.0
+    return AxisInnovations(time, innovation, variance, ratio, rejected, ~rejected)
 
 
 @dataclass(frozen=True)
@@ -149,18 +161,11 @@ class SetInnovations:
     parameters: Mapping[str, float]
 
 
-def innovation_panels(sets: Sequence[SetInnovations], first: int = 0) -> Iterator[Panel]:
-    """A panel for each source and axis, with every set that has samples of it.
-
-    Parameters
-    ----------
-    first : time, µs, before which nothing is shown
-    """
+def innovation_panels(sets: Sequence[SetInnovations]) -> Iterator[Panel]:
+    """A panel for each source and axis, with every set that has samples of it."""
     for source, one in MEASURED_SOURCES.items():
         for axis in range(one.axes):
-            series = tuple(
-                _innovation_series(each, source, axis, first) for each in sets if _has(each, source, axis, first)
-            )
+            series = tuple(_innovation_series(each, source, axis) for each in sets if _has(each, source, axis))
             if series:
                 name = innovation_name(source, axis)
                 yield Panel(
@@ -168,10 +173,10 @@ def innovation_panels(sets: Sequence[SetInnovations], first: int = 0) -> Iterato
                 )
 
 
-def ratio_panels(sets: Sequence[SetInnovations], first: int = 0) -> Iterator[Panel]:
+def ratio_panels(sets: Sequence[SetInnovations]) -> Iterator[Panel]:
     """A panel for each source with the largest test ratio of its axes, of every set."""
     for source, one in MEASURED_SOURCES.items():
-        series = tuple(found for each in sets if (found := _ratio_series(each, source, one.axes, first)) is not None)
+        series = tuple(found for each in sets if (found := _ratio_series(each, source, one.axes)) is not None)
         if series:
             name = ratio_name(source)
             yield Panel(
@@ -179,24 +184,22 @@ def ratio_panels(sets: Sequence[SetInnovations], first: int = 0) -> Iterator[Pan
             )
 
 
-def _has(one: SetInnovations, source: str, axis: int, first: int) -> bool:
+def _has(one: SetInnovations, source: str, axis: int) -> bool:
     samples = one.innovations.get((source, axis))
-    return samples is not None and bool(np.any(np.isfinite(samples.innovation[samples.time >= first])))
+    return samples is not None and bool(np.any(np.isfinite(samples.innovation)))
 
 
-def _innovation_series(one: SetInnovations, source: str, axis: int, first: int) -> Series:
-    samples = _since(one.innovations[source, axis], first)
+def _innovation_series(one: SetInnovations, source: str, axis: int) -> Series:
+    samples = one.innovations[source, axis]
     time, (innovation, sigma, ratio, rejected) = with_gaps(
         samples.time, (samples.innovation, samples.sigma, samples.ratio, samples.rejected)
     )
     gate = samples.gate(gate_of(one.parameters, source))
-    return Series(one.label, time, innovation, one.name, 0, sigma, gate, rejected, peaks=ratio)
+    return Series(one.label, time, innovation, one.name, sigma, gate, rejected, peaks=ratio)
 
 
-def _ratio_series(one: SetInnovations, source: str, axes: int, first: int) -> Series | None:
-    samples = [
-        _since(one.innovations[source, axis], first) for axis in range(axes) if (source, axis) in one.innovations
-    ]
+def _ratio_series(one: SetInnovations, source: str, axes: int) -> Series | None:
+    samples = [one.innovations[source, axis] for axis in range(axes) if (source, axis) in one.innovations]
     if not samples:
         return None
     time, ratio = samples[0].time, samples[0].ratio
@@ -217,13 +220,3 @@ def _at_all_times(left: tuple[Times, Figures], right: tuple[Times, Figures]) -> 
     found = np.full(times.size, np.nan)
     np.fmax.at(found, places, np.concatenate([left[1], right[1]]).astype(np.float64))
     return times, found
-
-
-def _since(samples: AxisInnovations, first: int) -> AxisInnovations:
-    rows = samples.time >= first
-    if rows.all():
-        return samples
-    return replace(
-        samples,
-        **{name: getattr(samples, name)[rows] for name in ("time", "innovation", "variance", "ratio", "rejected")},
-    )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.flight_data.blob import TICK_US, VERSION, ArrayStore, pack
 from fusetune.report.flight_data.content import (
     FlightContent,
@@ -17,7 +19,9 @@ from fusetune.report.flight_data.content import (
     Times,
     TrackView,
 )
+from fusetune.report.flight_data.panel_names import BIASES, SENSORS, UNCERTAINTY, VIBRATION, WIND_AND_FIELD
 from fusetune.report.flight_data.thinning import kept_rows
+from fusetune.report.set_styles import COLOURS, PRESENT_INDEX
 
 SMALL_BUDGET_BYTES = 300_000
 """Of the blob of a flight in the report, in base64."""
@@ -26,22 +30,34 @@ LARGE_BUDGET_BYTES = 2_000_000
 
 
 class Buckets(NamedTuple):
-    """Into how many buckets a series is parted: of the sets that matter most and of the others."""
+    """Into how many buckets a series is parted: of sets that matter most, of the others, of what changes slowly."""
 
     main: int
     other: int
+    slow: int
 
 
-_LEVELS = tuple(
-    Buckets(main, other)
-    for main, other in (
-        (1500, 1000), (1200, 600), (900, 400), (700, 250), (500, 180), (400, 130), (300, 100), (250, 80), (200, 60),
-        (160, 48), (130, 36), (100, 28), (80, 20), (60, 14), (40, 10), (24, 6), (12, 4), (6, 2),
-    )
-)  # fmt: skip
-"""From the finest to the coarsest."""
+_FINEST, _COARSEST = 1000, 4
+_STEP = 0.86
+_OTHER, _SLOW, _FEWEST = 0.5, 0.4, 2
 
+
+def _levels() -> tuple[Buckets, ...]:
+    """From the finest to the coarsest."""
+    found, main = [], float(_FINEST)
+    while main >= _COARSEST:
+        found.append(Buckets(round(main), *(max(round(share * main), _FEWEST) for share in (_OTHER, _SLOW))))
+        main *= _STEP
+    return tuple(found)
+
+
+_LEVELS = _levels()
+_SLOW_GROUPS = frozenset({BIASES, WIND_AND_FIELD, UNCERTAINTY, VIBRATION, SENSORS})
+_COLOURS = (*range(1, COLOURS), PRESENT_INDEX)
+"""Of what is of no set, in this order."""
 _IMPORTANT = ("present", "chosen", "onboard")
+_AIMED = 0.98
+"""Share of the budget: not every level takes what another one lets expect."""
 _BYTES_OF_FIGURE, _BYTES_OF_TIME, _BYTES_OF_SERIES = 2.7, 1.2, 30.0
 """What a kept point takes in the end, about; the first guess at a level is made of them."""
 
@@ -53,19 +69,26 @@ def pack_content(content: FlightContent, budget_bytes: int) -> bytes:
     """
     important = {one.name for one in content.sets if one.role in _IMPORTANT}
     most = budget_bytes * 3 // 4
-    level = next(
-        (i for i, one in enumerate(_LEVELS) if _guess(content.panels, important, one) <= most), len(_LEVELS) - 1
-    )
-    # of the two levels about the guess the finer one that fits
-    for number in range(max(level - 1, 0), len(_LEVELS)):
+    guesses = [_guess(content.panels, important, one) for one in _LEVELS]
+    number = _first_below(guesses, most)
+    blob = _packed(content, important, _LEVELS[number])
+    # what one level took says what the others take
+    scale = len(blob) / guesses[number]
+    better = _first_below(guesses, _AIMED * most / scale)
+    if better != number:
+        number, blob = better, _packed(content, important, _LEVELS[better])
+    while len(blob) > most and number + 1 < len(_LEVELS):
+        number += 1
         blob = _packed(content, important, _LEVELS[number])
-        if len(blob) <= most:
-            return blob
     return blob
 
 
+def _first_below(guesses: Sequence[float], most: float) -> int:
+    return next((number for number, one in enumerate(guesses) if one <= most), len(guesses) - 1)
+
+
 def _guess(panels: Iterable[Panel], important: set[str], buckets: Buckets) -> float:
-    return sum(_guess_of(one, _buckets_of(one, important, buckets)) for panel in panels for one in panel.series)
+    return sum(_guess_of(one, _buckets_of(panel, one, important, buckets)) for panel in panels for one in panel.series)
 
 
 def _guess_of(series: Series, buckets: int) -> float:
@@ -74,13 +97,16 @@ def _guess_of(series: Series, buckets: int) -> float:
     return _BYTES_OF_SERIES + points * (figures * _BYTES_OF_FIGURE + _BYTES_OF_TIME)
 
 
-def _buckets_of(series: Series, important: set[str], buckets: Buckets) -> int:
+def _buckets_of(panel: Panel, series: Series, important: set[str], buckets: Buckets) -> int:
+    source = AID_SOURCES.get(panel.source or "")
+    if panel.group in _SLOW_GROUPS or (source is not None and source.every_update):
+        return buckets.slow
     return buckets.main if series.set is None or series.set in important else buckets.other
 
 
 def _packed(content: FlightContent, important: set[str], buckets: Buckets) -> bytes:
     arrays = ArrayStore()
-    writer = _Writer(content.start_us, arrays)
+    writer = _Writer(content, arrays)
     panels = [writer.panel(one, important, buckets) for one in content.panels]
     track = None if content.track is None else writer.track(content.track, buckets)
     header = {
@@ -125,8 +151,9 @@ def _seconds(value: float | None) -> float | None:
 class _Writer:
     """Puts parts of a flight into the arrays of its blob, and says where."""
 
-    def __init__(self, start_us: int, arrays: ArrayStore) -> None:
-        self._start, self._arrays = start_us, arrays
+    def __init__(self, content: FlightContent, arrays: ArrayStore) -> None:
+        self._start, self._arrays = content.start_us, arrays
+        self._styles = {one.name: one.style for one in content.sets}
 
     def seconds(self, time: int) -> float:
         return round((time - self._start) * 1e-6, 4)
@@ -135,7 +162,18 @@ class _Writer:
         return [max(self.seconds(one.start), 0.0), self.seconds(one.stop), one.words]
 
     def panel(self, panel: Panel, important: set[str], buckets: Buckets) -> dict[str, Any]:
-        series = [self._series(one, _buckets_of(one, important, buckets)) for one in panel.series]
+        # what is of no set takes the colours that the sets beside it leave
+        taken = {self._styles[one.set] for one in panel.series if one.set is not None}
+        free = [number for number in _COLOURS if number not in taken] or [*_COLOURS]
+        others = cycle(free)
+        series = [
+            self._series(
+                one,
+                _buckets_of(panel, one, important, buckets),
+                next(others) if one.set is None else self._styles[one.set],
+            )
+            for one in panel.series
+        ]
         return {
             "id": panel.id,
             "group": panel.group,
@@ -149,14 +187,15 @@ class _Writer:
             "series": series,
         }
 
-    def _series(self, series: Series, buckets: int) -> dict[str, Any]:
+    def _series(self, series: Series, buckets: int, style: int) -> dict[str, Any]:
+        series = self._in_order(series)
         peaks = () if series.peaks is None else (series.peaks,)
         rows = kept_rows(series.values, buckets, peaks, series.rejected)
         rejected = series.rejected
         return {
             "label": series.label,
             "set": series.set,
-            "style": series.style,
+            "style": style,
             "time": self._times(series.time[rows]),
             "value": self._arrays.figures(series.values[rows]),
             "sigma": None if series.sigma is None else self._arrays.figures(series.sigma[rows]),
@@ -166,6 +205,14 @@ class _Writer:
             "samples": int(np.isfinite(series.values).sum()),
             "rejected_samples": None if rejected is None else int(rejected.sum()),
         }
+
+    def _in_order(self, series: Series) -> Series:
+        """By time, without what a log holds of before it began, as for a sensor's delay."""
+        if np.any(np.diff(series.time) < 0):
+            series = series.rows(np.argsort(series.time, kind="stable"))
+        if not series.time.size or series.time[0] >= self._start:
+            return series
+        return series.rows(slice(int(np.searchsorted(series.time, self._start)), None))
 
     def track(self, track: TrackView, buckets: Buckets) -> dict[str, Any]:
         written = self._plane(track.flown, buckets.main)
@@ -180,6 +227,7 @@ class _Writer:
 
     def _plane(self, track: PlaneTrack, buckets: int) -> dict[str, Any]:
         rows = _union(kept_rows(one, buckets) for one in (track.north, track.east, track.height))
+        rows = rows[track.time[rows] >= self._start]
         columns = {name: getattr(track, name)[rows] for name in ("north", "east", "height", "heading")}
         return {
             "time": self._times(track.time[rows]),

@@ -89,6 +89,16 @@ _PANELS: Mapping[str, tuple[str, tuple[str, ...], str]] = {
 """Panel → its group, the title of each of its axes, and the unit."""
 
 _OUTPUT_UNITS = ("rad", "m/s", "m")
+OUTPUT_TRACKING_AXES = len(_OUTPUT_UNITS)
+
+RESET_WORDS: Mapping[str, str] = {
+    "horizontal_position": "horizontal position",
+    "height": "height",
+    "horizontal_velocity": "horizontal velocity",
+    "vertical_velocity": "vertical velocity",
+    "heading": "heading",
+}
+"""What is reset, by the names of `RESET_COUNTERS`."""
 
 STATUS_RATIOS: Mapping[str, str] = {
     "vel_test_ratio": "velocity",
@@ -106,7 +116,7 @@ STATUS_RATIOS: Mapping[str, str] = {
 def panel_name(panel: str, axis: int = 0) -> PanelName:
     """Of a panel that is of no aid source."""
     group, titles, unit = _PANELS[panel]
-    return PanelName(group, titles[axis], _OUTPUT_UNITS[axis] if panel == "output_tracking" else unit)
+    return PanelName(group, _begun(titles[axis]), _OUTPUT_UNITS[axis] if panel == "output_tracking" else unit)
 
 
 def axes_of(panel: str) -> int:
@@ -118,15 +128,21 @@ def innovation_name(source: str, axis: int) -> PanelName:
     """Of the innovations of an aid source."""
     one = AID_SOURCES[source]
     words = _AXIS_WORDS.get(one.quantity)
-    return PanelName(INNOVATIONS, f"{one.label} {words[axis]}" if words and one.axes > 1 else one.label, one.unit)
+    title = f"{one.label} {words[axis]}" if words and one.axes > 1 else one.label
+    return PanelName(INNOVATIONS, _begun(title), one.unit)
 
 
 def ratio_name(source: str) -> PanelName:
     """Of the test ratios of an aid source, the largest of its axes."""
     one = AID_SOURCES[source]
-    return PanelName(RATIOS, f"{one.label}, the worst axis" if one.axes > 1 else one.label, "")
+    return PanelName(RATIOS, _begun(f"{one.label}, the worst axis" if one.axes > 1 else one.label), "")
 
 
 def status_ratio_name() -> PanelName:
     """Of the ratios by which the vehicle's filter sums up itself."""
-    return PanelName(RATIOS, "as the vehicle's own filter sums them up", "")
+    return PanelName(RATIOS, "Roots of the ratios, as the vehicle's own filter sums them up", "")
+
+
+def _begun(title: str) -> str:
+    """With a capital in front, but for a Greek letter."""
+    return title[0].upper() + title[1:] if title[0].isascii() else title

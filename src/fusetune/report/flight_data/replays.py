@@ -28,9 +28,14 @@ class Replay:
     name: str
 
     @cached_property
+    def summary(self) -> Mapping[str, Any]:
+        """How it went, see `fusetune.analyze.replaying.replay_summary`."""
+        return read_document(summary_file(self.folder, self.name))
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """All that the estimator had."""
-        return values_of(read_document(summary_file(self.folder, self.name)), "params")
+        return values_of(self.summary, "params")
 
     @cached_property
     def innovations(self) -> Innovations:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,21 @@ import numpy.typing as npt
 
 from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
 from fusetune.px4.flight import Flight
-from fusetune.px4.local_map import EARTH_RADIUS_M
-from fusetune.report.flight_data.content import Figures, PlaneTrack, Span, TrackView
+from fusetune.report.flight_data.content import PlaneTrack, Span, TrackView
+from fusetune.report.flight_data.local_plane import local_plane
+from fusetune.report.flight_data.position_frame import PositionFrame
+from fusetune.report.flight_data.state_panels import Teller
 
 _FIX_3D = 3
 
 
-def track_view(track: FlownTrack | None, conformance: Mapping[str, Any] | None, flight: Flight) -> TrackView | None:
+def track_view(
+    track: FlownTrack | None,
+    conformance: Mapping[str, Any] | None,
+    flight: Flight,
+    told: Sequence[Teller] = (),
+    frame: PositionFrame | None = None,
+) -> TrackView | None:
     """What is shown on the map; None where the flight has no track.
 
     North and east are about the home of the mission that was flown, else about where the track begins.
@@ -25,33 +33,35 @@ def track_view(track: FlownTrack | None, conformance: Mapping[str, Any] | None, 
     ----------
     conformance : `conformance.json`; None where there is none
     flight : canonical
+    told, frame : who else tells of the vehicle's place, of a set or the vehicle's own filter, and the frame of that
     """
     if track is None or not track.time.size:
         return None
-    told = conformance or {"missions": (), "flown": None, "manoeuvres": ()}
-    mission = next((one for one in told["missions"] if one["mission"] == told["flown"]), None)
-    manoeuvres = tuple(Span(one["start_us"], one["stop_us"], one["kind"]) for one in told["manoeuvres"])
+    compared = conformance or {"missions": (), "flown": None, "manoeuvres": ()}
+    mission = next((one for one in compared["missions"] if one["mission"] == compared["flown"]), None)
+    manoeuvres = tuple(Span(one["start_us"], one["stop_us"], one["kind"]) for one in compared["manoeuvres"])
     if not track.has_place:
         return TrackView(_local(track, flight), manoeuvres=manoeuvres)
     home = (track.lat[0], track.lon[0]) if mission is None else (mission["home"]["lat"], mission["home"]["lon"])
-    flown = _parted(PlaneTrack(track.time, *plane(track.lat, track.lon, *home), track.height, track.heading))
+    flown = _parted(PlaneTrack(track.time, *local_plane(track.lat, track.lon, *home), track.height, track.heading))
     fixes = _fixes(flight, home)
-    if fixes is not None and track.is_above_takeoff:
-        fixes = _above(fixes, flown)
-    return TrackView(flown, fixes, mission=_corners(mission), manoeuvres=manoeuvres)
+    sets = {} if frame is None or frame.origin is None else dict(_places(told, frame.origin, home))
+    if track.is_above_takeoff:
+        fixes = None if fixes is None else _above(fixes, flown)
+        sets = {name: _above(one, flown) for name, one in sets.items()}
+    return TrackView(flown, fixes, sets, _corners(mission), manoeuvres)
 
 
-def plane(lat: Figures, lon: Figures, home_lat: float, home_lon: float) -> tuple[Figures, Figures]:
-    """North and east of a home, m: `fusetune.px4.local_map`, of arrays (N,) in degrees."""
-    phi, ref = np.radians(lat), np.radians(home_lat)
-    difference = np.radians(lon - home_lon)
-    north = np.cos(ref) * np.sin(phi) - np.sin(ref) * np.cos(phi) * np.cos(difference)
-    east = np.cos(phi) * np.sin(difference)
-    sine = np.hypot(north, east)
-    cosine = np.sin(ref) * np.sin(phi) + np.cos(ref) * np.cos(phi) * np.cos(difference)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scale = EARTH_RADIUS_M * np.where(sine > 0.0, np.arctan2(sine, cosine) / sine, 1.0)
-    return scale * north, scale * east
+def _places(
+    told: Sequence[Teller], origin: tuple[float, float, float], home: tuple[float, float]
+) -> Iterator[tuple[str, PlaneTrack]]:
+    """About the home, heights above mean sea level, of all who are of a set."""
+    north, east = local_plane(np.array(origin[:1]), np.array(origin[1:2]), *home)
+    for one in told:
+        if one.set is not None and np.any(np.isfinite(one.position)):
+            place = one.position + np.array([north[0], east[0], 0.0])
+            nowhere = np.full(one.time.size, np.nan)
+            yield one.set, _parted(PlaneTrack(one.time, place[:, 0], place[:, 1], origin[2] - place[:, 2], nowhere))
 
 
 def _local(track: FlownTrack, flight: Flight) -> PlaneTrack:
@@ -77,7 +87,7 @@ def _fixes(flight: Flight, home: tuple[float, float]) -> PlaneTrack | None:
         table[name][rows].astype(np.float64) for name in ("latitude_deg", "longitude_deg", "altitude_msl_m")
     )
     time = table["timestamp"][rows].astype(np.int64)
-    return PlaneTrack(time, *plane(lat, lon, *home), height, np.full(time.size, np.nan))
+    return PlaneTrack(time, *local_plane(lat, lon, *home), height, np.full(time.size, np.nan))
 
 
 def _above(fixes: PlaneTrack, flown: PlaneTrack) -> PlaneTrack:
@@ -87,7 +97,7 @@ def _above(fixes: PlaneTrack, flown: PlaneTrack) -> PlaneTrack:
     if not known.any() or not inside.any():
         return fixes
     height = np.interp(fixes.time[inside], flown.time[known], flown.height[known])
-    shift = float(np.median(fixes.height[inside] - height))
+    shift = float(np.nanmedian(fixes.height[inside] - height))
     return PlaneTrack(fixes.time, fixes.north, fixes.east, fixes.height - shift, fixes.heading)
 
 

@@ -55,7 +55,7 @@ def effects_section(results: FlightResults) -> str:
         rows = [(_words(one["id"]), str(one["refusal"])) for one in refused]
         count = f"{count_words(len(rows), 'effect')} that this flight does not tell, and what to fly"
         parts.append(details(count, table(("effect", "why not, and what to fly"), rows)))
-    return section("What could be set from this flight", *parts)
+    return section("What could be set from this flight", *parts, id="effects")
 
 
 def _words(effect: str) -> str:

@@ -5,6 +5,10 @@ import pandas as pd
 
 from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
 from fusetune.px4.aid_sources import AID_SOURCES
+from fusetune.report.charts.differences import differences_chart
+from fusetune.report.charts.drift import drift_chart
+from fusetune.report.charts.flights_by_sets import flights_by_sets_chart
+from fusetune.report.charts.pareto import pareto_chart
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, number, paragraph, section, signed, table
 from fusetune.report.results import Results
@@ -41,7 +45,8 @@ def evidence_section(results: Results) -> str:
             "they predicted: aided, one step ahead; unaided, after seconds without GNSS; smoothed, against the velocity "
             "that the whole flight makes likely. How large a set says its uncertainty is does not count."
         ),
-        ranking_table(results),
+        differences_chart(results),
+        details("The ranking in figures", ranking_table(results)),
         objections_table(results),
         details("All other criteria", criteria_table(results)),
         id="ranking",
@@ -50,7 +55,10 @@ def evidence_section(results: Results) -> str:
 
 def flight_by_flight_section(results: Results) -> str:
     """Does it hold on each flight? Empty where no flight has a say."""
-    return section("On each flight", sign_table(results), id="each-flight") if results.flights else ""
+    if not results.flights:
+        return ""
+    figures = details("The figures", sign_table(results))
+    return section("On each flight", flights_by_sets_chart(results), figures, id="each-flight")
 
 
 def withheld_section(results: Results) -> str:
@@ -67,6 +75,8 @@ def withheld_section(results: Results) -> str:
             "the estimator for some seconds while it flew on. What the sensor measured in the end shows how far the "
             "prediction had drifted: the better the estimator knew its velocity, attitude and biases, the less."
         ),
+        details("How far it drifted", drift_chart(results)),
+        details("Two aims against each other", pareto_chart(results)),
         details("Figures of the drift", *told, _drift_note(results) if told[1] else "", *_shorter_gaps(results)),
     ]
     return section("Without a sensor", *parts, id="withheld")
@@ -140,7 +150,9 @@ def holds_section(results: Results) -> str:
     return section(
         title,
         paragraph(_holds(results)),
-        details("Each flight", table(("flight left out", "best set of the others", "change of the error there %"), rows)),
+        details(
+            "Each flight", table(("flight left out", "best set of the others", "change of the error there %"), rows)
+        ),
         paragraph(
             "Each flight was left out in turn, the best eligible set chosen from the others and judged on the flight "
             "that had no part in choosing it. Below 0 is better than the present set. This shows how much hangs on "
@@ -207,7 +219,9 @@ def weights_section(results: Results) -> str:
     )
     unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
     note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")
-    return section("What counts how much", paragraph(text), details("On each flight", table(head, rows), note if unknown else ""))
+    return section(
+        "What counts how much", paragraph(text), details("On each flight", table(head, rows), note if unknown else "")
+    )
 
 
 def _white_shares(results: Results) -> pd.DataFrame:
@@ -246,4 +260,8 @@ def paper_section(results: Results) -> str:
         for one in mode["ranking"]
     ]
     head = ("set", "aggregate RMS", "NIS inside the χ² bounds", "break rate %")
-    return section("The paper's own rule", paragraph(text), details("Why, and its ranking", bullets(mode["why"]), table(head, rows)))
+    return section(
+        "The paper's own rule",
+        paragraph(text),
+        details("Why, and its ranking", bullets(mode["why"]), table(head, rows)),
+    )

@@ -34,7 +34,14 @@ def findings_section(results: Results) -> str:
         return ""
     parts = []
     if findings:
-        rows = [(Html(severity_mark(one.severity, SEVERITY_WORDS[one.severity]), "short"), one.found, one.remedy) for one in findings]
+        rows = [
+            (
+                Html(severity_mark(one.severity, SEVERITY_WORDS[one.severity]), "short"),
+                Cell(one.found, "said"),
+                one.remedy,
+            )
+            for one in findings
+        ]
         head = ("", "what PX4 is told, and what the flights say", "what to do")
         parts += [paragraph(_INTRODUCTION, "note"), table(head, rows, kind="cards findings")]
     if noises:

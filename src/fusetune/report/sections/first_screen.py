@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterator, Mapping
 from html import escape
 from typing import Any
 
-from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
 from fusetune.apply.ranking import SAME
 from fusetune.report.comparison import percent_change
 from fusetune.report.counted import count_words
-from fusetune.report.markup import Cell, CellLike, Html, anchor, number, prose, severity_mark, signed, table
+from fusetune.report.markup import Cell, CellLike, Html, anchor, number, prose, severity_mark, signed, table, unit_cell
 from fusetune.report.results import Results
 from fusetune.report.sections.ranking_tables import NOT_KNOWN, confidence_of, interval_text
 from fusetune.report.sections.truth_section import truth_verdict
@@ -21,7 +20,6 @@ ROLLBACK = "results/apply/rollback.params"
 
 _MOST_PROBLEMS = 3
 _DIAGNOSED = "diagnosis."
-_TILES = {AIDED: "one step ahead", UNAIDED: "after seconds without GNSS", SMOOTHED: "against the smoothed velocity"}
 
 
 def first_screen(results: Results, picture: str = "") -> str:
@@ -68,12 +66,12 @@ def _gain(results: Results) -> str:
     rows = {one["name"]: one for one in results.ranking.to_dict("records")}
     if decision["status"] == "change":
         one = rows[decision["chosen"]]
-        return _lead(f"{_change_words(results, one)}{_on_flights(one)}.") + _tiles(one)
+        return _figure(results, one)
     other = _nearest(results, rows)
     if other is None:
         why = "No flight has a say in it." if not results.flights else "No other set was compared with it."
         return _lead(why)
-    return _lead(f"No other set proved better. The nearest, “{other['name']}”: {_uncapital(_change_words(results, other))}.")
+    return _lead(f"No other set proved better. The nearest, “{other['name']}”: {_change_words(results, other)}.")
 
 
 def _lead(text: str) -> str:
@@ -92,9 +90,14 @@ def _nearest(results: Results, rows: Mapping[Hashable, Mapping[Hashable, Any]]) 
 def _change_words(results: Results, one: Mapping[Hashable, Any]) -> str:
     change = float(percent_change(one["difference"]))
     size = f"{abs(change):.1f} % {'smaller' if change < 0.0 else 'larger'}" if change else "the same as now"
+    return f"prediction errors {size} {_span(results, one)}"
+
+
+def _span(results: Results, one: Mapping[Hashable, Any]) -> str:
     ends = interval_text(one["lower"], one["upper"])
-    span = "how far chance could do that is not known" if ends == NOT_KNOWN else f"{confidence_of(results)} interval {ends} %"
-    return f"Prediction errors {size} ({span})"
+    if ends == NOT_KNOWN:
+        return "(how far chance could do that is not known)"
+    return f"({confidence_of(results)} interval {ends} %)"
 
 
 def _on_flights(one: Mapping[Hashable, Any]) -> str:
@@ -102,22 +105,11 @@ def _on_flights(one: Mapping[Hashable, Any]) -> str:
     return f", smaller on {better} of {count_words(flights, 'flight')}"
 
 
-def _tiles(one: Mapping[Hashable, Any]) -> str:
-    """By how much each way of predicting changes."""
-    known = [(words, one[f"{aim}_difference"]) for aim, words in _TILES.items() if _is_known(one[f"{aim}_difference"])]
-    tiles = "".join(
-        f'<div class="tile"><dt>{escape(words)}</dt><dd class="{_side(value)}">{_percent(value)}&nbsp;%</dd></div>'
-        for words, value in known
-    )
-    return f'<dl class="tiles">{tiles}</dl>' if tiles else ""
-
-
-def _percent(difference: float) -> str:
-    return signed(float(percent_change(difference))).text
-
-
-def _side(difference: float) -> str:
-    return "good" if difference < 0.0 else "bad" if difference > 0.0 else ""
+def _figure(results: Results, one: Mapping[Hashable, Any]) -> str:
+    """By how much errors change, large, and how far that is sure."""
+    change = signed(float(percent_change(one["difference"]))).text
+    words = f"prediction errors {_span(results, one)}{_on_flights(one)}"
+    return f'<p class="gain"><span class="gain-figure">{change}&nbsp;%</span> <span>{prose(words)}</span></p>'
 
 
 def _load(results: Results) -> str:
@@ -154,13 +146,9 @@ def _change_row(change: Mapping[str, Any], in_file: str) -> tuple[CellLike, ...]
         number(change["previous"], 6, "number old"),
         Html("→", "arrow"),
         number(change["value"], 6, "number new"),
-        Cell(_powers(change["unit"]), "quiet"),
+        unit_cell(change["unit"]),
         Cell("; ".join(remarks), "quiet"),
     )
-
-
-def _powers(unit: str) -> str:
-    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def _cards(results: Results) -> str:
@@ -169,7 +157,7 @@ def _cards(results: Results) -> str:
         _card("Mend first", _mend_first(results)),
         _card("Next", _next_step(results)),
     ]
-    return f'<div class="cards">{"".join(cards)}</div>'
+    return f'<div class="answer-cards">{"".join(cards)}</div>'
 
 
 def _card(title: str, inside: str) -> str:
@@ -203,19 +191,28 @@ def _why_sure(results: Results) -> str:
         return f"{beyond}."
     stays, count = validated["stays"], len(validated["chosen"])
     same = "whichever flight is left out" if stays == count else f"without any one of {stays} of the {count} flights"
-    change = _percent(validated["difference"])
+    change = signed(float(percent_change(validated["difference"]))).text
     return f"{beyond}, and the same set is best {same}; on the one left out errors change by {change} %."
 
 
 def _mend_first(results: Results) -> str:
     """The worst of what was found wrong."""
-    findings = [one for one in results.decision["findings"] if one["severity"] in ("fail", "warning")]
+    changed = {one["name"] for one in results.decision["changes"]}
+    findings = [one for one in results.decision["findings"] if _is_to_mend(one, changed)]
     items = [_problem(one) for one in findings[:_MOST_PROBLEMS]]
     if not items:
         return ""
     more = len(findings) - len(items)
     end = f"<p>{anchor(f'and {more} more', 'what-is-wrong')}</p>" if more > 0 else ""
     return f'<ul class="problems">{"".join(items)}</ul>{end}'
+
+
+def _is_to_mend(finding: Mapping[str, Any], changed: Collection[str]) -> bool:
+    """Whether it is to be mended by hand: not what the parameters that are loaded mend."""
+    evidence = finding["evidence"]
+    if finding["severity"] not in ("fail", "warning") or evidence.get("mended_by_parameter"):
+        return False
+    return evidence.get("parameter") not in changed
 
 
 def _problem(finding: Mapping[str, Any]) -> str:
@@ -241,10 +238,6 @@ def _next_step(results: Results) -> str:
     more = len(steps) - 1
     end = f"<p>{anchor(f'and {more} more', 'next-steps')}</p>" if more else ""
     return f"<p>{prose(first['text'])}</p>{command}{end}"
-
-
-def _uncapital(text: str) -> str:
-    return text[:1].lower() + text[1:]
 
 
 def _is_known(value: object) -> bool:
