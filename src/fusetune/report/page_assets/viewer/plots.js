@@ -12,7 +12,7 @@
   viewer.makePanel = (view, panel) => {
     const { model, axis } = view;
     const { h } = viewer;
-    const all = panel.series.map((given, place) => seriesOf(view, given, place));
+    const all = panel.series.map((given, place) => seriesOf(view, given, place, panel.kind));
     const plot = h("div", { class: "fv-plot", role: "img" });
     const legend = h("ul", { class: "fv-legend" });
     const figures = h("div", { class: "fv-figures" });
@@ -24,9 +24,20 @@
     const element = h(
       "section",
       { class: "fv-panel", "data-panel": panel.id, "aria-label": panel.title },
-      h("div", { class: "fv-panel-head" },
-        h("h4", {}, panel.title, panel.unit ? h("span", { class: "fv-unit" }, ` ${panel.unit}`) : null), shut.button),
-      legend, plot, figures,
+      h(
+        "div",
+        { class: "fv-panel-head" },
+        h(
+          "h4",
+          {},
+          viewer.words.heading(panel.title),
+          panel.unit ? h("span", { class: "fv-unit" }, ` ${panel.unit}`) : null,
+        ),
+        shut.button,
+      ),
+      legend,
+      plot,
+      figures,
     );
     let u = null;
     let width = 0;
@@ -35,7 +46,10 @@
     let isLog = Boolean(panel.log);
 
     const shown = () => all.filter((series) => view.isShown(series.set));
-    const bounded = () => shown().filter((series) => series.sigma).slice(0, MOST_BOUNDED);
+    const bounded = () =>
+      shown()
+        .filter((series) => series.sigma)
+        .slice(0, MOST_BOUNDED);
 
     function make() {
       const joined = viewer.joined(all, { log: isLog });
@@ -52,9 +66,14 @@
       const grid = { stroke: () => view.colours.line, width: 1 };
       const ink = () => view.colours.quiet;
       return {
-        width, height: HEIGHT, padding: [8, viewer.GUTTER.right, 0, 0], legend: { show: false },
+        width,
+        height: HEIGHT,
+        padding: [8, viewer.GUTTER.right, 0, 0],
+        legend: { show: false },
         cursor: {
-          y: false, dataIdx: atCursor, bind: { dblclick: () => null },
+          y: false,
+          dataIdx: atCursor,
+          bind: { dblclick: () => null },
           drag: { x: true, y: false, setScale: false, dist: 5 },
           points: { size: 8, width: 1.5, stroke: () => view.colours.ground, fill: (_, k) => stroke(k - 1)() },
         },
@@ -63,30 +82,64 @@
           y: { distr: isLog ? 3 : 1, range: rangeOf },
         },
         axes: [
-          { stroke: ink, grid, ticks: { ...grid, size: 4 }, font: FONT, size: 26, gap: 3, space: 64, incrs: INCREMENTS,
-            splits: splitsFrom(model.origin), values: (_, at) => at.map((t) => timeTick(t - model.origin, model)) },
-          { stroke: ink, grid, ticks: { ...grid, size: 4 }, font: FONT, size: viewer.GUTTER.left, gap: 4, space: 28,
+          {
+            stroke: ink,
+            grid,
+            ticks: { ...grid, size: 4 },
+            font: FONT,
+            size: 26,
+            gap: 3,
+            space: 64,
+            incrs: INCREMENTS,
+            splits: splitsFrom(model.origin),
+            values: (_, at) => at.map((t) => timeTick(t - model.origin, model)),
+          },
+          {
+            stroke: ink,
+            grid,
+            ticks: { ...grid, size: 4 },
+            font: FONT,
+            size: viewer.GUTTER.left,
+            gap: 4,
+            space: 28,
             splits: isLog ? decades : undefined,
-            values: (_, at) => at.map((value) => (value === null ? "" : viewer.words.tick(value))) },
+            values: (_, at) => at.map((value) => (value === null ? "" : viewer.words.tick(value))),
+          },
         ],
-        series: [{}, ...all.map((series, k) => ({
-          label: series.label, show: view.isShown(series.set), stroke: stroke(k), width: series.leads ? 1.75 : 1.25,
-          paths: series.draw === "step" ? uPlot.paths.stepped({ align: 1 }) : series.draw === "points" ? () => null : undefined,
-          points: series.draw === "points" ? { show: true, size: 4, width: 0, fill: stroke(k) } : { show: false },
-        }))],
+        series: [
+          {},
+          ...all.map((series, k) => ({
+            label: series.label,
+            show: view.isShown(series.set),
+            stroke: stroke(k),
+            width: series.leads ? 1.75 : 1.25,
+            paths:
+              series.draw === "step"
+                ? uPlot.paths.stepped({ align: 1 })
+                : series.draw === "points"
+                  ? () => null
+                  : undefined,
+            points: series.draw === "points" ? { show: true, size: 4, width: 0, fill: stroke(k) } : { show: false },
+          })),
+        ],
         hooks: {
           drawAxes: [(plotted) => viewer.drawUnder(plotted, view, panel, bounded())],
           draw: [(plotted) => viewer.drawOver(plotted, view, shown(), shown().filter((one) => one.set).length > 1)],
-          setSelect: [(plotted) => {
-            const { left, width: wide } = plotted.select;
-            if (wide < 3) return;
-            const [t0, t1] = [plotted.posToVal(left, "x"), plotted.posToVal(left + wide, "x")];
-            plotted.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-            axis.setWindow(t0, t1);
-          }],
-          setCursor: [(plotted) => {
-            if (plotted.cursor.event && plotted.cursor.left >= 0) axis.setCursor(plotted.posToVal(plotted.cursor.left, "x"));
-          }],
+          setSelect: [
+            (plotted) => {
+              const { left, width: wide } = plotted.select;
+              if (wide < 3) return;
+              const [t0, t1] = [plotted.posToVal(left, "x"), plotted.posToVal(left + wide, "x")];
+              plotted.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+              axis.setWindow(t0, t1);
+            },
+          ],
+          setCursor: [
+            (plotted) => {
+              if (plotted.cursor.event && plotted.cursor.left >= 0)
+                axis.setCursor(plotted.posToVal(plotted.cursor.left, "x"));
+            },
+          ],
         },
       };
     }
@@ -116,9 +169,10 @@
       }
       let [low, high] = [least, most];
       for (const series of bounded()) {
-        const reach = largest(series, from, to) * (view.showsGate() ? series.gate || 1 : 1);
-        if (!view.showsGate() && reach > 3 * Math.max(Math.abs(least), Math.abs(most))) continue;
-        [low, high] = [Math.min(low, -reach), Math.max(high, reach)];
+        const [lowest, highest] = boundsOf(series, from, to, view.showsGate() ? series.gate || 1 : 1);
+        const far = Math.max(-lowest, highest) > 3 * Math.max(Math.abs(least), Math.abs(most));
+        if (panel.kind === "innovation" && far && !view.showsGate()) continue;
+        [low, high] = [Math.min(low, lowest), Math.max(high, highest)];
       }
       if (panel.kind === "ratio") low = Math.min(low, 0);
       const limit = panel.limit ?? null;
@@ -129,9 +183,17 @@
 
     function fillLegend() {
       values = shown().map((series) => ({ series, value: h("span", { class: "fv-value" }) }));
-      legend.replaceChildren(...values.map(({ series, value }) => h("li", {},
-        viewer.swatch(series.style, series.draw === "points" || !series.set ? null : series.marker),
-        h("span", { class: "fv-name" }, series.label), value)));
+      legend.replaceChildren(
+        ...values.map(({ series, value }) =>
+          h(
+            "li",
+            {},
+            viewer.swatch(series.style, series.draw === "points" || !series.set ? null : series.marker),
+            h("span", { class: "fv-name" }, series.label),
+            value,
+          ),
+        ),
+      );
     }
 
     function tellValues() {
@@ -144,9 +206,15 @@
 
     function told(series, i) {
       const { withUnit } = viewer.words;
-      const sigmas = series.sigma && series.sigma[i] > 0 ? ` (${(series.values[i] / series.sigma[i]).toFixed(1).replace("-", "−")} σ)` : "";
+      const sigmas = series.sigma && series.sigma[i] > 0 ? toldSigma(series, i) : "";
       const out = series.rejected && series.rejected[i] ? " rejected" : "";
       return withUnit(series.values[i], panel.unit) + sigmas + out;
+    }
+
+    /* Of an innovation in how many standard deviations it lies, of an estimate how well it is known. */
+    function toldSigma({ values: all, sigma }, i) {
+      if (panel.kind !== "innovation") return ` ± ${viewer.words.figure(sigma[i])}`;
+      return ` (${(all[i] / sigma[i]).toFixed(1).replace("-0.0", "0.0").replace("-", "−")} σ)`;
     }
 
     function describe() {
@@ -165,14 +233,23 @@
       const rows = shown().map((series) => {
         const seen = viewer.summary(series, axis.from, axis.to);
         const entire = viewer.summary(series);
-        return [series.label, figure(seen.least), at(seen.leastAt), figure(seen.most), at(seen.mostAt),
-          viewer.rejectedOf(series, entire) || "–"];
+        return [
+          series.label,
+          figure(seen.least),
+          at(seen.leastAt),
+          figure(seen.most),
+          at(seen.mostAt),
+          viewer.rejectedOf(series, entire) || "–",
+        ];
       });
       const unit = panel.unit ? `, ${panel.unit}` : "";
-      figures.replaceChildren(viewer.table(
-        ["", "smallest", "when", "largest", "when", "rejected, whole flight"], rows,
-        `${panel.title}${unit}: ${axis.isWhole() ? "the whole flight" : "what is in view"}`,
-      ));
+      figures.replaceChildren(
+        viewer.table(
+          ["", "smallest", "when", "largest", "when", "rejected, whole flight"],
+          rows,
+          `${panel.title}${unit}: ${axis.isWhole() ? "the whole flight" : "what is in view"}`,
+        ),
+      );
     }
 
     fillLegend();
@@ -221,15 +298,21 @@
     }
   };
 
-  function seriesOf(view, given, place) {
+  function seriesOf(view, given, place, kind) {
     const set = given.set ? view.model.sets.get(given.set) : null;
     const data = view.model.data(given);
     return {
-      ...given, ...data, place,
-      style: set ? set.style : given.style ?? 0,
+      ...given,
+      ...data,
+      place,
+      middle: kind === "innovation" ? null : data.values, // of ±1σ: zero for innovations, else the estimate itself
+      style: set ? set.style : (given.style ?? 0),
       marker: set ? set.marker : null,
       leads: Boolean(set && (set.role === "present" || set.role === "chosen")),
-      spacing: data.times.length > 1 ? (1.5 * (data.times[data.times.length - 1] - data.times[0])) / (data.times.length - 1) : 0,
+      spacing:
+        data.times.length > 1
+          ? (1.5 * (data.times[data.times.length - 1] - data.times[0])) / (data.times.length - 1)
+          : 0,
     };
   }
 
@@ -240,19 +323,24 @@
     return viewer.extremes(log ? seen.filter((value) => value > 0) : seen).filter(Number.isFinite);
   }
 
-  /* Largest standard deviation between two times. */
-  function largest({ times, sigma }, from, to) {
+  /* How far so many standard deviations reach down and up between two times; nowhere where none is known. */
+  function boundsOf({ times, sigma, middle }, from, to, factor) {
     const [first, last] = viewer.within(times, from, to);
-    let most = 0;
-    for (let i = first; i <= last; i += 1) if (sigma[i] > most) most = sigma[i];
-    return most;
+    let [least, most] = [Infinity, -Infinity];
+    for (let i = first; i <= last; i += 1) {
+      const at = middle ? middle[i] : 0;
+      if (at - factor * sigma[i] < least) least = at - factor * sigma[i];
+      if (at + factor * sigma[i] > most) most = at + factor * sigma[i];
+    }
+    return [least, most];
   }
 
   /* Round figures since take-off, not since the log began. */
   function splitsFrom(origin) {
     return (_, __, least, most, step) => {
       const found = [];
-      for (let k = Math.ceil((least - origin) / step - 1e-6); origin + k * step <= most + 1e-9; k += 1) found.push(origin + k * step);
+      for (let k = Math.ceil((least - origin) / step - 1e-6); origin + k * step <= most + 1e-9; k += 1)
+        found.push(origin + k * step);
       return found;
     };
   }
@@ -277,10 +365,10 @@
     return `${rounded < 0 ? "−" : ""}${minutes}:${rest < 10 ? "0" : ""}${rest}`;
   }
 
-  /* Of all samples where the data count them, else how many are marked. */
-  viewer.rejectedOf = (series, found) => {
-    if (!series.rejected) return "";
-    if (series.samples) return `${viewer.words.share(series.rejected_samples || 0, series.samples)} rejected`;
-    return found.rejected ? `${found.rejected} marked as rejected` : "none rejected";
+  /* Share of all samples where the data count them, else how many are marked; nothing of what no gate judges. */
+  viewer.rejectedOf = ({ rejected, samples, rejected_samples: lost }, found) => {
+    if (lost === 0) return "none rejected";
+    if (lost) return `${viewer.words.share(lost, samples)} rejected`;
+    return rejected ? `${found.rejected} marked as rejected` : "";
   };
 })();
