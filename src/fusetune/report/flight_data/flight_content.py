@@ -26,6 +26,7 @@ from fusetune.report.flight_data.innovation_panels import (
 from fusetune.report.flight_data.logged import Logged, read_logged
 from fusetune.report.flight_data.marks import marks
 from fusetune.report.flight_data.position_frame import PositionFrame, position_frame
+from fusetune.report.flight_data.preparing import prepared
 from fusetune.report.flight_data.replays import Replay, replays_of
 from fusetune.report.flight_data.sensor_panels import (
     output_tracking_panels,
@@ -80,14 +81,17 @@ def flight_content(
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
     told = tellers(logged, replays, _LABELS, frame)
-    panels = tuple(_panels(logged, replays, innovations, told, frame, results.health))
+    start_us = logged.flight.start_timestamp
+    panels = tuple(
+        prepared(one, start_us) for one in _panels(logged, replays, innovations, told, frame, results.health)
+    )
     curves = (one.set for panel in panels for one in panel.series if one.set is not None)
     names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
     flight = logged.flight
     return FlightContent(
         flight=results.flight,
         label=flight_label(results.flight, results.date),
-        start_us=flight.start_timestamp,
+        start_us=start_us,
         duration_s=flight.duration_s,
         takeoff_s=_finite(results.times.take_off_s),
         landing_s=_finite(results.times.landing_s),
