@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS
-from fusetune.px4.flight import Flight, LoggedMessage, ParameterChange, ParameterHistory
+from fusetune.px4.flight import Flight, LoggedMessage, ParameterChange, ParameterHistory, TopicKey, TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.px4.local_map import LocalMap
 from fusetune.report.flight_data.bands import bands
 from fusetune.report.flight_data.content import Panel
 from fusetune.report.flight_data.events import events
 from fusetune.report.flight_data.flag_words import FLAG_WORDS
-from fusetune.report.flight_data.local_plane import local_plane
 from fusetune.report.flight_data.logged import Logged
 from fusetune.report.flight_data.position_frame import PositionFrame, position_frame
 from fusetune.report.flight_data.sensor_panels import (
@@ -42,7 +42,7 @@ def logged() -> Logged:
     """Five seconds of v1.16."""
     still = single(0.0, 0.0, 0.0, 0.0, 0.0)
     axes = {f"magnetometer_ga[{axis}]": single(*(one,) * 5) for axis, one in enumerate((0.2, 0.0, 0.4))}
-    topics = {
+    topics: dict[TopicKey, TopicTable] = {
         ("vehicle_magnetometer", 0): {"timestamp": TIME, "timestamp_sample": TIME, **axes},
         ("vehicle_imu_status", 0): {
             "timestamp": TIME,
@@ -112,7 +112,10 @@ def by_id(*panels: Panel) -> dict[str, Panel]:
 
 
 def test_sensors_are_told_as_logged(logged: Logged) -> None:
-    health = [{"id": "gnss.eph", "threshold": 3.0}, {"id": "gnss.speed_accuracy", "threshold": None}]
+    health: list[dict[str, Any]] = [
+        {"id": "gnss.eph", "threshold": 3.0},
+        {"id": "gnss.speed_accuracy", "threshold": None},
+    ]
     panels = by_id(*sensor_panels(logged, health, None))
     assert set(panels) == {
         "mag.0", "mag.1", "mag.2", "mag_norm", "gnss_accuracy", "gnss_speed_accuracy", "gnss_satellites"
@@ -210,9 +213,3 @@ def test_positions_about_another_origin_are_moved() -> None:
     local |= {"ref_lat": np.array([np.nan, 47.001]), "ref_lon": np.array([np.nan, 8.0])}
     local |= {"ref_alt": np.array([np.nan, 480.0])}
     np.testing.assert_allclose(frame.of_vehicle(local), [[0.0, 0.0, 0.0], [111.195, 0.0, 20.0]], atol=1e-3)
-
-
-def test_the_plane_is_the_local_map() -> None:
-    lat, lon = np.array([47.0, 47.2, -33.0]), np.array([8.0, 7.9, 151.0])
-    single_places = [LocalMap(47.0, 8.0).to_local(*place) for place in zip(lat.tolist(), lon.tolist(), strict=True)]
-    np.testing.assert_allclose(np.column_stack(local_plane(lat, lon, 47.0, 8.0)), single_places, rtol=1e-12, atol=1e-9)
