@@ -31,6 +31,8 @@ Drawings = Mapping[str, Callable[[], Figure]]
 
 _SENSORS: tuple[SensorName, ...] = ("gyro", "accel", "mag", "baro", "gnss_vel", "gnss_pos")
 _PDF = "pdf"
+_PANELS = {"single": 1, "double": 2}
+"""Side by side."""
 
 
 def flight_drawings(flight: PlottedFlight, sets: Sequence[str], column: str) -> dict[str, Callable[[], Figure]]:
@@ -41,7 +43,7 @@ def flight_drawings(flight: PlottedFlight, sets: Sequence[str], column: str) -> 
     sets : whose curves are drawn; without any what flies now, what is chosen, and the vehicle's own filter
     column : of `COLUMNS`
     """
-    width = COLUMNS[column]
+    width, columns = COLUMNS[column], _PANELS[column]
     drawings: dict[str, Callable[[], Figure]] = {
         one.name: partial(one.draw, width) for one in flight_figures(flight, sets or flight.usual_sets)
     }
@@ -52,7 +54,7 @@ def flight_drawings(flight: PlottedFlight, sets: Sequence[str], column: str) -> 
     for name in _SENSORS:
         # which of them a flight has is known when it is characterised
         drawings[f"sensor_{name}"] = of_sensor(partial(_sensor, flight, name))
-    drawings["allan"] = of_sensor(lambda: draw_allan(flight.noise))
+    drawings["allan"] = of_sensor(lambda: draw_allan(flight.noise, columns))
     drawings["spectra"] = of_sensor(lambda: draw_spectra(flight.noise))
     return drawings
 

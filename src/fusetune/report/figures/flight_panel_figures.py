@@ -17,7 +17,6 @@ from fusetune.report.figures.plotted_flight import PlottedFlight
 from fusetune.report.figures.publication import INCH_MM
 from fusetune.report.figures.set_styles import PRINT_COLOURS
 from fusetune.report.flight_data.content import Panel, PlaneTrack, Series
-from fusetune.report.flight_data.flight_content import LABELS
 from fusetune.report.flight_data.panel_names import (
     ATTITUDE,
     BIASES,
@@ -255,7 +254,9 @@ def _track(flight: PlottedFlight, width_mm: float) -> Figure:
     shown: Mapping[str, PlaneTrack] = track.sets or {"estimate": track.flown}
     for place, (name, one) in enumerate(shown.items()):
         colour, style = _set_look(flight, name, place)
-        axes.plot(one.east, one.north, color=colour, linestyle=style, linewidth=0.9, label=LABELS.get(name, name))
+        axes.plot(
+            one.east, one.north, color=colour, linestyle=style, linewidth=0.9, label=flight.labels.get(name, name)
+        )
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="east [m]", ylabel="north [m]")
     axes.legend(loc="best")

@@ -45,6 +45,7 @@ class PlottedFlight:
     start_us : when its log begins, µs since boot
     why_not_replayed : of a log that is not; empty of others
     source : the log, or the saved flight
+    labels : of sets whose names say too little
     """
 
     name: str
@@ -55,6 +56,7 @@ class PlottedFlight:
     bands: tuple[Band, ...]
     track: TrackView | None
     source: ObservedFlight | Path
+    labels: Mapping[str, str]
     why_not_replayed: str = ""
 
     @property
@@ -87,7 +89,7 @@ def flight_of_results(results: AnyPath, flight: str, sets: Sequence[str], choice
         raise UserError(analyze, "there is no such flight", "Name one of the folders beside it")
     content = flight_content(save, analyze, sets, choice)
     return PlottedFlight(flight, content.start_us, content.duration_s, content.sets, content.panels, content.bands,
-                         content.track, save)  # fmt: skip
+                         content.track, save, LABELS)  # fmt: skip
 
 
 def flight_of_log(log: AnyPath, overrides: Mapping[str, float]) -> PlottedFlight:
@@ -139,6 +141,7 @@ def _told(
         bands=tuple(bands(logged, replays[0].status_flags if replays else None, None)),
         track=track_view(flown_track(observed.logged), None, flight, told, frame),
         source=observed,
+        labels=labels,
         why_not_replayed="; ".join(observed.verdict.reasons),
     )
 
