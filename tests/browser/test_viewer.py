@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import base64
 import math
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from tests.analyze.made_flight import END_S, START_US
 from tests.browser.conftest import OpenPage
 from tests.browser.looking import (
     ink_of,
@@ -19,27 +22,45 @@ from tests.browser.looking import (
     window_of,
 )
 from tests.browser.made_page import LONG_NAME, MadePage
+from tests.report.made_health import LANDING_S, TAKE_OFF_S
 
+from fusetune.analyze.flight_files import SAMPLES_FILE
 from fusetune.report.flight_data.blob import unpack
+from fusetune.report.scored_samples import scored_samples
 from fusetune.storage.parquet import read_table
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 WIDTHS = (390, 820, 1440)
 NORTH = "innovation.gnss_vel.0"
-START_US = 10_000_000
-TAKE_OFF_S, LANDING_S, END_S = 10.0, 70.0, 75.0
 
 
 def flights_of(made: MadePage, **more: str) -> str:
     return f"{made.url}#" + "&".join(f"{key}={value}" for key, value in {"tab": "flights", **more}.items())
 
 
-def innovations_of(made: MadePage, flight: str, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of the velocity to the north in the Parquet file of a replay: s since the log began, m/s, what was rejected."""
-    folder = next(folder for folder in made.folders if folder.name == flight)
-    table = read_table(folder / f"{name}.innovations.parquet").to_pandas()
+def folder_of(made: MadePage, flight: str) -> Path:
+    return next(folder for folder in made.folders if folder.name == flight)
+
+
+def replayed(made: MadePage, flight: str) -> tuple[np.ndarray, np.ndarray]:
+    """Innovations of the present set's velocity to the north in its own file: s since the log began, m/s."""
+    table = read_table(folder_of(made, flight) / "present.innovations.parquet").to_pandas()
     rows = table[(table["source"] == "gnss_vel") & (table["axis"] == 0)]
-    time = (rows["timestamp_sample"].to_numpy() - START_US) * 1e-6
-    return time, rows["innovation"].to_numpy(), rows["innovation_rejected"].to_numpy()
+    return (rows["timestamp_sample"].to_numpy() - START_US) * 1e-6, rows["innovation"].to_numpy()
+
+
+def scored(made: MadePage, flight: str, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of another set the innovations that are scored, with their test ratios."""
+    columns = ("time_us", "innovation", "test_ratio")
+    parts = [
+        one.columns
+        for one in scored_samples(folder_of(made, flight) / SAMPLES_FILE, columns)
+        if (one.set_name, one.source, one.axis) == (name, "gnss_vel", 0)
+    ]
+    time_us, innovation, ratio = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return (time_us - START_US) * 1e-6, innovation, ratio
 
 
 def four_digits(value: float) -> str:
@@ -52,25 +73,26 @@ def test_every_control_works(made: MadePage, open_page: OpenPage, width: int) ->
     page = open_page(flights_of(made), width, touch=width == WIDTHS[0])
     panel = panel_of(page, NORTH)
     assert overflow_of(page) <= 0
-    first, second = made.flights
+    earlier, newest = made.flights
 
-    page.get_by_role("button", name="Flight after").click()
-    settle(page)
-    assert state_of(page)["flight"] == second
+    assert page.get_by_label("Flight", exact=True).input_value() == newest
     page.get_by_role("button", name="Flight before").click()
     settle(page)
-    assert "flight" not in state_of(page)
-    page.get_by_label("Flight", exact=True).select_option(second)
+    assert state_of(page)["flight"] == earlier
+    page.get_by_role("button", name="Flight after").click()
     settle(page)
-    assert state_of(page)["flight"] == second
+    assert "flight" not in state_of(page)
+    page.get_by_label("Flight", exact=True).select_option(earlier)
+    settle(page)
+    assert state_of(page)["flight"] == earlier
     assert page.locator(".fv-strip").count() == 1
 
-    names = panel_of(page, NORTH).locator(".fv-name")
+    names = page.locator(f'[data-panel="{NORTH}"] .fv-name')
     shown = names.all_inner_texts()
     page.locator('.fv-chip[data-set="rejecting"]').click()
     settle(page)
     assert set(names.all_inner_texts()) == {*shown, "rejecting"}
-    page.get_by_role("button", name="all", exact=True).first.click()
+    page.get_by_role("button", name="all", exact=True).click()
     settle(page)
     assert len(names.all_inner_texts()) == 6
     assert LONG_NAME in state_of(page)["sets"]
@@ -79,8 +101,11 @@ def test_every_control_works(made: MadePage, open_page: OpenPage, width: int) ->
     assert names.all_inner_texts() == shown
     assert "sets" not in state_of(page)
 
-    click = lambda label: (page.get_by_role("button", name=label, exact=True).first.click(), settle(page))  # noqa: E731
-    click("From take-off to landing")
+    def click(label: str) -> None:
+        page.get_by_role("button", name=label, exact=True).click()
+        settle(page)
+
+    click("in the air")
     assert window_of(page) == pytest.approx((TAKE_OFF_S, LANDING_S), abs=0.2)
     click("Closer")
     closer = window_of(page)
@@ -129,16 +154,16 @@ def test_every_control_works(made: MadePage, open_page: OpenPage, width: int) ->
     panel.locator(".fv-figures-button").click()
     assert panel.locator("table").is_visible()
     page.get_by_role("button", name="What mouse, fingers and keys do").click()
-    assert page.locator(".fv-help").is_visible()
+    assert "zoom to a part of the flight" in page.locator(".fv-help").inner_text()
     assert overflow_of(page) <= 0
 
 
 def test_what_is_pointed_at_is_what_parquet_holds(made: MadePage, open_page: OpenPage) -> None:
     """The sample with the largest innovation of a set, found by zooming to it."""
-    flight = made.flights[1]
-    time, value, rejected = innovations_of(made, flight, "rejecting")
+    flight = made.flights[0]
+    time, value, ratio = scored(made, flight, "rejecting")
     peak = int(np.argmax(np.abs(value)))
-    assert rejected[peak]  # of 0.9 m/s errors with a gate of 1 m/s
+    assert ratio[peak] > 1.0  # of errors of 0.9 m/s, where the gate is at 1 m/s
     window = f"{time[peak] - 0.25:.4f},{time[peak] + 0.25:.4f}"
     page = open_page(flights_of(made, flight=flight, sets="present,rejecting", t=window))
     panel = panel_of(page, NORTH)
@@ -146,25 +171,27 @@ def test_what_is_pointed_at_is_what_parquet_holds(made: MadePage, open_page: Ope
     told = told_at_cursor(panel)
     assert told["rejecting"].startswith(f"{four_digits(value[peak])} m/s")
     assert told["rejecting"].endswith("rejected")
-    own_time, own, _ = innovations_of(made, flight, "present")
+    own_time, own = replayed(made, flight)
     at_cursor = int(np.argmin(np.abs(own_time - time[peak])))
     assert told["present"].startswith(f"{four_digits(own[at_cursor])} m/s")
     # claimed 0.3 m/s of itself
     assert f"({own[at_cursor] / 0.3:.1f} σ)".replace("-", "−") in told["present"]
     # every other panel tells of the same moment
     assert told_at_cursor(page.locator('[data-panel="innovation.gnss_vel.1"]'))["present"]
-    assert f"{time[peak] - TAKE_OFF_S:.2f}"[:-1] in page.locator(".fv-cursor").inner_text()
+    moment = page.locator(".fv-cursor").inner_text()
+    assert float(moment.split(" s ")[0]) == pytest.approx(time[peak] - TAKE_OFF_S, abs=2e-3)
+    assert "s after take-off" in moment
 
 
 def test_figures_of_a_panel_are_those_of_parquet(made: MadePage, open_page: OpenPage) -> None:
-    flight = made.flights[0]
-    _, value, rejected = innovations_of(made, flight, "rejecting")
+    flight = made.flights[-1]
+    _, value, ratio = scored(made, flight, "rejecting")
     page = open_page(flights_of(made, sets="rejecting"))
     panel = panel_of(page, NORTH)
     panel.locator(".fv-figures-button").click()
     name, least, _, most, _, lost = panel.locator("tbody tr").first.locator("th, td").all_inner_texts()
     assert (name, least, most) == ("rejecting", four_digits(value.min()), four_digits(value.max()))
-    assert lost == f"{100 * rejected.mean():.1f} % rejected"
+    assert lost == f"{100 * np.mean(ratio > 1.0):.1f} % rejected"
     described = panel.locator(".fv-plot").get_attribute("aria-label") or ""
     assert f"from {four_digits(value.min())} to {four_digits(value.max())} m/s, {lost}" in described
 
@@ -249,7 +276,7 @@ def test_fingers_move_the_cursor_and_zoom(made: MadePage, open_page: OpenPage) -
 def test_the_address_restores_what_is_seen(made: MadePage, open_page: OpenPage) -> None:
     page = open_page(flights_of(made))
     panel_of(page, NORTH)
-    page.get_by_role("button", name="Flight after").click()
+    page.get_by_role("button", name="Flight before").click()
     page.locator('.fv-chip[data-set="better"]').click()
     page.locator(f'.fv-chip[data-set="{LONG_NAME}"]').click()
     page.locator('[data-group="Flags"] .fv-group-button').click()
@@ -257,7 +284,7 @@ def test_the_address_restores_what_is_seen(made: MadePage, open_page: OpenPage) 
     page.locator('[data-source="gnss_vel"]').first.click()
     settle(page)
 
-    def seen(page) -> dict[str, object]:
+    def seen(page: Page) -> dict[str, object]:
         pressed = page.locator('.fv-chip[aria-pressed="true"]').all_inner_texts()
         return {
             "state": state_of(page),
@@ -272,11 +299,10 @@ def test_the_address_restores_what_is_seen(made: MadePage, open_page: OpenPage) 
     other.locator(".fv-strip").wait_for()
     settle(other)
     assert seen(other) == seen(page)
-    other.go_back  # noqa: B018
     page.go_back()
     page.locator(".fv-strip").wait_for()
     settle(page)
-    assert page.get_by_label("Flight", exact=True).input_value() == made.flights[0]
+    assert page.get_by_label("Flight", exact=True).input_value() == made.flights[-1]
 
 
 def test_one_axis_can_be_asked_for(made: MadePage, open_page: OpenPage) -> None:
@@ -309,9 +335,11 @@ def test_the_theme_changes_what_is_drawn(made: MadePage, open_page: OpenPage) ->
     settle(page)
     light = canvas.evaluate("c => c.toDataURL()")
     page.locator(".theme-switch").click()
+    panel_of(page, NORTH)
     settle(page)
     assert canvas.evaluate("c => c.toDataURL()") != light
     page.locator(".theme-switch").click()
+    panel_of(page, NORTH)
     settle(page)
     assert canvas.evaluate("c => c.toDataURL()") == light
 
@@ -361,12 +389,12 @@ def test_the_browser_unpacks_what_was_packed(made: MadePage, open_page: OpenPage
         assert last is None or last == pytest.approx(float(known[-1]), rel=1e-12)
 
 
-def test_a_damaged_flight_is_told_and_the_others_are_shown(made: MadePage, open_page: OpenPage, tmp_path) -> None:
+def test_a_damaged_flight_is_told_and_the_others_are_shown(made: MadePage, open_page: OpenPage, tmp_path: Path) -> None:
     text = made.report.read_text(encoding="utf-8")
-    start = text.index(f'data-flight="{made.flights[0]}">', text.index('class="flight-data"')) + 200
+    start = text.index(f'data-flight="{made.flights[-1]}">', text.index('class="flight-data"')) + 200
     damaged = tmp_path / "report.html"
     damaged.write_text(text[:start] + "AAAA" + text[start + 4 :], encoding="utf-8")
     page = open_page(f"{damaged.as_uri()}#tab=flights")
     page.locator(".fv-status", has_text="cannot be shown").wait_for()
-    page.get_by_role("button", name="Flight after").click()
+    page.get_by_role("button", name="Flight before").click()
     panel_of(page, NORTH)

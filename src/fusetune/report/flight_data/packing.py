@@ -194,6 +194,8 @@ class _Writer:
             "gate": series.gate,
             "rejected": None if rejected is None or not rejected.any() else self._arrays.flags(rejected[rows]),
             "draw": series.draw,
+            "samples": int(np.isfinite(series.values).sum()),
+            "rejected_samples": None if rejected is None else int(rejected.sum()),
         }
 
     def _in_order(self, series: Series) -> Series:
