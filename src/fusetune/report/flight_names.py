@@ -19,15 +19,14 @@ _DIGITS = re.compile(r"(\d+)")
 def short_names(flights: Iterable[str]) -> dict[str, str]:
     """Short name of each flight; no two are alike.
 
-    Of `SkyRats__log_8_2021-8-12-15-53-14` it is `log_8`. Where two would be alike without owner or date they keep it;
-    what is still long loses what all begin with, then its middle.
+    Of `SkyRats__log_8_2021-8-12-15-53-14` it is `log_8`. Where two would be alike without owner or date they keep it, but
+    for a flight of the owner who has most; what is still long loses what all begin with, then its middle.
     """
     names = list(dict.fromkeys(flights))
     short = {name: name for name in names}
     for shorten in (_without_date, _without_owner):
         shorter = {name: shorten(one) or one for name, one in short.items()}
-        alike = Counter(shorter.values())
-        short = {name: one if alike[one] == 1 else short[name] for name, one in shorter.items()}
+        short = {name: shorter[name] if _may_have(name, shorter) else short[name] for name in names}
     common = _common_start([one for one in short.values() if len(one) > LONGEST])
     told: dict[str, str] = {}
     taken: set[str] = set()
@@ -35,6 +34,20 @@ def short_names(flights: Iterable[str]) -> dict[str, str]:
         told[name] = _fitted(one, common, taken)
         taken.add(told[name])
     return told
+
+
+def _may_have(name: str, short: Mapping[str, str]) -> bool:
+    """Whether a flight may have its short name: no other of as frequent an owner would have the same."""
+    rivals = [one for one, words in short.items() if words == short[name] and one != name]
+    if not rivals:
+        return True
+    flights = Counter(map(_owner, short))
+    return bool(_owner(name)) and all(flights[_owner(name)] > flights[_owner(one)] for one in rivals)
+
+
+def _owner(name: str) -> str:
+    before, between, _ = name.partition("__")
+    return before if between else ""
 
 
 def _without_date(name: str) -> str:
@@ -48,9 +61,11 @@ def _without_owner(name: str) -> str:
 def _common_start(names: list[str]) -> int:
     """How many characters all of several names begin with, up to the beginning of a word."""
     shared = len(os.path.commonprefix(names)) if len(names) > 1 else 0
-    return max((match.start() for match in _WORD_BEGINS.finditer(names[0]) if match.start() <= shared), default=0) if (
-        shared
-    ) else 0
+    return (
+        max((match.start() for match in _WORD_BEGINS.finditer(names[0]) if match.start() <= shared), default=0)
+        if (shared)
+        else 0
+    )
 
 
 def _fitted(name: str, common: int, taken: set[str]) -> str:

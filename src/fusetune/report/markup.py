@@ -2,6 +2,7 @@
 
 import base64
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -10,6 +11,7 @@ from urllib.parse import quote
 
 from fusetune.storage.files import AnyPath
 
+_QUOTED = re.compile(r"`([^`]+)`")
 _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 
 
@@ -54,7 +56,12 @@ def signed(value: object, digits: int = 1, kind: str = "number") -> Cell:
 
 def unit_cell(unit: str) -> Cell:
     """A unit beside a figure, powers of PX4's spelling raised."""
-    return Cell(unit.replace("^2", "²"), "quiet")
+    return Cell(raised(unit), "quiet")
+
+
+def raised(unit: str) -> str:
+    """A unit whose powers are raised."""
+    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def table(
@@ -166,8 +173,8 @@ def paragraph(text: str, kind: str = "") -> str:
 
 
 def _prose(text: str) -> str:
-    """Escaped, no line break between a figure and its percent sign."""
-    return escape(text).replace(" %", "&nbsp;%")
+    """Escaped, names in back quotes as code, no line break between a figure and its percent sign."""
+    return _QUOTED.sub(r"<code>\1</code>", escape(text).replace(" %", "&nbsp;%"))
 
 
 def prose(text: str) -> str:
@@ -177,7 +184,9 @@ def prose(text: str) -> str:
 
 def bullets(sentences: Sequence[str], kind: str = "") -> str:
     """A list of plain sentences."""
-    return f"<ul{_class(kind)}>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
+    return (
+        f"<ul{_class(kind)}>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
+    )
 
 
 def details(summary: str, *parts: str, kind: str = "", id: str = "") -> str:

@@ -37,7 +37,7 @@ from fusetune.report.sections.first_screen import first_screen, heading
 from fusetune.report.sections.flights_section import Logs, flights_section, single_flights_section
 from fusetune.report.sections.health_section import health_answer, health_section
 from fusetune.report.sections.history_section import history_section
-from fusetune.report.sections.innovations_section import as_flown_section, innovations_section
+from fusetune.report.sections.innovations_section import innovations_section
 from fusetune.report.sections.mission_section import mission_section
 from fusetune.report.sections.next_steps_section import next_steps_section
 from fusetune.report.sections.provenance_section import provenance_section
@@ -191,8 +191,8 @@ def _untold_of_decision(results: Results) -> Iterator[str]:
 
 def _flights_tab(read: _Read) -> str:
     return _joined(
-        flights_section(read.results, read.logs),
-        viewer_section(read.blobs, read.logs),
+        flights_section(read.results, read.logs, [blob.flight for blob in read.blobs]),
+        viewer_section(read.blobs, read.logs, read.results.flights),
         conformance_section(read.results, read.missions),
         mission_section(read.mission),
         single_flights_section(read.results),
@@ -223,7 +223,6 @@ def _sensors_tab(read: _Read) -> str:
     return _joined(
         findings_section(read.results),
         innovations_section(read.results),
-        as_flown_section(read.results),
     )
 
 

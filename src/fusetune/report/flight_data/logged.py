@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +11,7 @@ from fusetune.px4.aid_sources import vector
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
 
@@ -60,6 +62,11 @@ class Logged:
 
     raw: Flight
     flight: Flight
+
+    @cached_property
+    def parameters(self) -> Mapping[str, float]:
+        """All that the estimator had when the log began."""
+        return complete(self.flight.parameters.initial, {}, self.flight.release)
 
     @cached_property
     def status_flags(self) -> TopicTable | None:

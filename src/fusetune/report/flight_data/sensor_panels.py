@@ -22,6 +22,8 @@ from fusetune.report.flight_data.panel_names import (
 )
 
 _MOST_INSTANCES = 4
+_STATES = {"jamming_state": "jamming state (3: critical)", "spoofing_state": "spoofing state (2: indicated)"}
+"""Of the receiver: 0 says that it does not tell, 1 that there is none."""
 _GAUSS_AXES = 3
 
 
@@ -63,20 +65,25 @@ def vibration_panels(logged: Logged, health: Sequence[Mapping[str, Any]]) -> Ite
     yield from _panel("imu_temperature", _each(status, "temperature_accel"))
 
 
-def sensor_panels(logged: Logged, earth_field: Series | None) -> Iterator[Panel]:
+def sensor_panels(logged: Logged, health: Sequence[Mapping[str, Any]], earth_field: Series | None) -> Iterator[Panel]:
     """Of each sensor what tells how good it is.
 
     Parameters
     ----------
+    health : rows of the health table, whose limits are drawn
     earth_field : strength of the earth's field as the filter holds it
     """
     yield from _panel("baro_height", _fields(logged.topic("vehicle_air_data"), {"baro_alt_meter": "barometer"}))
     gnss = logged.topic("vehicle_gps_position")
-    yield from _panel("gnss_accuracy", _fields(gnss, {"eph": "horizontal", "epv": "vertical"}))
-    yield from _panel("gnss_speed_accuracy", _fields(gnss, {"s_variance_m_s": "speed"}))
+    yield from _panel(
+        "gnss_accuracy", _fields(gnss, {"eph": "horizontal", "epv": "vertical"}), 0, _limit(health, "gnss.eph")
+    )
+    yield from _panel(
+        "gnss_speed_accuracy", _fields(gnss, {"s_variance_m_s": "speed"}), 0, _limit(health, "gnss.speed_accuracy")
+    )
     counted = {"satellites_used": "satellites", "fix_type": "fix type (3: three-dimensional)"}
     yield from _panel("gnss_satellites", _fields(gnss, counted, is_step=True))
-    noise = {"noise_per_ms": "noise per ms", "jamming_indicator": "jamming indicator"}
+    noise = {"noise_per_ms": "noise per ms", "jamming_indicator": "jamming indicator", **_STATES}
     yield from _panel("gnss_noise", (one for one in _fields(gnss, noise) if np.any(one.values)))
     yield from _panel("mag_norm", [*_field_strengths(logged), *([] if earth_field is None else [earth_field])])
     distances = _each(_instances(logged, "distance_sensor"), "current_distance")

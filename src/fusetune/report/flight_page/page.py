@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
-from fusetune.analyze.flight_files import CONFORMANCE_FILE, SENSOR_NOISE_FILE
+from fusetune.analyze.conformance.track_file import read_track
+from fusetune.analyze.flight_files import CONFORMANCE_FILE, SENSOR_NOISE_FILE, TRACK_FILE
 from fusetune.report.flight_page.answer import answer_section, causes_section
 from fusetune.report.flight_page.conformance_section import conformance_section
 from fusetune.report.flight_page.effects_section import effects_section
-from fusetune.report.flight_page.flight_results import read_flight_results
 from fusetune.report.flight_page.health_table import health_table_section
 from fusetune.report.flight_page.sensors_section import sensors_section
+from fusetune.report.flight_results import read_flight_results
 from fusetune.report.markup import section
 from fusetune.report.page_shell.shell import VIEWER_CLASS, FlightBlob, PageHead, Tab, page_links, write_page
 from fusetune.storage.documents import read_document
@@ -41,10 +42,10 @@ def build_flight_page(
     noise, conformance = (Path(analyze_folder) / name for name in (SENSOR_NOISE_FILE, CONFORMANCE_FILE))
     mount = f'<div class="{VIEWER_CLASS}" data-flight="{escape(results.flight)}"></div>'
     sections = (
-        answer_section(results),
-        causes_section(results),
+        answer_section(results, bool(blob)),
+        causes_section(results, bool(blob)),
         section("The flight over time", mount, id="viewer") if blob else "",
-        conformance_section(read_document(conformance)) if conformance.exists() else "",
+        _flown(conformance, Path(analyze_folder) / TRACK_FILE),
         effects_section(results),
         health_table_section(results),
         sensors_section(read_document(noise)) if noise.exists() else "",
@@ -57,6 +58,12 @@ def build_flight_page(
     Path(output).parent.mkdir(parents=True, exist_ok=True)
     blobs = [FlightBlob(results.flight, blob)] if blob else []
     write_page(output, head, [Tab("flight", "Flight", "\n".join(filter(None, sections)))], blobs)
+
+
+def _flown(conformance: Path, track: Path) -> str:
+    if not conformance.exists():
+        return ""
+    return conformance_section(read_document(conformance), read_track(track) if track.exists() else None)
 
 
 def _known(name: str, what: str) -> str:

@@ -62,7 +62,7 @@
       if (!target) return;
       const panel = target.closest("[role=tabpanel]");
       const index = panels.indexOf(panel);
-      const more = link.dataset.flight ? { flight: link.dataset.flight } : {};
+      const more = Object.fromEntries(new URLSearchParams(link.dataset.state || ""));
       fusetune.state.push({ tab: index > 0 ? names[index] : null, at: target.id, ...more });
       reveal(target.id); // again, though the address names it already
     });

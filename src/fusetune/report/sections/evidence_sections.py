@@ -10,7 +10,7 @@ from fusetune.report.charts.drift import drift_chart
 from fusetune.report.charts.flights_by_sets import flights_by_sets_chart
 from fusetune.report.charts.pareto import pareto_chart
 from fusetune.report.comparison import percent_change
-from fusetune.report.markup import Cell, bullets, details, number, paragraph, section, signed, table
+from fusetune.report.markup import Cell, CellLike, bullets, details, number, paragraph, section, signed, table
 from fusetune.report.results import Results
 from fusetune.report.sections.ranking_tables import (
     NOT_KNOWN,
@@ -46,7 +46,7 @@ def evidence_section(results: Results) -> str:
             "that the whole flight makes likely. How large a set says its uncertainty is does not count."
         ),
         differences_chart(results),
-        ranking_table(results),
+        details("The ranking in figures", ranking_table(results)),
         objections_table(results),
         details("All other criteria", criteria_table(results)),
         id="ranking",
@@ -75,8 +75,8 @@ def withheld_section(results: Results) -> str:
             "the estimator for some seconds while it flew on. What the sensor measured in the end shows how far the "
             "prediction had drifted: the better the estimator knew its velocity, attitude and biases, the less."
         ),
-        drift_chart(results),
-        pareto_chart(results),
+        details("How far it drifted", drift_chart(results)),
+        details("Two aims against each other", pareto_chart(results)),
         details("Figures of the drift", *told, _drift_note(results) if told[1] else "", *_shorter_gaps(results)),
     ]
     return section("Without a sensor", *parts, id="withheld")
@@ -92,7 +92,7 @@ def _drift_table(results: Results, withheld: tuple[Withheld, ...], caption: str)
         head += ["change %"]
     rows = []
     for name in results.shown:
-        row: list[Cell | str] = [set_name(name, results)]
+        row: list[CellLike] = [set_name(name, results)]
         for _, summary in summaries:
             last = _horizons(summary)[-1]
             row += [number(_figure(summary, name, seconds, "mean")) for seconds in _horizons(summary)]
@@ -145,12 +145,16 @@ def holds_section(results: Results) -> str:
         return ""
     chosen, worth = validated["chosen"], validated["differences"]
     ordered = sorted(chosen, key=lambda flight: results.flights.index(flight) if flight in results.flights else -1)
-    rows = [(flight, set_name(chosen[flight], results), _worth(worth[flight])) for flight in ordered]
+    rows: list[tuple[CellLike, ...]] = [
+        (flight, set_name(chosen[flight], results), _worth(worth[flight])) for flight in ordered
+    ]
     rows.append((Cell("mean", "quiet"), Cell(""), signed(float(percent_change(validated["difference"])))))
     return section(
         title,
         paragraph(_holds(results)),
-        details("Each flight", table(("flight left out", "best set of the others", "change of the error there %"), rows)),
+        details(
+            "Each flight", table(("flight left out", "best set of the others", "change of the error there %"), rows)
+        ),
         paragraph(
             "Each flight was left out in turn, the best eligible set chosen from the others and judged on the flight "
             "that had no part in choosing it. Below 0 is better than the present set. This shows how much hangs on "
@@ -217,7 +221,9 @@ def weights_section(results: Results) -> str:
     )
     unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
     note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")
-    return section("What counts how much", paragraph(text), details("On each flight", table(head, rows), note if unknown else ""))
+    return section(
+        "What counts how much", paragraph(text), details("On each flight", table(head, rows), note if unknown else "")
+    )
 
 
 def _white_shares(results: Results) -> pd.DataFrame:
@@ -256,4 +262,8 @@ def paper_section(results: Results) -> str:
         for one in mode["ranking"]
     ]
     head = ("set", "aggregate RMS", "NIS inside the χ² bounds", "break rate %")
-    return section("The paper's own rule", paragraph(text), details("Why, and its ranking", bullets(mode["why"]), table(head, rows)))
+    return section(
+        "The paper's own rule",
+        paragraph(text),
+        details("Why, and its ranking", bullets(mode["why"]), table(head, rows)),
+    )

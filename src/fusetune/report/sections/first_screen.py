@@ -9,7 +9,7 @@ from typing import Any
 from fusetune.apply.ranking import SAME
 from fusetune.report.comparison import percent_change
 from fusetune.report.counted import count_words
-from fusetune.report.markup import Cell, CellLike, Html, anchor, number, prose, severity_mark, signed, table
+from fusetune.report.markup import Cell, CellLike, Html, anchor, number, prose, severity_mark, signed, table, unit_cell
 from fusetune.report.results import Results
 from fusetune.report.sections.ranking_tables import NOT_KNOWN, confidence_of, interval_text
 from fusetune.report.sections.truth_section import truth_verdict
@@ -146,13 +146,9 @@ def _change_row(change: Mapping[str, Any], in_file: str) -> tuple[CellLike, ...]
         number(change["previous"], 6, "number old"),
         Html("→", "arrow"),
         number(change["value"], 6, "number new"),
-        Cell(_powers(change["unit"]), "quiet"),
+        unit_cell(change["unit"]),
         Cell("; ".join(remarks), "quiet"),
     )
-
-
-def _powers(unit: str) -> str:
-    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def _cards(results: Results) -> str:
@@ -161,7 +157,7 @@ def _cards(results: Results) -> str:
         _card("Mend first", _mend_first(results)),
         _card("Next", _next_step(results)),
     ]
-    return f'<div class="cards">{"".join(cards)}</div>'
+    return f'<div class="answer-cards">{"".join(cards)}</div>'
 
 
 def _card(title: str, inside: str) -> str:

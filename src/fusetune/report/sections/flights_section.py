@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 from fusetune.finding import from_documents
 from fusetune.report.comparison import flight_changes
 from fusetune.report.counted import count_words
 from fusetune.report.flight_names import in_time_order
-from fusetune.report.markup import Cell, CellLike, details, grouped_table, number, paragraph, section, signed, table
+from fusetune.report.markup import (
+    Cell,
+    CellLike,
+    Html,
+    details,
+    grouped_table,
+    number,
+    paragraph,
+    section,
+    signed,
+    table,
+)
 from fusetune.report.results import Results
 from fusetune.report.sections.trust_section import GRADE_KINDS
 from fusetune.report.severity_words import worst_of
@@ -66,17 +79,25 @@ class Logs:
         return tuple(self.diagnoses[flight]["diagnoses"]) if flight in self.diagnoses else ()
 
 
-def flights_section(results: Results, logs: Logs) -> str:
-    """A table of all logs in groups, each in order of time."""
+def flights_section(results: Results, logs: Logs, shown: Collection[str] = ()) -> str:
+    """A table of all logs in groups, each in order of time.
+
+    Parameters
+    ----------
+    shown : flights that the page's own viewer can show
+    """
     compared = _compared_set(results)
     changes = flight_changes(results)
     by_flight = changes[compared].to_dict() if compared in changes else {}
     groups: dict[str, list[list[CellLike]]] = {DECIDES: [], NOT_COUNTED: [], OTHER_VEHICLES: [], NOT_REPLAYED: []}
     for name in logs.verdicts:
-        groups[_group(name, results)].append(_row(name, results, logs, by_flight))
-    head = ["flight", "recorded", "in the air s", "trust grade", "what is wrong", "why it does not count"]
+        row = _row(name, results, logs, by_flight)
+        groups[_group(name, results)].append([*row, _look(name, shown)] if shown else row)
+    head = ["flight", "recorded", "in the air s", "trust grade", "what is wrong", "remark"]
     if by_flight:
         head.append(f"“{compared}” %")
+    if shown:
+        head.append("")
     text = f"{count_words(len(logs.verdicts), 'log')}, each group in order of time; a name leads to the flight's page."
     note = (
         f"“{compared}” %: change of the prediction error on the flight with that set, below 0 is better."
@@ -130,8 +151,15 @@ def _row(name: str, results: Results, logs: Logs, changes: Mapping[Hashable, flo
     if changes:
         change = changes.get(name)
         kind = "number" if change is None or not change else f"number {'good' if change < 0.0 else 'bad'}"
-        row.append(signed(change, kind=kind))
+        row.append(Cell("", "number") if change is None else signed(change, kind=kind))
     return row
+
+
+def _look(name: str, shown: Collection[str]) -> Html:
+    if name not in shown:
+        return Html("")
+    state = escape(urlencode({"flight": name}))
+    return Html(f'<a href="#viewer" data-state="{state}">look<span class="hidden"> at {escape(name)}</span></a>')
 
 
 def _wrong(findings: Sequence[Document]) -> Cell:
@@ -156,9 +184,9 @@ def single_flights_section(results: Results) -> str:
     head = ("flight", "scored s", "cut s", "because of")
     cuts = details("What is scored of each flight", table(head, rows))
     troubles = [row for name, summary in results.scoring.items() for row in _set_troubles(name, summary)]
-    head = ("flight", "set", "resets in flight", "lost sources", "faults", "note")
+    columns = ("flight", "set", "resets in flight", "lost sources", "faults", "note")
     text = f"What befell the sets: {count_words(len(troubles), 'case')}"
-    return section("What is scored", cuts, details(text, table(head, troubles)))
+    return section("What is scored", cuts, details(text, table(columns, troubles)))
 
 
 def _cut_row(name: str, results: Results) -> tuple[CellLike, ...]:

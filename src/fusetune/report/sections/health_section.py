@@ -15,6 +15,8 @@ from fusetune.report.severity_words import SEVERITY_WORDS, cause_words, confiden
 Document = Mapping[str, Any]
 
 _MOST_LINKS = 12
+_MOST_ROWS = 8
+"""More findings are behind a click."""
 
 
 def health_answer(logs: Logs) -> str:
@@ -77,9 +79,11 @@ def health_section(logs: Logs) -> str:
 
     rows = [_row(cause, flights, logs) for cause, flights in sorted(found.items(), key=order)]
     head = ("", "what is wrong", "flights", "how sure", "what to do")
-    told = table(head, rows, kind="cards findings")
+    told = table(head, rows[:_MOST_ROWS], kind="cards findings")
+    rest = rows[_MOST_ROWS:]
+    more = details(count_words(len(rest), "more finding"), table(head, rest, kind="cards findings"))
     text = paragraph("No parameter cures what is broken: mend it first, then tune.", "note") if rows else ""
-    return section("What is wrong", text, told, _untold(logs), id="what-is-wrong")
+    return section("What is wrong", text, told, more, _untold(logs), id="what-is-wrong")
 
 
 def _worst_of(flights: Sequence[tuple[str, Document]]) -> str:
@@ -117,9 +121,7 @@ def _how_sure(confidences: Sequence[float]) -> str:
 
 def _links(cause: str, names: Sequence[str], logs: Logs) -> str:
     count = f"<b>{count_words(len(names), 'flight')}</b>: "
-    told = [
-        link(name, logs.pages[name], cause) if name in logs.pages else escape(name) for name in names[:_MOST_LINKS]
-    ]
+    told = [link(name, logs.pages[name], f"cause-{cause}") if name in logs.pages else escape(name) for name in names[:_MOST_LINKS]]
     more = len(names) - _MOST_LINKS
     return count + ", ".join(told) + (f" and {more} more" if more > 0 else "")
 

@@ -1,9 +1,17 @@
 """The innovations of each source, by set, and beside them the vehicle's own."""
 
 from fusetune.px4.aid_sources import AID_SOURCES, REPORTED_SOURCES
-from fusetune.report.figures.innovation_figures import rms_table
+from fusetune.report.charts.innovations import (
+    breaks_chart,
+    consistency_chart,
+    innovations_chart,
+    normalised_innovations_chart,
+    rms_chart,
+)
+from fusetune.report.innovation_tables import rms_table
 from fusetune.report.markup import Cell, details, number, paragraph, section, table
-from fusetune.report.results import Results, as_flown, figure_values
+from fusetune.report.results import Results, figure_values, pooled_samples
+from fusetune.report.results import as_flown as own_innovations
 
 _AS_FLOWN_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
 
@@ -30,12 +38,21 @@ def innovations_section(results: Results) -> str:
             "ranking tells."
         )
         parts.append(details("RMS of each", table(("variable", *map(str, rms.columns)), rows, footer=units)))
+    pooled = pooled_samples(results)
+    parts = [rms_chart(results), *parts]
+    parts += [
+        details("What each source surprised the filter by", innovations_chart(results, pooled)),
+        details("In units of the uncertainty that the filter claimed", normalised_innovations_chart(results, pooled)),
+        details("Consistency", consistency_chart(results)),
+        details("Fusion breaks", breaks_chart(results)),
+    ]
+    parts.append(as_flown(results))
     return section("The innovations", *parts, id="innovations")
 
 
-def as_flown_section(results: Results) -> str:
+def as_flown(results: Results) -> str:
     """The vehicle's own innovations beside the replay of the present set."""
-    own = as_flown(results)
+    own = own_innovations(results)
     rows = []
     for source, axis in _AS_FLOWN_GROUPS:
         row: list[Cell | str] = [AID_SOURCES[source].label]
@@ -56,4 +73,4 @@ def as_flown_section(results: Results) -> str:
         "where the firmware is another release, the log is thinned, or the vehicle flew other parameters."
     )
     head = ("source", "RMS as flown", "RMS replayed", "mean NIS as flown", "mean NIS replayed")
-    return section("As flown", details("The vehicle's own innovations beside the replay", paragraph(text), table(head, rows)))
+    return details("The vehicle's own innovations beside the replay", paragraph(text), table(head, rows))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from fusetune.apply.missing_motion import THINNED
+from fusetune.apply.missing_motion_kinds import THINNED
 from fusetune.report.charts.power import power_chart
 from fusetune.report.markup import Cell, bullets, details, paragraph, section, table
 from fusetune.report.results import Results
@@ -23,7 +23,11 @@ def next_steps_section(results: Results) -> str:
         parts.append(details("What these flights cannot tell, and what would", told))
     power = decision["power"]
     if power:
-        parts.append(details("How many flights it takes", paragraph(_power_text(power)), power_chart(results), _power_table(power)))
+        parts.append(
+            details(
+                "How many flights it takes", paragraph(_power_text(power)), power_chart(results), _power_table(power)
+            )
+        )
     return section("What to do next", *parts, id="next-steps")
 
 

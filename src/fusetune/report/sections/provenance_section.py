@@ -36,6 +36,9 @@ def provenance_section(results: Results) -> str:
         details("Logs and their checksums", table(("log", "SHA-256", "firmware"), logs, kind="whole")),
         details("Configuration files", table(("configuration file", "SHA-256"), files)),
         details("Settings of the decision", table(("setting", "value"), rule)),
-        details("Files of results", table(("file", "what it holds"), [(Cell(name, "mono"), words) for name, words in FILES.items()])),
+        details(
+            "Files of results",
+            table(("file", "what it holds"), [(Cell(name, "mono"), words) for name, words in FILES.items()]),
+        ),
         id="provenance",
     )

@@ -2,21 +2,33 @@
 
 import math
 from collections.abc import Hashable, Mapping, Sequence
+from html import escape
 from typing import Any
 
+from fusetune.apply.ranking import PRESENT, SAME
 from fusetune.px4.aid_sources import AID_SOURCES
+from fusetune.report.charts.set_looks import set_class, set_marker
 from fusetune.report.comparison import AIM_WORDS, flight_changes, percent_change, told_aims
 from fusetune.report.counted import count_words
-from fusetune.report.markup import Cell, details, number, signed, table
+from fusetune.report.markup import Cell, CellLike, Html, details, number, signed, table
 from fusetune.report.results import OUT, Results
 
 _MOST_REASONS = 4
 NOT_KNOWN = "not known"
 
 
-def set_name(name: str, results: Results) -> Cell:
-    """A set's name, marked if it is the one to fly."""
-    return Cell(name, "short best" if name == results.decision["chosen"] else "short")
+def set_name(name: str, results: Results) -> Html:
+    """A set's name with its marker, set off if it is the one to fly."""
+    kind = "short best" if name == results.decision["chosen"] else "short"
+    return Html(f'<span class="set-name">{marker_sign(results, name)}{escape(name)}</span>', kind)
+
+
+def marker_sign(results: Results, name: str) -> str:
+    """The marker of a set as a picture beside its name; empty of one that has none."""
+    if name not in results.styles:
+        return ""
+    drawn = f'<g class="{set_class(results, name)}">{set_marker(results, name, 6.0, 6.0, 5.0)}</g>'
+    return f'<svg class="chart-sign chart" viewBox="0 0 12 12" aria-hidden="true">{drawn}</svg>'
 
 
 def confidence_of(results: Results) -> str:
@@ -31,9 +43,10 @@ def ranking_table(results: Results) -> str:
     if corrected not in results.ranking:
         corrected = "p_holm"
     head = ("set", "", "change %", "interval %", *(f"{aim} %" for aim in aims), "better on", "p", "P(best)")
-    rows = []
+    rows: list[tuple[CellLike, ...]] = []
     for one in results.ranking.to_dict("records"):
-        is_present = one["name"] == results.present
+        # of what is as the present one there is nothing to say
+        is_present = one["status"] in (PRESENT, SAME)
         rows.append(
             (
                 set_name(one["name"], results),
@@ -43,7 +56,7 @@ def ranking_table(results: Results) -> str:
                 *(signed(None if is_present else _percent(one[f"{aim}_difference"])) for aim in aims),
                 _better_on(one, is_present),
                 _probability(None if is_present else one[corrected], is_present),
-                _share(one["p_best"]),
+                Cell("–", "number quiet") if one["status"] == SAME else _share(one["p_best"]),
             )
         )
     note = (
@@ -94,7 +107,7 @@ def sign_table(results: Results) -> str:
     if changes.empty or not len(changes.columns):
         return ""
     flights = [name for name in results.flights if name in changes.index]
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[tuple[CellLike, ...]] = []
     for name in changes.columns:
         told = changes.loc[flights, name]
         rows.append((set_name(str(name), results), *(_mark(value) for value in told)))
@@ -149,7 +162,7 @@ def criteria_table(results: Results) -> str:
         "timeouts": "lost sources",
         "faults": "flights with faults",
     }
-    rows = [
+    rows: list[tuple[CellLike, ...]] = [
         (set_name(one["name"], results), *(number(one[column]) for column in columns))
         for one in results.ranking.to_dict("records")
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fusetune.apply.sensitivity.result import FLAT, MATTERS, NOT_TOLD, UNSURE, ParameterSensitivity, Sensitivity
 from fusetune.apply.sensitivity.wording import best_value
+from fusetune.report.charts.sensitivity import sensitivity_chart
 from fusetune.report.comparison import percent_change
 from fusetune.report.markup import Cell, bullets, details, number, paragraph, section, table
 from fusetune.report.results import Results
@@ -22,6 +23,7 @@ def sensitivity_section(results: Results) -> str:
         return section(title, paragraph(told.sentences[0]), id="sensitivity")
     parts = [paragraph(told.sentences[0]), bullets(told.sentences[1:])]
     if any(one.curve is not None for one in told.found.parameters):
+        parts.append(sensitivity_chart(told.found))
         parts.append(details("Figures of each parameter", _table(told.found)))
     return section(title, *parts, id="sensitivity")
 

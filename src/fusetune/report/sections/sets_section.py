@@ -1,10 +1,11 @@
 """What was compared: the values of each set, and where they could act."""
 
+import math
 from typing import Any
 
 from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 from fusetune.report.counted import count_words, listed
-from fusetune.report.markup import Cell, details, number, section, table
+from fusetune.report.markup import Cell, CellLike, details, number, section, table, unit_cell
 from fusetune.report.results import Results
 from fusetune.report.sections.ranking_tables import set_name
 
@@ -14,15 +15,18 @@ def sets_section(results: Results) -> str:
     sets = {one["set"]: one for one in results.decision["sets"]}
     parameters = sorted({name for one in sets.values() for name in one["overrides"]})
     now = _present_parameters(results)
-    rows = []
+    rows: list[list[CellLike]] = []
+    alike: list[str] = []
     for parameter in parameters:
-        row = [Cell(parameter, "mono"), Cell(_unit(parameter), "quiet")]
-        for name in results.shown:
-            value = sets[name]["overrides"].get(parameter)
-            kind = "number quiet" if value is None else "number"
-            row.append(number(now.get(parameter) if value is None else value, 6, kind))
-        rows.append(row)
-    parts = [table(("parameter", "unit", *results.shown), rows, footer="In grey: as the vehicle has it now.")]
+        flown = now.get(parameter, sets[results.present]["overrides"].get(parameter, math.nan))
+        values = [sets[name]["overrides"].get(parameter, flown) for name in results.shown]
+        if all(_same(value, flown) for value in values):
+            alike.append(f"{parameter} {number(flown, 6).text}")
+            continue
+        told = [number(one, 6, "number quiet" if _same(one, flown) else "number best") for one in values]
+        rows.append([Cell(parameter, "mono"), unit_cell(_unit(parameter)), *told])
+    same = f" The same in all: {', '.join(alike)}." if alike else ""
+    parts = [table(("parameter", "unit", *results.shown), rows, footer=f"In grey: as the vehicle has it now.{same}")]
     described = [(set_name(name, results), one["description"]) for name, one in sets.items() if one["description"]]
     parts.append(details("What each set is", table(("set", "description"), described)))
     inactive = _inactive(results.decision["sets"])
@@ -33,6 +37,11 @@ def sets_section(results: Results) -> str:
         )
     )
     return section("The parameter sets", *parts, id="sets")
+
+
+def _same(value: float, flown: float) -> bool:
+    """Equal as a parameter, which is a float of 32 bits."""
+    return math.isclose(value, flown, rel_tol=1e-6)
 
 
 def _present_parameters(results: Results) -> dict[str, float]:

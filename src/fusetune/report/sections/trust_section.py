@@ -49,7 +49,13 @@ def trust_section(flights: Sequence[dict[str, Any]]) -> str:
     parts = [details(f"{flight['flight']}: figures", _details(flight)) for flight in flights]
     rows = [_row(flight) for flight in flights]
     told = details("Grade of each flight", table(head, rows))
-    return section("How far the replay can be trusted", paragraph(INTRODUCTION), told, details("Figures of each flight", *parts), id="trust")
+    return section(
+        "How far the replay can be trusted",
+        paragraph(INTRODUCTION),
+        told,
+        details("Figures of each flight", *parts),
+        id="trust",
+    )
 
 
 def _row(flight: dict[str, Any]) -> tuple[str | Cell, ...]:

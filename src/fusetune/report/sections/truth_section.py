@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from fusetune.report.markup import Cell, number, paragraph, section, table
+from fusetune.report.markup import Cell, details, number, paragraph, section, table
 from fusetune.report.results import Results, figure_values
 
 _TRUE_ERRORS = (
@@ -92,8 +92,12 @@ def truth_section(results: Results) -> str:
     return section(
         "Against the truth",
         paragraph(sentence or text),
-        _error_table("set", by_set.loc[order], "RMSE, mean over the flights"),
-        _error_table("flight", by_flight, f"RMSE of the set “{results.present}” on each flight"),
+        details("True errors of each set", _error_table("set", by_set.loc[order], "RMSE, mean over the flights")),
+        details(
+            "True errors on each flight",
+            _error_table("flight", by_flight, f"RMSE of the set “{results.present}”"),
+        ),
+        id="truth",
     )
 
 

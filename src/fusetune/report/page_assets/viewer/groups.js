@@ -146,7 +146,7 @@
     function refresh(what) {
       for (const group of groups) {
         for (const panel of group.panels || []) {
-          if (near.has(panel)) panel.refresh(what);
+          if (near.has(panel) || what === "sets") panel.refresh(what); // legends are read out of view as well
           else stale.set(panel, (stale.get(panel) || new Set()).add(what));
         }
       }

@@ -11,13 +11,14 @@
     const { h } = viewer;
     const blobs = new Map([...document.querySelectorAll("script.flight-data")].map((data) => [data.dataset.flight, data]));
     const names = "choose" in place.dataset ? [...blobs.keys()] : [place.dataset.flight].filter((name) => blobs.has(name));
+    const first = names.includes(place.dataset.first) ? place.dataset.first : names[0];
     const status = h("p", { class: "fv-status", role: "status" });
     const body = h("div", { class: "fv-shown" });
     let shown = null;
     let asked = null;
     const textOf = (name) => blobs.get(name).textContent;
     const choice = names.length > 1 ? viewer.makeFlightChoice(names, textOf, (name) =>
-      fusetune.state.push({ flight: name === names[0] ? null : name, t: null, source: null, axis: null })) : null;
+      fusetune.state.push({ flight: name === first ? null : name, t: null, source: null, axis: null })) : null;
     place.setAttribute("role", "region");
     place.setAttribute("aria-label", "Flight in detail");
     place.replaceChildren(...(choice ? [choice.element] : []), status, body);
@@ -25,7 +26,7 @@
       status.textContent = "Of this flight no curves are kept.";
       return;
     }
-    const wanted = () => (names.includes(fusetune.state.get("flight")) ? fusetune.state.get("flight") : names[0]);
+    const wanted = () => (names.includes(fusetune.state.get("flight")) ? fusetune.state.get("flight") : first);
 
     async function show() {
       const name = wanted();
@@ -129,6 +130,10 @@
     function fit() {
       const width = sticky.clientWidth;
       if (!width || gone) return;
+      // what sticks stands below the page's tabs, which stick as well, and above what sticks beside the panels
+      const tabs = document.querySelector(".tab-bar");
+      body.style.setProperty("--fv-below-tabs", `${tabs ? tabs.offsetHeight : 0}px`);
+      body.style.setProperty("--fv-below-strip", `${(tabs ? tabs.offsetHeight : 0) + sticky.offsetHeight}px`);
       strip.resize(width);
       if (map) map.draw(map.element.querySelector(".fv-plot").clientWidth);
       if (height) height.draw(height.element.querySelector(".fv-plot").clientWidth);

@@ -277,10 +277,10 @@
     return `${rounded < 0 ? "−" : ""}${minutes}:${rest < 10 ? "0" : ""}${rest}`;
   }
 
-  /* Of all samples where the data count them, else how many are marked. */
-  viewer.rejectedOf = (series, found) => {
-    if (!series.rejected) return "";
-    if (series.samples) return `${viewer.words.share(series.rejected_samples || 0, series.samples)} rejected`;
-    return found.rejected ? `${found.rejected} marked as rejected` : "none rejected";
+  /* Share of all samples where the data count them, else how many are marked; nothing of what no gate judges. */
+  viewer.rejectedOf = ({ rejected, samples, rejected_samples: lost }, found) => {
+    if (lost === 0) return "none rejected";
+    if (lost) return `${viewer.words.share(lost, samples)} rejected`;
+    return rejected ? `${found.rejected} marked as rejected` : "";
   };
 })();

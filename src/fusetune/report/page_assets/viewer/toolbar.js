@@ -14,13 +14,12 @@
   viewer.makeToolbar = (view) => {
     const { model, axis } = view;
     const { h } = viewer;
-    const button = (label, text, act) =>
-      h("button", { type: "button", "aria-label": label, title: label, "data-act": label, onclick: act }, text);
+    const button = (label, text, act) => h("button", { type: "button", "aria-label": label, title: label, onclick: act }, text);
     const range = h("span", { class: "fv-window" });
     const cursor = h("span", { class: "fv-cursor" });
-    const whole = button("Whole flight", "all", () => axis.reset());
+    const whole = button("Whole flight", "whole", () => axis.reset());
     const air = model.takeoff !== null
-      ? button("From take-off to landing", "in the air", () => axis.setWindow(model.takeoff, model.landing ?? model.stop)) : null;
+      ? button("in the air", "in the air", () => axis.setWindow(model.takeoff, model.landing ?? model.stop)) : null;
     const help = h("dl", { class: "fv-help" }, HELP.map(([what, does]) => [h("dt", {}, what), h("dd", {}, does)]));
     const shut = viewer.discloser("?", help, { className: "fv-help-button" });
     shut.button.setAttribute("aria-label", "What mouse, fingers and keys do");
