@@ -42,7 +42,7 @@ from fusetune.report.flight_data.sensor_panels import (
     status_ratio_panel,
     vibration_panels,
 )
-from fusetune.report.flight_data.shown_sets import replayed_sets, shown_sets
+from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_sets
 from fusetune.report.flight_data.state_panels import (
     Teller,
     earth_field,
@@ -58,39 +58,42 @@ from fusetune.set_names import AS_FLOWN, ONBOARD, PRESENT
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
-_LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
+LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
+"""Of what no study names."""
 
 
-def flight_content(flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = ()) -> FlightContent:
+def flight_content(
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice | None = None
+) -> FlightContent:
     """Gather it.
 
     Parameters
     ----------
     flight_folder : `results/save/<flight>` of a log of which something could be read
     analyze_folder : `results/analyze/<flight>`; of a flight that is not replayed without replays and scores
-    sets : that are told first behind the present one, in this order
+    sets : that are told first behind the present one and the chosen one, in this order
+    choice : what was decided
 
     Raises
     ------
     UserError
         A file is missing or damaged.
     """
-    folder = Path(analyze_folder)
+    folder, choice = Path(analyze_folder), choice or Choice()
     results = read_flight_results(folder)
     scoring = _document(folder / SCORING_FILE)
     logged = read_logged(flight_folder, innovations=not (folder / ONBOARD_FILE).exists())
     replays = replays_of(folder, scoring)
     present = PRESENT if scoring is None else scoring["present"]
-    innovations = list(
-        _innovations(folder, logged, scoring, replays, replayed_sets(scoring, folder / SCORE_TABLES["blocks"], sets))
-    )
+    first = [*([choice.chosen] if choice.chosen else []), *sets]
+    names = replayed_sets(scoring, folder / SCORE_TABLES["blocks"], first)
+    innovations = list(_innovations(folder, logged, scoring, replays, names))
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
-    told = tellers(logged, replays, _LABELS, frame)
+    told = tellers(logged, replays, LABELS, frame)
     start_us = logged.flight.start_timestamp
-    panels = tuple(
-        prepared(one, start_us) for one in _panels(logged, replays, innovations, told, frame, results.health)
-    )
+    shown = flight_panels(logged, replays, innovations, told, frame, results.health)
+    panels = tuple(prepared(one, start_us) for one in shown)
     curves = (one.set for panel in panels for one in panel.series if one.set is not None)
     names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
     flight = logged.flight
@@ -101,7 +104,7 @@ def flight_content(flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequen
         duration_s=flight.duration_s,
         takeoff_s=_finite(results.times.take_off_s),
         landing_s=_finite(results.times.landing_s),
-        sets=shown_sets(names, scoring, present),
+        sets=shown_sets(names, scoring, present, choice),
         panels=panels,
         bands=tuple(bands(logged, flags, scoring)),
         marks=tuple(marks(results)),
@@ -110,7 +113,7 @@ def flight_content(flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequen
     )
 
 
-def _panels(
+def flight_panels(
     logged: Logged,
     replays: Sequence[Replay],
     innovations: Sequence[SetInnovations],
@@ -124,7 +127,7 @@ def _panels(
     yield from status_ratio_panel(logged)
     gnss, parameters = logged.topic("vehicle_gps_position"), replays[0].parameters if replays else logged.parameters
     yield from motion_panels(told, gnss, round(parameters["EKF2_GPS_DELAY"] * 1e3), frame)
-    inner = inner_states(logged, replays, _LABELS)
+    inner = inner_states(logged, replays, LABELS)
     yield from inner_state_panels(inner)
     yield from output_tracking_panels(logged)
     yield from vibration_panels(logged, health)
@@ -137,10 +140,10 @@ def _innovations(
 ) -> Iterator[SetInnovations]:
     """The present set, what flew, the vehicle's own, and of the other sets what was scored."""
     for one in replays:
-        yield SetInnovations(one.name, _LABELS.get(one.name, one.name), one.innovations, one.parameters)
+        yield SetInnovations(one.name, LABELS.get(one.name, one.name), one.innovations, one.parameters)
     own = _own_innovations(folder, logged)
     if own:
-        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, logged.parameters)
+        yield SetInnovations(ONBOARD, LABELS[ONBOARD], own, logged.parameters)
     others = [name for name in sets if name not in {one.name for one in replays}]
     if scoring is not None and others:
         scored = scored_innovations(folder / SAMPLES_FILE, others)
@@ -154,6 +157,11 @@ def _own_innovations(folder: Path, logged: Logged) -> Innovations:
     file = folder / ONBOARD_FILE
     if file.exists():
         return recorded_innovations(file)
+    return logged_innovations(logged)
+
+
+def logged_innovations(logged: Logged) -> Innovations:
+    """Of the vehicle's own filter, as its log holds them."""
     samples = onboard_samples(logged.flight)
     return {
         key: AxisInnovations(

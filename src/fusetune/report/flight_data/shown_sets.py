@@ -67,8 +67,11 @@ def replayed_sets(
     if len(names) <= most + 1:
         return names
     errors = relative_errors(scores, present)
-    best = sorted(names, key=lambda name: (name != present, errors.get(name, math.inf)))[: most + 1]
-    return [name for name in names if name in set(best)]
+    # so many that are to be first say as little as none does; what is first of all is what was chosen, if anything was
+    wanted = {present, *(first if len(first) <= most else first[:1])}
+    best = sorted(names, key=lambda name: (name != present, name not in wanted, errors.get(name, math.inf)))
+    kept = set(best[: most + 1])
+    return [name for name in names if name in kept]
 
 
 def relative_errors(scores: AnyPath, present: str) -> dict[str, float]:
@@ -97,17 +100,19 @@ def relative_errors(scores: AnyPath, present: str) -> dict[str, float]:
     return {name: float(against[row, known[row]].mean()) for row, name in enumerate(names) if known[row].any()}
 
 
-def shown_sets(names: Sequence[str], scoring: Mapping[str, Any] | None, present: str) -> tuple[ShownSet, ...]:
-    """The sets as the views show them, before anything is decided.
+def shown_sets(
+    names: Sequence[str], scoring: Mapping[str, Any] | None, present: str, choice: Choice
+) -> tuple[ShownSet, ...]:
+    """The sets as the views show them.
 
     Parameters
     ----------
     names : of those that have something to show, `onboard` and `as_flown` too
     scoring : `scoring.json`: with the sets of the study, by which they are told apart; None as of `replayed_sets`
     """
-    styles = set_styles(() if scoring is None else scoring["sets"], present)
+    styles = set_styles(() if scoring is None else scoring["sets"], present, choice.chosen)
     found = []
     for name in names:
-        style = styles.get(name) or set_style(name, present)
-        found.append(ShownSet(name, Choice().role_of(name, present), style.index, style.marker))
+        style = styles.get(name) or set_style(name, present, choice.chosen)
+        found.append(ShownSet(name, choice.role_of(name, present), style.index, style.marker))
     return tuple(found)
