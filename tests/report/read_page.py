@@ -73,7 +73,7 @@ def told(html: str) -> str:
     """What a reader sees of HTML."""
     body = html[html.index("<body") :] if "<body" in html else html
     shown = re.sub(r"<(style|script)\b.*?</\1>", " ", body, flags=re.S)
-    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", re.sub(r"</(?:p|li|td|th|dt|dd|h\d|div|text)>", " ", shown))
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", re.sub(r"</(?:p|li|td|th|dt|dd|h\d|div|text|summary)>", " ", shown))
                   .replace("&nbsp;", " ").replace("\xa0", " ")).strip()  # fmt: skip
 
 
