@@ -120,7 +120,8 @@ def _load(results: Results) -> str:
     changes = table(("parameter", "now", "", "new", "unit", ""), _change_rows(results.decision), kind="changes")
     if not on_vehicle["parameters"]:
         refused = " ".join(f"{one['name']}: {one['reason']}. {one['remedy']}." for one in on_vehicle["refused"])
-        return f"{changes}<p>{prose('There is nothing to load, as this vehicle cannot be given all of it. ' + refused)}</p>"
+        nothing = "There is nothing to load, as this vehicle cannot be given all of it."
+        return f"{changes}<p>{prose(f'{nothing} {refused}')}</p>"
     file = f'<p class="load">Load <code>{BEST_PARAMS}</code></p>'
     return (
         f'{file}{changes}<details class="how"><summary>How to load it, and how to go back</summary>'

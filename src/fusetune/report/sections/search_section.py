@@ -57,8 +57,8 @@ def _load(results: SearchResults) -> str:
     if not (results.is_change and results.decision["on_vehicle"]["parameters"]):
         return paragraph("There is nothing to load: best_params.params holds no parameter and says so.", "note")
     return (
-        '<p class="load">Load <code>best_params.params</code></p><p class="note">In QGroundControl: Parameters → Tools → '
-        "Load from file; reboot, and fly a short, safe flight first. rollback.params brings the old values back.</p>"
+        '<p class="load">Load <code>best_params.params</code></p><p class="note">In QGroundControl: Parameters → '
+        "Tools → Load from file; reboot, and fly a short, safe flight first. rollback.params brings the old values back.</p>"
     )
 
 
@@ -144,13 +144,13 @@ def search_evidence(results: SearchResults) -> str:
         worth = [
             drawn(
                 kept_aside_chart(results),
-                "One bar for each flight: what was found without this flight, flown on it, against what flies now. Line "
-                "and shade: the change to expect on as many flights again, and its 95 % interval.",
+                "One bar for each flight: what was found without this flight, flown on it, against what flies now. "
+                "Line and shade: the change to expect on as many flights again, and its 95 % interval.",
             ),
             drawn(
                 shrinkage_chart(results),
-                "What a search promises on the flights it saw, and what is left of it on flights that it did not see. A "
-                "search always fits some chance of its own flights; the distance is that luck. A single part may do "
+                "What a search promises on the flights it saw, and what is left of it on flights that it did not see. "
+                "A search always fits some chance of its own flights; the distance is that luck. A single part may do "
                 "better than promised when its flights happen to be easier.",
             ),
         ]
