@@ -26,6 +26,7 @@ from fusetune.report.markup import (
     table,
 )
 from fusetune.report.search_results import SearchResults
+from fusetune.report.sections.loading import NOTHING_TO_LOAD, file_to_load, how_to_load
 from fusetune.report.sections.next_steps_section import steps_list
 
 _MATTERS_WORDS = {MATTERS: "yes", FLAT: "hardly", UNSURE: "not sure", NOT_TOLD: "not told"}
@@ -55,11 +56,8 @@ def search_answer(results: SearchResults) -> str:
 
 def _load(results: SearchResults) -> str:
     if not (results.is_change and results.decision["on_vehicle"]["parameters"]):
-        return paragraph("There is nothing to load: best_params.params holds no parameter and says so.", "note")
-    return (
-        '<p class="load">Load <code>best_params.params</code></p><p class="note">In QGroundControl: Parameters → '
-        "Tools → Load from file; reboot, and fly a short, safe flight first. rollback.params brings the old values back.</p>"
-    )
+        return paragraph(NOTHING_TO_LOAD, "note")
+    return file_to_load() + how_to_load()
 
 
 def search_found(results: SearchResults) -> str:
