@@ -154,7 +154,7 @@ def test_sets_have_the_part_that_the_decision_gave_them(folders: tuple[Path, Pat
     assert after[decision["chosen"]]["role"] == "chosen"
     assert (after[PRESENT]["role"], after[RESTLESS]["role"]) == ("present", "ruled_out")
     for name, one in after.items():
-        assert (one["style"], one["marker"]) == styles[name]
+        assert (one["style"], one["marker"]) == (styles[name].index, styles[name].marker)
     chosen = [
         one["style"] for one in panel(decided, "innovation.gnss_vel.0")["series"] if one["set"] == decision["chosen"]
     ]
