@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fusetune.report.figure_words import figure_words
-from fusetune.report.flight_page.flight_results import FlightResults
+from fusetune.report.flight_results import FlightResults
 from fusetune.report.severity_words import cause_words
 
 _MOST_FIGURES = 8

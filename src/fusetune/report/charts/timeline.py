@@ -11,7 +11,7 @@ from fusetune.report.charts.svg.elements import group, hinted, px, rectangle, sv
 from fusetune.report.charts.svg.scales import Linear
 from fusetune.report.charts.svg.text_width import BOLDER, ends_fitted, text_width
 from fusetune.report.finding_bars import Bar, finding_bars
-from fusetune.report.flight_page.flight_results import FlightResults
+from fusetune.report.flight_results import FlightResults
 from fusetune.report.severity_words import SEVERITY_WORDS
 
 _LANE, _TALL_LANE = 20.0, 32.0

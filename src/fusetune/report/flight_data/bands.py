@@ -14,7 +14,7 @@ from fusetune.finding import from_documents
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.flight_modes import ARMED, flight_mode
 from fusetune.report.flight_data.content import Band, Span
-from fusetune.report.flight_data.flag_words import ALARMS, FLAG_WORDS, STATES, USUAL
+from fusetune.report.flight_data.flag_words import ALARMS, FLAG_WORDS, GNSS_CHECK_WORDS, STATES, USUAL
 from fusetune.report.flight_data.logged import Logged
 
 _MOST_SPANS = 400
@@ -43,6 +43,7 @@ def bands(logged: Logged, replayed: TopicTable | None, scoring: Mapping[str, Any
     for band in _of_flags(flags, (*STATES, *ALARMS), last, "", ""):
         if band.id not in USUAL or len(band.spans) > 1 or not _holds(band.spans[0], logged):
             yield band
+    yield from _gnss_checks(logged, last)
     if flags is not own:
         yield from _of_flags(own, ALARMS, last, "onboard.", ", as flown")
 
@@ -60,6 +61,19 @@ def _of_vehicle(logged: Logged, last: int) -> Iterator[Band]:
         yield from _band("armed", "armed", _spans(time, status["arming_state"] == ARMED, last))
     if "failsafe" in status:
         yield from _band("failsafe", "failsafe", _spans(time, status["failsafe"].astype(bool), last))
+
+
+def _gnss_checks(logged: Logged, last: int) -> Iterator[Band]:
+    """Checks of the vehicle's own filter that failed, those that EKF2_GPS_CHECK asks for, and that of the fix."""
+    status = logged.of_primary("estimator_status")
+    if status is None or "gps_check_fail_flags" not in status or logged.topic("vehicle_gps_position") is None:
+        return
+    time, failed = status["timestamp"].astype(np.int64), status["gps_check_fail_flags"].astype(np.int64)
+    asked = int(logged.parameters["EKF2_GPS_CHECK"]) << 1 | 1
+    for bit, words in enumerate(GNSS_CHECK_WORDS):
+        if asked >> bit & 1:
+            spans = _spans(time, (failed >> bit & 1).astype(bool), last)
+            yield from _band(f"gnss_check.{bit}", f"GNSS check failed: {words}", spans)
 
 
 def _holds(span: Span, logged: Logged) -> bool:

@@ -132,6 +132,11 @@ def unpack(blob: bytes, name: AnyPath = "a flight's blob") -> Blob:
     return Blob(header, arrays)
 
 
+def read_header(blob: bytes, name: AnyPath = "a flight's blob") -> dict[str, Any]:
+    """The header of a blob alone; parameters and errors are those of `unpack`."""
+    return _parts(blob, name)[0]
+
+
 def with_header(blob: bytes, changed: Mapping[str, Any], name: AnyPath = "a flight's blob") -> bytes:
     """The blob with some entries of its header changed; errors as for `unpack`."""
     header, content = _parts(blob, name)
@@ -155,4 +160,4 @@ def _array(content: bytes, entry: Mapping[str, Any]) -> npt.NDArray[Any]:
     dtype, count, start = _DTYPES[entry["type"]], entry["count"], entry["offset"]
     planes = np.frombuffer(content, np.uint8, count * dtype.itemsize, start)
     values = np.ascontiguousarray(planes.reshape(dtype.itemsize, count).T).view(dtype).reshape(count)
-    return np.cumsum(values, dtype=np.int64) * (TICK_US * 1e-6) if entry["type"] == "dt" else values
+    return np.cumsum(values, dtype=np.int64) / (1_000_000 // TICK_US) if entry["type"] == "dt" else values

@@ -43,14 +43,17 @@ def events(logged: Logged, replayed: TopicTable | None, flags: TopicTable | None
 
 
 def _resets(position: TopicTable | None, whose: str) -> Iterator[Event]:
+    """Of all that were reset at once one event."""
     if position is None:
         return
+    kinds: dict[int, list[str]] = {}
     for kind, counter in RESET_COUNTERS.items():
         if counter in position:
             # a counter that jumps by many is told once
-            times = np.unique(counter_steps(position["timestamp"], position[counter]))
-            for time in times[:_MOST_OF_A_KIND].tolist():
-                yield Event(time, "reset", f"{RESET_WORDS[kind]} reset, {whose}")
+            for time in np.unique(counter_steps(position["timestamp"], position[counter])).tolist():
+                kinds.setdefault(time, []).append(RESET_WORDS[kind])
+    for time in sorted(kinds)[:_MOST_OF_A_KIND]:
+        yield Event(time, "reset", f"reset of {', '.join(kinds[time])}; {whose}")
 
 
 def _begun(flags: TopicTable | None, whose: str) -> Iterator[Event]:
@@ -59,7 +62,7 @@ def _begun(flags: TopicTable | None, whose: str) -> Iterator[Event]:
     for name in flags:
         if name.startswith("reject_") and name in FLAG_WORDS:
             for time in _rises(flags["timestamp"], flags[name])[:_MOST_OF_A_KIND].tolist():
-                yield Event(time, "rejected", f"{FLAG_WORDS[name]}, {whose}")
+                yield Event(time, "rejected", f"{FLAG_WORDS[name]}; {whose}")
 
 
 def _rises(time: npt.NDArray[np.int64], flag: npt.NDArray) -> npt.NDArray[np.int64]:

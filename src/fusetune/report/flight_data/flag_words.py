@@ -78,6 +78,21 @@ _ALARM_WORDS: Mapping[str, str] = {
     "fs_bad_acc_clipping": "fault: the accelerometer clips",
 }
 
+GNSS_CHECK_WORDS = (
+    "no three-dimensional fix",
+    "too few satellites",
+    "PDOP too large",
+    "horizontal accuracy too poor",
+    "vertical accuracy too poor",
+    "speed accuracy too poor",
+    "position drifts horizontally at rest",
+    "position drifts vertically at rest",
+    "horizontal speed at rest",
+    "vertical speed against the filter's",
+    "spoofed, as the receiver says",
+)
+"""Bits of `estimator_status.gps_check_fail_flags`, from the lowest: the fix, then those of EKF2_GPS_CHECK."""
+
 STATES = tuple(_STATE_WORDS)
 """What the filter does."""
 USUAL = frozenset({"cs_tilt_align", "cs_yaw_align"})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import Any
 from fusetune.analyze.conformance.track_file import read_track
 from fusetune.analyze.flight_files import CONFORMANCE_FILE, ONBOARD_FILE, SAMPLES_FILE, SCORING_FILE, TRACK_FILE
 from fusetune.analyze.replaying.onboard import onboard_samples
-from fusetune.px4.parameters.ekf2_parameters import complete
 from fusetune.report.flight_data.bands import bands
 from fusetune.report.flight_data.content import FlightContent, Panel
 from fusetune.report.flight_data.events import events
@@ -28,6 +26,7 @@ from fusetune.report.flight_data.innovation_panels import (
 from fusetune.report.flight_data.logged import Logged, read_logged
 from fusetune.report.flight_data.marks import marks
 from fusetune.report.flight_data.position_frame import PositionFrame, position_frame
+from fusetune.report.flight_data.preparing import prepared
 from fusetune.report.flight_data.replays import Replay, replays_of
 from fusetune.report.flight_data.sensor_panels import (
     output_tracking_panels,
@@ -46,13 +45,12 @@ from fusetune.report.flight_data.state_panels import (
     tellers,
 )
 from fusetune.report.flight_data.track_view import track_view
-from fusetune.report.flight_page.flight_results import read_flight_results
+from fusetune.report.flight_names import short_names
+from fusetune.report.flight_results import read_flight_results
 from fusetune.set_names import AS_FLOWN, ONBOARD, PRESENT
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
-_DATE_BEHIND = re.compile(r"[_-]\d{4}-\d{1,2}-\d{1,2}(-\d{1,2}){0,3}$")
-_OWNER_BEFORE = re.compile(r"^.*__")
 _LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
 
 
@@ -83,14 +81,17 @@ def flight_content(
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
     told = tellers(logged, replays, _LABELS, frame)
-    panels = tuple(_panels(logged, replays, innovations, told, frame, results.health))
+    start_us = logged.flight.start_timestamp
+    panels = tuple(
+        prepared(one, start_us) for one in _panels(logged, replays, innovations, told, frame, results.health)
+    )
     curves = (one.set for panel in panels for one in panel.series if one.set is not None)
     names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
     flight = logged.flight
     return FlightContent(
         flight=results.flight,
         label=flight_label(results.flight, results.date),
-        start_us=flight.start_timestamp,
+        start_us=start_us,
         duration_s=flight.duration_s,
         takeoff_s=_finite(results.times.take_off_s),
         landing_s=_finite(results.times.landing_s),
@@ -115,20 +116,14 @@ def _panels(
     yield from innovation_panels(innovations)
     yield from ratio_panels(innovations)
     yield from status_ratio_panel(logged)
-    gnss = logged.topic("vehicle_gps_position")
-    yield from motion_panels(told, gnss, round(_parameters(logged, replays)["EKF2_GPS_DELAY"] * 1e3), frame)
+    gnss, parameters = logged.topic("vehicle_gps_position"), replays[0].parameters if replays else logged.parameters
+    yield from motion_panels(told, gnss, round(parameters["EKF2_GPS_DELAY"] * 1e3), frame)
     inner = inner_states(logged, replays, _LABELS)
     yield from inner_state_panels(inner)
     yield from output_tracking_panels(logged)
     yield from vibration_panels(logged, health)
-    yield from sensor_panels(logged, earth_field(inner))
+    yield from sensor_panels(logged, health, earth_field(inner))
     yield from reset_panel(logged)
-
-
-def _parameters(logged: Logged, replays: Sequence[Replay]) -> Mapping[str, float]:
-    """Of the present set, or of the log where nothing was replayed."""
-    flight = logged.flight
-    return replays[0].parameters if replays else complete(flight.parameters.initial, {}, flight.release)
 
 
 def _innovations(
@@ -139,7 +134,7 @@ def _innovations(
         yield SetInnovations(one.name, _LABELS.get(one.name, one.name), one.innovations, one.parameters)
     own = _own_innovations(folder, logged)
     if own:
-        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, _parameters(logged, ()))
+        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, logged.parameters)
     others = [name for name in sets if name not in {one.name for one in replays}]
     if scoring is not None and others:
         scored = scored_innovations(folder / SAMPLES_FILE, others)
@@ -183,7 +178,7 @@ def flight_label(flight: str, date: str) -> str:
     ----------
     date : ISO 8601; empty where the log does not tell
     """
-    name = _OWNER_BEFORE.sub("", _DATE_BEHIND.sub("", flight)) or flight
+    (name,) = short_names([flight]).values()
     try:
         when = datetime.fromisoformat(date)
     except ValueError:

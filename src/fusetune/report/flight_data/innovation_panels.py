@@ -81,7 +81,7 @@ class AxisInnovations:
             found = np.abs(self.innovation) / np.sqrt(self.ratio * self.variance)
         # of a ratio that all but vanishes single precision keeps nothing
         clear = self.ratio > _LEAST_OF_ALL * np.nanmax(self.ratio, initial=0.0)
-        found = found[clear & np.isfinite(found)].astype(np.float64)
+        found = found[clear & np.isfinite(found) & (found > 0.0)].astype(np.float64)
         middle = float(np.median(found)) if found.size else np.nan
         is_shared = found.size > 0 and np.mean(np.abs(found / middle - 1.0) <= _SAME_GATE) >= _MOSTLY
         # a parameter that was changed in flight, or a gate that is a constant

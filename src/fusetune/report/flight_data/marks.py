@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fusetune.report.flight_data.content import Mark
-from fusetune.report.flight_page.flight_results import FlightResults
+from fusetune.report.flight_results import FlightResults
 
 
 def marks(results: FlightResults) -> Iterator[Mark]:

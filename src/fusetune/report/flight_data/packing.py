@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,8 +19,9 @@ from fusetune.report.flight_data.content import (
     TrackView,
 )
 from fusetune.report.flight_data.panel_names import BIASES, SENSORS, UNCERTAINTY, VIBRATION, WIND_AND_FIELD
+from fusetune.report.flight_data.preparing import FINEST, kept_rows_of
+from fusetune.report.flight_data.series_colours import coloured
 from fusetune.report.flight_data.thinning import kept_rows
-from fusetune.report.set_styles import COLOURS, PRESENT_INDEX
 
 SMALL_BUDGET_BYTES = 300_000
 """Of the blob of a flight in the report, in base64."""
@@ -37,14 +37,14 @@ class Buckets(NamedTuple):
     slow: int
 
 
-_FINEST, _COARSEST = 1000, 4
+_COARSEST = 4
 _STEP = 0.86
 _OTHER, _SLOW, _FEWEST = 0.5, 0.4, 2
 
 
 def _levels() -> tuple[Buckets, ...]:
     """From the finest to the coarsest."""
-    found, main = [], float(_FINEST)
+    found, main = [], float(FINEST)
     while main >= _COARSEST:
         found.append(Buckets(round(main), *(max(round(share * main), _FEWEST) for share in (_OTHER, _SLOW))))
         main *= _STEP
@@ -53,12 +53,12 @@ def _levels() -> tuple[Buckets, ...]:
 
 _LEVELS = _levels()
 _SLOW_GROUPS = frozenset({BIASES, WIND_AND_FIELD, UNCERTAINTY, VIBRATION, SENSORS})
-_COLOURS = (*range(1, COLOURS), PRESENT_INDEX)
-"""Of what is of no set, in this order."""
 _IMPORTANT = ("present", "chosen", "onboard")
+_NOT_WORTH = 2
+"""So few levels finer are not worth packing once more."""
 _AIMED = 0.98
 """Share of the budget: not every level takes what another one lets expect."""
-_BYTES_OF_FIGURE, _BYTES_OF_TIME, _BYTES_OF_SERIES = 2.7, 1.2, 30.0
+_BYTES_OF_FIGURE, _BYTES_OF_TIME, _BYTES_OF_SERIES = 1.95, 0.85, 22.0
 """What a kept point takes in the end, about; the first guess at a level is made of them."""
 
 
@@ -66,21 +66,30 @@ def pack_content(content: FlightContent, budget_bytes: int) -> bytes:
     """The blob of a flight whose base64 takes no more than the budget, as fine as that allows.
 
     Where even the coarsest takes more, that is what is given.
+
+    Parameters
+    ----------
+    content : with panels that were made ready (`fusetune.report.flight_data.preparing`)
     """
     important = {one.name for one in content.sets if one.role in _IMPORTANT}
-    most = budget_bytes * 3 // 4
+    most = budget_bytes // 4 * 3
     guesses = [_guess(content.panels, important, one) for one in _LEVELS]
     number = _first_below(guesses, most)
     blob = _packed(content, important, _LEVELS[number])
     # what one level took says what the others take
     scale = len(blob) / guesses[number]
     better = _first_below(guesses, _AIMED * most / scale)
-    if better != number:
+    if len(blob) > most or better + _NOT_WORTH < number:
         number, blob = better, _packed(content, important, _LEVELS[better])
     while len(blob) > most and number + 1 < len(_LEVELS):
         number += 1
         blob = _packed(content, important, _LEVELS[number])
     return blob
+
+
+def fits(blob: bytes, budget_bytes: int) -> bool:
+    """Whether the base64 of a blob takes no more than a budget: four characters for three bytes."""
+    return -(-len(blob) // 3) * 4 <= budget_bytes
 
 
 def _first_below(guesses: Sequence[float], most: float) -> int:
@@ -108,6 +117,7 @@ def _packed(content: FlightContent, important: set[str], buckets: Buckets) -> by
     arrays = ArrayStore()
     writer = _Writer(content, arrays)
     panels = [writer.panel(one, important, buckets) for one in content.panels]
+    sets = [one._asdict() for one in content.sets]
     track = None if content.track is None else writer.track(content.track, buckets)
     header = {
         "version": VERSION,
@@ -117,9 +127,9 @@ def _packed(content: FlightContent, important: set[str], buckets: Buckets) -> by
         "duration_s": round(content.duration_s, 4),
         "takeoff_s": _seconds(content.takeoff_s),
         "landing_s": _seconds(content.landing_s),
-        "sets": [one._asdict() for one in content.sets],
+        "sets": sets,
         "arrays": arrays.entries,
-        "panels": panels,
+        "panels": coloured(panels, sets),
         "bands": [
             {"id": one.id, "label": one.label, "spans": [writer.span(each) for each in one.spans]}
             for one in content.bands
@@ -153,7 +163,6 @@ class _Writer:
 
     def __init__(self, content: FlightContent, arrays: ArrayStore) -> None:
         self._start, self._arrays = content.start_us, arrays
-        self._styles = {one.name: one.style for one in content.sets}
 
     def seconds(self, time: int) -> float:
         return round((time - self._start) * 1e-6, 4)
@@ -162,18 +171,7 @@ class _Writer:
         return [max(self.seconds(one.start), 0.0), self.seconds(one.stop), one.words]
 
     def panel(self, panel: Panel, important: set[str], buckets: Buckets) -> dict[str, Any]:
-        # what is of no set takes the colours that the sets beside it leave
-        taken = {self._styles[one.set] for one in panel.series if one.set is not None}
-        free = [number for number in _COLOURS if number not in taken] or [*_COLOURS]
-        others = cycle(free)
-        series = [
-            self._series(
-                one,
-                _buckets_of(panel, one, important, buckets),
-                next(others) if one.set is None else self._styles[one.set],
-            )
-            for one in panel.series
-        ]
+        series = [self._series(one, _buckets_of(panel, one, important, buckets)) for one in panel.series]
         return {
             "id": panel.id,
             "group": panel.group,
@@ -187,32 +185,20 @@ class _Writer:
             "series": series,
         }
 
-    def _series(self, series: Series, buckets: int, style: int) -> dict[str, Any]:
-        series = self._in_order(series)
-        peaks = () if series.peaks is None else (series.peaks,)
-        rows = kept_rows(series.values, buckets, peaks, series.rejected)
-        rejected = series.rejected
+    def _series(self, series: Series, buckets: int) -> dict[str, Any]:
+        rows, rejected = kept_rows_of(series, buckets), series.rejected
         return {
             "label": series.label,
             "set": series.set,
-            "style": style,
             "time": self._times(series.time[rows]),
             "value": self._arrays.figures(series.values[rows]),
             "sigma": None if series.sigma is None else self._arrays.figures(series.sigma[rows]),
             "gate": series.gate,
             "rejected": None if rejected is None or not rejected.any() else self._arrays.flags(rejected[rows]),
             "draw": series.draw,
-            "samples": int(np.isfinite(series.values).sum()),
-            "rejected_samples": None if rejected is None else int(rejected.sum()),
+            "samples": series.samples,
+            "rejected_samples": series.rejected_samples,
         }
-
-    def _in_order(self, series: Series) -> Series:
-        """By time, without what a log holds of before it began, as for a sensor's delay."""
-        if np.any(np.diff(series.time) < 0):
-            series = series.rows(np.argsort(series.time, kind="stable"))
-        if not series.time.size or series.time[0] >= self._start:
-            return series
-        return series.rows(slice(int(np.searchsorted(series.time, self._start)), None))
 
     def track(self, track: TrackView, buckets: Buckets) -> dict[str, Any]:
         written = self._plane(track.flown, buckets.main)

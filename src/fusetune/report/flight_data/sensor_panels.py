@@ -13,15 +13,17 @@ from fusetune.px4.layouts.vibration_metrics import vibrations
 from fusetune.report.flight_data.content import Figures, Panel, Series, with_gaps
 from fusetune.report.flight_data.logged import Logged
 from fusetune.report.flight_data.panel_names import (
-    OUTPUT_TRACKING_AXES,
     RATIOS,
     RESET_WORDS,
     STATUS_RATIOS,
+    axes_of,
     panel_name,
     status_ratio_name,
 )
 
 _MOST_INSTANCES = 4
+_STATES = {"jamming_state": "jamming state (3: critical)", "spoofing_state": "spoofing state (2: indicated)"}
+"""Of the receiver: 0 says that it does not tell, 1 that there is none."""
 _GAUSS_AXES = 3
 
 
@@ -38,7 +40,7 @@ def status_ratio_panel(logged: Logged) -> Iterator[Panel]:
 def output_tracking_panels(logged: Logged) -> Iterator[Panel]:
     """By how much the output predictor lags behind the filter."""
     status = logged.of_primary("estimator_status")
-    for axis in range(OUTPUT_TRACKING_AXES):
+    for axis in range(axes_of("output_tracking")):
         yield from _panel("output_tracking", _fields(status, {f"output_tracking_error[{axis}]": "as flown"}), axis)
 
 
@@ -63,20 +65,32 @@ def vibration_panels(logged: Logged, health: Sequence[Mapping[str, Any]]) -> Ite
     yield from _panel("imu_temperature", _each(status, "temperature_accel"))
 
 
-def sensor_panels(logged: Logged, earth_field: Series | None) -> Iterator[Panel]:
+def sensor_panels(logged: Logged, health: Sequence[Mapping[str, Any]], earth_field: Series | None) -> Iterator[Panel]:
     """Of each sensor what tells how good it is.
 
     Parameters
     ----------
+    health : rows of the health table, whose limits are drawn
     earth_field : strength of the earth's field as the filter holds it
     """
+    combined = logged.raw.topic("sensor_combined")
+    for panel, field in (("gyro", "gyro_rad"), ("accel", "accelerometer_m_s2")):
+        for axis in range(axes_of(panel)):
+            yield from _panel(panel, _fields(combined, {f"{field}[{axis}]": "IMU in use"}), axis)
+    for axis in range(axes_of("mag")):
+        measured = _fields(logged.topic("vehicle_magnetometer"), {f"magnetometer_ga[{axis}]": "magnetometer in use"})
+        yield from _panel("mag", measured, axis)
     yield from _panel("baro_height", _fields(logged.topic("vehicle_air_data"), {"baro_alt_meter": "barometer"}))
     gnss = logged.topic("vehicle_gps_position")
-    yield from _panel("gnss_accuracy", _fields(gnss, {"eph": "horizontal", "epv": "vertical"}))
-    yield from _panel("gnss_speed_accuracy", _fields(gnss, {"s_variance_m_s": "speed"}))
+    yield from _panel(
+        "gnss_accuracy", _fields(gnss, {"eph": "horizontal", "epv": "vertical"}), 0, _limit(health, "gnss.eph")
+    )
+    yield from _panel(
+        "gnss_speed_accuracy", _fields(gnss, {"s_variance_m_s": "speed"}), 0, _limit(health, "gnss.speed_accuracy")
+    )
     counted = {"satellites_used": "satellites", "fix_type": "fix type (3: three-dimensional)"}
     yield from _panel("gnss_satellites", _fields(gnss, counted, is_step=True))
-    noise = {"noise_per_ms": "noise per ms", "jamming_indicator": "jamming indicator"}
+    noise = {"noise_per_ms": "noise per ms", "jamming_indicator": "jamming indicator", **_STATES}
     yield from _panel("gnss_noise", (one for one in _fields(gnss, noise) if np.any(one.values)))
     yield from _panel("mag_norm", [*_field_strengths(logged), *([] if earth_field is None else [earth_field])])
     distances = _each(_instances(logged, "distance_sensor"), "current_distance")
@@ -173,5 +187,5 @@ def _panel(panel: str, series: Iterable[Series], axis: int = 0, limit: float | N
     known = tuple(one for one in series if np.any(np.isfinite(one.values)))
     if known:
         name = panel_name(panel, axis)
-        number = f"{panel}.{axis}" if panel == "output_tracking" else panel
+        number = f"{panel}.{axis}" if axes_of(panel) > 1 else panel
         yield Panel(number, name.group, name.title, name.unit, known, limit=limit)

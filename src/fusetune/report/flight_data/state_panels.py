@@ -166,7 +166,10 @@ def _of_replay(replay: Replay, label: str) -> Teller:
     position = np.column_stack([table[name] for name in ("x", "y", "z")])
     _unless(position[:, :2], table.get("xy_valid"))
     _unless(position[:, 2:], table.get("z_valid"))
-    q = np.column_stack([table[f"q_{number}"] for number in range(4)])
+    names = [f"q_{number}" for number in range(4)]
+    if not set(names) <= set(table):  # a replay of another program may lack it
+        return Teller(label, replay.name, time, velocity, position, time[:0], np.zeros((0, 4)))
+    q = np.column_stack([table[name] for name in names])
     return Teller(label, replay.name, time, velocity, position, time, q)
 
 

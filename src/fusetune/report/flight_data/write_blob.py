@@ -17,9 +17,10 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fusetune.report.flight_data.blob import unpack, with_header
+from fusetune.report.flight_data.blob import read_header, with_header
 from fusetune.report.flight_data.flight_content import flight_content
-from fusetune.report.flight_data.packing import LARGE_BUDGET_BYTES, SMALL_BUDGET_BYTES, pack_content
+from fusetune.report.flight_data.packing import LARGE_BUDGET_BYTES, SMALL_BUDGET_BYTES, fits, pack_content
+from fusetune.report.flight_data.series_colours import coloured
 from fusetune.report.flight_data.shown_sets import Choice
 from fusetune.report.set_styles import SetStyle
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
@@ -68,12 +69,15 @@ def write_blob(
     -------
     Whether there is something to show.
     """
-    targets = [(small, SMALL_BUDGET_BYTES), *([] if large is None else [(large, LARGE_BUDGET_BYTES)])]
     content = flight_content(flight_folder, analyze_folder, sets) if is_readable(flight_folder) else None
-    for target, budget in targets:
-        blob = b"" if content is None else pack_content(content, budget)
-        with atomic_path(target) as path:
-            path.write_bytes(blob)
+    blob = b""
+    # what is not thinned for the larger one, and small, is the same for both
+    for target, budget in ((large, LARGE_BUDGET_BYTES), (small, SMALL_BUDGET_BYTES)):
+        if content is not None and (not blob or not fits(blob, budget)):
+            blob = pack_content(content, budget)
+        if target is not None:
+            with atomic_path(target) as path:
+                path.write_bytes(blob)
     return content is not None
 
 
@@ -93,7 +97,8 @@ def with_choice(
     UserError
         It is no blob.
     """
-    sets = unpack(blob).header["sets"]
+    header = read_header(blob)
+    sets = header["sets"]
     present = next((one["name"] for one in sets if one["role"] == "present"), "")
     choice, looks = Choice(chosen, frozenset(ruled_out)), styles or {}
 
@@ -102,7 +107,8 @@ def with_choice(
         style = {} if look is None else {"style": look.index, "marker": look.marker}
         return one | {"role": choice.role_of(one["name"], present)} | style
 
-    return with_header(blob, {"sets": [changed(one) for one in sets]})
+    decided = [changed(one) for one in sets]
+    return with_header(blob, {"sets": decided, "panels": coloured(header["panels"], decided)})
 
 
 def is_readable(flight_folder: AnyPath) -> bool:

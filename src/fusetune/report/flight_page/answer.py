@@ -9,8 +9,8 @@ from html import escape
 from typing import Any
 
 from fusetune.report.counted import count_words
-from fusetune.report.flight_page.flight_results import Document, FlightResults
 from fusetune.report.flight_page.measured_words import figure_in_words
+from fusetune.report.flight_results import Document, FlightResults
 from fusetune.report.markup import bullets, details, number, paragraph, section, severity_mark
 from fusetune.report.severity_words import SEVERITY_WORDS, FlightTimes, confidence_words, worst_of
 

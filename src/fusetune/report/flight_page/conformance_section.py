@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fusetune.analyze.conformance.words import TRACK_WORDS, leg_name
 from fusetune.analyze.flight.manoeuvre_classes import FLOWN_CLASSES
-from fusetune.report.flight_page.flight_results import Document
+from fusetune.report.flight_results import Document
 from fusetune.report.markup import Cell, details, number, paragraph, section, signed, table
 
 

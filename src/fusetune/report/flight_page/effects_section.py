@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fusetune.report.counted import count_words
-from fusetune.report.flight_page.flight_results import Document, FlightResults
+from fusetune.report.flight_results import Document, FlightResults
 from fusetune.report.markup import Cell, details, number, paragraph, section, table, unit_cell
 from fusetune.report.severity_words import worst_of
 

@@ -6,7 +6,7 @@ from collections import defaultdict
 
 from fusetune.report.counted import count_words
 from fusetune.report.figure_words import figure_words
-from fusetune.report.flight_page.flight_results import Document, FlightResults
+from fusetune.report.flight_results import Document, FlightResults
 from fusetune.report.markup import Cell, CellLike, Html, details, number, paragraph, section, severity_mark, table
 from fusetune.report.severity_words import rank
 

@@ -10,9 +10,9 @@ from fusetune.analyze.flight_files import CONFORMANCE_FILE, SENSOR_NOISE_FILE
 from fusetune.report.flight_page.answer import answer_section, causes_section
 from fusetune.report.flight_page.conformance_section import conformance_section
 from fusetune.report.flight_page.effects_section import effects_section
-from fusetune.report.flight_page.flight_results import read_flight_results
 from fusetune.report.flight_page.health_table import health_table_section
 from fusetune.report.flight_page.sensors_section import sensors_section
+from fusetune.report.flight_results import read_flight_results
 from fusetune.report.markup import section
 from fusetune.report.page_shell.shell import VIEWER_CLASS, FlightBlob, PageHead, Tab, page_links, write_page
 from fusetune.storage.documents import read_document

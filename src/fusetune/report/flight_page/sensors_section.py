@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fusetune.report.flight_page.flight_results import Document
+from fusetune.report.flight_results import Document
 from fusetune.report.markup import Cell, details, number, paragraph, section, table, unit_cell
 
 _HOW_TO_DRAW = (
