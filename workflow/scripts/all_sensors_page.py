@@ -1,7 +1,6 @@
 """Draw each sensor over all flights, and write their page."""
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.flight_page.sensor_page import build_pooled_sensor_page
@@ -12,6 +11,6 @@ if TYPE_CHECKING:
     snakemake: Any
 
 keep_out("pandas")
-with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
+with logged_job(snakemake.log[0]):
     folders = [Path(file).parent for file in snakemake.input.noise]
-    build_pooled_sensor_page(folders, figures, snakemake.output[0], {"The decision": "results/report.html"})
+    build_pooled_sensor_page(folders, snakemake.output[0], {"The decision": "results/report.html"})

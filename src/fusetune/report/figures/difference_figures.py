@@ -1,6 +1,7 @@
 """Figures of the comparison with the present set: forest plot, flights by sets, aided against unaided."""
 
 import math
+import textwrap
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,7 @@ Limits = tuple[float, float]
 NOTHING_TO_COMPARE = "Only the present set was scored: there is nothing to compare."
 
 _ANNOTATED_CELLS = 240
+_TITLE_WIDTH = 18
 _LONGEST_NAME = 30
 
 
@@ -79,7 +81,7 @@ def _forest(axes: Axes, results: Results, aim: str, names: list[str]) -> None:
             _beyond(axes, row, one["change"], left, right)
     axes.axvline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
     axes.set_xlim(left, right)
-    axes.set_title(AIM_LABELS[aim])
+    axes.set_title(textwrap.fill(AIM_LABELS[aim], _TITLE_WIDTH))
 
 
 def _beyond(axes: Axes, row: int, change: float, left: float, right: float) -> None:
@@ -116,7 +118,7 @@ def flights_by_sets(results: Results) -> Figure:
     beyond = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
         (bool(np.nanmin(values) < -limit), bool(np.nanmax(values) > limit)), "neither"
     )
-    figure.colorbar(image, ax=axes, label="change of the prediction error [%]", extend=beyond)
+    figure.colorbar(image, ax=axes, label="change [%]", extend=beyond)
     figure.suptitle("Per flight against the present set; below 0 is better", fontsize=9, x=0.01, ha="left")
     return figure
 

@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator
 from fusetune.analyze.metrics.break_rate import clopper_pearson
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, label_sets, new_figure, panel_grid
-from fusetune.report.figures.set_styles import status_colour
+from fusetune.report.figures.set_styles import set_styles, status_colour
 from fusetune.report.innovation_tables import (
     BREAK_METRICS,
     CONSISTENT_WHISKER,
@@ -35,13 +35,14 @@ def rms_by_variable(results: Results) -> Figure:
         return empty_figure("No GNSS, height or magnetometer innovations were scored.")
     figure = new_figure(7.2, 0.9 + 0.36 * len(shown) + 0.14 * (len(results.shown) // 4))
     axes = figure.add_subplot()
-    markers = "osD^vP*Xd<>hp"
+    styles = set_styles(results)
     others = [name for name in table.columns if name != results.present]
     offsets = np.linspace(-0.25, 0.25, max(len(others), 1))
     for i, name in enumerate(others):
         ratio = 100.0 * (table.loc[shown, name] / base[shown] - 1.0)
         rows = np.arange(len(shown)) + offsets[i]
-        axes.plot(ratio, rows, markers[i % len(markers)], markersize=4, label=name, alpha=0.9)
+        look = styles[name]
+        axes.plot(ratio, rows, look.marker, color=look.colour, markersize=4, label=name, alpha=0.9)
     axes.axvline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
     label_sets(axes, shown)
     axes.set_xscale("symlog", linthresh=20.0)

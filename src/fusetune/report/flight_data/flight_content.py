@@ -51,7 +51,8 @@ from fusetune.set_names import AS_FLOWN, ONBOARD, PRESENT
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
-_LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
+LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
+"""Of what no study names."""
 
 
 def flight_content(
@@ -80,10 +81,10 @@ def flight_content(
     innovations = list(_innovations(folder, logged, scoring, replays, replayed_sets(scoring, sets, choice)))
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
-    told = tellers(logged, replays, _LABELS, frame)
+    told = tellers(logged, replays, LABELS, frame)
     start_us = logged.flight.start_timestamp
     panels = tuple(
-        prepared(one, start_us) for one in _panels(logged, replays, innovations, told, frame, results.health)
+        prepared(one, start_us) for one in flight_panels(logged, replays, innovations, told, frame, results.health)
     )
     curves = (one.set for panel in panels for one in panel.series if one.set is not None)
     names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
@@ -104,7 +105,7 @@ def flight_content(
     )
 
 
-def _panels(
+def flight_panels(
     logged: Logged,
     replays: Sequence[Replay],
     innovations: Sequence[SetInnovations],
@@ -112,13 +113,20 @@ def _panels(
     frame: PositionFrame,
     health: Sequence[Mapping[str, Any]],
 ) -> Iterator[Panel]:
-    """In the order of `panel_names.GROUPS`."""
+    """All panels, in the order of `panel_names.GROUPS`.
+
+    Parameters
+    ----------
+    innovations : of every set, and of the vehicle's own filter
+    told, frame : who tells of the motion, and about which origin
+    health : rows of the health table, for their limits
+    """
     yield from innovation_panels(innovations)
     yield from ratio_panels(innovations)
     yield from status_ratio_panel(logged)
     gnss, parameters = logged.topic("vehicle_gps_position"), replays[0].parameters if replays else logged.parameters
     yield from motion_panels(told, gnss, round(parameters["EKF2_GPS_DELAY"] * 1e3), frame)
-    inner = inner_states(logged, replays, _LABELS)
+    inner = inner_states(logged, replays, LABELS)
     yield from inner_state_panels(inner)
     yield from output_tracking_panels(logged)
     yield from vibration_panels(logged, health)
@@ -131,10 +139,10 @@ def _innovations(
 ) -> Iterator[SetInnovations]:
     """The present set, what flew, the vehicle's own, and of the other sets what was scored."""
     for one in replays:
-        yield SetInnovations(one.name, _LABELS.get(one.name, one.name), one.innovations, one.parameters)
+        yield SetInnovations(one.name, LABELS.get(one.name, one.name), one.innovations, one.parameters)
     own = _own_innovations(folder, logged)
     if own:
-        yield SetInnovations(ONBOARD, _LABELS[ONBOARD], own, logged.parameters)
+        yield SetInnovations(ONBOARD, LABELS[ONBOARD], own, logged.parameters)
     others = [name for name in sets if name not in {one.name for one in replays}]
     if scoring is not None and others:
         scored = scored_innovations(folder / SAMPLES_FILE, others)
@@ -148,6 +156,11 @@ def _own_innovations(folder: Path, logged: Logged) -> Innovations:
     file = folder / ONBOARD_FILE
     if file.exists():
         return recorded_innovations(file)
+    return logged_innovations(logged)
+
+
+def logged_innovations(logged: Logged) -> Innovations:
+    """Of the vehicle's own filter, as its log holds them."""
     samples = onboard_samples(logged.flight)
     return {
         key: AxisInnovations(

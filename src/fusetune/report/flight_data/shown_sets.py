@@ -70,6 +70,6 @@ def shown_sets(
     styles = set_styles(() if scoring is None else scoring["sets"], present, choice.chosen)
     found = []
     for name in names:
-        style = styles.get(name) or set_style(name, present)
+        style = styles.get(name) or set_style(name, present, choice.chosen)
         found.append(ShownSet(name, choice.role_of(name, present), style.index, style.marker))
     return tuple(found)

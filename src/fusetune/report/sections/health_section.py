@@ -121,7 +121,7 @@ def _how_sure(confidences: Sequence[float]) -> str:
 
 def _links(cause: str, names: Sequence[str], logs: Logs) -> str:
     count = f"<b>{count_words(len(names), 'flight')}</b>: "
-    told = [link(name, logs.pages[name], cause) if name in logs.pages else escape(name) for name in names[:_MOST_LINKS]]
+    told = [link(name, logs.pages[name], f"cause-{cause}") if name in logs.pages else escape(name) for name in names[:_MOST_LINKS]]
     more = len(names) - _MOST_LINKS
     return count + ", ".join(told) + (f" and {more} more" if more > 0 else "")
 
