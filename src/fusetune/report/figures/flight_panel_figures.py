@@ -160,6 +160,7 @@ def _series(axes: Axes, flight: PlottedFlight, panel: Panel, one: Series, place:
         )
     if one.rejected is not None and bool(np.any(one.rejected)):
         wild = np.flatnonzero(one.rejected)
+        wild = wild[drawn_rows(values[wild])]
         axes.plot(
             time[wild], values[wild], "x", color=_REJECTED_COLOUR, markersize=2.5, markeredgewidth=0.6, label="rejected"
         )

@@ -44,6 +44,7 @@ class PlottedFlight:
     ----------
     start_us : when its log begins, µs since boot
     why_not_replayed : of a log that is not; empty of others
+    analyzed : folder of its analysis; None of a log
     source : the log, or the saved flight
     labels : of sets whose names say too little
     """
@@ -58,6 +59,7 @@ class PlottedFlight:
     source: ObservedFlight | Path
     labels: Mapping[str, str]
     why_not_replayed: str = ""
+    analyzed: Path | None = None
 
     @property
     def usual_sets(self) -> tuple[str, ...]:
@@ -89,7 +91,7 @@ def flight_of_results(results: AnyPath, flight: str, sets: Sequence[str], choice
         raise UserError(analyze, "there is no such flight", "Name one of the folders beside it")
     content = flight_content(save, analyze, sets, choice)
     return PlottedFlight(flight, content.start_us, content.duration_s, content.sets, content.panels, content.bands,
-                         content.track, save, LABELS)  # fmt: skip
+                         content.track, save, LABELS, analyzed=analyze)  # fmt: skip
 
 
 def flight_of_log(log: AnyPath, overrides: Mapping[str, float]) -> PlottedFlight:

@@ -113,14 +113,7 @@ def flight_panels(
     frame: PositionFrame,
     health: Sequence[Mapping[str, Any]],
 ) -> Iterator[Panel]:
-    """All panels, in the order of `panel_names.GROUPS`.
-
-    Parameters
-    ----------
-    innovations : of every set, and of the vehicle's own filter
-    told, frame : who tells of the motion, and about which origin
-    health : rows of the health table, for their limits
-    """
+    """In the order of `panel_names.GROUPS`."""
     yield from innovation_panels(innovations)
     yield from ratio_panels(innovations)
     yield from status_ratio_panel(logged)
