@@ -370,8 +370,11 @@ def test_nothing_closed_is_drawn_and_paper_gets_what_is_open(made: MadePage, ope
     assert page.evaluate("document.documentElement.dataset.theme") == "dark"
 
 
-def test_nothing_is_left_in_the_browser_but_the_page_itself(made: MadePage, open_page: OpenPage) -> None:
-    empty = open_page("about:blank").evaluate("Object.keys(window)")
+def test_nothing_is_left_in_the_browser_but_the_page_itself(
+    made: MadePage, open_page: OpenPage, tmp_path: Path
+) -> None:
+    (tmp_path / "empty.html").write_text('<!DOCTYPE html><html lang="en"><title>Empty</title></html>', encoding="utf-8")
+    empty = open_page((tmp_path / "empty.html").as_uri()).evaluate("Object.keys(window)")
     page = open_page(flights_of(made))
     panel_of(page, NORTH)
     assert set(page.evaluate("Object.keys(window)")) - set(empty) <= {"fusetune", "uPlot"}
