@@ -42,7 +42,7 @@ from fusetune.report.flight_data.sensor_panels import (
     status_ratio_panel,
     vibration_panels,
 )
-from fusetune.report.flight_data.shown_sets import replayed_sets, shown_sets
+from fusetune.report.flight_data.shown_sets import UNDECIDED, Choice, replayed_sets, shown_sets
 from fusetune.report.flight_data.state_panels import (
     Teller,
     earth_field,
@@ -62,7 +62,9 @@ LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
 """Of what no study names."""
 
 
-def flight_content(flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = ()) -> FlightContent:
+def flight_content(
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice = UNDECIDED
+) -> FlightContent:
     """Gather it.
 
     Parameters
@@ -70,6 +72,7 @@ def flight_content(flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequen
     flight_folder : `results/save/<flight>` of a log of which something could be read
     analyze_folder : `results/analyze/<flight>`; of a flight that is not replayed without replays and scores
     sets : that are told first behind the present one, in this order
+    choice : what was decided, where it is known
 
     Raises
     ------
@@ -102,7 +105,7 @@ def flight_content(flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequen
         duration_s=flight.duration_s,
         takeoff_s=_finite(results.times.take_off_s),
         landing_s=_finite(results.times.landing_s),
-        sets=shown_sets(names, scoring, present),
+        sets=shown_sets(names, scoring, present, choice),
         panels=panels,
         bands=tuple(bands(logged, flags, scoring)),
         marks=tuple(marks(results)),

@@ -45,6 +45,9 @@ class Choice:
         return "ruled_out" if name in self.ruled_out else "candidate"
 
 
+UNDECIDED = Choice()
+
+
 def replayed_sets(
     scoring: Mapping[str, Any] | None, scores: AnyPath, first: Sequence[str] = (), most: int = MOST_SETS
 ) -> list[str]:
@@ -97,17 +100,19 @@ def relative_errors(scores: AnyPath, present: str) -> dict[str, float]:
     return {name: float(against[row, known[row]].mean()) for row, name in enumerate(names) if known[row].any()}
 
 
-def shown_sets(names: Sequence[str], scoring: Mapping[str, Any] | None, present: str) -> tuple[ShownSet, ...]:
-    """The sets as the views show them, before anything is decided.
+def shown_sets(
+    names: Sequence[str], scoring: Mapping[str, Any] | None, present: str, choice: Choice = UNDECIDED
+) -> tuple[ShownSet, ...]:
+    """The sets as the views show them.
 
     Parameters
     ----------
     names : of those that have something to show, `onboard` and `as_flown` too
     scoring : `scoring.json`: with the sets of the study, by which they are told apart; None as of `replayed_sets`
     """
-    styles = set_styles(() if scoring is None else scoring["sets"], present)
+    styles = set_styles(() if scoring is None else scoring["sets"], present, choice.chosen)
     found = []
     for name in names:
-        style = styles.get(name) or set_style(name, present)
-        found.append(ShownSet(name, Choice().role_of(name, present), style.index, style.marker))
+        style = styles.get(name) or set_style(name, present, choice.chosen)
+        found.append(ShownSet(name, choice.role_of(name, present), style.index, style.marker))
     return tuple(found)
