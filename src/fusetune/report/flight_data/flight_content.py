@@ -42,7 +42,7 @@ from fusetune.report.flight_data.sensor_panels import (
     status_ratio_panel,
     vibration_panels,
 )
-from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_sets
+from fusetune.report.flight_data.shown_sets import UNDECIDED, Choice, replayed_sets, shown_sets
 from fusetune.report.flight_data.state_panels import (
     Teller,
     earth_field,
@@ -63,7 +63,7 @@ LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
 
 
 def flight_content(
-    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice | None = None
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice = UNDECIDED
 ) -> FlightContent:
     """Gather it.
 
@@ -72,28 +72,29 @@ def flight_content(
     flight_folder : `results/save/<flight>` of a log of which something could be read
     analyze_folder : `results/analyze/<flight>`; of a flight that is not replayed without replays and scores
     sets : that are told first behind the present one and the chosen one, in this order
-    choice : what was decided
+    choice : what was decided, where it is known
 
     Raises
     ------
     UserError
         A file is missing or damaged.
     """
-    folder, choice = Path(analyze_folder), choice or Choice()
+    folder = Path(analyze_folder)
     results = read_flight_results(folder)
     scoring = _document(folder / SCORING_FILE)
     logged = read_logged(flight_folder, innovations=not (folder / ONBOARD_FILE).exists())
     replays = replays_of(folder, scoring)
     present = PRESENT if scoring is None else scoring["present"]
     first = [*([choice.chosen] if choice.chosen else []), *sets]
-    names = replayed_sets(scoring, folder / SCORE_TABLES["blocks"], first)
-    innovations = list(_innovations(folder, logged, scoring, replays, names))
+    shown = replayed_sets(scoring, folder / SCORE_TABLES["blocks"], first)
+    innovations = list(_innovations(folder, logged, scoring, replays, shown))
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
     told = tellers(logged, replays, LABELS, frame)
     start_us = logged.flight.start_timestamp
-    shown = flight_panels(logged, replays, innovations, told, frame, results.health)
-    panels = tuple(prepared(one, start_us) for one in shown)
+    panels = tuple(
+        prepared(one, start_us) for one in flight_panels(logged, replays, innovations, told, frame, results.health)
+    )
     curves = (one.set for panel in panels for one in panel.series if one.set is not None)
     names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
     flight = logged.flight

@@ -45,6 +45,9 @@ class Choice:
         return "ruled_out" if name in self.ruled_out else "candidate"
 
 
+UNDECIDED = Choice()
+
+
 def replayed_sets(
     scoring: Mapping[str, Any] | None, scores: AnyPath, first: Sequence[str] = (), most: int = MOST_SETS
 ) -> list[str]:
@@ -101,7 +104,7 @@ def relative_errors(scores: AnyPath, present: str) -> dict[str, float]:
 
 
 def shown_sets(
-    names: Sequence[str], scoring: Mapping[str, Any] | None, present: str, choice: Choice
+    names: Sequence[str], scoring: Mapping[str, Any] | None, present: str, choice: Choice = UNDECIDED
 ) -> tuple[ShownSet, ...]:
     """The sets as the views show them.
 
