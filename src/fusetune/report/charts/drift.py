@@ -90,7 +90,7 @@ def _relative(results: Results, withheld: Withheld, summary: pd.DataFrame) -> st
     curves.pop(results.present, None)
     others = [name for name in results.shown if name in curves]
     step = float(np.min(np.diff(horizons))) if len(horizons) > 1 else 1.0
-    offsets = np.linspace(-0.5, 0.5, len(others)) * _DODGE * step if len(others) > 1 else np.zeros(1)
+    offsets = np.linspace(-0.5, 0.5, len(others)) * _DODGE * step if len(others) > 1 else np.zeros(len(others))
     shown = summary[summary.index.get_level_values("set").isin(others)]
     able = [not results.is_ruled_out(name) for name in shown.index.get_level_values("set")]
     limits = robust_reach(shown["change_low"], shown["change_high"], able)
