@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,12 @@ class DecisionSummary:
     parameters: dict[str, tuple[float, float]]
     can_be_loaded: bool
     next_step: str
+
+    def lines(self) -> Iterator[str]:
+        """The sentence, and below it each parameter with its values."""
+        yield self.sentence
+        for name, (before, after) in self.parameters.items():
+            yield f"  {name}  {before:.6g} → {after:.6g}"
 
     def document(self) -> dict[str, Any]:
         """As JSON holds it."""
