@@ -12,8 +12,8 @@ import pytest
 DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "flights/README.md", "docs/*.md")
 
 MADE = (
-    "results", "uploads", ".snakemake", ".cache", ".venv", "flights/*", "flights.csv", "ranking.csv", "candidates.yaml",
-    "apply/candidates.yaml",
+    "results", "uploads", ".snakemake", ".cache", ".venv", "flights/*", "flights.csv", "checks.csv", "ranking.csv",
+    "candidates.yaml", "apply/candidates.yaml", "save/checks.csv",
 )  # fmt: skip
 """What runs and people make."""
 

@@ -331,7 +331,7 @@ def test_a_set_has_one_part_in_files_and_page(tmp_path: Path) -> None:
     }
     decision = run(tmp_path, sets)
     expected = {"present": "flies now", "restless": "not eligible", "worse": "not eligible", "able": "eligible"}
-    table = pd.read_csv(tmp_path / "apply" / "ranking.csv").set_index("name")
+    table = pd.read_csv(tmp_path / "apply" / "ranking.csv").set_index("set")
     for name, status in expected.items():
         assert ranked(decision, name)["status"] == table.loc[name, "status"] == status
     assert "so not eligible: worse." in decision["paragraph"]

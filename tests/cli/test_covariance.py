@@ -24,7 +24,7 @@ def test_a_design_becomes_tables_and_figures(tmp_path: Path, capsys: pytest.Capt
     printed = capsys.readouterr().out.splitlines()
     assert printed[0] == "p_x: 0.03483 m just before a correction"
     assert printed[1].split() == ["-33.4", "%", "gyro:", "noise", "÷2"]
-    with open(tmp_path / "covariance.csv", encoding="utf-8", newline="") as file:
+    with open(tmp_path / "covariance.csv", encoding="utf-8-sig", newline="") as file:
         rows = list(csv.DictReader(file))
     keys = [(row["variation"], row["state"]) for row in rows]
     assert len(keys) == len(set(keys)) == 4 * len({name for name, _ in keys})

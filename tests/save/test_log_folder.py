@@ -20,6 +20,7 @@ from fusetune.px4.ulog.reader import read_ulog
 from fusetune.px4.ulog.writer import write_ulog
 from fusetune.save import VerdictThresholds, load_flight, save_log, write_flights_table
 from fusetune.save.discovery import RefusedEntry
+from fusetune.save.flights_sheet import FLIGHTS_SHEET
 from fusetune.save.log_facts import recorded_at
 
 
@@ -202,7 +203,7 @@ def test_flights_table_keeps_the_given_order(tmp_path: Path, log: Path) -> None:
     assert rows[0]["checksum"] == read_ulog(log).checksum
     assert rows[1]["airborne_s"] is None
     csv = pa_csv.read_csv(tmp_path / "flights.csv")
-    assert csv.column_names == [name for name in rows[0] if name != "advice"]
+    assert csv.column_names == [column.name for column in FLIGHTS_SHEET]
     assert csv.column("status").to_pylist() == ["replayable", "refused"]
 
 
@@ -280,7 +281,7 @@ def test_names_and_hardware_are_no_formulas_in_the_table_of_flights(tmp_path: Pa
     save_log(tmp_path / f"{name}.ulg", tmp_path / name)
     write_flights_table([tmp_path / name], tmp_path / "flights.parquet", tmp_path / "flights.csv")
     row = pa_csv.read_csv(tmp_path / "flights.csv").to_pylist()[0]
-    assert (row["flight"], row["hardware"]) == (f"'{name}", f"'{hardware.decode()}")
+    assert (row["flight"], row["vehicle_hardware"]) == (f"'{name}", f"'{hardware.decode()}")
     assert row["duration_s"] == pytest.approx(12.995)
     kept = pq.read_table(tmp_path / "flights.parquet").to_pylist()[0]
     assert (kept["flight"], kept["hardware"]) == (name, hardware.decode())

@@ -58,7 +58,7 @@ def test_written_tables_hold_no_formula_and_keep_their_numbers(tmp_path: Path) -
         }
     )
     write_csv(tmp_path / "table.csv", table)
-    with open(tmp_path / "table.csv", encoding="utf-8", newline="") as file:
+    with open(tmp_path / "table.csv", encoding="utf-8-sig", newline="") as file:
         rows = list(csv.DictReader(file))
     assert rows[0] == {"flight": "'=1+1", "figure": "-1.5", "count": "-3", "kind": "'+x", "'@name": "true"}
     assert [row["flight"] for row in rows] == ["'=1+1", "plain", ""]

@@ -17,7 +17,7 @@ LONG_AGO_S = 1_600_000_000
 
 
 def verdicts(workspace: Workspace) -> dict[str, dict[str, str]]:
-    with open(workspace.folder / TABLE, encoding="utf-8", newline="") as file:
+    with open(workspace.folder / TABLE, encoding="utf-8-sig", newline="") as file:
         return {row["flight"]: row for row in csv.DictReader(file)}
 
 

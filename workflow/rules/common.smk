@@ -14,6 +14,8 @@ from fusetune.set_names import AS_FLOWN, mended_name
 from fusetune.storage.documents import read_document
 from fusetune.save import read_present
 from fusetune.save.discovery import printable
+from fusetune.save.flights_sheet import FLIGHTS_SHEET
+from fusetune.storage.sheet import table_row
 
 REPLAYED_FILES = [f"results/analyze/{{flight}}/{pset}.{part}" for pset in (PRESENT, AS_FLOWN) for part in PARTS]
 """The replays that are kept of a flight."""
@@ -31,14 +33,16 @@ TOLD_FILES = [*DIAGNOSED_FILES, TRACK_FILE, CONFORMANCE_FILE, *([DELAYS_FILE] if
 """What is told of a flight before any set is compared."""
 
 
-def read_csv(path):
+def read_flights(path):
+    """Rows of the table of flights."""
     check_checksum(path, RUN_AGAIN)
-    with open(path, encoding="utf-8", newline="") as file:
-        return [{as_it_was(name): as_it_was(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+    with open(path, encoding="utf-8-sig", newline="") as file:
+        cells = [{name: as_it_was(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+    return [table_row(FLIGHTS_SHEET, row) for row in cells]
 
 
 def replayable_flights():
-    rows = read_once(read_csv, checkpoints.list_flights.get().output.csv)
+    rows = read_once(read_flights, checkpoints.list_flights.get().output.csv)
     # What other flights left here is no answer to these; a dry run, which mends nothing, may meet it.
     return [row["flight"] for row in rows if row["status"] == "replayable" and row["flight"] in LOGS]
 
@@ -182,7 +186,7 @@ HISTORY = placed("results/history")
 @cache
 def changes_flown():
     """Of every flight that flew a change decided before: which, and the values before and after it."""
-    rows = read_once(read_csv, checkpoints.list_flights.get().output.csv)
+    rows = read_once(read_flights, checkpoints.list_flights.get().output.csv)
     if not os.path.isdir(HISTORY):
         return {}
     # it reads saved flights
@@ -197,13 +201,38 @@ def of_flights_after(pattern):
     return lambda wildcards: expand(pattern, flight=changes_flown())
 
 
+def verdict_of_flight(wildcards):
+    """Labels of a flight in Snakemake's report, from what was found."""
+    rows = {row["flight"]: row for row in read_once(read_flights, placed("results/save/flights.csv"))}
+    row = rows.get(wildcards.flight, {})
+    found = row.get("reason") or f"{row.get('warning_checks', 'no')} warnings"
+    return {"flight": wildcards.flight, "verdict": row.get("status", ""), "found": found}
+
+
+def told_in_report():
+    """What Snakemake's report says at its top: of the results that it packs, not of the configuration that is in force."""
+    file = placed("results/apply/decision.json")
+    if not os.path.exists(file):
+        return {}
+    document = read_document(file)
+    files = document["provenance"]["configuration_files"]
+    return {
+        "product": document["provenance"]["product"],
+        "paragraphs": document["paragraphs"],
+        "flights": len(document["flights"]),
+        "scored": document["flights_scored"],
+        "sets": len(document["sets"]),
+        "files": sorted(files),
+    }
+
+
 def closing_words():
     table, page, decision = map(
         placed, ("results/save/flights.csv", "results/report.html", "results/apply/decision.json")
     )
     if not os.path.exists(table):
         return "Done."
-    statuses = [row["status"] for row in told_in_one_line(read_csv, table)]
+    statuses = [row["status"] for row in told_in_one_line(read_flights, table)]
     kind = "simulated flights" if DEMONSTRATED else "flights"
     refused = len(statuses) - statuses.count("replayable")
     flights = f"{len(statuses)} {kind}, {refused} refused (reasons: {table})."

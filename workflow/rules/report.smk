@@ -22,7 +22,7 @@ rule plot_flight:
         report(
             "results/report/flights/{flight}.png",
             caption="../report/flight.rst",
-            category="Flights",
+            category=FLIGHTS_STEP,
             labels={"flight": "{flight}"},
         ),
     log:
@@ -56,8 +56,8 @@ rule flight_page:
             report(
                 "results/report/flights/{flight}.html",
                 caption="../report/flight_page.rst",
-                category="Flights",
-                labels={"flight": "{flight}"},
+                category=FLIGHTS_STEP,
+                labels=verdict_of_flight,
             )
         ),
     log:
@@ -138,7 +138,7 @@ rule fleet_page:
         report(
             "results/fleet.html",
             caption="../report/fleet_page.rst",
-            category="Flights",
+            category=FLIGHTS_STEP,
             labels={"flight": "all flights"},
         ),
     log:
@@ -168,7 +168,7 @@ rule plot_summary:
             report(
                 f"results/report/{figure}",
                 caption="../report/summary.rst",
-                category="Decision",
+                category=DECISION_STEP,
                 labels={"figure": label},
             )
             for figure, label in SUMMARY_FIGURES.items()
@@ -208,7 +208,7 @@ rule build_report:
         report(
             "results/report.html",
             caption="../report/page.rst",
-            category="Decision",
+            category=DECISION_STEP,
             labels={"page": "report"},
         ),
     log:

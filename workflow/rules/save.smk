@@ -36,8 +36,14 @@ checkpoint list_flights:
         csv=report(
             "results/save/flights.csv",
             caption="../report/flights.rst",
-            category="Flights",
+            category=FLIGHTS_STEP,
             labels={"table": "verdicts"},
+        ),
+        checks=report(
+            "results/save/checks.csv",
+            caption="../report/checks.rst",
+            category=FLIGHTS_STEP,
+            labels={"table": "checks"},
         ),
     log:
         "results/logs/list_flights.log",

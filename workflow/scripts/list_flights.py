@@ -30,7 +30,9 @@ keep_out("pandas")
 with logged_job(snakemake.log[0]):
     params, folders = snakemake.params, {Path(folder).name: Path(folder) for folder in snakemake.input.folders}
     refused = [RefusedEntry(*entry) for entry in params.refused]
-    rows = write_flights_table(list(folders.values()), snakemake.output.table, snakemake.output.csv, refused)
+    rows = write_flights_table(
+        list(folders.values()), snakemake.output.table, snakemake.output.csv, refused, snakemake.output.checks
+    )
     present = find_present(rows, folders, params.varied, params.present_flight, params.vehicle, counts, params.around)
     write_present(snakemake.output.present, present)
     print(*(f"no set {name}: {why}" for name, why in present.left_out.items()), sep="\n")

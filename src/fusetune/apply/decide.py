@@ -48,6 +48,7 @@ from fusetune.apply.power.power import Power, power_of
 from fusetune.apply.power.spread import spread_of
 from fusetune.apply.provenance import file_hash, flight_rows, provenance
 from fusetune.apply.ranking import RankedSet, rank
+from fusetune.apply.ranking_sheet import sheet_of_ranking
 from fusetune.apply.recommended import Recommended
 from fusetune.apply.rounded import rounded
 from fusetune.apply.sensitivity.files import SENSITIVITY_FILE, write_sensitivity
@@ -203,7 +204,7 @@ def decide(
     )
 
     output = Path(output_folder)
-    _write_ranking(output, ranked, values)
+    _write_ranking(output, ranked, values, settings.main_source)
     _write_per_flight(output, flights)
     write_candidates(output / "candidates.yaml", proposed)
     write_sensitivity(output / SENSITIVITY_FILE, _sensitivity(flights, newest, present, choice, ranked, settings))
@@ -418,7 +419,7 @@ def _paper_mode(
     }
 
 
-def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, Criteria]) -> None:
+def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, Criteria], source: str) -> None:
     rows = []
     for position, one in enumerate(ranked, start=1):
         row: dict[str, Any] = {"rank": position, **_figures_of(one), **_flat_aims(one), **values[one.name]}
@@ -432,7 +433,7 @@ def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, 
     table = table.cast(pa.schema(schema))
     with atomic_path(folder / "ranking.parquet") as temporary:
         write_table(table, temporary)
-    write_csv(folder / "ranking.csv", table)
+    write_csv(folder / "ranking.csv", *sheet_of_ranking(table, source))
 
 
 def _flat_aims(one: RankedSet) -> dict[str, float | None]:

@@ -27,7 +27,7 @@ _LOG = re.compile(r"\.ulg$", re.IGNORECASE | re.DOTALL)
 _PACKED = re.compile(r"\.ulg\.(gz|xz|bz2|zst|lz4|zip|7z)$", re.IGNORECASE | re.DOTALL)
 
 SD_CARD_FOLDER = "log"
-TABLE_NAMES = ("flights.parquet", "flights.csv", "present.json", "delays.json", "legs.parquet")
+TABLE_NAMES = ("flights.parquet", "flights.csv", "checks.csv", "present.json", "delays.json", "legs.parquet")
 """Files that lie beside the folders of flights, of the save and of the analyze room."""
 LONGEST_NAME_BYTES = 120
 """File systems end names at 255 bytes; jobs append parts of their own."""

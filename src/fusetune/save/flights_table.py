@@ -9,10 +9,11 @@ from typing import Any
 
 import pyarrow as pa
 
-from fusetune.finding import Finding, documents, from_documents, of_severity
+from fusetune.finding import Finding, Severity, documents, from_documents, of_severity
 from fusetune.px4.vehicle_identity import VehicleIdentity
 from fusetune.save.discovery import RefusedEntry
 from fusetune.save.flight_folder import METADATA_FILE, read_flight_document
+from fusetune.save.flights_sheet import CHECKS_SHEET, FLIGHTS_SHEET
 from fusetune.save.log_folder import VERDICT_FILE
 from fusetune.storage.checksum_file import write_checksum
 from fusetune.storage.csv_file import write_csv
@@ -44,11 +45,24 @@ SCHEMA = pa.schema(
 `file` is the path of the log below the folder of flights.
 `vehicle` is the short name of who flew, the columns behind it what it is made of (`fusetune.px4.vehicle_identity`);
 all are empty where the log could not be read.
-`checks` holds id, severity and figure of every check's finding; `advice`, which the CSV leaves out, those that did not
-pass and have a remedy, as findings (`fusetune.finding.from_documents`).
+`checks` holds id, severity and figure of every check's finding; `advice` those that did not pass and have a remedy, as
+findings (`fusetune.finding.from_documents`). The sheets have each of them in a row of its own.
 """
 
+CHECKS_SCHEMA = pa.schema(
+    [
+        *((name, pa.string()) for name in ("flight", "id", "severity")),
+        *((name, pa.float64()) for name in ("figure", "threshold")),
+        ("unit", pa.string()),
+        *((name, pa.float64()) for name in ("from_boot_s", "to_boot_s")),
+        *((name, pa.string()) for name in ("found", "remedy")),
+    ]
+)
+"""Columns of the table of checks, findings of each flight in their order; times in s since boot."""
+
 _DUPLICATE = "duplicate"
+
+_COUNTED: dict[str, Severity] = {"failed_checks": "fail", "warning_checks": "warning"}
 
 
 def write_flights_table(
@@ -56,8 +70,11 @@ def write_flights_table(
     table: str | os.PathLike[str],
     csv: str | os.PathLike[str],
     refused: Sequence[RefusedEntry] = (),
+    checks: str | os.PathLike[str] | None = None,
 ) -> list[dict[str, Any]]:
     """Put the verdicts of saved flights into one table, in the order given, as Parquet and as CSV.
+
+    Where asked for, the checks of all flights go into another CSV, each a row.
 
     What was `refused` before it could be saved comes last.
 
@@ -76,12 +93,27 @@ def write_flights_table(
     found = [_row(Path(folder)) for folder in folders]
     _refuse_duplicates(found)
     found += [_row_of_refused(entry) for entry in refused]
+    findings = [row.pop("findings") for row in found]
     rows = pa.Table.from_pylist(found, schema=SCHEMA)
     with atomic_path(table) as temporary:
         write_table(rows, temporary)
-    write_csv(csv, rows.drop_columns(["advice"]))
+    for name, severity in _COUNTED.items():
+        counts = [len(of_severity(of_flight, severity)) for of_flight in findings]
+        rows = rows.append_column(name, pa.array(counts, pa.int64()))
+    write_csv(csv, rows, FLIGHTS_SHEET)
     write_checksum(csv)
+    if checks is not None:
+        of_checks = [
+            _row_of_check(row["flight"], one) for row, told in zip(found, findings, strict=True) for one in told
+        ]
+        write_csv(checks, pa.Table.from_pylist(of_checks, schema=CHECKS_SCHEMA), CHECKS_SHEET)
     return found
+
+
+def _row_of_check(flight: str, finding: Finding) -> dict[str, Any]:
+    times = {"from_boot_s": finding.start_us, "to_boot_s": finding.stop_us}
+    in_seconds = {name: None if time is None else time / 1e6 for name, time in times.items()}
+    return {"flight": flight, **finding.document(), **in_seconds}
 
 
 def _row(folder: Path) -> dict[str, Any]:
@@ -124,6 +156,7 @@ def _refuse_duplicates(rows: list[dict[str, Any]]) -> None:
             told = _told([found])
             row |= {"status": "refused"} | {name: told[name] for name in ("reason", "remedy", "advice")}
         row["checks"] += f"; {_compact(found)}"
+        row["findings"] = (*row["findings"], found)
 
 
 def _told(findings: Sequence[Finding]) -> dict[str, Any]:
@@ -135,6 +168,7 @@ def _told(findings: Sequence[Finding]) -> dict[str, Any]:
         "warnings": "; ".join(finding.found for finding in warnings),
         "checks": "; ".join(map(_compact, findings)),
         "advice": documents(finding for finding in (*failures, *warnings) if finding.remedy),
+        "findings": tuple(findings),
     }
 
 
