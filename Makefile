@@ -4,6 +4,7 @@
 # make test           adds to .venv what development needs, where that is missing, then runs the tests
 # make lint           … then looks for slips, form, and imports that the house forbids
 # make types          … then checks the types
+# make docs           … then builds the documentation into site/, its notebooks run on the demonstration's flights
 # make with-upload    adds to .venv what requirements-upload.lock holds; likewise with-slurm, with-mlflow, with-dev
 # These are the checks of a change; .ci/run and .github/workflows/checks.yml call them.
 CORES ?= 2
@@ -30,7 +31,7 @@ unexport UV_COMPILE_BYTECODE
 # What the demonstration is for; with real logs the same files come.
 MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
 
-.PHONY: all setup test lint types demonstration demo-loop lock clean
+.PHONY: all setup test lint types demonstration demo-loop docs lock clean
 
 all: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -60,6 +61,10 @@ demonstration: all
 		grep -q "$$name" results/apply/best_params.params || { echo "$$name is left wrong" >&2; exit 1; }; \
 	done
 	@$(BIN)/snakemake --cores 1 --dry-run | grep -q "Nothing to be done" || { echo "a second run would not be idle" >&2; exit 1; }
+
+# Fails where a link leads nowhere, a docstring cannot be read, or a cell of a notebook fails.
+docs: .venv/.with-docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 demo-loop: $(READY)
 	$(BIN)/python -m benchmarks.closed_loop --cores $(CORES)
@@ -95,7 +100,7 @@ $(READY): requirements.lock pyproject.toml
 lock:
 	$(LOCK) $(UPGRADE) --extra build --extra test --extra dev --output-file requirements-dev.lock
 	$(LOCK) $(UPGRADE) --extra build --constraint requirements-dev.lock --output-file requirements.lock
-	for extra in upload slurm mlflow; do \
+	for extra in upload slurm mlflow docs; do \
 		$(LOCK) $(UPGRADE) --extra $$extra --constraint requirements-dev.lock --output-file requirements-$$extra.lock || exit 1; \
 	done
 

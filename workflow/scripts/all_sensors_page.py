@@ -14,4 +14,4 @@ keep_out("pandas")
 with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
     folders = [Path(file).parent for file in snakemake.input.noise]
     page = Path(snakemake.output[0])
-    build_pooled_sensor_page(folders, figures, page, {"All flights": page.parents[1] / "fleet.html"})
+    build_pooled_sensor_page(folders, figures, page, {"The decision": page.parents[1] / "report.html"})

@@ -1,6 +1,7 @@
 """Figures of the comparison with the present set: forest plot, flights by sets, aided against unaided."""
 
 import math
+import textwrap
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ from fusetune.report.comparison import (
 )
 from fusetune.report.figures.drawing import GOOD_COLOUR, PRESENT_COLOUR, empty_figure, label_sets, minus, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles, status_colour
+from fusetune.report.flight_names import short_names
 from fusetune.report.results import OUT, Results
 
 Limits = tuple[float, float]
@@ -29,6 +31,7 @@ Limits = tuple[float, float]
 NOTHING_TO_COMPARE = "Only the present set was scored: there is nothing to compare."
 
 _ANNOTATED_CELLS = 240
+_TITLE_WIDTH = 18
 _LONGEST_NAME = 30
 
 
@@ -78,7 +81,7 @@ def _forest(axes: Axes, results: Results, aim: str, names: list[str]) -> None:
             _beyond(axes, row, one["change"], left, right)
     axes.axvline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
     axes.set_xlim(left, right)
-    axes.set_title(AIM_LABELS[aim])
+    axes.set_title(textwrap.fill(AIM_LABELS[aim], _TITLE_WIDTH))
 
 
 def _beyond(axes: Axes, row: int, change: float, left: float, right: float) -> None:
@@ -95,7 +98,7 @@ def flights_by_sets(results: Results) -> Figure:
     if changes.empty or not len(changes.columns):
         return empty_figure(NOTHING_TO_COMPARE)
     values = changes.to_numpy()
-    labels = flight_labels([str(name) for name in changes.index])
+    labels = list(short_names(map(str, changes.index)).values())
     numbered = [f"{label}  {i}" for i, label in enumerate(labels, start=1)]
     label_inches = 0.3 + 0.066 * max(map(len, numbered))
     # no narrower than its title
@@ -115,7 +118,7 @@ def flights_by_sets(results: Results) -> Figure:
     beyond = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
         (bool(np.nanmin(values) < -limit), bool(np.nanmax(values) > limit)), "neither"
     )
-    figure.colorbar(image, ax=axes, label="change of the prediction error [%]", extend=beyond)
+    figure.colorbar(image, ax=axes, label="change [%]", extend=beyond)
     figure.suptitle("Per flight against the present set; below 0 is better", fontsize=9, x=0.01, ha="left")
     return figure
 
@@ -198,13 +201,3 @@ def shortened(name: str, longest: int = _LONGEST_NAME) -> str:
         return name
     head = (longest - 1) // 3
     return f"{name[:head]}…{name[-(longest - 1 - head) :]}"
-
-
-def flight_labels(names: list[str]) -> list[str]:
-    """Names of flights without the beginning that they share, where they are long."""
-    if max(map(len, names)) <= _LONGEST_NAME:
-        return names
-    # What the first and the last in alphabetical order share, all between them share.
-    first, last = min(names), max(names)
-    shared = next((i for i, pair in enumerate(zip(first, last, strict=False)) if pair[0] != pair[1]), 0)
-    return [shortened(f"…{name[shared:]}" if shared > 3 else name) for name in names]

@@ -1,6 +1,7 @@
 """All figures that compare the sets over all flights, and the files they are kept in."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -11,7 +12,7 @@ from fusetune.report.figures.innovation_figures import boxes, breaks, consistenc
 from fusetune.report.figures.power_figure import power_figure
 from fusetune.report.figures.sensitivity_figure import sensitivity_figure
 from fusetune.report.figures.unaided_figures import drift_figure
-from fusetune.report.results import pooled_samples, read_results
+from fusetune.report.results import Results, pooled_samples, read_results
 from fusetune.storage.files import AnyPath
 
 SUMMARY_FIGURES = (
@@ -39,21 +40,26 @@ def plot_summary(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath, figu
     apply_folder : `results/apply`
     """
     results = read_results(analyze_folders, apply_folder)
-    pooled = pooled_samples(results)
-    drawings: dict[str, Callable[[], Figure]] = {
+    drawings = summary_drawings(results)
+    with figure_style():
+        for name in SUMMARY_FIGURES:
+            figure = drawings[name]() if results.flights else empty_figure("No flight has a say in the decision.")
+            save_svg(figure, Path(figure_folder) / name)
+
+
+def summary_drawings(results: Results) -> dict[str, Callable[[], Figure]]:
+    """How each of `SUMMARY_FIGURES` is drawn."""
+    pooled = cache(lambda: pooled_samples(results))
+    return {
         "differences.svg": lambda: differences(results),
         "flights_by_sets.svg": lambda: flights_by_sets(results),
         "pareto.svg": lambda: pareto(results),
         "drift.svg": lambda: drift_figure(results),
         "sensitivity.svg": lambda: sensitivity_figure(results.sensitivity.found),
         "rms.svg": lambda: rms_by_variable(results),
-        "innovations.svg": lambda: boxes(results, pooled, normalised=False),
-        "normalised_innovations.svg": lambda: boxes(results, pooled, normalised=True),
+        "innovations.svg": lambda: boxes(results, pooled(), normalised=False),
+        "normalised_innovations.svg": lambda: boxes(results, pooled(), normalised=True),
         "consistency.svg": lambda: consistency(results),
         "breaks.svg": lambda: breaks(results),
         "power.svg": lambda: power_figure(results),
     }
-    with figure_style():
-        for name in SUMMARY_FIGURES:
-            figure = drawings[name]() if results.flights else empty_figure("No flight has a say in the decision.")
-            save_svg(figure, Path(figure_folder) / name)
