@@ -137,7 +137,7 @@ def test_results_of_a_release_that_is_not_understood_are_told(
 def test_what_the_vehicle_cannot_be_given_is_said_with_the_decision(made_results: ResultsFolder) -> None:
     refused = {"name": "EKF2_DELAY_MAX", "reason": "v1.12 has no such parameter", "remedy": "Leave it out"}
     summary = decision_summary(made_results.decision | {"on_vehicle": {"parameters": [], "refused": [refused]}})
-    assert "Nothing of it can be loaded: EKF2_DELAY_MAX: v1.12 has no such parameter." in summary.sentence
+    assert "But nothing of it can be loaded: EKF2_DELAY_MAX: v1.12 has no such parameter." in summary.sentence
     assert not summary.can_be_loaded
 
 

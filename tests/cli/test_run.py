@@ -122,7 +122,7 @@ def test_piped_it_is_quiet_and_by_lines(capsys: Captured, monkeypatch: pytest.Mo
     monkeypatch.setattr("fusetune.cli.output.run_display.EVERY_S", 0.0)
     assert shown(capsys).splitlines()[1:] == [
         "Save: read one (0 %, 0 of 2 flights)",
-        "Analyze: replay and score one (5 %, 0 of 2 flights)",
+        "Analyze: replay and score one (6 %, 0 of 2 flights)",
     ]
     every = shown(capsys, verbose=True).splitlines()
     assert every[2:4] == ["Save: read one", "Save: read one: done after 0.0 s"]

@@ -24,22 +24,22 @@ def work(progress: RunProgress, number: int, rule: str, flight: str = "") -> Non
 
 
 def test_share_and_time_left_follow_from_what_jobs_cost() -> None:
-    """Two flights: 2 × (0.2 + 1.7) + 0.5 of the list; when 0.4 + 0.5 + 1.7 = 2.6 of 4.3 took 13 s, 8.5 s are left."""
+    """Two flights: 2 × (0.25 + 2) + 0.4 of the list; when 0.5 + 0.4 + 2 = 2.9 of 4.9 took 14.5 s, 10 s are left."""
     clock = Clock()
     progress = RunProgress(clock)
     progress.take(Planned({"save_flight": 2, "list_flights": 1}))
     assert progress.flights == 2
     for number in (1, 2):
         work(progress, number, "save_flight", f"flight_{number}")
-    assert progress.share == pytest.approx(0.4 / 4.3)
+    assert progress.share == pytest.approx(0.5 / 4.9)
     assert progress.left_s is None, "too little is done"
     work(progress, 3, "list_flights")
     work(progress, 4, "analyze_flight", "flight_1")
-    clock.now = 13.0
+    clock.now = 14.5
     progress.take(Counted(4, 5))
     assert (progress.done, progress.total) == (4, 5)
-    assert progress.share == pytest.approx(2.6 / 4.3)
-    assert progress.left_s == pytest.approx(8.5)
+    assert progress.share == pytest.approx(2.9 / 4.9)
+    assert progress.left_s == pytest.approx(10.0)
     assert (progress.flights_done, progress.flights) == (1, 2)
 
 
@@ -63,10 +63,10 @@ def test_compiling_says_nothing_of_the_time_left() -> None:
     clock.now = 100.0
     assert progress.left_s is None
     progress.take(JobDone(1))
-    for number in (2, 3):
+    for number in (2, 3, 4):
         work(progress, number, "tell_flight", str(number))
     clock.now = 106.0
-    assert progress.left_s == pytest.approx(6.0)
+    assert progress.left_s == pytest.approx(2.0)
 
 
 def test_rules_that_are_named_exist(project_root: Path) -> None:

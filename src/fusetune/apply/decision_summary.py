@@ -64,7 +64,7 @@ def decision_summary(decision: Mapping[str, Any]) -> DecisionSummary:
     if exploratory and decision["status"] != "no_evidence":
         sentence += f" Exploratory: {counted(decision['flights_scored'], 'flight')} cannot speak for the next one."
     if refused:
-        sentence += f" Nothing of it can be loaded: {refused[0]['name']}: {refused[0]['reason']}."
+        sentence += f" But nothing of it can be loaded: {refused[0]['name']}: {refused[0]['reason']}."
     return DecisionSummary(
         status=decision["status"],
         chosen=decision["chosen"],
