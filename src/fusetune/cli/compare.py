@@ -112,6 +112,9 @@ def _flights(found: ComparedResults, most: int | None) -> Iterator[str]:
         notes += [] if one.a_counts == one.b_counts else ["counts in A alone" if one.a_counts else "counts in B alone"]
         if notes or size >= 5e-5:
             rows.append((size, [one.flight, percent(one.largest_percent, digits=4), one.of_set, "; ".join(notes)]))
+    if not found.flights:
+        yield "Scores: no flight is in both."
+        return
     if not rows:
         yield f"Scores: the same on all {len(found.flights)} flights that both have."
         return

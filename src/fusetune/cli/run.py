@@ -70,6 +70,7 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.running.project_folder import RESULTS
     from fusetune.running.run_failures import RunFailures
     from fusetune.running.worker_processes import all_cores
+    from fusetune.running.workflow_events import JobBegun
     from fusetune.running.workflow_files import workflow_file
     from fusetune.running.workflow_run import run_workflow
 
@@ -81,7 +82,11 @@ def run(options: argparse.Namespace) -> int:
     failures = RunFailures(folder)
     display = run_display(quiet=options.quiet, verbose=options.verbose or options.dry_run)
 
+    jobs = 0
+
     def take(told: Event | str) -> None:
+        nonlocal jobs
+        jobs += isinstance(told, JobBegun)
         failures.take(told)
         display.take(told)
 
@@ -93,6 +98,8 @@ def run(options: argparse.Namespace) -> int:
         for sentence in failures.sentences():
             print(f"fusetune: {sentence}", file=sys.stderr)
         return USER_ERROR
+    if not jobs and not options.quiet:
+        print("Nothing is out of date.", file=sys.stderr)
     if not options.dry_run:
         outcome = run_outcome(folder / RESULTS)
         if options.json:
