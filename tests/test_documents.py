@@ -13,7 +13,7 @@ DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md",
 
 MADE = (
     "results", "uploads", ".snakemake", ".cache", ".venv", "flights/*", "flights.csv", "checks.csv", "ranking.csv",
-    "candidates.yaml", "apply/candidates.yaml",
+    "candidates.yaml", "apply/candidates.yaml", "save/checks.csv",
 )  # fmt: skip
 """What runs and people make."""
 

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import time
+import zipfile
 from pathlib import Path
 
 from tests.workflow.conftest import ONE_MORE_MESSAGE, STUDY, Workspace
@@ -61,6 +62,18 @@ def test_the_present_set_carries_the_values_of_the_newest_flight(demonstration: 
     assert overrides.keys() == flown_last.keys()
     for name, value in flown_last.items():
         assert abs(overrides[name] - value) < 1e-6  # a log keeps parameters in single precision
+
+
+def test_the_report_of_snakemake_tells_of_the_results_by_step(demonstration: Workspace, tmp_path: Path) -> None:
+    """Of what was decided, with the files that it was decided with."""
+    demonstration.run_ok("--report", str(tmp_path / "report.zip"))
+    with zipfile.ZipFile(tmp_path / "report.zip") as file:
+        page = file.read("report/report.html").decode()
+    decision = json.loads((demonstration.folder / DECISION).read_text(encoding="utf-8"))
+    assert json.dumps(decision["paragraphs"][0])[1:-1] in page
+    assert "config/small.yaml</tt>" in page
+    assert [name for name in ("1 Design", "2 Flights", "3 Decision") if f'"{name}"' not in page] == []
+    assert '"verdict": "replayable", "found": "0 warnings"' in page
 
 
 def test_a_second_run_has_nothing_to_do(demonstration: Workspace) -> None:

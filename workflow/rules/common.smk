@@ -212,6 +212,31 @@ def of_flights_after(pattern):
     return lambda wildcards: expand(pattern, flight=changes_flown())
 
 
+def verdict_of_flight(wildcards):
+    """Labels of a flight in Snakemake's report, from what was found."""
+    rows = {row["flight"]: row for row in read_once(read_flights, placed("results/save/flights.csv"))}
+    row = rows.get(wildcards.flight, {})
+    found = row.get("reason") or f"{row.get('warning_checks', 'no')} warnings"
+    return {"flight": wildcards.flight, "verdict": row.get("status", ""), "found": found}
+
+
+def told_in_report():
+    """What Snakemake's report says at its top: of the results that it packs, not of the configuration that is in force."""
+    file = placed("results/apply/decision.json")
+    if not os.path.exists(file):
+        return {}
+    document = read_document(file)
+    files = document["provenance"]["configuration_files"]
+    return {
+        "product": document["provenance"]["product"],
+        "paragraphs": document["paragraphs"],
+        "flights": len(document["flights"]),
+        "scored": document["flights_scored"],
+        "sets": len(document["sets"]),
+        "files": sorted(files),
+    }
+
+
 def closing_words():
     table, page, decision = map(
         placed, ("results/save/flights.csv", "results/report.html", "results/apply/decision.json")

@@ -6,6 +6,8 @@ from fusetune.inputs import check_demonstration, read_inputs
 from fusetune.save.present import PRESENT, FlightSets
 
 NO_FLIGHT = "(?!)"
+# In the report of Snakemake, which sorts them by name.
+DESIGN_STEP, FLIGHTS_STEP, DECISION_STEP = "1 Design", "2 Flights", "3 Decision"
 CONFIG_FILE = (configuration_files() or [GIVEN_NAME])[-1]
 
 INPUTS = told_in_one_line(read_inputs, SETTINGS, CONFIG_FILE)

@@ -10,7 +10,7 @@ rule design:
         sets=report(
             "results/design/sets.parquet",
             caption="../report/sets.rst",
-            category="Design",
+            category=DESIGN_STEP,
             labels={"table": "parameter sets"},
         ),
         params=expand("results/design/{pset}.params", pset=list(SETS.study)),
@@ -41,7 +41,7 @@ rule mission_map:
         map=report(
             f"results/design/{INPUTS.mission.name}.svg",
             caption="../report/mission.rst",
-            category="Design",
+            category=DESIGN_STEP,
             labels={"figure": "mission"},
         ),
         outlook=f"results/design/{INPUTS.mission.name}.json",

@@ -12,8 +12,8 @@ rule flight_page:
             report(
                 "results/report/flights/{flight}.html",
                 caption="../report/flight_page.rst",
-                category="Flights",
-                labels={"flight": "{flight}"},
+                category=FLIGHTS_STEP,
+                labels=verdict_of_flight,
             )
         ),
         blob=update("results/report/flights/{flight}.blob"),
@@ -107,7 +107,7 @@ rule build_report:
         report(
             "results/report.html",
             caption="../report/page.rst",
-            category="Decision",
+            category=DECISION_STEP,
             labels={"page": "report"},
         ),
     log:

@@ -36,13 +36,13 @@ checkpoint list_flights:
         csv=report(
             "results/save/flights.csv",
             caption="../report/flights.rst",
-            category="Flights",
+            category=FLIGHTS_STEP,
             labels={"table": "verdicts"},
         ),
         checks=report(
             "results/save/checks.csv",
             caption="../report/checks.rst",
-            category="Flights",
+            category=FLIGHTS_STEP,
             labels={"table": "checks"},
         ),
     log:

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from fusetune.apply.decision_summary import decision_summary
+from fusetune.apply.flat_settings import changed_settings
 from fusetune.apply.results_folder import ResultsFolder
 from fusetune.errors import UserError
 from fusetune.storage.parquet import read_table
@@ -130,15 +131,11 @@ def compare_results(a: ResultsFolder, b: ResultsFolder) -> ComparedResults:
     documents = [_decision(one) for one in (a, b)]
     one, other = documents
     flights = [{row["flight"]: row for row in document["flights"]} for document in documents]
-    rules = [{**document["rule"]} for document in documents]
-    names = dict.fromkeys((*rules[0], *rules[1]))
     hashes = [document["provenance"]["configuration_files"] for document in documents]
     return ComparedResults(
         a=_told(a, one),
         b=_told(b, other),
-        settings={
-            name: values for name in names if (values := (rules[0].get(name), rules[1].get(name)))[0] != values[1]
-        },
+        settings=changed_settings(one["rule"], other["rule"]),
         files=tuple(sorted(name for name in {*hashes[0], *hashes[1]} if hashes[0].get(name) != hashes[1].get(name))),
         parameters=_parameters(one, other),
         sets=_sets(one, other),

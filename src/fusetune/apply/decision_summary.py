@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +31,12 @@ class DecisionSummary:
     can_be_loaded: bool
     next_step: str
 
+    def lines(self) -> Iterator[str]:
+        """The sentence, and below it each parameter with its values."""
+        yield self.sentence
+        for name, (before, after) in self.parameters.items():
+            yield f"  {name}  {before:.6g} → {after:.6g}"
+
     def document(self) -> dict[str, Any]:
         """As JSON holds it."""
         return {
@@ -58,7 +64,7 @@ def decision_summary(decision: Mapping[str, Any]) -> DecisionSummary:
     if exploratory and decision["status"] != "no_evidence":
         sentence += f" Exploratory: {counted(decision['flights_scored'], 'flight')} cannot speak for the next one."
     if refused:
-        sentence += f" Nothing of it can be loaded: {refused[0]['name']}: {refused[0]['reason']}."
+        sentence += f" But nothing of it can be loaded: {refused[0]['name']}: {refused[0]['reason']}."
     return DecisionSummary(
         status=decision["status"],
         chosen=decision["chosen"],

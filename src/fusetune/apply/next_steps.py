@@ -32,10 +32,7 @@ LOG, LOAD, CONFIRM, FLY, STUDY, SEARCH, STOP, OWN_LOGS = (
 )  # fmt: skip
 
 SEARCH_COMMAND = "fusetune search flights/*.ulg --out results/search"
-STUDY_COMMAND = (
-    "cp results/apply/candidates.yaml config/studies/ && "
-    "snakemake --cores 2 --config study=config/studies/candidates.yaml"
-)
+STUDY_COMMAND = "cp results/apply/candidates.yaml candidates.yaml && fusetune run --study candidates.yaml"
 
 
 @dataclass(frozen=True)

@@ -101,11 +101,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if "_ARGCOMPLETE" in os.environ:
         from fusetune.cli.output.completers import complete
 
-        complete(_parser())
+        complete(parser())
     if not arguments and sys.stdout is not None and sys.stdout.isatty():
         print(_BEGIN)
         return DONE
-    options = _parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     try:
         status = COMMANDS[options.command].run(options)
         if sys.stdout is not None:
@@ -136,32 +136,30 @@ def _failed(message: str) -> int:
     return USER_ERROR
 
 
-class _Layout(argparse.RawDescriptionHelpFormatter):
-    """Keeps the lines of what stands around the options; a text without line breaks of its own is filled."""
-
-    def _fill_text(self, text: str, width: int, indent: str) -> str:
-        if "\n" in text:
-            return super()._fill_text(text, width, indent)
-        return argparse.HelpFormatter._fill_text(self, text, width, indent)
+_KEEP_LINES = argparse.RawDescriptionHelpFormatter
+"""What stands around the options has lines of its own."""
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """All sub-commands with their options."""
+    whole = argparse.ArgumentParser(
         prog="fusetune",
         usage="fusetune COMMAND …    (fusetune COMMAND --help for its options and examples)",
         description=_listed(),
         epilog=_STATUSES,
-        formatter_class=_Layout,
+        formatter_class=_KEEP_LINES,
     )
-    parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
-    commands = parser.add_subparsers(
+    whole.add_argument("--version", action="version", version=f"fusetune {__version__}")
+    commands = whole.add_subparsers(
         dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS, prog="fusetune"
     )
     for name, command in COMMANDS.items():
-        own = commands.add_parser(name, help=command.HELP, description=_sentence(command.HELP), formatter_class=_Layout)
+        own = commands.add_parser(
+            name, help=command.HELP, description=_wrapped(_sentence(command.HELP)), formatter_class=_KEEP_LINES
+        )
         command.add_arguments(own)
         own.epilog = "\n\n".join(filter(None, (_examples(command), own.epilog and _wrapped(own.epilog))))
-    return parser
+    return whole
 
 
 def _listed() -> str:

@@ -51,6 +51,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _lines(found: ComparedResults, most: int | None) -> Iterator[str]:
+    from fusetune.apply.wording import named
+
     yield f"The decision is {'the same' if found.same_decision else 'another'}."
     for letter, one in (("A", found.a), ("B", found.b)):
         yield f"{letter}  {one['folder']}, {one['product']}: {one['sentence']}"
@@ -62,7 +64,7 @@ def _lines(found: ComparedResults, most: int | None) -> Iterator[str]:
     yield from _flights(found, most)
     for letter, names in (("A", found.only_a), ("B", found.only_b)):
         if names:
-            yield f"Only in {letter}: {', '.join(names)}"
+            yield f"Only in {letter}: {', '.join(names) if most is None else named(names)}"
     for name, (one, other) in found.settings.items():
         yield f"Setting {name}: {_shown(one)} → {_shown(other)}"
     if found.files:
@@ -110,6 +112,9 @@ def _flights(found: ComparedResults, most: int | None) -> Iterator[str]:
         notes += [] if one.a_counts == one.b_counts else ["counts in A alone" if one.a_counts else "counts in B alone"]
         if notes or size >= 5e-5:
             rows.append((size, [one.flight, percent(one.largest_percent, digits=4), one.of_set, "; ".join(notes)]))
+    if not found.flights:
+        yield "Scores: no flight is in both."
+        return
     if not rows:
         yield f"Scores: the same on all {len(found.flights)} flights that both have."
         return

@@ -13,6 +13,7 @@ from fusetune.cli.output.json_document import add_json, print_document
 from fusetune.errors import UserError
 
 if TYPE_CHECKING:
+    from fusetune.apply.decision_summary import DecisionSummary
     from fusetune.apply.settings import DecisionSettings
 
 HELP = "decide anew from scores that are there, with other settings of the decision"
@@ -59,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
             {
                 **now.document(),
                 "before": before.document(),
-                "settings_changed": {name: {"before": then.get(name), "now": value} for name, value in changed.items()},
+                "settings_changed": {name: {"before": one, "now": other} for name, (one, other) in changed.items()},
                 "ranking": decision["ranking"],
                 "folder": options.out,
             }
@@ -68,86 +69,50 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.cli.lines import Lines
 
     lines = Lines()
-    for line in _lines(decision, now.sentence, before.sentence, {name: then.get(name) for name in changed}, changed):
+    for line in _lines(decision, now, before, changed):
         lines.tell(line)
     if options.out is not None:
         lines.tell(f"Decision and parameter files: {options.out}")
     return DONE
 
 
-def _settings(then: Mapping[str, Any], asked: list[str]) -> tuple[DecisionSettings, dict[str, Any]]:
+def _settings(then: Mapping[str, Any], asked: list[str]) -> tuple[DecisionSettings, dict[str, tuple[Any, Any]]]:
     """The settings of a run with some changed, and those that are otherwise now."""
     from dataclasses import asdict, replace
 
+    from fusetune.apply.flat_settings import changed_settings
     from fusetune.configuration import read_configuration
 
-    given = {"decision": {name: value for name, value in then.items() if name != "seed"}, "seed": then.get("seed", 0)}
+    given: dict[str, Any] = {
+        "decision": {name: value for name, value in then.items() if name != "seed"},
+        "seed": then.get("seed", 0),
+    }
     for text in asked:
-        _set(given, text)
+        key, equals, value = text.partition("=")
+        if not (key and equals):
+            raise UserError("--config", f"{text!r} is not KEY=VALUE", "Mend it")
+        given[key if key == "seed" or key.startswith("decision.") else f"decision.{key}"] = value
     read = read_configuration([], given)
     settings = replace(read.decision, seed=read.seed)
-    now = asdict(settings)
-    return settings, {name: value for name, value in now.items() if _plain(value) != _plain(then.get(name))}
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _set(given: dict[str, Any], text: str) -> None:
-    """Put KEY=VALUE in its place; keys of keys are behind a dot."""
-    from fusetune.settings.yaml_reader import read_value
-
-    key, equals, value = text.partition("=")
-    if not (key.strip() and equals):
-        raise UserError("--config", f"{text!r} is not KEY=VALUE", "Mend it")
-    if key != "seed" and not key.startswith("decision."):
-        key = f"decision.{key}"
-    section, _, rest = key.partition(".")
-    if not rest:
-        given[section] = read_value(value, "--config")
-        return
-    name, _, below = rest.partition(".")
-    if below:
-        # of the names of a mapping, which have dots of their own (gnss_vel.z), one is changed and the others stay
-        given[section] = {
-            **given[section],
-            name: {**given[section].get(name, {}), below: read_value(value, "--config")},
-        }
-    else:
-        given[section] = {**given[section], name: read_value(value, "--config")}
+    return settings, changed_settings(then, asdict(settings))
 
 
 def _lines(
-    decision: Mapping[str, Any], now: str, before: str, then: Mapping[str, Any], changed: Mapping[str, Any]
+    decision: Mapping[str, Any], now: DecisionSummary, before: DecisionSummary, changed: Mapping[str, tuple[Any, Any]]
 ) -> Iterator[str]:
-    from fusetune.cli.output.tables import percent, table_lines
-
-    yield now
-    for change in decision["changes"]:
-        yield f"  {change['name']}  {change['previous']:.6g} → {change['value']:.6g}"
-    yield "Before: the same." if now == before else f"Before: {before}"
-    for name, value in changed.items():
-        yield f"Setting {name}: {then[name]} → {value}"
-    rows = [["set", "change", "interval", "better on", ""]]
-    for one in decision["ranking"]:
-        gain = one["improvement_percent"]
-        rows.append(
-            [
-                one["name"],
-                "" if one["is_present"] else percent(None if gain is None else -gain),
-                "" if one["is_present"] else _interval(one),
-                "" if one["is_present"] else f"{one['flights_better']} of {one['flights']}",
-                one["status"],
-            ]
-        )
-    yield from table_lines(rows, right=(1, 2, 3), indent=" ")
-
-
-def _interval(one: Mapping[str, Any]) -> str:
     from fusetune.apply.ranking import improvement_percent
+    from fusetune.cli.output.tables import interval, percent, table_lines
 
-    if one["lower"] is None or one["upper"] is None:
-        return "not known"
-    lower, upper = (-improvement_percent(one[end]) for end in ("lower", "upper"))
-    return f"{lower:+.1f} to {upper:+.1f} %".replace("-", "−")
+    yield from now.lines()
+    yield "Before: the same." if now.sentence == before.sentence else f"Before: {before.sentence}"
+    for name, (one, other) in changed.items():
+        yield f"Setting {name}: {one} → {other}"
+    rows = [["set", "change", "interval", "better on", ""]]
+    for row in decision["ranking"]:
+        told = ["", "", ""]
+        if not row["is_present"]:
+            gain, ends = row["improvement_percent"], (row["lower"], row["upper"])
+            span = interval(*(None if end is None else -improvement_percent(end) for end in ends))
+            told = [percent(None if gain is None else -gain), span, f"{row['flights_better']} of {row['flights']}"]
+        rows.append([row["name"], *told, row["status"]])
+    yield from table_lines(rows, right=(1, 2, 3), indent=" ")

@@ -18,8 +18,8 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Mission, study, folder."""
-    parser.add_argument("--mission", type=Path, required=True, metavar="FILE")
-    parser.add_argument("--study", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--mission", type=Path, required=True, metavar="MISSION")
+    parser.add_argument("--study", type=Path, required=True, metavar="STUDY.yaml")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
 
 

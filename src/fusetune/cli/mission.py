@@ -26,7 +26,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Mission or what it is made of, vehicle, plan, map."""
-    parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="mission (.yaml) or plan (.plan)")
+    parser.add_argument("file", type=Path, nargs="?", metavar="MISSION", help="mission (.yaml) or plan (.plan)")
     parser.add_argument(
         "--shape",
         action="append",
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", metavar="NAME", help="name of the mission")
     parser.add_argument("--speed", type=float, metavar="M_S", help="horizontal speed (5)")
     parser.add_argument("--field", type=float, metavar="M", help="side of the square for a purpose (60)")
-    parser.add_argument("--vehicle", type=Path, metavar="FILE", help="vehicle to plan for (PX4's defaults)")
+    parser.add_argument("--vehicle", type=Path, metavar="VEHICLE.yaml", help="vehicle to plan for (PX4's defaults)")
     parser.add_argument("--out", type=Path, metavar="FILE.plan", help="plan to write")
     parser.add_argument("--map", type=Path, metavar="FILE.png", help="map and profile to draw, .png or .svg")
     add_json(parser)

@@ -37,7 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a set: its name, and the parameters in which it differs from what flies; may be given several times",
     )
     which.add_argument(
-        "--study", type=Path, metavar="FILE", help="all sets of a study; of one around present values, of the last log"
+        "--study",
+        type=Path,
+        metavar="STUDY.yaml",
+        help="all sets of a study; of one around present values, of the last log",
     )
     parser.add_argument("--cores", type=from_one, metavar="N", help="flights at a time (all cores)")
     add_json(parser)
@@ -57,9 +60,10 @@ def run(options: argparse.Namespace) -> int:
         if log.error is not None:
             raise log.error
         logs.append(Path(log.path))
-    found = compare(logs, _sets(options, logs), cores=options.cores)
+    sets = _sets(options, logs)
+    found = compare(logs, sets, cores=options.cores)
     if options.json:
-        print_document(_document(found))
+        print_document(_document(found, sets))
     else:
         from fusetune.cli.lines import Lines
 
@@ -105,11 +109,11 @@ def _sets(options: argparse.Namespace, logs: Sequence[Path]) -> dict[str, dict[s
     return {one.name: dict(one.overrides) for one in found}
 
 
-def _document(found: Comparison) -> dict[str, Any]:
+def _document(found: Comparison, sets: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
     changes = found.changes.to_dict("index")
     return {
         "flights": [{**row, "change_percent": changes.get(row["flight"], {})} for row in _rows(found.flights)],
-        "sets": _rows(found.ranking),
+        "sets": [{**row, "parameters": sets.get(row["set"], {})} for row in _rows(found.ranking)],
         "answer": found.answer,
     }
 
@@ -120,7 +124,7 @@ def _rows(table: Any) -> list[Mapping[str, Any]]:
 
 
 def _lines(found: Comparison) -> Iterator[str]:
-    from fusetune.cli.output.tables import percent, table_lines
+    from fusetune.cli.output.tables import interval, percent, table_lines
 
     ranking = {row["set"]: row for row in _rows(found.ranking)}
     names = [name for name in ranking if name in found.changes.columns]
@@ -128,9 +132,10 @@ def _lines(found: Comparison) -> Iterator[str]:
     rows = [["change of the prediction error", *names]]
     for flight, changes in found.changes.to_dict("index").items():
         rows.append([str(flight), *(percent(changes[name]) for name in names)])
-    rows.append(["all flights", *(percent(ranking[name]["change_percent"]) for name in names)])
-    rows.append(["95 % interval", *(_interval(ranking[name]) for name in names)])
-    rows.append(["better on", *(f"{ranking[name]['flights_better']} of {ranking[name]['flights']}" for name in names)])
+    compared = [ranking[name] for name in names]
+    rows.append(["all flights", *(percent(row["change_percent"]) for row in compared)])
+    rows.append(["95 % interval", *(interval(row["lower_percent"], row["upper_percent"]) for row in compared)])
+    rows.append(["better on", *(f"{row['flights_better']} of {row['flights']}" for row in compared)])
     yield from table_lines(rows, right=range(1, len(names) + 1), indent=" ")
     if missing:
         yield f"Scored on no flight: {', '.join(missing)}."
@@ -138,10 +143,3 @@ def _lines(found: Comparison) -> Iterator[str]:
         if not row["has_a_say"]:
             yield f"{row['flight']} has no say: {row['reason']}."
     yield "Below 0 % is better than what flies now."
-
-
-def _interval(row: Mapping[str, Any]) -> str:
-    lower, upper = row["lower_percent"], row["upper_percent"]
-    if lower != lower or upper != upper:
-        return "not known"
-    return f"{lower:+.1f} to {upper:+.1f}".replace("-", "−")

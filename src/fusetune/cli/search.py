@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "search.json and what is kept for going on",
     )
     parser.add_argument(
-        "--parameters", type=Path, metavar="FILE", help="YAML file of what to search, and how (docs/search.md)"
+        "--parameters", type=Path, metavar="FILE.yaml", help="YAML file of what to search, and how (docs/search.md)"
     )
     parser.add_argument("--evaluations", type=int, metavar="N", help="parameter sets that are tried (600)")
     parser.add_argument("--seed", type=int, metavar="N", help="what chance follows from (1)")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from fusetune.apply.results_folder import ResultsFolder
-from fusetune.report.page import build_report
+from fusetune.report.page import ReportInput, build_report
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
@@ -30,22 +31,25 @@ def write_results_page(results: ResultsFolder, output: AnyPath | None = None) ->
     """
     page = Path(output) if output is not None else results.path / PAGE
     flights = [row["flight"] for row in results.flights]
-    report = results.path / "report"
-    pages = [one for flight in flights if (one := report / "flights" / f"{flight}.html").is_file()]
-    build_report(
-        results.flights_table,
-        results.analyzed,
-        [report / "flights" / f"{flight}.png" for flight in results.replayable],
-        results.path / "apply",
-        report,
-        page,
-        results.diagnoses(flights),
-        pages,
-        results.optional("fleet.html"),
-        _mission(results),
-        results.optional("analyze", "missions.json"),
+    health = results.optional("analyze", "health.parquet")
+    given = ReportInput(
+        flights_table=results.flights_table,
+        analyze_folders=results.analyzed,
+        apply_folder=results.path / "apply",
+        diagnoses=results.diagnoses(flights),
+        flight_pages=_of_flights(results, flights, "html"),
+        blobs=_of_flights(results, flights, "blob"),
+        health_table=health if results.optional("apply", "fleet.json") else None,
+        mission=_mission(results),
+        missions=results.optional("analyze", "missions.json"),
     )
+    build_report(given, page)
     return page
+
+
+def _of_flights(results: ResultsFolder, flights: Sequence[str], suffix: str) -> list[Path]:
+    """What was made of each flight for the page, where it was."""
+    return [one for flight in flights if (one := results.optional("report", "flights", f"{flight}.{suffix}"))]
 
 
 def _mission(results: ResultsFolder) -> Path | None:

@@ -12,7 +12,7 @@ from fusetune.errors import UserError, write_error
 from fusetune.running.workflow_files import packaged_config
 from fusetune.storage.files import AnyPath, atomic_path
 
-FLIGHTS, CONFIG = "flights", "config"
+FLIGHTS, CONFIG, RESULTS = "flights", "config", "results"
 README = "README.md"
 
 _TEXT = """\
@@ -66,6 +66,26 @@ def make_project_folder(folder: AnyPath) -> Path:
     return folder
 
 
+def link_results(folder: AnyPath, target: AnyPath) -> None:
+    """Let the results of a folder lie elsewhere, behind a link; the place is made where there is none.
+
+    Raises
+    ------
+    UserError
+        There are results in the folder already, or it takes no links.
+    """
+    own, place = Path(folder) / RESULTS, Path(os.path.abspath(target))
+    place.mkdir(parents=True, exist_ok=True)
+    if os.path.realpath(own) == os.path.realpath(place):
+        return
+    if own.is_symlink() or own.exists():
+        raise UserError(own, "is there already", f"Move it to {target}, or leave out --results")
+    try:
+        own.symlink_to(place, target_is_directory=True)
+    except (OSError, NotImplementedError) as error:
+        raise UserError(own, f"cannot be a link to {target} ({error})", "Leave out --results") from error
+
+
 def _write(folder: Path) -> None:
     (folder / FLIGHTS).mkdir(parents=True)
     shutil.copytree(packaged_config(), folder / CONFIG, ignore=shutil.ignore_patterns(".*"))
@@ -73,10 +93,20 @@ def _write(folder: Path) -> None:
         for name in names:
             # what is packaged may be read-only
             os.chmod(os.path.join(path, name), 0o644)
-    _rewrite(folder / CONFIG / "config.yaml", lambda text: _SCHEMA_LINE.sub("", text))
-    _rewrite(folder / CONFIG / README, lambda text: _LINK_TO_DOCS.sub(r"\1 (\2)", text))
+    for name in ("config.yaml", README):
+        _rewrite(folder / CONFIG / name, _without_the_checkout)
     with atomic_path(folder / README) as temporary:
         temporary.write_text(_TEXT, encoding="utf-8")
+
+
+def _without_the_checkout(text: str) -> str:
+    """A text of the configuration without links to what lies beside it in a checkout alone."""
+
+    def named(link: re.Match[str]) -> str:
+        words, target = link.groups()
+        return words if words == target else f"{words} ({target})"
+
+    return _LINK_TO_DOCS.sub(named, _SCHEMA_LINE.sub("", text))
 
 
 def _rewrite(file: Path, changed: Callable[[str], str]) -> None:

@@ -10,16 +10,19 @@ from fusetune.running.workflow_events import Counted, Event, JobBegun, JobDone, 
 
 COSTS_S = {
     "simulate_flight": 0.6,
-    "save_flight": 0.2,
-    "tell_flight": 1.0,
-    "analyze_flight": 1.7,
-    "flight_page": 0.5,
+    "save_flight": 0.25,
+    "tell_flight": 0.8,
+    "analyze_flight": 2.0,
+    "flight_page": 0.3,
+    "join_conformance": 1.0,
+    "decide": 1.5,
+    "build_report": 1.5,
     "search_try": 20.0,
     "search_flights": 2.0,
 }
-"""What a job of a rule takes, s, beside the others: a run of 26 public flights with seven sets, on one core. The rules
-of one round of a search are named for it and its number."""
-OTHER_COST_S = 0.5
+"""What a job of a rule takes, s of processor: public flights with a study of seven sets. The rules of one round of a
+search are named for it and its number."""
+OTHER_COST_S = 0.4
 """Of any other."""
 
 ASKED_LATER = {"list_flights": {"analyze_flight": "save_flight"}}

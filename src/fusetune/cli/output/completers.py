@@ -12,6 +12,7 @@ from collections.abc import Iterable
 _SUFFIX = re.compile(r"\.(ulg|yaml|params|plan|png|html|pdf)\b")
 _OF_NAMES = {
     "LOG": ("ulg",),
+    "LOG|RESULTS": ("ulg",),
     "STUDY_OR_PARAMS": ("yaml", "params"),
     "MISSION": ("yaml", "plan"),
     "BEST_PARAMS": ("params",),
@@ -19,7 +20,7 @@ _OF_NAMES = {
 }
 """Names of arguments that say no suffix themselves → suffixes."""
 _FOLDERS = ("DIR", "RESULTS", "A", "B")
-_PARAMETERS = ("NAME:KEY=VALUE,…", "NAMES")
+_PARAMETERS = ("NAME:KEY=VALUE,…", "NAME=VALUE,…", "NAMES")
 _SETTINGS = ("KEY=VALUE",)
 
 

@@ -27,3 +27,10 @@ def percent(value: float | None, digits: int = 1) -> str:
         return "–"
     text = f"{value:+.{digits}f} %".replace("-", "−")
     return text if any(one in "123456789" for one in text) else f"{0:.{digits}f} %"
+
+
+def interval(lower: float | None, upper: float | None) -> str:
+    """An interval of a change in percent."""
+    if lower is None or upper is None or lower != lower or upper != upper:
+        return "not known"
+    return f"{lower:+.1f} to {upper:+.1f} %".replace("-", "−")
