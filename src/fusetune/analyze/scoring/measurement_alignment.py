@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -203,30 +204,48 @@ def _single(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class AxesTogether:
-    """Axes of one source that share their times, of one set; `confidence` is that of intervals."""
+    """Axes of one source that share their times, of one set or of several at the same measurements.
+
+    Attributes
+    ----------
+    samples : of one set after the other, each with the same axes
+    confidence : of intervals
+    sets : number of sets
+    """
 
     source: str
     samples: tuple[CountedSamples, ...]
     confidence: float = np.nan
+    sets: int = 1
+
+    @property
+    def masks(self) -> tuple[SampleMask, ...]:
+        """Of the axes."""
+        return tuple(one.mask for one in self.samples[: len(self.samples) // self.sets])
 
     @property
     def axes(self) -> list[int]:
-        return [one.mask.axis for one in self.samples]
+        return [mask.axis for mask in self.masks]
 
     @property
     def time(self) -> npt.NDArray[np.int64]:
         """(N,) µs"""
         return self.samples[0].mask.time
 
+    def samples_of_sets(self) -> list[tuple[CountedSamples, ...]]:
+        """Of one set after the other."""
+        axes = len(self.masks)
+        return [self.samples[first : first + axes] for first in range(0, len(self.samples), axes)]
+
     @cached_property
     def innovations(self) -> Innovations:
-        """Each axis by itself, what metrics are made of, (1, A, N)."""
+        """Each axis of each set by itself, what metrics are made of, (1, S A, N)."""
         limits = np.array([one.mask.winsor_limit for one in self.samples])[:, None]
         figures = [np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES]
         return _innovations(figures, [limits], self.confidence)
 
     def groups(self) -> Iterable[tuple[str, Innovations]]:
-        """Groups of axes (horizontal, vertical, all) that are all here, (D, 1, N), by name."""
+        """Groups of axes (horizontal, vertical, all) that are all here, (D, S, N), by name."""
         return self._groups.items() if self.time.size <= _FEW_SAMPLES else self._each_group()
 
     @cached_property
@@ -239,9 +258,10 @@ class AxesTogether:
                 yield name, self._group(axes)
 
     def _group(self, axes: Sequence[int]) -> Innovations:
-        members = [self.samples[self.axes.index(axis)] for axis in axes]
-        limits = [one.mask.winsor_limit for one in members]
-        figures = [np.stack([getattr(one, name) for one in members])[:, None] for name in FIGURES]
+        masks, places = self.masks, [self.axes.index(axis) for axis in axes]
+        limits = [masks[place].winsor_limit for place in places]
+        each = [getattr(self.innovations, name)[0].reshape(self.sets, len(masks), -1) for name in FIGURES]
+        figures = [np.ascontiguousarray(values[:, places].swapaxes(0, 1)) for values in each]
         return _innovations(figures, limits, self.confidence, of_group=True)
 
     def of_masks(self, masks: Masks) -> AxesTogether | None:
@@ -268,3 +288,24 @@ def axes_together(samples: Iterable[Counted], confidence: float = np.nan) -> Ite
             found.setdefault((mask.source, id(mask.time)), []).append(one.samples)
     for (source, _), members in found.items():
         yield AxesTogether(source, tuple(members), confidence)
+
+
+def sets_together(
+    each: Sequence[Iterable[Counted]], confidence: float = np.nan
+) -> Iterator[tuple[tuple[int, ...], AxesTogether]]:
+    """What several sets have of one source, those at the same measurements together; with the places of the sets.
+
+    What there is of one set comes in the order of `axes_together`.
+    """
+    alike: dict[tuple[tuple[int, ...], ...], list[tuple[int, list[AxesTogether]]]] = {}
+    for place, samples in enumerate(each):
+        found = [*axes_together(samples, confidence)]
+        alike.setdefault(tuple(tuple(map(id, one.masks)) for one in found), []).append((place, found))
+    for members in alike.values():
+        places = tuple(place for place, _ in members)
+        for found in zip(*(own for _, own in members), strict=True):
+            # another one than is kept here: what it makes of its samples goes with it
+            yield (
+                places,
+                replace(found[0], samples=tuple(chain.from_iterable(one.samples for one in found)), sets=len(found)),
+            )
