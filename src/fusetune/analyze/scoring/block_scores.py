@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from fusetune.analyze.metrics.likelihood import gaussian_nll, student_t_nll, winsorised
+from fusetune.analyze.metrics.consistency import nis_of_axes
+from fusetune.analyze.metrics.innovation_metrics import squares
+from fusetune.analyze.metrics.likelihood import clipped_nis, gaussian_terms, log_variance, student_t_terms
 from fusetune.analyze.scoring.columns import (
     FLIGHT_AND_SET,
     SOURCE_AND_AXIS,
@@ -33,6 +35,17 @@ BLOCK_SCHEMA = pa.schema(
     ]
 )
 """One row per set, source, axis and block; `n` is the same for all sets of a flight."""
+
+
+_SCORES = {
+    "sum_squared_innovation": squares,
+    "sum_nis": nis_of_axes,
+    "sum_nis_winsorised": clipped_nis,
+    "sum_log_variance": log_variance,
+    "sum_nll": gaussian_terms,
+    "sum_nll_student_t": student_t_terms,
+}
+"""Of each axis and sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +75,8 @@ def block_sums(samples: AxesTogether, edges: npt.NDArray[np.int64]) -> list[Bloc
     edges : (B + 1,) edges of the blocks, µs; blocks without samples have no sum
     """
     parts, axes = parts_of(samples.time, edges), tuple(samples.axes)
-    sums = {name: np.add.reduceat(scores, parts.starts, axis=1) for name, scores in _scores(samples)}
+    given = samples.innovations
+    sums = {name: np.add.reduceat(given.by_axis(score)[0], parts.starts, axis=1) for name, score in _SCORES.items()}
     places = [slice(first, first + len(axes)) for first in range(0, len(samples.samples), len(axes))]
     return [
         BlockSums(samples.source, axes, parts, {name: values[place] for name, values in sums.items()})
@@ -90,15 +104,3 @@ def block_rows(flight: str, of_sets: Mapping[str, Sequence[BlockSums]]) -> Itera
         columns[name] = pa.array(np.concatenate([one.values[name].ravel() for one in sums]))
     table = pa.table(columns, schema=BLOCK_SCHEMA)
     return parted(table, [sum(one.rows for one in found) for found in of_sets.values()])
-
-
-def _scores(samples: AxesTogether) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
-    """Of each axis of each set and sample, (S A, N); one after the other, for each is as large as the innovations."""
-    given = samples.innovations
-    innovation, variance = given.innovation[0], given.innovation_variance[0]
-    yield "sum_squared_innovation", np.square(innovation)
-    yield "sum_nis", np.square(innovation) / variance
-    yield "sum_nis_winsorised", np.square(winsorised(innovation, given.winsor_limits()[0])) / variance
-    yield "sum_log_variance", np.log(variance)
-    yield "sum_nll", gaussian_nll(innovation, variance)
-    yield "sum_nll_student_t", student_t_nll(innovation, variance)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.metrics.likelihood import winsor_limit
-from fusetune.analyze.metrics.metric import Innovations
+from fusetune.analyze.metrics.metric import FEW_SAMPLES, Innovations
 from fusetune.analyze.replaying.measurement_times import match, measurement_time
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis, gate_of
@@ -26,9 +26,6 @@ from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES, AidSource
 
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""
-
-_FEW_SAMPLES = 50_000
-"""Of so few what groups of axes are made of is kept for the next who asks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,11 +239,11 @@ class AxesTogether:
         """Each axis of each set by itself, what metrics are made of, (1, S A, N)."""
         limits = np.array([one.mask.winsor_limit for one in self.samples])[:, None]
         figures = [np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES]
-        return _innovations(figures, [limits], self.confidence)
+        return Innovations(*figures, lambda: [limits], self.confidence)
 
     def groups(self) -> Iterable[tuple[str, Innovations]]:
         """Groups of axes (horizontal, vertical, all) that are all here, (D, S, N), by name."""
-        return self._groups.items() if self.time.size <= _FEW_SAMPLES else self._each_group()
+        return self._groups.items() if self.time.size <= FEW_SAMPLES else self._each_group()
 
     @cached_property
     def _groups(self) -> Mapping[str, Innovations]:
@@ -258,11 +255,9 @@ class AxesTogether:
                 yield name, self._group(axes)
 
     def _group(self, axes: Sequence[int]) -> Innovations:
-        masks, places = self.masks, [self.axes.index(axis) for axis in axes]
-        limits = [masks[place].winsor_limit for place in places]
-        each = [getattr(self.innovations, name)[0].reshape(self.sets, len(masks), -1) for name in FIGURES]
-        figures = [np.ascontiguousarray(values[:, places].swapaxes(0, 1)) for values in each]
-        return _innovations(figures, limits, self.confidence, of_group=True)
+        places = [self.axes.index(axis) for axis in axes]
+        limits = [self.samples[place].mask.winsor_limit for place in places]
+        return Innovations.of_places(self.innovations, self.sets, places, limits)
 
     def of_masks(self, masks: Masks) -> AxesTogether | None:
         """Those of the axes whose measurements are those of some masks; None where none are."""
@@ -270,13 +265,6 @@ class AxesTogether:
         if not kept:
             return None
         return self if len(kept) == len(self.samples) else replace(self, samples=kept)
-
-
-def _innovations(
-    figures: Sequence[npt.NDArray], limits: Sequence[float | npt.NDArray], confidence: float, *, of_group: bool = False
-) -> Innovations:
-    innovation, variance, ratio, rejected = figures
-    return Innovations(innovation, variance, ratio, rejected, lambda: limits, confidence, of_group)
 
 
 def axes_together(samples: Iterable[Counted], confidence: float = np.nan) -> Iterator[AxesTogether]:

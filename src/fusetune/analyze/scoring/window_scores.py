@@ -101,7 +101,7 @@ def window_figures(samples: AxesTogether, edges: npt.NDArray[np.int64]) -> Itera
 
 def _figures(given: Innovations, parts: Parts) -> dict[str, Array]:
     def mean(values: npt.NDArray) -> Array:
-        return np.add.reduceat(values.astype(np.float64), parts.starts, axis=-1) / parts.counts
+        return np.add.reduceat(values.astype(np.float64, copy=False), parts.starts, axis=-1) / parts.counts
 
     return {name: window.of_mean(mean(window.score(given))) for name, window in _METRICS.items()}
 
