@@ -23,7 +23,7 @@ from fusetune.analyze.scoring.score_flight import scores_writer
 from fusetune.analyze.scoring.set_scores import SetScores, score_flight, score_together
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.yardstick import WITH_MEASURED_ANTENNA, ScoredFlight, Yardstick
-from fusetune.ekf2.replay.recording import FULL, Recording
+from fusetune.ekf2.replay.recording import FULL, TRACED, Recording
 from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
@@ -163,7 +163,7 @@ class _SetsAtWork:
             yield present
         elif self._antenna is not None and name == self._antenna.name:
             yield self._antenna
-        elif overrides is not None and recording is FULL and self._flight.prepared.is_long:
+        elif overrides is not None and recording is TRACED and self._flight.prepared.is_long:
             with TemporaryDirectory(prefix=SCRATCH_PREFIX, dir=self._folder) as scratch:
                 write_replay(self._flight.prepared, name, overrides, scratch)
                 yield read_set(scratch, name)

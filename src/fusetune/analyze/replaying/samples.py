@@ -11,6 +11,7 @@ import io
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from threading import Lock
 from typing import IO, Any
 
@@ -51,6 +52,10 @@ class AxisSamples:
         """The samples that an index or boolean array selects."""
         parts = {one.name: getattr(self, one.name) for one in fields(self)}
         return AxisSamples(**{name: values[selected] if values.size else values for name, values in parts.items()})
+
+    def part(self, rows: slice) -> AxisSamples:
+        """Consecutive samples, which stay where they are."""
+        return AxisSamples(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
 class SampleSpool:
@@ -149,25 +154,35 @@ class SortedSamples(Mapping[SourceAxis, AxisSamples]):
     """
 
     def __init__(self, rows: np.ndarray, names: Sequence[str], gate: Callable[[str], float]) -> None:
-        key = rows["source"].astype(np.int64) * _AXES + rows["axis"]
-        order = np.argsort(key, kind="stable")
-        self._rows, self._gate = rows[order], gate
+        # of so few values NumPy sorts small integers in the time of some passes
+        key = (rows["source"] * _AXES + rows["axis"]).astype(np.uint16)
+        counts = np.bincount(key, minlength=len(names) * _AXES)
+        stops = np.cumsum(counts)
+        self._rows, self._gate = rows.take(np.argsort(key, kind="stable")), gate
         self._kept: dict[SourceAxis, AxisSamples] = {}
-        found, starts = np.unique(key[order], return_index=True)
-        stops = [*starts[1:].tolist(), len(rows)]
         self._slices = {
-            (names[number // _AXES], number % _AXES): slice(start, stop)
-            for number, start, stop in zip(found.tolist(), starts.tolist(), stops, strict=True)
+            (names[number // _AXES], number % _AXES): slice(int(stops[number] - counts[number]), int(stops[number]))
+            for number in np.flatnonzero(counts).tolist()
             if names[number // _AXES] in MEASURED_SOURCES
         }
 
     def __getitem__(self, key: SourceAxis) -> AxisSamples:
         found = self._kept.get(key)
-        if found is None:
+        if found is not None:
+            return found
+        if len(self._rows) > _FEW_ROWS:
+            return _axis_samples(self._rows[self._slices[key]], self._gate(key[0]))
+        if "test_ratio" in (self._rows.dtype.names or ()):
+            found = self._whole.part(self._slices[key])
+        else:
             found = _axis_samples(self._rows[self._slices[key]], self._gate(key[0]))
-            if len(self._rows) <= _FEW_ROWS:
-                self._kept[key] = found
+        self._kept[key] = found
         return found
+
+    @cached_property
+    def _whole(self) -> AxisSamples:
+        """All of them, one source and axis after the other."""
+        return _axis_samples(self._rows, np.nan)
 
     def __iter__(self) -> Iterator[SourceAxis]:
         return iter(self._slices)

@@ -25,7 +25,7 @@ from fusetune.analyze.scoring.window import ScoringWindow, after, end_of_warm_up
 from fusetune.analyze.scoring.withheld_scores import GapMask, gap_masks
 from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
 from fusetune.analyze.smoothing.smoothed_velocity import smoothed_velocity
-from fusetune.ekf2.replay.recording import FULL, SCORING, Recording
+from fusetune.ekf2.replay.recording import SCORING, TRACED, Recording
 from fusetune.px4.flight import Flight
 from fusetune.set_names import ANTENNA_MENDED, mended_name
 
@@ -143,7 +143,7 @@ class Yardstick:
     @property
     def recording(self) -> Recording:
         """How much a replay has to record for its scores: errors need the published position at every update."""
-        return FULL if self.references else SCORING
+        return TRACED if self.references else SCORING
 
     @cached_property
     def smoothed(self) -> SmoothedMask | None:
