@@ -145,15 +145,18 @@ class _SetsAtWork:
             yield from pool.map(self._scores, parts)
 
     def _scores(self, names: Sequence[str], alone: bool = False) -> dict[str, SetScores]:
+        # of small ones the next need the same memory again
+        is_large = self._flight.prepared.sets_at_once == 1
         with ExitStack() as records:
             replayed = [records.enter_context(self._record(name)) for name in names]
-            if alone:
+            if alone and is_large:
                 # where several are at work the others may be replayed with them
                 self._flight.forget_schedules()
                 give_back_freed_memory()
             scores = score_together(self.yardstick, replayed)
             del replayed
-        give_back_freed_memory()
+        if is_large:
+            give_back_freed_memory()
         return dict(zip(names, scores, strict=True))
 
     @contextmanager

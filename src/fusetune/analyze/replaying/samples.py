@@ -11,7 +11,6 @@ import io
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 from threading import Lock
 from typing import IO, Any
 
@@ -158,7 +157,11 @@ class SortedSamples(Mapping[SourceAxis, AxisSamples]):
         key = (rows["source"] * _AXES + rows["axis"]).astype(np.uint16)
         counts = np.bincount(key, minlength=len(names) * _AXES)
         stops = np.cumsum(counts)
-        self._rows, self._gate = rows.take(np.argsort(key, kind="stable")), gate
+        rows = rows.take(np.argsort(key, kind="stable"))
+        self._rows, self._gate = rows, gate
+        self._whole: AxisSamples | None = None
+        if len(rows) <= _FEW_ROWS and "test_ratio" in (rows.dtype.names or ()):
+            self._rows, self._whole = rows[:0].copy(), _axis_samples(rows, np.nan)
         self._kept: dict[SourceAxis, AxisSamples] = {}
         self._slices = {
             (names[number // _AXES], number % _AXES): slice(int(stops[number] - counts[number]), int(stops[number]))
@@ -167,22 +170,12 @@ class SortedSamples(Mapping[SourceAxis, AxisSamples]):
         }
 
     def __getitem__(self, key: SourceAxis) -> AxisSamples:
-        found = self._kept.get(key)
-        if found is not None:
-            return found
-        if len(self._rows) > _FEW_ROWS:
+        if self._whole is None:
             return _axis_samples(self._rows[self._slices[key]], self._gate(key[0]))
-        if "test_ratio" in (self._rows.dtype.names or ()):
-            found = self._whole.part(self._slices[key])
-        else:
-            found = _axis_samples(self._rows[self._slices[key]], self._gate(key[0]))
-        self._kept[key] = found
+        found = self._kept.get(key)
+        if found is None:
+            found = self._kept[key] = self._whole.part(self._slices[key])
         return found
-
-    @cached_property
-    def _whole(self) -> AxisSamples:
-        """All of them, one source and axis after the other."""
-        return _axis_samples(self._rows, np.nan)
 
     def __iter__(self) -> Iterator[SourceAxis]:
         return iter(self._slices)

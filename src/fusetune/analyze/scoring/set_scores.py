@@ -140,8 +140,9 @@ def score_together(yardstick: Yardstick, records: Sequence[ReplayedSet]) -> list
     for one in compared:
         one.gaps = _gaps(yardstick, one.record, one.window)
         add_withheld_metrics(one.table, one.name, one.gaps)
-    # of a long flight the samples' arrays and those of the states are about as large
-    give_back_freed_memory()
+    if len(sets) == 1:
+        # of a long flight the samples' arrays and those of the states are about as large
+        give_back_freed_memory()
     for one in compared:
         one.differences = _add_state_figures(one.table, yardstick, one.record, one.window)
     rows = {name: [schema.empty_table()] * len(sets) for name, schema in TABLES.items()}
