@@ -36,7 +36,7 @@ class SampleMask:
     ----------
     time : (N,) µs, of the measurement
     tolerance : how near to one its like must be, µs
-    row : (N,) of that set's samples
+    row : (N,) of that set's samples, ascending
     innovation : (N,) that set's
     """
 
@@ -166,10 +166,18 @@ def _is_usable(samples: AxisSamples) -> npt.NDArray[np.bool_]:
 
 def _matched(mask: SampleMask, samples: AxisSamples, record: ReplayedSet, window: ScoringWindow) -> _Matched:
     time = measurement_time(samples, mask.source, record.parameters)
-    row = match(mask.time, time, mask.tolerance)
+    row = _rows_of(mask, time)
     lacking = (row < 0) | ~_is_usable(samples)[row] | (mask.time < time[np.argmax(samples.fused)])
     after_reset = window.after_own_reset(record.name, mask.time) & ~lacking
     return _Matched(lacking, after_reset, record.name in window.own_resets, row)
+
+
+def _rows_of(mask: SampleMask, time: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Index into `time`, ascending, of the sample that is each of the mask's measurements; −1 where there is none."""
+    # a set with the delays of the one that the mask is of has the same measurements, in the same places
+    if mask.row[-1] < time.size and np.array_equal(time[mask.row], mask.time):
+        return mask.row.astype(np.int64)
+    return match(mask.time, time, mask.tolerance)
 
 
 def _charged_figures(

@@ -254,11 +254,12 @@ def _add_state_figures(
     is_present = record is yardstick.present
     states = yardstick.states if is_present else record.states()
     _add_source_figures(table, yardstick, record, states)
-    for truth in yardstick.references:
+    for reference in yardstick.known_references:
+        truth = reference.truth
         # what a set is fed with is no reference for it
         if truth.kind == "vision" and any(source.startswith("ev_") for source in record.fused_sources):
             continue
-        figures = true_errors(record, states, truth, window, yardstick.settings.confidence)
+        figures = true_errors(record, states, reference, window, yardstick.settings.confidence)
         add_true_errors(table, record.name, figures, truth.kind)
         if truth.kind == "truth":
             add_true_drift(table, record, truth, window)
