@@ -15,11 +15,14 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 
 from fusetune.analyze.scoring.columns import parted
 from fusetune.analyze.scoring.set_scores import TABLES, SetScores
 from fusetune.storage.files import AnyPath
+
+_CODEC = "lz4"
 
 
 class _Place(NamedTuple):
@@ -153,7 +156,7 @@ def _packed(scores: Mapping[str, SetScores]) -> tuple[bytes, bytes]:
         for key, one in scores.items()
     ]
     sink = pa.BufferOutputStream()
-    with pa.CompressedOutputStream(sink, "zstd") as stream:
+    with pa.CompressedOutputStream(sink, _CODEC) as stream:
         for name in TABLES:
             table = _with_dictionaries(pa.concat_tables(getattr(one, name) for one in scores.values()))
             with pa.ipc.new_stream(stream, table.schema) as writer:
@@ -165,7 +168,7 @@ def _unpacked(head: bytes, content: bytes) -> list[SetScores]:
     """The scores of each set."""
     told: list[dict[str, Any]] = json.loads(head)
     found: list[dict[str, pa.Table]] = [{} for _ in told]
-    with pa.CompressedInputStream(pa.BufferReader(content), "zstd") as stream:
+    with pa.CompressedInputStream(pa.BufferReader(content), _CODEC) as stream:
         for name, schema in TABLES.items():
             with pa.ipc.open_stream(stream) as reader:
                 table = reader.read_all().cast(schema)
@@ -182,9 +185,17 @@ def _with_dictionaries(table: pa.Table) -> pa.Table:
 
 
 def _of_itself(table: pa.Table) -> pa.Table:
-    """A part of a table without what its dictionaries have of the others."""
+    """A part of a table without what its dictionaries have of the others, the rest in the order of its rows."""
     for place, field in enumerate(table.schema):
         if pa.types.is_dictionary(field.type):
-            own = table.column(place).cast(field.type.value_type).dictionary_encode()
+            column = table.column(place).combine_chunks()
+            codes = column.indices.to_numpy(zero_copy_only=False)
+            # texts repeat in long runs
+            used = list(dict.fromkeys(codes[np.flatnonzero(np.diff(codes, prepend=-1))].tolist()))
+            renamed = np.zeros(len(column.dictionary), np.int32)
+            renamed[used] = np.arange(len(used), dtype=np.int32)
+            own = pa.DictionaryArray.from_arrays(
+                pa.array(renamed[codes]), column.dictionary.take(pa.array(used, pa.int32()))
+            )
             table = table.set_column(place, field, own)
     return table

@@ -201,7 +201,9 @@ def _matched(
     since = np.repeat([record.first_fused.get((mask.source, 0), never) for mask in masks], counts)
     absent = table["key"][row] != key
     lacking = absent | ~_is_usable(table)[row] | (start < since)
-    alone = absent & (start >= since) & np.isin(key // _HORIZONS, table["key"] // _HORIZONS)
+    alone = absent & (start >= since)
+    if alone.any():
+        alone &= np.isin(key // _HORIZONS, table["key"] // _HORIZONS)
     after_reset = window.after_own_reset(record.name, start) & ~lacking
     error, variance = table["innovation"][row], table["innovation_variance"][row]
     return _parted(counts, lacking, after_reset, resets, error, variance, alone)
@@ -227,8 +229,8 @@ def _is_usable(table: Mapping[str, npt.NDArray]) -> npt.NDArray[np.bool_]:
 
 def _by_key(table: Columns) -> dict[str, npt.NDArray]:
     """Columns of one set's predictions, in ascending order of a key that names gap, source, axis and horizon."""
-    sources = list(AID_SOURCES)
-    source = np.array([sources.index(name) if name in AID_SOURCES else -1 for name in table["source"]], np.int64)
+    numbers = {name: number for number, name in enumerate(AID_SOURCES)}
+    source = np.array([numbers.get(name, -1) for name in table["source"]], np.int64)
     horizon_ds = np.rint(table["horizon_s"] * 10.0).astype(np.int64)
     key = ((table["start"] * 64 + source) * 4 + table["axis"]) * _HORIZONS + horizon_ds
     order = np.argsort(key, kind="stable")
