@@ -106,6 +106,23 @@ def test_what_is_better_is_what_a_wrong_filter_does_worse(metric: InnovationMetr
         assert abs(good - aim) < abs(bad - aim)
 
 
+def test_what_groups_share_of_an_axis_is_what_they_make_of_it_alone() -> None:
+    """To the bit: two axes of three, the middle one left out as well, of two sets."""
+    made = innovations(3, sets=2, seed=7)
+    arrays = (made.innovation, made.innovation_variance, made.test_ratio, made.rejected)
+    # of one set after the other
+    each = [np.ascontiguousarray(values.swapaxes(0, 1)).reshape(1, 6, -1) for values in arrays]
+    whole = Innovations(*each, lambda: [np.full((6, 1), 1.5)])
+    for places in ([0, 1], [0, 2], [0, 1, 2], [2]):
+        shared = Innovations.of_places(whole, 2, places, [1.5] * len(places))
+        own = Innovations(
+            *(np.ascontiguousarray(values[places]) for values in arrays), lambda: [1.5] * 3, of_group=True
+        )
+        for metric in INNOVATION_METRICS:
+            if metric.of_groups:
+                assert metric.function(shared) == pytest.approx(metric.function(own), rel=0.0, abs=0.0)
+
+
 def innovations(axes: int, sets: int, seed: int) -> Innovations:
     """White innovations of the variance that is claimed."""
     generator = np.random.default_rng(seed)

@@ -122,9 +122,12 @@ class Innovations:
     def _alone(self, axis: int) -> Innovations:
         if self.dimension == 1:
             return self
-        arrays = (self.innovation, self.innovation_variance, self.test_ratio, self.rejected)
+        rows = slice(axis, axis + 1)
         return Innovations(
-            *(values[axis : axis + 1] for values in arrays),
+            self.innovation[rows],
+            self.innovation_variance[rows],
+            self.test_ratio[rows],
+            self.rejected[rows],
             lambda: [self.winsor_limits()[axis]],
             self.confidence,
             self.of_group,
@@ -142,9 +145,21 @@ class Innovations:
         """
         follow = [*places] == [*range(places[0], places[-1] + 1)]
         taken: slice | Sequence[int] = slice(places[0], places[-1] + 1) if follow else places
-        arrays = (whole.innovation, whole.innovation_variance, whole.test_ratio, whole.rejected)
-        own = [values[0].reshape(sets, -1, values.shape[-1])[:, taken].swapaxes(0, 1) for values in arrays]
-        return cls(*own, lambda: limits, whole.confidence, of_group=True, whole=whole, places=taken)
+
+        def own(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            return values[0].reshape(sets, -1, values.shape[-1])[:, taken].swapaxes(0, 1)
+
+        return cls(
+            own(whole.innovation),
+            own(whole.innovation_variance),
+            own(whole.test_ratio),
+            own(whole.rejected),
+            lambda: limits,
+            whole.confidence,
+            of_group=True,
+            whole=whole,
+            places=taken,
+        )
 
 
 def mean_of_samples(values: Array) -> Array:
