@@ -246,8 +246,10 @@ class AxesTogether:
     def innovations(self) -> Innovations:
         """Each axis of each set by itself, what metrics are made of, (1, S A, N)."""
         limits = np.array([one.mask.winsor_limit for one in self.samples])[:, None]
-        figures = [np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES]
-        return Innovations(*figures, lambda: [limits], self.confidence)
+        innovation, variance, ratio, rejected = (
+            np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES
+        )
+        return Innovations(innovation, variance, ratio, rejected, lambda: [limits], self.confidence)
 
     def groups(self) -> Iterable[tuple[str, Innovations]]:
         """Groups of axes (horizontal, vertical, all) that are all here, (D, S, N), by name."""
@@ -299,9 +301,7 @@ def sets_together(
         alike.setdefault(tuple(tuple(map(id, one.masks)) for one in found), []).append((place, found))
     for members in alike.values():
         places = tuple(place for place, _ in members)
-        for found in zip(*(own for _, own in members), strict=True):
+        for together in zip(*(own for _, own in members), strict=True):
+            joined = tuple(chain.from_iterable(one.samples for one in together))
             # another one than is kept here: what it makes of its samples goes with it
-            yield (
-                places,
-                replace(found[0], samples=tuple(chain.from_iterable(one.samples for one in found)), sets=len(found)),
-            )
+            yield places, replace(together[0], samples=joined, sets=len(together))
