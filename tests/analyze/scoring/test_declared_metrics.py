@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -114,10 +115,10 @@ def test_what_groups_share_of_an_axis_is_what_they_make_of_it_alone() -> None:
     each = [np.ascontiguousarray(values.swapaxes(0, 1)).reshape(1, 6, -1) for values in arrays]
     whole = Innovations(*each, lambda: [np.full((6, 1), 1.5)])
     for places in ([0, 1], [0, 2], [0, 1, 2], [2]):
-        shared = Innovations.of_places(whole, 2, places, [1.5] * len(places))
-        own = Innovations(
-            *(np.ascontiguousarray(values[places]) for values in arrays), lambda: [1.5] * 3, of_group=True
-        )
+        limits = [1.5] * len(places)
+        shared = Innovations.of_places(whole, 2, places, limits)
+        innovation, variance, ratio, rejected = (np.ascontiguousarray(values[places]) for values in arrays)
+        own = Innovations(innovation, variance, ratio, rejected, partial(list, limits), of_group=True)
         for metric in INNOVATION_METRICS:
             if metric.of_groups:
                 found, expected = metric.function(shared), metric.function(own)
