@@ -19,6 +19,7 @@ from fusetune.report.flight_data.content import (
     TrackView,
 )
 from fusetune.report.flight_data.panel_names import BIASES, SENSORS, UNCERTAINTY, VIBRATION, WIND_AND_FIELD
+from fusetune.report.flight_data.preparing import FINEST, kept_rows_of
 from fusetune.report.flight_data.series_colours import coloured
 from fusetune.report.flight_data.thinning import kept_rows
 
@@ -36,14 +37,14 @@ class Buckets(NamedTuple):
     slow: int
 
 
-_FINEST, _COARSEST = 1000, 4
+_COARSEST = 4
 _STEP = 0.86
 _OTHER, _SLOW, _FEWEST = 0.5, 0.4, 2
 
 
 def _levels() -> tuple[Buckets, ...]:
     """From the finest to the coarsest."""
-    found, main = [], float(_FINEST)
+    found, main = [], float(FINEST)
     while main >= _COARSEST:
         found.append(Buckets(round(main), *(max(round(share * main), _FEWEST) for share in (_OTHER, _SLOW))))
         main *= _STEP
@@ -65,6 +66,10 @@ def pack_content(content: FlightContent, budget_bytes: int) -> bytes:
     """The blob of a flight whose base64 takes no more than the budget, as fine as that allows.
 
     Where even the coarsest takes more, that is what is given.
+
+    Parameters
+    ----------
+    content : with panels that were made ready (`fusetune.report.flight_data.preparing`)
     """
     important = {one.name for one in content.sets if one.role in _IMPORTANT}
     most = budget_bytes // 4 * 3
@@ -181,10 +186,7 @@ class _Writer:
         }
 
     def _series(self, series: Series, buckets: int) -> dict[str, Any]:
-        series = self._in_order(series)
-        peaks = () if series.peaks is None else (series.peaks,)
-        rows = kept_rows(series.values, buckets, peaks, series.rejected)
-        rejected = series.rejected
+        rows, rejected = kept_rows_of(series, buckets), series.rejected
         return {
             "label": series.label,
             "set": series.set,
@@ -194,17 +196,9 @@ class _Writer:
             "gate": series.gate,
             "rejected": None if rejected is None or not rejected.any() else self._arrays.flags(rejected[rows]),
             "draw": series.draw,
-            "samples": int(np.isfinite(series.values).sum()),
-            "rejected_samples": None if rejected is None else int(rejected.sum()),
+            "samples": series.samples,
+            "rejected_samples": series.rejected_samples,
         }
-
-    def _in_order(self, series: Series) -> Series:
-        """By time, without what a log holds of before it began, as for a sensor's delay."""
-        if np.any(np.diff(series.time) < 0):
-            series = series.rows(np.argsort(series.time, kind="stable"))
-        if not series.time.size or series.time[0] >= self._start:
-            return series
-        return series.rows(slice(int(np.searchsorted(series.time, self._start)), None))
 
     def track(self, track: TrackView, buckets: Buckets) -> dict[str, Any]:
         written = self._plane(track.flown, buckets.main)

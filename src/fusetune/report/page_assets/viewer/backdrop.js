@@ -1,10 +1,11 @@
-/* What is drawn under and over the lines of a panel: ground, findings, bounds, limit, rejected samples, markers, events. */
+/* What lies under and over the lines of a panel: ground, findings, bounds, limit; rejected samples, markers, events. */
 (() => {
   "use strict";
   const viewer = (fusetune.viewer = fusetune.viewer || {});
   const MARKER_EVERY_PX = 110;
   const MARKER_PX = 4;
   const CROSS_PX = 3.5;
+  const MOST_EVENTS = 20; // in view: more hide what they are about; the strip has them all
   const MOST_TINTED = 0.6; // of the flight: a finding about all of it tints nothing
 
   /* Draws in pixels of the canvas, within the plot. */
@@ -15,7 +16,14 @@
     context.beginPath();
     context.rect(left, top, width, height);
     context.clip();
-    draw(context, globalThis.devicePixelRatio || 1, { left, top, width, height, right: left + width, bottom: top + height });
+    draw(context, globalThis.devicePixelRatio || 1, {
+      left,
+      top,
+      width,
+      height,
+      right: left + width,
+      bottom: top + height,
+    });
     context.restore();
   }
 
@@ -67,13 +75,14 @@
     context.stroke();
   }
 
-  /* ±1σ as a shade around zero, the gate as dashed lines. */
-  function drawBounds(context, u, { times, sigma, gate }, colour, dpr) {
+  /* ±1σ as a shade around zero, or around an estimate, the gate as dashed lines. */
+  function drawBounds(context, u, { times, sigma, gate, middle }, colour, dpr) {
+    const y = (i, factor) => yOf(u, (middle ? middle[i] : 0) + factor * sigma[i]);
     const [first, last] = viewer.within(times, u.scales.x.min, u.scales.x.max);
     for (const [i0, i1] of runs(sigma, first, last)) {
       context.beginPath();
-      for (let i = i0; i <= i1; i += 1) context.lineTo(xOf(u, times[i]), yOf(u, sigma[i]));
-      for (let i = i1; i >= i0; i -= 1) context.lineTo(xOf(u, times[i]), yOf(u, -sigma[i]));
+      for (let i = i0; i <= i1; i += 1) context.lineTo(xOf(u, times[i]), y(i, 1));
+      for (let i = i1; i >= i0; i -= 1) context.lineTo(xOf(u, times[i]), y(i, -1));
       context.closePath();
       context.fillStyle = colour;
       context.globalAlpha = 0.14;
@@ -85,7 +94,7 @@
       context.setLineDash([4 * dpr, 4 * dpr]);
       for (const sign of [1, -1]) {
         context.beginPath();
-        for (let i = i0; i <= i1; i += 1) context.lineTo(xOf(u, times[i]), yOf(u, sign * gate * sigma[i]));
+        for (let i = i0; i <= i1; i += 1) context.lineTo(xOf(u, times[i]), y(i, sign * gate));
         context.stroke();
       }
       context.setLineDash([]);
@@ -119,9 +128,9 @@
         if (series.rejected) drawRejected(context, u, series, colours.bad, dpr);
       }
       context.fillStyle = colours.quiet;
-      for (const event of model.events) {
+      const seen = model.events.filter(({ t }) => t >= u.scales.x.min && t <= u.scales.x.max);
+      for (const event of seen.length > MOST_EVENTS ? [] : seen) {
         const x = xOf(u, event.t);
-        if (x < box.left || x > box.right) continue;
         context.beginPath();
         context.moveTo(x - 4 * dpr, box.top);
         context.lineTo(x + 4 * dpr, box.top);
@@ -134,7 +143,7 @@
   function drawMarkers(context, u, { times, values, marker, place }, box, dpr) {
     context.lineWidth = 1.5 * dpr;
     const step = MARKER_EVERY_PX * dpr;
-    for (let x = box.left + step * (0.3 + 0.17 * place) % step; x < box.right; x += step) {
+    for (let x = box.left + ((step * (0.3 + 0.17 * place)) % step); x < box.right; x += step) {
       const t = u.posToVal((x - box.left) / dpr, "x");
       const i = viewer.nearest(times, t);
       if (i < 0 || Number.isNaN(values[i]) || Math.abs(xOf(u, times[i]) - x) > step / 3) continue;

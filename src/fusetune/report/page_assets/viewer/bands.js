@@ -12,15 +12,25 @@
     const { h, visible, fitted } = viewer;
     const canvas = viewer.makeCanvas(TOP + ROW * bands.length, draw);
     const now = h("p", { class: "fv-now" });
-    const plot = h("div", { class: "fv-plot fv-bands", role: "img", "aria-label": described(view, bands) }, canvas.element);
+    const plot = h(
+      "div",
+      { class: "fv-plot fv-bands", role: "img", "aria-label": described(view, bands) },
+      canvas.element,
+    );
     const figures = h("div", { class: "fv-figures" });
     const shut = viewer.discloser("Times", figures, {
       className: "fv-figures-button",
       changed: (open) => open && figures.replaceChildren(timesTable(view, bands)),
     });
     shut.button.setAttribute("aria-label", "Times of flight modes and flags");
-    const element = h("section", { class: "fv-panel", "data-panel": "bands", "aria-label": "Flight modes and flags" },
-      h("div", { class: "fv-panel-head" }, h("h4", {}, "Flight modes and flags"), shut.button), now, plot, figures);
+    const element = h(
+      "section",
+      { class: "fv-panel", "data-panel": "bands", "aria-label": "Flight modes and flags" },
+      h("div", { class: "fv-panel-head" }, h("h4", {}, "Flight modes and flags"), shut.button),
+      now,
+      plot,
+      figures,
+    );
     const scale = () => viewer.scaleOf(axis.from, axis.to, canvas.width());
     const at = (clientX) => scale().t(clientX - canvas.element.getBoundingClientRect().left);
     const widthOf = () => scale().right - scale().left;
@@ -83,17 +93,24 @@
 
   function described(view, bands) {
     const { model } = view;
-    return bands.map((band) => {
-      const lasts = band.spans.reduce((sum, [t0, t1]) => sum + t1 - t0, 0);
-      const names = [...new Set(band.spans.map((span) => span[2]).filter(Boolean))];
-      return `${band.label}${names.length ? ` (${names.join(", ")})` : ""}: ${viewer.words.share(lasts, model.stop)} of the log`;
-    }).join("; ");
+    return bands
+      .map((band) => {
+        const lasts = band.spans.reduce((sum, [t0, t1]) => sum + t1 - t0, 0);
+        const names = [...new Set(band.spans.map((span) => span[2]).filter(Boolean))];
+        const told = names.length ? `${band.label} (${names.join(", ")})` : band.label;
+        return `${told}: ${viewer.words.share(lasts, model.stop - model.start)} of the log`;
+      })
+      .join("; ");
   }
 
   function timesTable(view, bands) {
-    const rows = bands.flatMap((band) => band.spans.map(([t0, t1, text]) => [
-      text ? `${band.label}: ${text}` : band.label, view.model.moment(t0), viewer.words.seconds(t1 - t0, 1),
-    ]));
+    const rows = bands.flatMap((band) =>
+      band.spans.map(([t0, t1, text]) => [
+        text ? `${band.label}: ${text}` : band.label,
+        view.model.moment(t0),
+        viewer.words.seconds(t1 - t0, 1),
+      ]),
+    );
     return viewer.table(["", "since", "for"], rows, "Flight modes and flags: the whole flight");
   }
 

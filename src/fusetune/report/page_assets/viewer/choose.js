@@ -12,8 +12,12 @@
     const go = (by) => chosen(names[names.indexOf(select.value) + by]);
     const before = h("button", { type: "button", "aria-label": "Flight before", onclick: () => go(-1) }, "‹");
     const after = h("button", { type: "button", "aria-label": "Flight after", onclick: () => go(1) }, "›");
-    const element = h("div", { class: "fv-flight" }, h("label", { for: select.id }, "Flight"),
-      h("span", { class: "fv-joined" }, before, select, after));
+    const element = h(
+      "div",
+      { class: "fv-flight" },
+      h("label", { for: select.id }, "Flight"),
+      h("span", { class: "fv-joined" }, before, select, after),
+    );
 
     async function tellLabels() {
       for (const [at, name] of names.entries()) {
@@ -46,17 +50,34 @@
     const { h } = viewer;
     const chips = [...model.sets.values()].map((set) => {
       const role = model.roleOf(set.name);
-      const button = h("button", { type: "button", class: "fv-chip", "data-set": set.name, onclick: () => toggle(set.name) },
-        viewer.swatch(set.style, set.marker), h("span", {}, model.labelOf(set.name)), role ? h("small", {}, role) : null);
+      const button = h(
+        "button",
+        { type: "button", class: "fv-chip", "data-set": set.name, onclick: () => toggle(set.name) },
+        viewer.swatch(set.style, set.marker),
+        h("span", {}, model.labelOf(set.name)),
+        role ? h("small", {}, role) : null,
+      );
       return { name: set.name, button };
     });
-    const more = h("button", { type: "button", class: "fv-quiet-button", onclick: () => (closed = false, tell()) });
+    const more = h("button", { type: "button", class: "fv-quiet-button", onclick: () => ((closed = false), tell()) });
     let closed = chips.length > MOST_CHIPS;
     const choose = (names) => changed(model.sets.size ? names : []);
-    const element = h("div", { class: "fv-sets", role: "group", "aria-label": "Sets shown" },
-      chips.map((chip) => chip.button), more,
-      chips.length > 2 ? h("button", { type: "button", class: "fv-quiet-button", onclick: () => choose([...model.sets.keys()]) }, "all") : null,
-      chips.length > 2 ? h("button", { type: "button", class: "fv-quiet-button", onclick: () => choose(model.usualSets()) }, "usual") : null);
+    const element = h(
+      "div",
+      { class: "fv-sets", role: "group", "aria-label": "Sets shown" },
+      chips.map((chip) => chip.button),
+      more,
+      chips.length > 2
+        ? h(
+            "button",
+            { type: "button", class: "fv-quiet-button", onclick: () => choose([...model.sets.keys()]) },
+            "all",
+          )
+        : null,
+      chips.length > 2
+        ? h("button", { type: "button", class: "fv-quiet-button", onclick: () => choose(model.usualSets()) }, "usual")
+        : null,
+    );
 
     function toggle(name) {
       const now = [...model.sets.keys()].filter((one) => (one === name ? !view.isShown(one) : view.isShown(one)));

@@ -24,7 +24,8 @@
     const length = new DataView(bytes.buffer, bytes.byteOffset).getUint32(0, true);
     if (bytes.length < 4 + length) return null;
     const header = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
-    if (header.version !== VERSION) throw new Error(`The data are of version ${header.version}; this page reads ${VERSION}.`);
+    if (header.version !== VERSION)
+      throw new Error(`The data are of version ${header.version}; this page reads ${VERSION}.`);
     return { header, start: 4 + length };
   }
 

@@ -20,7 +20,9 @@
       if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
       else element.setAttribute(name, value === true ? "" : value);
     }
-    element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+    element.append(
+      ...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false),
+    );
     return element;
   }
 
@@ -53,9 +55,27 @@
         "table",
         { class: "fv-table" },
         h("caption", {}, caption),
-        h("thead", {}, h("tr", {}, head.map((text) => h("th", { scope: "col" }, text)))),
-        h("tbody", {}, rows.map(([first, ...cells]) =>
-          h("tr", {}, h("th", { scope: "row" }, first), cells.map((text) => h("td", {}, text))))),
+        h(
+          "thead",
+          {},
+          h(
+            "tr",
+            {},
+            head.map((text) => h("th", { scope: "col" }, text)),
+          ),
+        ),
+        h(
+          "tbody",
+          {},
+          rows.map(([first, ...cells]) =>
+            h(
+              "tr",
+              {},
+              h("th", { scope: "row" }, first),
+              cells.map((text) => h("td", {}, text)),
+            ),
+          ),
+        ),
       ),
     );
   }

@@ -9,14 +9,18 @@
      the page. With fingers: one across moves the cursor, two zoom and pan, one up or down scrolls the page.
      `timeAt(clientX)` in s of the log; `widthOf()` of the time axis in pixels. */
   viewer.addGestures = (element, axis, timeAt, widthOf, { cursor = true } = {}) => {
-    element.addEventListener("wheel", (event) => {
-      const unit = event.deltaMode === 1 ? LINE_PX : 1;
-      const across = event.shiftKey && !event.deltaX ? event.deltaY : event.deltaX;
-      if (event.ctrlKey || event.metaKey) axis.zoom(Math.exp(event.deltaY * unit * PER_PIXEL), timeAt(event.clientX));
-      else if (Math.abs(across) > Math.abs(event.shiftKey ? 0 : event.deltaY)) axis.pan((across * unit) / widthOf());
-      else return;
-      event.preventDefault();
-    }, { passive: false });
+    element.addEventListener(
+      "wheel",
+      (event) => {
+        const unit = event.deltaMode === 1 ? LINE_PX : 1;
+        const across = event.shiftKey && !event.deltaX ? event.deltaY : event.deltaX;
+        if (event.ctrlKey || event.metaKey) axis.zoom(Math.exp(event.deltaY * unit * PER_PIXEL), timeAt(event.clientX));
+        else if (Math.abs(across) > Math.abs(event.shiftKey ? 0 : event.deltaY)) axis.pan((across * unit) / widthOf());
+        else return;
+        event.preventDefault();
+      },
+      { passive: false },
+    );
 
     element.addEventListener("dblclick", () => axis.reset());
 

@@ -9,7 +9,9 @@
   /* What titles begin with alike: "GNSS velocity" of "GNSS velocity north" and "… east". */
   function commonWords(titles) {
     const [first, ...others] = titles.map((title) => title.split(",")[0].split(" "));
-    const same = first.filter((word, i) => others.every((words) => words.slice(0, i + 1).join(" ") === first.slice(0, i + 1).join(" ")));
+    const same = first.filter((word, i) =>
+      others.every((words) => words.slice(0, i + 1).join(" ") === first.slice(0, i + 1).join(" ")),
+    );
     return (same.length ? same : first).join(" ");
   }
 
@@ -19,19 +21,26 @@
     const near = new Set();
     const stale = new Map();
     const byElement = new Map();
-    const watch = new IntersectionObserver((entries) => {
-      for (const { target, isIntersecting } of entries) {
-        const panel = byElement.get(target);
-        if (!panel) continue;
-        if (!isIntersecting) near.delete(panel);
-        else {
-          near.add(panel);
-          bring(panel);
+    const watch = new IntersectionObserver(
+      (entries) => {
+        for (const { target, isIntersecting } of entries) {
+          const panel = byElement.get(target);
+          if (!panel) continue;
+          if (!isIntersecting) near.delete(panel);
+          else {
+            near.add(panel);
+            bring(panel);
+          }
         }
-      }
-    }, { rootMargin: NEAR });
+      },
+      { rootMargin: NEAR },
+    );
     const groups = model.groups.map(makeGroup);
-    const element = h("div", { class: "fv-groups" }, groups.map((group) => group.element));
+    const element = h(
+      "div",
+      { class: "fv-groups" },
+      groups.map((group) => group.element),
+    );
 
     function makeGroup(name) {
       const own = model.panels.filter((panel) => panel.group === name && panel.series.length);
@@ -40,12 +49,18 @@
       const count = own.length + (bands.length ? 1 : 0);
       const open = openNow().includes(name);
       const { button, set } = viewer.discloser(
-        [name, h("small", {}, count === 1 ? "1 panel" : `${count} panels`)], content,
+        [name, h("small", {}, count === 1 ? "1 panel" : `${count} panels`)],
+        content,
         { open, className: "fv-group-button", changed: () => changed({ open: listed() }) },
       );
       const group = { name, own, bands, content, set, panels: null, filter: null };
-      group.element = h("section", { class: "fv-group", "data-group": name, "aria-label": name }, h("h3", {}, button), content,
-        h("p", { class: "fv-print-hint" }, `${name}: closed when this was printed.`));
+      group.element = h(
+        "section",
+        { class: "fv-group", "data-group": name, "aria-label": name },
+        h("h3", {}, button),
+        content,
+        h("p", { class: "fv-print-hint" }, `${name}: closed when this was printed.`),
+      );
       if (open) fill(group);
       return group;
     }
@@ -87,25 +102,52 @@
         const sources = [...new Set(group.own.map((panel) => panel.source))].filter(Boolean);
         if (sources.length > 1) parts.push(sourceChips(group, sources));
       }
-      if (group.own.some((panel) => panel.series.some((series) => series.gate))) {
-        parts.push(h("span", { class: "fv-quiet" }, "shade: ±1 σ · dashed: gate · ×: rejected"));
-        parts.push(checkbox("whole gate in view", () => view.showsGate(), (on) => changed({ gate: on ? "1" : null })));
+      const any = (test) => group.own.some((panel) => panel.series.some(test));
+      const isGated = any((series) => series.gate);
+      if (any((series) => series.sigma !== null && series.sigma !== undefined)) {
+        parts.push(
+          h("span", { class: "fv-quiet" }, isGated ? "shade: ±1 σ · dashed: gate · ×: rejected" : "shade: ±1 σ"),
+        );
+      }
+      if (isGated) {
+        parts.push(
+          checkbox(
+            "whole gate in view",
+            () => view.showsGate(),
+            (on) => changed({ gate: on ? "1" : null }),
+          ),
+        );
       }
       if (group.own.some((panel) => panel.kind === "ratio")) {
-        parts.push(checkbox("logarithmic", () => group.panels.some((panel) => panel.isLog && panel.isLog()),
-          (on) => changed({ log: on ? "1" : "0" })));
+        parts.push(
+          checkbox(
+            "logarithmic",
+            () => group.panels.some((panel) => panel.isLog && panel.isLog()),
+            (on) => changed({ log: on ? "1" : "0" }),
+          ),
+        );
       }
       return parts.length ? h("div", { class: "fv-tools" }, parts) : null;
     }
 
     function sourceChips(group, sources) {
+      const titles = (source) => group.own.filter((panel) => panel.source === source).map((panel) => panel.title);
+      const words = (source) => (source ? viewer.words.heading(commonWords(titles(source))) : "All sources");
       group.filter = [null, ...sources].map((source) => ({
         source,
-        button: h("button", {
-          type: "button", class: "fv-chip", "data-source": source, onclick: () => changed({ source, axis: null }),
-        }, h("span", {}, source ? commonWords(group.own.filter((panel) => panel.source === source).map((panel) => panel.title)) : "all sources")),
+        button: h(
+          "button",
+          {
+            type: "button",
+            class: "fv-chip",
+            "data-source": source,
+            onclick: () => changed({ source, axis: null }),
+          },
+          words(source),
+        ),
       }));
-      return h("span", { class: "fv-sources", role: "group", "aria-label": "Source" }, group.filter.map(({ button }) => button));
+      const buttons = group.filter.map(({ button }) => button);
+      return h("span", { class: "fv-sources", role: "group", "aria-label": "Source" }, buttons);
     }
 
     function checkbox(label, get, act) {
@@ -124,10 +166,12 @@
         const other = has && (panel.source !== source || (axis !== undefined && String(panel.axis) !== axis));
         at.hidden = other;
       }
-      for (const one of group.filter || []) one.button.setAttribute("aria-pressed", String(one.source === (has ? source : null)));
+      for (const one of group.filter || [])
+        one.button.setAttribute("aria-pressed", String(one.source === (has ? source : null)));
       const log = fusetune.state.get("log");
       for (const panel of group.panels) {
-        if (log !== undefined && panel.panel && panel.panel.kind === "ratio" && panel.isLog() !== (log === "1")) panel.setLog(log === "1");
+        if (log !== undefined && panel.panel && panel.panel.kind === "ratio" && panel.isLog() !== (log === "1"))
+          panel.setLog(log === "1");
       }
     }
 
@@ -146,7 +190,8 @@
     function refresh(what) {
       for (const group of groups) {
         for (const panel of group.panels || []) {
-          if (near.has(panel) || what === "sets") panel.refresh(what); // legends are read out of view as well
+          if (near.has(panel) || what === "sets")
+            panel.refresh(what); // legends are read out of view as well
           else stale.set(panel, (stale.get(panel) || new Set()).add(what));
         }
       }

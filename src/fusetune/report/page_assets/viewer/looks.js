@@ -9,12 +9,56 @@
   const HEIGHTS = 4;
   /* Outlines around 0, 0 in a square from -1 to 1; lines where they are not closed. */
   const OUTLINES = {
-    square: [[[-0.85, -0.85], [0.85, -0.85], [0.85, 0.85], [-0.85, 0.85]]],
-    diamond: [[[0, -1.1], [1.1, 0], [0, 1.1], [-1.1, 0]]],
-    triangle: [[[0, -1], [1, 0.8], [-1, 0.8]]],
-    down: [[[0, 1], [1, -0.8], [-1, -0.8]]],
-    plus: [[[-1, 0], [1, 0]], [[0, -1], [0, 1]]],
-    cross: [[[-0.8, -0.8], [0.8, 0.8]], [[-0.8, 0.8], [0.8, -0.8]]],
+    square: [
+      [
+        [-0.85, -0.85],
+        [0.85, -0.85],
+        [0.85, 0.85],
+        [-0.85, 0.85],
+      ],
+    ],
+    diamond: [
+      [
+        [0, -1.1],
+        [1.1, 0],
+        [0, 1.1],
+        [-1.1, 0],
+      ],
+    ],
+    triangle: [
+      [
+        [0, -1],
+        [1, 0.8],
+        [-1, 0.8],
+      ],
+    ],
+    down: [
+      [
+        [0, 1],
+        [1, -0.8],
+        [-1, -0.8],
+      ],
+    ],
+    plus: [
+      [
+        [-1, 0],
+        [1, 0],
+      ],
+      [
+        [0, -1],
+        [0, 1],
+      ],
+    ],
+    cross: [
+      [
+        [-0.8, -0.8],
+        [0.8, 0.8],
+      ],
+      [
+        [-0.8, 0.8],
+        [0.8, -0.8],
+      ],
+    ],
     star: [star()],
   };
 
@@ -64,15 +108,26 @@
   function swatch(style, marker) {
     const { svg } = viewer;
     const outlines = OUTLINES[marker];
-    const sign = marker === null ? [] : outlines
-      ? outlines.map((outline) => svg(outline.length > 2 ? "polygon" : "polyline", {
-        points: outline.map(([x, y]) => `${12 + 4.5 * x},${7 + 4.5 * y}`).join(" "),
-        class: outline.length > 2 ? "fv-filled" : "fv-stroked",
-      }))
-      : [svg("circle", { cx: 12, cy: 7, r: 4, class: "fv-filled" })];
+    const sign =
+      marker === null
+        ? []
+        : outlines
+          ? outlines.map((outline) =>
+              svg(outline.length > 2 ? "polygon" : "polyline", {
+                points: outline.map(([x, y]) => `${12 + 4.5 * x},${7 + 4.5 * y}`).join(" "),
+                class: outline.length > 2 ? "fv-filled" : "fv-stroked",
+              }),
+            )
+          : [svg("circle", { cx: 12, cy: 7, r: 4, class: "fv-filled" })];
     return svg(
       "svg",
-      { class: `fv-swatch fv-set-${style % COLOURS}`, viewBox: "0 0 24 14", width: 24, height: 14, "aria-hidden": "true" },
+      {
+        class: `fv-swatch fv-set-${style % COLOURS}`,
+        viewBox: "0 0 24 14",
+        width: 24,
+        height: 14,
+        "aria-hidden": "true",
+      },
       svg("line", { x1: 1, y1: 7, x2: 23, y2: 7, class: "fv-stroked" }),
       sign,
     );

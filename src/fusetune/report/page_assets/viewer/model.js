@@ -34,10 +34,20 @@
     return [Math.max(firstFrom(times, from) - 1, 0), Math.min(firstFrom(times, to), times.length - 1)];
   }
 
+  /* When the first of what is shown was: some logs say that they began minutes before anything was written. */
+  function beginning({ takeoff_s: takeoff, bands = [], panels = [], track }, array) {
+    const first = [takeoff ?? Infinity, ...bands.flatMap((band) => band.spans.map((span) => span[0]))];
+    if (track) first.push(array(track.time)[0] ?? Infinity);
+    for (const panel of panels)
+      first.push(...panel.series.slice(0, 1).map((series) => array(series.time)[0] ?? Infinity));
+    const found = Math.min(...first);
+    return Number.isFinite(found) ? Math.max(found, 0) : 0;
+  }
+
   viewer.makeModel = ({ header, array }) => {
-    const start = 0;
     const stop = Math.max(header.duration_s, 0.1);
     const sets = new Map((header.sets || []).map((set) => [set.name, set]));
+    const start = Math.min(beginning(header, array), stop - 0.1);
     const model = {
       header,
       name: header.flight,
@@ -61,7 +71,12 @@
     model.groups = [...new Set(model.panels.map((panel) => panel.group))];
     if (model.bands.length && !model.groups.includes("Flags")) model.groups.push("Flags");
 
-    const labels = new Map(model.panels.flatMap((panel) => panel.series).map((series) => [series.set, series.label]));
+    const labels = new Map(
+      model.panels
+        .flatMap((panel) => panel.series)
+        .reverse()
+        .map((series) => [series.set, series.label]),
+    );
     model.labelOf = (name) => labels.get(name) || name;
     model.roleOf = (name) => ROLES[sets.get(name)?.role] || "";
     /* What is shown until the reader chooses: what flies now and what was chosen. */
@@ -71,6 +86,14 @@
       return (usual.length ? usual : all.slice(0, 1)).map((set) => set.name);
     };
     model.airTime = () => (model.landing ?? stop) - (model.takeoff ?? start);
+    model.isFlown = (t) => t >= (model.takeoff ?? start) && t <= (model.landing ?? stop);
+    /* What is in view at first: the flight with some of what was before and after it, where the log is much longer. */
+    const around = Math.max(0.1 * model.airTime(), 3);
+    const flown = [
+      Math.max((model.takeoff ?? start) - around, start),
+      Math.min((model.landing ?? stop) + around, stop),
+    ];
+    model.home = flown[1] - flown[0] > 0.6 * (stop - start) ? [start, stop] : flown;
     /* What of a window counts for the scale of a panel: the part in the air, unless there is hardly any. On the ground
        the filter aligns, and what it says then would press the flight flat. */
     model.counts = (from, to) => {

@@ -9,16 +9,23 @@
 
   function mount(place) {
     const { h } = viewer;
-    const blobs = new Map([...document.querySelectorAll("script.flight-data")].map((data) => [data.dataset.flight, data]));
-    const names = "choose" in place.dataset ? [...blobs.keys()] : [place.dataset.flight].filter((name) => blobs.has(name));
+    const blobs = new Map(
+      [...document.querySelectorAll("script.flight-data")].map((data) => [data.dataset.flight, data]),
+    );
+    const names =
+      "choose" in place.dataset ? [...blobs.keys()] : [place.dataset.flight].filter((name) => blobs.has(name));
     const first = names.includes(place.dataset.first) ? place.dataset.first : names[0];
     const status = h("p", { class: "fv-status", role: "status" });
     const body = h("div", { class: "fv-shown" });
     let shown = null;
     let asked = null;
     const textOf = (name) => blobs.get(name).textContent;
-    const choice = names.length > 1 ? viewer.makeFlightChoice(names, textOf, (name) =>
-      fusetune.state.push({ flight: name === first ? null : name, t: null, source: null, axis: null })) : null;
+    const choice =
+      names.length > 1
+        ? viewer.makeFlightChoice(names, textOf, (name) =>
+            fusetune.state.push({ flight: name === first ? null : name, t: null, source: null, axis: null }),
+          )
+        : null;
     place.setAttribute("role", "region");
     place.setAttribute("aria-label", "Flight in detail");
     place.replaceChildren(...(choice ? [choice.element] : []), status, body);
@@ -48,25 +55,31 @@
     }
 
     /* A flight is unpacked when its place is first seen, not while its tab is closed. */
-    const seen = new IntersectionObserver((entries) => {
-      if (!entries.some((entry) => entry.isIntersecting)) return;
-      seen.disconnect();
-      show();
-      fusetune.state.subscribe((changed) => {
-        if (changed.includes("flight")) show();
-        if (shown) shown.follow(changed);
-      });
-      fusetune.theme.subscribe(() => shown && shown.recolour());
-    }, { rootMargin: "400px 0px" });
+    const seen = new IntersectionObserver(
+      (entries) => {
+        if (!entries.some((entry) => entry.isIntersecting)) return;
+        seen.disconnect();
+        show();
+        fusetune.state.subscribe((changed) => {
+          if (changed.includes("flight")) show();
+          if (shown) shown.follow(changed);
+        });
+        fusetune.theme.subscribe(() => shown && shown.recolour());
+      },
+      { rootMargin: "400px 0px" },
+    );
     seen.observe(place);
   }
 
   /* All that is shown of a flight, in `body`. */
   function build(model, body) {
     const { h } = viewer;
-    const axis = viewer.makeTimeAxis(model.start, model.stop);
+    const axis = viewer.makeTimeAxis(model);
     const view = {
-      model, axis, colours: viewer.readColours(), sets: new Set(),
+      model,
+      axis,
+      colours: viewer.readColours(),
+      sets: new Set(),
       isShown: (set) => set === null || set === undefined || view.sets.has(set),
       showsGate: () => fusetune.state.get("gate") === "1",
       telling: (t, digits) => told(model, t, digits),
@@ -84,14 +97,25 @@
     const sticky = h("div", { class: "fv-sticky" }, toolbar.element, strip.element);
     const findings = viewer.makeFindings(view);
     const aside = h("div", { class: "fv-aside" }, map && map.element, height && height.element, findings);
-    const columns = h("div", { class: aside.children.length ? "fv-columns" : "fv-columns is-single" }, aside, groups.element);
+    const columns = h(
+      "div",
+      { class: aside.children.length ? "fv-columns" : "fv-columns is-single" },
+      aside,
+      groups.element,
+    );
     body.replaceChildren(...(model.sets.size ? [chips.element] : []), sticky, columns);
     viewer.addKeys(body, axis);
     if (map) map.colourBy(fusetune.state.get("map"));
 
     function readState() {
       const given = fusetune.state.get("sets");
-      const names = given === undefined ? model.usualSets() : given.split(",").map(unescaped).filter((name) => model.sets.has(name));
+      const names =
+        given === undefined
+          ? model.usualSets()
+          : given
+              .split(",")
+              .map(unescaped)
+              .filter((name) => model.sets.has(name));
       view.sets = new Set(names);
       const [from, to] = (fusetune.state.get("t") || "").split(",").map(Number);
       if (to > from) axis.setWindow(from, to);
@@ -122,7 +146,7 @@
     axis.subscribe((what) => {
       if (what === "window") {
         const ends = [axis.from, axis.to].map((t) => Number(t.toFixed(4)));
-        changed({ t: axis.isWhole() ? null : ends.join(",") });
+        changed({ t: axis.isHome() ? null : ends.join(",") });
       }
       refresh(what);
     });
@@ -130,11 +154,11 @@
     function fit() {
       const width = sticky.clientWidth;
       if (!width || gone) return;
+      strip.resize(width);
       // what sticks stands below the page's tabs, which stick as well, and above what sticks beside the panels
       const tabs = document.querySelector(".tab-bar");
       body.style.setProperty("--fv-below-tabs", `${tabs ? tabs.offsetHeight : 0}px`);
       body.style.setProperty("--fv-below-strip", `${(tabs ? tabs.offsetHeight : 0) + sticky.offsetHeight}px`);
-      strip.resize(width);
       if (map) map.draw(map.element.querySelector(".fv-plot").clientWidth);
       if (height) height.draw(height.element.querySelector(".fv-plot").clientWidth);
       groups.resize();
@@ -156,19 +180,24 @@
       refresh("theme");
     }
 
-    const paper = toPaper(view, () => {
-      strip.resize(PAPER_PX);
-      if (map) map.draw(MAP_ON_PAPER_PX);
-      if (height) {
-        height.draw(PAPER_PX);
-        height.refresh("theme");
-      }
-      groups.print(PAPER_PX);
-    }, () => {
-      fit();
-      groups.afterPrint();
-      refresh("theme");
-    }, () => !gone && body.isConnected);
+    const paper = toPaper(
+      view,
+      () => {
+        strip.resize(PAPER_PX);
+        if (map) map.draw(MAP_ON_PAPER_PX);
+        if (height) {
+          height.draw(PAPER_PX);
+          height.refresh("theme");
+        }
+        groups.print(PAPER_PX);
+      },
+      () => {
+        fit();
+        groups.afterPrint();
+        refresh("theme");
+      },
+      () => !gone && body.isConnected,
+    );
 
     return {
       follow,
@@ -216,7 +245,14 @@
     if (!track) return null;
     const series = [{ label: "height", set: null, style: 0, time: track.time, value: track.height }];
     if (track.gnss_height !== undefined && track.gnss_height !== null) {
-      series.push({ label: "GNSS", set: null, style: 2, time: track.gnss_time, value: track.gnss_height, draw: "points" });
+      series.push({
+        label: "GNSS",
+        set: null,
+        style: 2,
+        time: track.gnss_time,
+        value: track.gnss_height,
+        draw: "points",
+      });
     }
     return viewer.makePanel(view, { id: "height", title: "Height above take-off", unit: "m", kind: "line", series });
   }

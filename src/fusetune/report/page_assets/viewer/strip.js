@@ -15,11 +15,20 @@
     const rows = lay(modes, model);
     const longFirst = [...model.marks].sort((a, b) => b.t1 - b.t0 - (a.t1 - a.t0)); // so that short ones stay visible
     const canvas = viewer.makeCanvas(rows.height, draw);
-    const element = h("div", {
-      class: "fv-strip", role: "slider", tabindex: "0", "aria-label": "moment of the flight",
-      "aria-valuemin": "0", "aria-valuemax": String(Math.round(model.stop)), "aria-valuenow": "0",
-      title: "Drag to choose what is in view; drag within it to move it",
-    }, canvas.element);
+    const element = h(
+      "div",
+      {
+        class: "fv-strip",
+        role: "slider",
+        tabindex: "0",
+        "aria-label": "moment of the flight",
+        "aria-valuemin": String(Math.floor(model.start)),
+        "aria-valuemax": String(Math.ceil(model.stop)),
+        "aria-valuenow": String(Math.round(model.start)),
+        title: "Drag to choose what is in view; drag within it to move it",
+      },
+      canvas.element,
+    );
     const whole = () => viewer.scaleOf(model.start, model.stop, canvas.width());
     const at = (clientX) => whole().t(clientX - canvas.element.getBoundingClientRect().left);
 
@@ -82,7 +91,9 @@
       const y = event.clientY - canvas.element.getBoundingClientRect().top;
       if (y < rows.findings || y > rows.findings + FINDINGS || !model.marks.length) return;
       const near = (NEAR_PX / (whole().right - whole().left)) * (model.stop - model.start);
-      const hit = model.marks.filter((mark) => at(event.clientX) >= mark.t0 - near && at(event.clientX) <= mark.t1 + near);
+      const hit = model.marks.filter(
+        (mark) => at(event.clientX) >= mark.t0 - near && at(event.clientX) <= mark.t1 + near,
+      );
       hit.sort((a, b) => a.t1 - a.t0 - (b.t1 - b.t0));
       if (hit.length) axis.jump(hit[0].t0, hit[0].t1);
     });

@@ -1,17 +1,18 @@
-/* The one time axis of all panels, the strip and the map: what is in view, and where the cursor stands. Seconds of the log. */
+/* The one time axis of panels, strip and map: what is in view, and where the cursor stands. Seconds of the log. */
 (() => {
   "use strict";
   const viewer = (fusetune.viewer = fusetune.viewer || {});
   const SHORTEST_S = 0.02;
 
-  viewer.makeTimeAxis = (start, stop) => {
+  viewer.makeTimeAxis = ({ start, stop, home }) => {
     const listeners = [];
-    const axis = { start, stop, from: start, to: stop, cursor: null };
+    const axis = { start, stop, from: home[0], to: home[1], cursor: null };
     const tell = (what) => listeners.forEach((listener) => listener(what));
     const shortest = Math.min(SHORTEST_S, stop - start);
 
     axis.subscribe = (listener) => listeners.push(listener);
     axis.isWhole = () => axis.from === start && axis.to === stop;
+    axis.isHome = () => Math.abs(axis.from - home[0]) < 1e-6 && Math.abs(axis.to - home[1]) < 1e-6;
 
     axis.setWindow = (from, to) => {
       const length = Math.min(Math.max(to - from, shortest), stop - start);
@@ -22,7 +23,8 @@
       axis.to = length === stop - start ? stop : first + length;
       tell("window");
     };
-    axis.reset = () => axis.setWindow(start, stop);
+    axis.reset = () => axis.setWindow(...home);
+    axis.showWhole = () => axis.setWindow(start, stop);
     axis.pan = (share) => axis.shift(share * (axis.to - axis.from));
     axis.shift = (by) => axis.setWindow(axis.from + by, axis.to + by);
     /* Makes the window `factor` times as long; the moment `about` stays where it is. */

@@ -51,5 +51,8 @@
     return part > 0 && percent < 0.1 ? "less than 0.1 %" : `${percent.toFixed(1)} %`;
   }
 
-  viewer.words = { figure, tick, withUnit, seconds, moment, span, share, MINUTES_FROM_S };
+  /* As a heading begins; what begins with a Greek letter or an abbreviation stays. */
+  const heading = (text) => (/^[a-z]+\b/.test(text) ? text[0].toUpperCase() + text.slice(1) : text);
+
+  viewer.words = { heading, figure, tick, withUnit, seconds, moment, span, share, MINUTES_FROM_S };
 })();
