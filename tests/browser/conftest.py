@@ -53,6 +53,8 @@ def demonstration() -> str:
 def open_page(chromium: Browser) -> Iterator[OpenPage]:
     """Opens an address; whatever a page writes to the console, throws or asks of a network fails the test."""
     complaints: list[str] = []
+    asked: list[str] = []
+    opened_files: set[str] = set()
     contexts = []
 
     def opened(url: str, width: int = 1440, *, scheme: Any = "light", touch: bool = False, **more: Any) -> Page:
@@ -64,7 +66,8 @@ def open_page(chromium: Browser) -> Iterator[OpenPage]:
         page.set_default_timeout(MOST_MS)
         page.on("console", lambda message: complaints.append(f"console: {message.text}"))
         page.on("pageerror", lambda error: complaints.append(f"error: {error}"))
-        page.on("request", lambda request: complaints.append(f"request: {request.url}") if request.url != url.partition("#")[0] else None)
+        page.on("request", lambda request: asked.append(request.url))
+        opened_files.add(url.partition("#")[0])
         page.goto(url)
         return page
 
@@ -72,6 +75,7 @@ def open_page(chromium: Browser) -> Iterator[OpenPage]:
     for context in contexts:
         context.close()
     assert complaints == []
+    assert set(asked) <= opened_files
 
 
 @pytest.fixture(scope="session")

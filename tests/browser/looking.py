@@ -8,6 +8,9 @@ from urllib.parse import parse_qsl, urlsplit
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
+WRITTEN_AFTER_MS = 180
+"""The page writes the address 150 ms after what it tells has changed."""
+
 
 def panel_of(page: Page, name: str) -> Locator:
     """A panel of the viewer, drawn and in view."""
@@ -19,7 +22,8 @@ def panel_of(page: Page, name: str) -> Locator:
 
 def settle(page: Page) -> None:
     """Waits until what was asked for is drawn, and the address written."""
-    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 200))))")
+    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.wait_for_timeout(WRITTEN_AFTER_MS)
 
 
 def state_of(page: Page) -> dict[str, str]:

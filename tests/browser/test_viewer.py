@@ -256,8 +256,11 @@ def test_fingers_move_the_cursor_and_zoom(made: MadePage, open_page: OpenPage) -
 
     def touch(kind: str, finger: int, share: float) -> None:
         over.evaluate(
-            "(e, [kind, finger, share]) => { const b = e.getBoundingClientRect(); e.dispatchEvent(new PointerEvent(kind,"
-            " {pointerId: finger, pointerType: 'touch', bubbles: true, clientX: b.x + share * b.width, clientY: b.y + 50})); }",
+            """(element, [kind, finger, share]) => {
+              const box = element.getBoundingClientRect();
+              const at = {clientX: box.x + share * box.width, clientY: box.y + 50};
+              element.dispatchEvent(new PointerEvent(kind, {pointerId: finger, pointerType: "touch", ...at}));
+            }""",
             [kind, finger, share],
         )
 
@@ -318,7 +321,8 @@ def test_the_map_tells_where_the_vehicle_was(made: MadePage, open_page: OpenPage
     page.locator(".fv-map canvas").wait_for()
     page.locator(".fv-map").scroll_into_view_if_needed()
     settle(page)
-    assert "40.00 m from south to north, 40.00 m from west to east" in (page.locator(".fv-map").get_attribute("aria-label") or "")
+    described = page.locator(".fv-map").get_attribute("aria-label") or ""
+    assert "40.00 m from south to north, 40.00 m from west to east" in described
     box = page.locator(".fv-map canvas").bounding_box()
     assert box is not None
     side = min(box["width"], box["height"]) - 2 * 26
@@ -364,6 +368,18 @@ def test_nothing_closed_is_drawn_and_paper_gets_what_is_open(made: MadePage, ope
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     settle(page)
     assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+
+
+def test_nothing_is_left_in_the_browser_but_the_page_itself(
+    made: MadePage, open_page: OpenPage, tmp_path: Path
+) -> None:
+    (tmp_path / "empty.html").write_text('<!DOCTYPE html><html lang="en"><title>Empty</title></html>', encoding="utf-8")
+    empty = open_page((tmp_path / "empty.html").as_uri()).evaluate("Object.keys(window)")
+    page = open_page(flights_of(made))
+    panel_of(page, NORTH)
+    assert set(page.evaluate("Object.keys(window)")) - set(empty) <= {"fusetune", "uPlot"}
+    page.evaluate("document.querySelector('.flight-viewer').remove()")
+    assert page.locator("main [style]").count() == 0
 
 
 def test_the_browser_unpacks_what_was_packed(made: MadePage, open_page: OpenPage) -> None:

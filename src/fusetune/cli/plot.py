@@ -10,21 +10,22 @@ from fusetune.cli.command import DONE
 from fusetune.errors import UserError
 
 if TYPE_CHECKING:
+    from fusetune.report.figures.asked_figures import Drawings
     from fusetune.report.figures.plotted_flight import PlottedFlight
-    from fusetune.report.results import Results
 
 HELP = "draw figures in the sizes of print, of a log or of a folder of results"
 EXAMPLES = (
     ("fusetune plot flight.ulg --out figures", "every figure of a flight: innovations, states, flags, track"),
     ("fusetune plot flight.ulg --set EKF2_GPS_DELAY=160 --format pdf", "with another value beside, as one PDF"),
     ("fusetune plot results --figure 17 --size single", "all flights of a run: a figure of the paper, one column wide"),
+    ("fusetune plot found --format pdf", "a search"),
     ("fusetune plot results --flight log_8 --figure innovations_gnss_vel --sets present,paper2", "one figure"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Log or results, which figures, and how they are written."""
-    parser.add_argument("what", type=Path, metavar="LOG|RESULTS", help="log, or folder of results of a run")
+    parser.add_argument("what", type=Path, metavar="LOG|RESULTS", help="log, or folder of results of a run or a search")
     parser.add_argument("--flight", metavar="NAME", help="of RESULTS, this flight instead of all together")
     parser.add_argument(
         "--sets", type=_names, default=(), metavar="NAME,…", help="sets to draw (what flies now, what is chosen)"
@@ -59,10 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw, and name the files; always `DONE`."""
-    from fusetune.report.figures.asked_figures import flight_drawings, results_drawings, write_figures
+    from fusetune.report.figures.asked_figures import flight_drawings, write_figures
 
+    pages = ""
     if options.what.is_dir() and options.flight is None:
-        drawings, pages = results_drawings(_results(options.what), options.size), ""
+        drawings = _of_several(options.what, options.size)
     else:
         flight = _flight(options)
         if flight.why_not_replayed:
@@ -74,7 +76,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _flight(options: argparse.Namespace) -> PlottedFlight:
-    from fusetune.report.figures.plotted_flight import flight_of_log, flight_of_results
+    from fusetune.plotted_log import flight_of_log
+    from fusetune.report.figures.plotted_flight import flight_of_results
 
     if not options.what.is_dir():
         if options.flight is not None:
@@ -91,19 +94,26 @@ def _flight(options: argparse.Namespace) -> PlottedFlight:
     return flight_of_results(folder, options.flight, options.sets, Choice(chosen=chosen))
 
 
-def _results(path: Path) -> Results:
-    """All flights that decide, the oldest first."""
+def _of_several(path: Path, size: str) -> Drawings:
+    """Of the flights that decide, or of a search."""
+    from fusetune.report.figures.asked_figures import results_drawings, search_figures
+    from fusetune.report.fleet.fleet_results import read_fleet_results
     from fusetune.report.flight_names import in_time_order
     from fusetune.report.results import read_results
+    from fusetune.report.search_results import SEARCH_FILE, read_search
     from fusetune.storage.parquet import read_table
 
+    if (path / SEARCH_FILE).is_file():
+        return search_figures(read_search(path), size)
     folder = _folder(path)
     flights = in_time_order(read_table(folder / "save" / "flights.parquet").to_pylist())
     folders = [folder / "analyze" / name for name in flights]
     results = read_results([one for one in folders if (one / "scoring.json").exists()], folder / "apply")
     if not results.flights:
         raise UserError(path, "no flight has a say in the decision", "Name one flight with --flight")
-    return results
+    fleet, health = folder / "apply" / "fleet.json", folder / "analyze" / "health.parquet"
+    told = read_fleet_results(fleet, health, {}) if fleet.is_file() and health.is_file() else None
+    return results_drawings(results, told, size)
 
 
 def _folder(path: Path) -> Path:

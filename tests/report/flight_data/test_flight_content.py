@@ -8,31 +8,47 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from tests.analyze.made_flight import LANDING_S, START_US, TAKE_OFF_S
+from tests.analyze.made_flight import LANDING_S, START_US, TAKE_OFF_S, MadeSet
+from tests.apply.study import make_study
 from tests.report.made_health import LANDING_S as MADE_LANDING_S
 from tests.report.made_health import LATE, health_rows, rejected, write_documents, write_log
 from tests.report.made_health import TAKE_OFF_S as MADE_TAKE_OFF_S
-from tests.report.made_report import SETS
 
+from fusetune.apply.decide import decide
 from fusetune.report.flight_data.blob import Blob, unpack
 from fusetune.report.flight_data.panel_names import GROUPS
+from fusetune.report.flight_data.shown_sets import relative_errors, replayed_sets
 from fusetune.report.flight_data.write_blob import pack_flight, with_choice, write_blob
 from fusetune.report.set_styles import set_styles
 from fusetune.set_names import PRESENT
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.parquet import read_table
 
-LABEL = "<restless>"
+RESTLESS = "<restless>"
+
+
+SETS = {
+    PRESENT: MadeSet(error=0.13, overrides={"EKF2_ACC_NOISE": 0.35}),
+    "better": MadeSet(error=0.1, overrides={"EKF2_ACC_NOISE": 0.2}),
+    RESTLESS: MadeSet(resets_s=(40.0, 50.0)),
+}
 
 
 @pytest.fixture(scope="module")
-def folders(made: tuple[Path, str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a study of made flights, with its decision."""
+    root = tmp_path_factory.mktemp("results")
+    folders, table = make_study(root, SETS, 5)
+    decide(folders, table, root / "apply", sets=list(SETS))
+    return root
+
+
+@pytest.fixture(scope="module")
+def folders(study: Path) -> tuple[Path, Path]:
     """A saved flight, and what was found of it: scored sets, a cause and a figure beyond its limit."""
-    root = made[0]
-    analyzed = tmp_path_factory.mktemp("results") / "flight_0"
-    shutil.copytree(root / "analyze" / "flight_0", analyzed)
+    analyzed = study / "analyze" / "flight_0"
     write_documents(analyzed, (LATE,), health_rows(rejected("gnss_vel_vertical", 0.2, 22.0, 30.0)))
-    return root / "save" / "flight_0", analyzed
+    return study / "save" / "flight_0", analyzed
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +91,7 @@ def test_innovations_are_those_of_the_replay(blob: Blob, folders: tuple[Path, Pa
 
 
 def test_innovations_of_other_sets_are_the_scored_samples(blob: Blob, folders: tuple[Path, Path]) -> None:
-    for name in ("better", "drifting"):
+    for name in ("better", RESTLESS):
         rows = rows_of(folders[1] / "samples.parquet", "gnss_vel", 2, set=name)
         one = series(blob, "innovation.gnss_vel.2", name)
         found = blob.arrays[one["value"]]
@@ -124,21 +140,22 @@ def test_findings_are_marks_and_flags_are_bands(blob: Blob) -> None:
     assert "cs_baro_fault" not in bands
 
 
-def test_sets_have_the_part_that_the_decision_gave_them(folders: tuple[Path, Path], made: tuple[Path, str]) -> None:
+def test_sets_have_the_part_that_the_decision_gave_them(folders: tuple[Path, Path], study: Path) -> None:
     packed = pack_flight(*folders)
     assert packed is not None
     before = {one["name"]: one for one in unpack(packed).header["sets"]}
     assert {name: one["role"] for name, one in before.items()} == {
-        PRESENT: "present", "better": "candidate", "drifting": "candidate", LABEL: "candidate"
+        PRESENT: "present", "better": "candidate", RESTLESS: "candidate"
     }  # fmt: skip
-    decision = read_document(made[0] / "apply" / "decision.json")
+    decision = read_document(study / "apply" / "decision.json")
+    assert decision["chosen"] == "better"
     styles = set_styles(SETS, PRESENT, decision["chosen"])
-    decided = unpack(with_choice(packed, decision["chosen"], (LABEL,), styles))
+    decided = unpack(with_choice(packed, decision["chosen"], (RESTLESS,), styles))
     after = {one["name"]: one for one in decided.header["sets"]}
     assert after[decision["chosen"]]["role"] == "chosen"
-    assert (after[PRESENT]["role"], after[LABEL]["role"]) == ("present", "ruled_out")
+    assert (after[PRESENT]["role"], after[RESTLESS]["role"]) == ("present", "ruled_out")
     for name, one in after.items():
-        assert (one["style"], one["marker"]) == styles[name]
+        assert (one["style"], one["marker"]) == (styles[name].index, styles[name].marker)
     chosen = [
         one["style"] for one in panel(decided, "innovation.gnss_vel.0")["series"] if one["set"] == decision["chosen"]
     ]
@@ -149,8 +166,8 @@ def test_resets_are_events_and_step_the_track_of_their_set(folders: tuple[Path, 
     """The replay of a set that resets its position at 40 and 50 s, taken for the present one."""
     analyzed = tmp_path / "flight_0"
     shutil.copytree(folders[1], analyzed)
-    for file in analyzed.glob(f"{LABEL}.*"):
-        shutil.copyfile(file, analyzed / file.name.replace(LABEL, PRESENT))
+    for file in analyzed.glob(f"{RESTLESS}.*"):
+        shutil.copyfile(file, analyzed / file.name.replace(RESTLESS, PRESENT))
     packed = pack_flight(folders[0], analyzed)
     assert packed is not None
     events = unpack(packed).header["events"]
@@ -187,3 +204,18 @@ def test_a_log_of_which_nothing_could_be_read_has_no_blob(tmp_path: Path) -> Non
 
 def test_the_same_files_give_the_same_bytes(folders: tuple[Path, Path]) -> None:
     assert pack_flight(*folders, 50_000) == pack_flight(*folders, 50_000)
+
+
+def test_of_too_many_sets_those_are_shown_that_predict_best(folders: tuple[Path, Path]) -> None:
+    """The made errors are 0.13 m/s of the present set, 0.1 of both others, of which one resets."""
+    scoring, scores = read_document(folders[1] / "scoring.json"), folders[1] / "scores.parquet"
+    assert replayed_sets(scoring, scores) == [PRESENT, *(name for name in scoring["sets"] if name != PRESENT)]
+    assert replayed_sets(scoring, scores, ("better",))[:2] == [PRESENT, "better"]
+    errors = relative_errors(scores, PRESENT)
+    assert errors[PRESENT] == 0.0
+    assert errors["better"] == pytest.approx(np.log(0.1 / 0.13), abs=0.03)
+    best = min((name for name in errors if name != PRESENT), key=lambda name: errors[name])
+    assert replayed_sets(scoring, scores, most=1) == [PRESENT, best]
+    worst = max((name for name in errors if name != PRESENT), key=lambda name: errors[name])
+    assert replayed_sets(scoring, scores, (worst,), most=1) == [PRESENT, worst], "what is asked for is shown"
+    assert replayed_sets(None, scores) == []

@@ -8,6 +8,7 @@ import pytest
 from fusetune.report.flight_data.blob import unpack
 from fusetune.report.flight_data.content import FlightContent, Panel, Series, ShownSet, with_gaps
 from fusetune.report.flight_data.packing import pack_content
+from fusetune.report.flight_data.preparing import prepared
 
 START = 5_000_000
 ROWS = 20_000
@@ -22,26 +23,33 @@ def noisy(name: str | None, seed: int) -> Series:
     )
 
 
+SETS = (ShownSet("present", "present", 0, "circle"), ShownSet("other", "candidate", 3, "square"))
+
+
 @pytest.fixture(scope="module")
-def content() -> FlightContent:
-    sets = (ShownSet("present", "present", 0, "circle"), ShownSet("other", "candidate", 3, "square"))
-    panels = tuple(
+def panels() -> tuple[Panel, ...]:
+    return tuple(
         Panel(f"innovation.gnss_vel.{axis}", "Innovations", "GNSS velocity", "m/s", tuple(
             noisy(name, 3 * axis + number) for number, name in enumerate(("present", "other", None))
         ), "innovation", "gnss_vel", axis)
         for axis in range(3)
     )  # fmt: skip
-    return FlightContent("made", "made", START, 200.0, 10.0, None, sets, panels, (), (), (), None)
+
+
+@pytest.fixture(scope="module")
+def content(panels: tuple[Panel, ...]) -> FlightContent:
+    ready = tuple(prepared(one, START) for one in panels)
+    return FlightContent("made", "made", START, 200.0, 10.0, None, SETS, ready, (), (), (), None)
 
 
 @pytest.mark.parametrize("budget", [15_000, 30_000, 60_000])
-def test_it_fits_and_no_peak_is_lost(content: FlightContent, budget: int) -> None:
+def test_it_fits_and_no_peak_is_lost(panels: tuple[Panel, ...], content: FlightContent, budget: int) -> None:
     blob = pack_content(content, budget)
     # base64 makes four characters of three bytes
     assert 0.6 * budget < len(blob) * 4 / 3 <= budget
     header, arrays = unpack(blob)
     counts = {"present": 0, "other": 0}
-    for panel, packed in zip(content.panels, header["panels"], strict=True):
+    for panel, packed in zip(panels, header["panels"], strict=True):
         for series, told in zip(panel.series, packed["series"], strict=True):
             values, time = arrays[told["value"]], arrays[told["time"]]
             assert values.max() == pytest.approx(series.values.max(), rel=2**-17)
@@ -53,6 +61,7 @@ def test_it_fits_and_no_peak_is_lost(content: FlightContent, budget: int) -> Non
             np.testing.assert_allclose(values, series.values[rows], rtol=2**-17)
             assert series.rejected is not None
             assert arrays[told["rejected"]].astype(bool).tolist() == series.rejected[rows].tolist()
+            assert (told["samples"], told["rejected_samples"]) == (ROWS, series.rejected.sum())
             if told["set"]:
                 counts[told["set"]] += len(values)
     assert counts["other"] < counts["present"], "the sets that matter less are thinned first"
@@ -69,16 +78,13 @@ def test_a_flight_that_cannot_fit_is_as_coarse_as_can_be(content: FlightContent)
                for panel in unpack(blob).header["panels"] for one in panel["series"])  # fmt: skip
 
 
-def test_nothing_of_before_the_log_began_is_packed() -> None:
+def test_what_is_packed_is_in_order_and_begins_with_the_log() -> None:
     """A delayed sensor's first samples hold for a time before it."""
-    series = Series("one", np.array([START - 2, START, START + 100]), np.array([7.0, 8.0, 9.0]))
-    panel = Panel("baro_height", "Sensors", "Height", "m", (series,))
-    header, arrays = unpack(
-        pack_content(FlightContent("a", "a", START, 1.0, None, None, (), (panel,), (), (), (), None), 9999)
-    )
-    (told,) = header["panels"][0]["series"]
-    assert arrays[told["value"]].tolist() == [8.0, 9.0]
-    assert arrays[told["time"]].tolist() == [0.0, 1e-4]
+    series = Series("one", np.array([START + 100, START - 2, START]), np.array([9.0, 7.0, 8.0]))
+    (ready,) = prepared(Panel("baro_height", "Sensors", "Height", "m", (series,)), START).series
+    assert ready.time.tolist() == [START, START + 100]
+    assert ready.values.tolist() == [8.0, 9.0]
+    assert (ready.samples, ready.rejected_samples) == (2, None)
 
 
 def test_a_line_is_parted_where_there_is_long_no_sample() -> None:

@@ -47,9 +47,9 @@ def _horizons(summary: pd.DataFrame) -> list[float]:
 
 def _curves(results: Results, summary: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Of each set that has one, the present one last, so that it lies on top."""
-    names = summary.index.get_level_values("set")
     order = [*(name for name in results.shown if name != results.present), results.present]
-    return {name: summary[names == name].droplevel("set").sort_index() for name in order if (names == name).any()}
+    found = {str(name): rows.droplevel("set").sort_index() for name, rows in summary.groupby(level="set")}
+    return {name: found[name] for name in order if name in found}
 
 
 def _absolute(results: Results, withheld: Withheld, summary: pd.DataFrame, *, with_legend: bool) -> str:
@@ -90,7 +90,7 @@ def _relative(results: Results, withheld: Withheld, summary: pd.DataFrame) -> st
     curves.pop(results.present, None)
     others = [name for name in results.shown if name in curves]
     step = float(np.min(np.diff(horizons))) if len(horizons) > 1 else 1.0
-    offsets = np.linspace(-0.5, 0.5, len(others)) * _DODGE * step if len(others) > 1 else np.zeros(1)
+    offsets = np.linspace(-0.5, 0.5, len(others)) * _DODGE * step if len(others) > 1 else np.zeros(len(others))
     shown = summary[summary.index.get_level_values("set").isin(others)]
     able = [not results.is_ruled_out(name) for name in shown.index.get_level_values("set")]
     limits = robust_reach(shown["change_low"], shown["change_high"], able)

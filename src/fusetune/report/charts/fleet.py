@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fusetune.apply.fleet.flights import OF_FLIGHT, SEVERITIES
+from fusetune.apply.fleet.flights import SEVERITIES
 from fusetune.report.charts.blocks import chart_block
 from fusetune.report.charts.svg.axes import HEAD, LABEL_ROOM, NARROW, TICK_ROOM, Panel, head, x_axis, y_axis, y_room
 from fusetune.report.charts.svg.elements import group, hinted, line, path_steps, px, rectangle, svg, text
@@ -17,17 +17,14 @@ from fusetune.report.charts.svg.scales import Linear, Log, figure, round_values
 from fusetune.report.counted import count_words
 from fusetune.report.figure_words import figure_words
 from fusetune.report.fleet.fleet_results import Document, FleetResults
+from fusetune.report.fleet.shown_figures import is_spread, is_within_reach, trend_columns
 from fusetune.report.set_styles import MARKERS
 
 Array = npt.NDArray[np.float64]
 
 _HEIGHT = 92.0
-_MOST_TRENDS = 12
-_FEWEST_FLIGHTS = 3
 _TONES = 7
 _DECADES = 50.0
-_WITHIN_REACH = 4.0
-"""A limit that is so many times farther than the largest value would flatten all, and is left out."""
 _MARKED = {"fail": "bad", "warning": "warn"}
 _HEADROOM = 1.2
 _TRENDS = (
@@ -40,38 +37,10 @@ def trends_chart(results: FleetResults) -> str:
     """A panel per figure that changed or troubles: its value on each dated flight, a look per vehicle, medians between
     steps; empty with fewer than three dated flights or where no figure changed or lies beyond its limit."""
     dated = np.array([bool(one.date) for one in results.table.flights], bool)
-    columns = _trend_columns(results) if np.count_nonzero(dated) >= _FEWEST_FLIGHTS else []
+    columns = trend_columns(results)
     rows = np.flatnonzero(dated)
     charts = [_trend(results, column, rows, with_legend=column == columns[0]) for column in columns]
     return chart_block(_TRENDS, charts)
-
-
-def _trend_columns(results: FleetResults) -> list[int]:
-    """Figures that changed, then of each subject the one that lies beyond its limit on most flights."""
-    places = {(one.id, one.unit): place for place, one in enumerate(results.table.figures)}
-    changed = [places[one["id"], one["unit"]] for one in (*results.changes, *results.drifts)]
-    troubled = sorted((one for one in results.figures if _beyond(one) and _is_spread(one)), key=_beyond, reverse=True)
-    worst: dict[str, int] = {}
-    for one in troubled:
-        worst.setdefault(one["id"].partition(".")[0], places[one["id"], one["unit"]])
-    return list(dict.fromkeys([*changed, *worst.values()]))[:_MOST_TRENDS]
-
-
-def _beyond(one: Document) -> int:
-    """On how many flights a figure lies beyond its limit."""
-    return int(one["verdict"]["counts"].get("fail", 0) + one["verdict"]["counts"].get("warning", 0))
-
-
-def _is_spread(one: Document) -> bool:
-    """Whether a histogram of a figure shows anything."""
-    spread = one["distribution"]
-    return (
-        spread is not None
-        and one["limit"] is not None
-        and one["group"] != OF_FLIGHT
-        and spread["n"] >= _FEWEST_FLIGHTS
-        and spread["minimum"] < spread["maximum"]
-    )
 
 
 def vehicle_looks(results: FleetResults) -> dict[str, tuple[str, str]]:
@@ -89,7 +58,7 @@ def _trend(results: FleetResults, column: int, rows: npt.NDArray[np.intp], *, wi
     looks = {
         one: look for one, look in vehicle_looks(results).items() if one in {table.flights[r].vehicle for r in rows}
     }
-    limit = name.limit if name.limit is not None and _is_within_reach(name.limit, values) else None
+    limit = name.limit if name.limit is not None and is_within_reach(name.limit, values) else None
     y = _value_scale(values, limit)
     panel = Panel(Linear(0.4, rows.size + 0.6, y_room(y, most=4), NARROW - 8.0), y)
     title = figure_words(name.id)
@@ -180,11 +149,6 @@ def _steps(
     return parts
 
 
-def _is_within_reach(limit: float | None, values: Array) -> bool:
-    known = values[np.isfinite(values)]
-    return limit is not None and known.size > 0 and abs(limit) <= _WITHIN_REACH * max(float(np.abs(known).max()), 1e-12)
-
-
 def troubled_histograms_chart(results: FleetResults) -> str:
     """Histograms of the figures that lie beyond their limits on some flight; empty where none does."""
     return chart_block(_HISTOGRAMS, [_histogram(one) for one in results.figures if _is_troubled(one)])
@@ -192,19 +156,19 @@ def troubled_histograms_chart(results: FleetResults) -> str:
 
 def other_histograms_chart(results: FleetResults) -> str:
     """Histograms of all other figures that are spread; empty where there are none."""
-    others = [one for one in results.figures if _is_spread(one) and not _is_troubled(one)]
+    others = [one for one in results.figures if is_spread(one) and not _is_troubled(one)]
     return chart_block(_HISTOGRAMS, [_histogram(one) for one in others])
 
 
 def _is_troubled(one: Document) -> bool:
-    return _is_spread(one) and one["verdict"]["worst"] in ("warning", "fail")
+    return is_spread(one) and one["verdict"]["worst"] in ("warning", "fail")
 
 
 def _histogram(one: Document) -> str:
     """A figure of `fleet.json`: counts, median, middle 90 %, limit, and how many lie beyond the bins."""
     found, spread = one["histogram"], one["distribution"]
     edges, counts = [float(edge) for edge in found["edges"]], [int(count) for count in found["counts"]]
-    limit = one["limit"] if _is_within_reach(one["limit"], np.array([edges[0], edges[-1]])) else None
+    limit = one["limit"] if is_within_reach(one["limit"], np.array([edges[0], edges[-1]])) else None
     shown = [*edges, spread["p05"], spread["p95"], spread["median"], *([] if limit is None else [limit])]
     margin = 0.04 * (max(shown) - min(shown))
     top = HEAD + 16.0

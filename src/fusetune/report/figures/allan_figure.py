@@ -24,9 +24,9 @@ NOT_STILL = (
 )
 
 
-def draw_allan(noise: SensorNoise) -> Figure:
-    """Of one flight."""
-    return _draw([(one.sensor, one.curve, one.figures) for one in noise.sensors.values()])
+def draw_allan(noise: SensorNoise, columns: int = _COLUMNS) -> Figure:
+    """Of one flight, so many panels side by side."""
+    return _draw([(one.sensor, one.curve, one.figures) for one in noise.sensors.values()], columns)
 
 
 def draw_pooled_allan(pooled: tuple[PooledSensor, ...]) -> Figure:
@@ -34,11 +34,11 @@ def draw_pooled_allan(pooled: tuple[PooledSensor, ...]) -> Figure:
     return _draw([(one.sensor, one.curve, one.figures) for one in pooled if one.curve and one.figures])
 
 
-def _draw(found: list[tuple[Sensor, AllanCurve, AllanFigures]]) -> Figure:
+def _draw(found: list[tuple[Sensor, AllanCurve, AllanFigures]], most: int = _COLUMNS) -> Figure:
     shown = [one for one in found if len(one[1].factors)]
     if not shown:
         return empty_figure(NOT_STILL)
-    columns = min(_COLUMNS, len(shown))
+    columns = min(most, len(shown))
     rows = -(-len(shown) // columns)
     width, height = 3.6 * columns, 3.2 * rows
     figure = new_figure(width, height, layout=None)

@@ -8,9 +8,14 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from fusetune.analyze.conformance.track_file import read_track
+from fusetune.analyze.flight_files import CONFORMANCE_FILE, SCORING_FILE, TRACK_FILE
 from fusetune.analyze.sensor_noise.sensor_series import SensorName
 from fusetune.errors import UserError
 from fusetune.report.figures.allan_figure import draw_allan
+from fusetune.report.figures.conformance_figure import draw_conformance
+from fusetune.report.figures.fleet_figures import draw_trends
+from fusetune.report.figures.flight_figures import overview_figure
 from fusetune.report.figures.flight_panel_figures import flight_figures
 from fusetune.report.figures.paper_figures import PAPER_FIGURES
 from fusetune.report.figures.plotted_flight import PlottedFlight
@@ -21,16 +26,29 @@ from fusetune.report.figures.publication import (
     save_figure,
     save_pages,
 )
+from fusetune.report.figures.search_figures import search_drawings
 from fusetune.report.figures.sensor_figures import draw_sensor
 from fusetune.report.figures.spectrum_figure import draw_spectra
 from fusetune.report.figures.summary_figures import summary_drawings
+from fusetune.report.figures.timeline_figure import TIMELINE_TOPICS, draw_timeline
+from fusetune.report.finding_bars import finding_bars
+from fusetune.report.fleet.fleet_results import FleetResults
+from fusetune.report.fleet.shown_figures import trend_columns
+from fusetune.report.flight_results import read_flight_results
 from fusetune.report.results import Results
+from fusetune.report.search_results import SearchResults
+from fusetune.save.flight_folder import load_flight
+from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
 Drawings = Mapping[str, Callable[[], Figure]]
 
 _SENSORS: tuple[SensorName, ...] = ("gyro", "accel", "mag", "baro", "gnss_vel", "gnss_pos")
+_WHEN_ASKED = ("sensor_", "allan", "spectra")
+"""Takes long."""
 _PDF = "pdf"
+_PANELS = {"single": 1, "double": 2}
+"""Side by side."""
 
 
 def flight_drawings(flight: PlottedFlight, sets: Sequence[str], column: str) -> dict[str, Callable[[], Figure]]:
@@ -41,30 +59,59 @@ def flight_drawings(flight: PlottedFlight, sets: Sequence[str], column: str) -> 
     sets : whose curves are drawn; without any what flies now, what is chosen, and the vehicle's own filter
     column : of `COLUMNS`
     """
-    width = COLUMNS[column]
+    width, columns = COLUMNS[column], _PANELS[column]
     drawings: dict[str, Callable[[], Figure]] = {
         one.name: partial(one.draw, width) for one in flight_figures(flight, sets or flight.usual_sets)
     }
 
-    def of_sensor(draw: Callable[[], Figure]) -> Callable[[], Figure]:
-        return lambda: fitted_to_column(draw(), width)
+    # which sensors a flight has is known when they are characterised
+    others: dict[str, Callable[[], Figure]] = {f"sensor_{name}": partial(_sensor, flight, name) for name in _SENSORS}
+    others |= {
+        "allan": lambda: draw_allan(flight.noise, columns),
+        "spectra": lambda: draw_spectra(flight.noise),
+    }
+    if flight.folders is not None:
+        others |= _of_folders(*flight.folders)
+    return drawings | _fitted(others, column)
 
-    for name in _SENSORS:
-        # which of them a flight has is known when it is characterised
-        drawings[f"sensor_{name}"] = of_sensor(partial(_sensor, flight, name))
-    drawings["allan"] = of_sensor(lambda: draw_allan(flight.noise))
-    drawings["spectra"] = of_sensor(lambda: draw_spectra(flight.noise))
-    return drawings
+
+def _of_folders(saved: Path, folder: Path) -> dict[str, Callable[[], Figure]]:
+    """What is drawn of a flight that the pipeline analysed."""
+    found: dict[str, Callable[[], Figure]] = {
+        "timeline": lambda: draw_timeline(
+            load_flight(saved, topics=TIMELINE_TOPICS), tuple(finding_bars(read_flight_results(folder)))
+        )
+    }
+    if (folder / SCORING_FILE).exists():
+        scoring = read_document(folder / SCORING_FILE)
+        names, present = list(scoring["sets"]), scoring["present"]
+        found["overview"] = lambda: overview_figure(saved, folder, names, present=present)
+    track = read_track(folder / TRACK_FILE)
+    if track is not None and track.has_place:
+        found["map"] = lambda: draw_conformance(track, read_document(folder / CONFORMANCE_FILE))
+    return found
 
 
-def results_drawings(results: Results, column: str) -> dict[str, Callable[[], Figure]]:
-    """All that can be drawn of the flights that decide together, by name."""
-    width = COLUMNS[column]
+def results_drawings(results: Results, fleet: FleetResults | None, column: str) -> Drawings:
+    """All that can be drawn of the flights that decide together, by name, and of all flights where they are given."""
+    drawings = summary_drawings(results)
+    if fleet is not None and (columns := trend_columns(fleet)):
+        drawings["trends"] = partial(draw_trends, fleet.table, columns, fleet.changes)
+    return _fitted(drawings, column)
 
-    def fitted(draw: Callable[[], Figure]) -> Callable[[], Figure]:
-        return lambda: fitted_to_column(draw(), width)
 
-    return {Path(name).stem: fitted(draw) for name, draw in summary_drawings(results).items()}
+def search_figures(results: SearchResults, column: str) -> Drawings:
+    """All that can be drawn of a search, by name."""
+    return _fitted(search_drawings(results), column)
+
+
+def _fitted(drawings: Drawings, column: str) -> dict[str, Callable[[], Figure]]:
+    """As drawn for the screen, no wider than a column."""
+
+    def narrowed(draw: Callable[[], Figure]) -> Callable[[], Figure]:
+        return lambda: fitted_to_column(draw(), COLUMNS[column])
+
+    return {name: narrowed(draw) for name, draw in drawings.items()}
 
 
 def _sensor(flight: PlottedFlight, name: SensorName) -> Figure:
@@ -107,7 +154,7 @@ def write_figures(
 
 def _names(drawings: Drawings, asked: Sequence[str]) -> list[str]:
     if not asked:
-        return [name for name in drawings if not name.startswith("sensor_") and name not in ("allan", "spectra")]
+        return [name for name in drawings if not name.startswith(_WHEN_ASKED)]
     found: list[str] = []
     for one in asked:
         told = PAPER_FIGURES.get(int(one), ()) if one.isdecimal() else (one,)

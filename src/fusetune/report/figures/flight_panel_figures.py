@@ -17,7 +17,6 @@ from fusetune.report.figures.plotted_flight import PlottedFlight
 from fusetune.report.figures.publication import INCH_MM
 from fusetune.report.figures.set_styles import PRINT_COLOURS
 from fusetune.report.flight_data.content import Panel, PlaneTrack, Series
-from fusetune.report.flight_data.flight_content import LABELS
 from fusetune.report.flight_data.panel_names import (
     ATTITUDE,
     BIASES,
@@ -161,6 +160,7 @@ def _series(axes: Axes, flight: PlottedFlight, panel: Panel, one: Series, place:
         )
     if one.rejected is not None and bool(np.any(one.rejected)):
         wild = np.flatnonzero(one.rejected)
+        wild = wild[drawn_rows(values[wild])]
         axes.plot(
             time[wild], values[wild], "x", color=_REJECTED_COLOUR, markersize=2.5, markeredgewidth=0.6, label="rejected"
         )
@@ -255,7 +255,9 @@ def _track(flight: PlottedFlight, width_mm: float) -> Figure:
     shown: Mapping[str, PlaneTrack] = track.sets or {"estimate": track.flown}
     for place, (name, one) in enumerate(shown.items()):
         colour, style = _set_look(flight, name, place)
-        axes.plot(one.east, one.north, color=colour, linestyle=style, linewidth=0.9, label=LABELS.get(name, name))
+        axes.plot(
+            one.east, one.north, color=colour, linestyle=style, linewidth=0.9, label=flight.labels.get(name, name)
+        )
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="east [m]", ylabel="north [m]")
     axes.legend(loc="best")

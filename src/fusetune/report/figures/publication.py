@@ -21,6 +21,8 @@ FORMATS = ("svg", "pdf", "png")
 INCH_MM = 25.4
 
 _DPI = 300
+_WIDEST_MARGIN = 0.6
+"""Share of a figure."""
 _STYLE: dict[Any, Any] = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
@@ -54,24 +56,22 @@ def fitted_to_column(figure: Figure, width_mm: float) -> Figure:
     if width <= narrower:
         return figure
     figure.set_size_inches(narrower, height)
-    if figure.get_layout_engine() is None:
-        _keep_margins(figure, width / narrower)
+    if figure.get_layout_engine() is None and not _keep_margins(figure, width / narrower):
+        figure.set_layout_engine("constrained")
     return figure
 
 
-def _keep_margins(figure: Figure, ratio: float) -> None:
-    """Margins as wide in inches as before, of a figure that was so many times as wide."""
+def _keep_margins(figure: Figure, ratio: float) -> bool:
+    """Whether a figure has margins of its own; they are as wide in inches as when it was so many times as wide."""
     places = [(axes, place) for axes in figure.axes if (place := axes.get_subplotspec()) is not None]
-    grids = {
-        id(grid): grid
-        for _, place in places
-        if isinstance(grid := place.get_topmost_subplotspec().get_gridspec(), GridSpec)
-    }
-    for grid in grids.values():
-        margins = grid.get_subplot_params(figure)
-        grid.update(left=min(margins.left * ratio, 0.6), right=1.0 - (1.0 - margins.right) * ratio)
-    for axes, place in places:
+    grids = {id(grid): grid for _, place in places if (grid := place.get_topmost_subplotspec().get_gridspec())}
+    reckoned = [one for one in grids.values() if isinstance(one, GridSpec) and one.left is not None]
+    for one in reckoned:
+        margins = one.get_subplot_params(figure)
+        one.update(left=min(margins.left * ratio, _WIDEST_MARGIN), right=1.0 - (1.0 - margins.right) * ratio)
+    for axes, place in places if reckoned else ():
         axes.set_position(place.get_position(figure))
+    return bool(reckoned)
 
 
 def save_figure(figure: Figure, path: AnyPath) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,6 +16,7 @@ from fusetune.report.figures.sensor_figures import FLIGHT_COLOUR, REST_COLOUR
 from fusetune.report.sensor_shapes import tone_words, vibration_title
 
 _MOST_TONES = 4
+_TITLE_WIDTH = 34
 
 
 def draw_spectra(noise: SensorNoise) -> Figure:
@@ -61,5 +64,5 @@ def _spectrum(axes: Axes, character: SensorCharacter) -> None:
     axes.margins(y=0.15)
     axes.set_xlabel("frequency [Hz] (grey: motion)")
     axes.set_ylabel(f"density, axes together [{unit}/√Hz]")
-    axes.set_title(vibration_title(character))
+    axes.set_title(textwrap.fill(vibration_title(character), _TITLE_WIDTH, break_on_hyphens=False))
     axes.legend(loc="lower left", fontsize=7)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping
 
-from fusetune.apply.fleet.changes import FEWEST_A_SIDE, LEVEL
-from fusetune.apply.fleet.outliers import FALSE_SHARE, FEWEST_FLIGHTS
+from fusetune.apply.fleet.levels import FALSE_SHARE, FEWEST_A_SIDE, FEWEST_FLIGHTS, LEVEL
+from fusetune.report.charts.fleet import other_histograms_chart, trends_chart, troubled_histograms_chart
 from fusetune.report.counted import count_words, listed
 from fusetune.report.figure_words import figure_words
 from fusetune.report.fleet.change_points import change_points
@@ -36,6 +36,7 @@ def changes_section(results: FleetResults) -> str:
             "the chances are corrected for the number of figures."
         )
         parts.append(paragraph(text, "note"))
+    parts.append(trends_chart(results))
     return section("What changed, and when", *parts, id="changes")
 
 
@@ -176,7 +177,13 @@ def figures_section(results: FleetResults) -> str:
             rows += [_spread_row(f"   {name}", "", spread, None, "quiet") for name, spread in by_vehicle]
         parts.append(details(f"{group[0].upper()}{group[1:]}: {count_words(len(found), 'figure')}", table(head, rows)))
     text = "All of it is one table, a line per figure and flight: results/analyze/health.parquet, for pandas or DuckDB."
-    return section("All figures of health", *parts, paragraph(text, "note")) if parts else ""
+    if not parts:
+        return ""
+    spread = [
+        details("How those beyond their limits are spread", troubled_histograms_chart(results)),
+        details("How the others are spread", other_histograms_chart(results)),
+    ]
+    return section("All figures of health", *spread, *parts, paragraph(text, "note"), id="figures")
 
 
 def _spread_row(

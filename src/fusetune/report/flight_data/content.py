@@ -43,6 +43,7 @@ class Series:
     gate : the filter rejects what lies beyond so many of them; None where there is no gate
     rejected : (N,) what the filter rejected
     peaks : (N,) whose largest values are kept, too, when it is thinned
+    samples, rejected_samples : how many there are, and how many of them were rejected, before it is thinned
     """
 
     label: str
@@ -54,6 +55,8 @@ class Series:
     rejected: npt.NDArray[np.bool_] | None = None
     draw: Draw = "line"
     peaks: Figures | None = None
+    samples: int = 0
+    rejected_samples: int | None = None
 
     def rows(self, chosen: slice | npt.NDArray[Any]) -> Series:
         """Some of its samples."""
@@ -177,7 +180,7 @@ def with_gaps(time: Times, columns: Iterable[Figures]) -> tuple[Times, list[Figu
         order = np.argsort(time, kind="stable")
         time, given = time[order], [one[order] for one in given]
         steps = np.diff(time)
-    if not steps.size:
+    if not steps.size or steps.max() <= _SHORTEST_GAP_US:
         return time, given
     longest = max(_LONG_GAP * float(np.median(steps)), _SHORTEST_GAP_US)
     behind = np.flatnonzero(steps > longest) + 1

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.conformance.track_file import read_track
-from fusetune.analyze.flight_files import CONFORMANCE_FILE, ONBOARD_FILE, SAMPLES_FILE, SCORING_FILE, TRACK_FILE
+from fusetune.analyze.flight_files import (
+    CONFORMANCE_FILE,
+    ONBOARD_FILE,
+    SAMPLES_FILE,
+    SCORE_TABLES,
+    SCORING_FILE,
+    TRACK_FILE,
+)
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.report.flight_data.bands import bands
 from fusetune.report.flight_data.content import FlightContent, Panel
@@ -26,6 +33,7 @@ from fusetune.report.flight_data.innovation_panels import (
 from fusetune.report.flight_data.logged import Logged, read_logged
 from fusetune.report.flight_data.marks import marks
 from fusetune.report.flight_data.position_frame import PositionFrame, position_frame
+from fusetune.report.flight_data.preparing import prepared
 from fusetune.report.flight_data.replays import Replay, replays_of
 from fusetune.report.flight_data.sensor_panels import (
     output_tracking_panels,
@@ -34,7 +42,7 @@ from fusetune.report.flight_data.sensor_panels import (
     status_ratio_panel,
     vibration_panels,
 )
-from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_sets
+from fusetune.report.flight_data.shown_sets import UNDECIDED, Choice, replayed_sets, shown_sets
 from fusetune.report.flight_data.state_panels import (
     Teller,
     earth_field,
@@ -51,10 +59,11 @@ from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
 LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
+"""Of what no study names."""
 
 
 def flight_content(
-    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice | None = None
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice = UNDECIDED
 ) -> FlightContent:
     """Gather it.
 
@@ -62,32 +71,37 @@ def flight_content(
     ----------
     flight_folder : `results/save/<flight>` of a log of which something could be read
     analyze_folder : `results/analyze/<flight>`; of a flight that is not replayed without replays and scores
-    sets : that are shown beside the present one, in this order; without any those that were scored
-    choice : what was decided
+    sets : that are told first behind the present one and the chosen one, in this order
+    choice : what was decided, where it is known
 
     Raises
     ------
     UserError
         A file is missing or damaged.
     """
-    folder, choice = Path(analyze_folder), choice or Choice()
+    folder = Path(analyze_folder)
     results = read_flight_results(folder)
     scoring = _document(folder / SCORING_FILE)
     logged = read_logged(flight_folder, innovations=not (folder / ONBOARD_FILE).exists())
     replays = replays_of(folder, scoring)
     present = PRESENT if scoring is None else scoring["present"]
-    innovations = list(_innovations(folder, logged, scoring, replays, replayed_sets(scoring, sets, choice)))
+    first = [*([choice.chosen] if choice.chosen else []), *sets]
+    shown = replayed_sets(scoring, folder / SCORE_TABLES["blocks"], first)
+    innovations = list(_innovations(folder, logged, scoring, replays, shown))
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
     told = tellers(logged, replays, LABELS, frame)
-    panels = tuple(flight_panels(logged, replays, innovations, told, frame, results.health))
+    start_us = logged.flight.start_timestamp
+    panels = tuple(
+        prepared(one, start_us) for one in flight_panels(logged, replays, innovations, told, frame, results.health)
+    )
     curves = (one.set for panel in panels for one in panel.series if one.set is not None)
     names = [*dict.fromkeys([*(one.name for one in innovations), *curves])]
     flight = logged.flight
     return FlightContent(
         flight=results.flight,
         label=flight_label(results.flight, results.date),
-        start_us=flight.start_timestamp,
+        start_us=start_us,
         duration_s=flight.duration_s,
         takeoff_s=_finite(results.times.take_off_s),
         landing_s=_finite(results.times.landing_s),
@@ -108,14 +122,7 @@ def flight_panels(
     frame: PositionFrame,
     health: Sequence[Mapping[str, Any]],
 ) -> Iterator[Panel]:
-    """All panels, in the order of `panel_names.GROUPS`.
-
-    Parameters
-    ----------
-    innovations : of every set, and of the vehicle's own filter
-    told, frame : who tells of the motion, and about which origin
-    health : rows of the health table, for their limits
-    """
+    """In the order of `panel_names.GROUPS`."""
     yield from innovation_panels(innovations)
     yield from ratio_panels(innovations)
     yield from status_ratio_panel(logged)

@@ -46,8 +46,12 @@ _PARTS = {
     ),
 }  # fmt: skip
 """Topics with a row for every update: of these the columns that are shown."""
-_INTERVALS = {"sensor_combined": ("gyro_integral_dt",), "vehicle_imu": ("delta_angle_dt",)}
-"""By what vibration metrics of old releases are divided. They are no canonical topics, so they stay apart."""
+_RAW = {
+    "sensor_combined": ("gyro_integral_dt", *vector("gyro_rad"), *vector("accelerometer_m_s2")),
+    "vehicle_imu": ("delta_angle_dt",),
+}
+"""What is shown as it was logged, and by what vibration metrics of old releases are divided. Without their other
+columns these are no canonical topics, so they stay apart."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,6 @@ def read_logged(folder: AnyPath, *, innovations: bool) -> Logged:
         It is not the folder of a saved flight, or a file in it is damaged.
     """
     wanted = dict.fromkeys((*_WHOLE, *(INNOVATION_TOPICS if innovations else ())), None) | _PARTS
-    loaded = load_flight(folder, wanted | _INTERVALS)
-    shown = loaded.with_topics({key: table for key, table in loaded.topics.items() if key[0] not in _INTERVALS})
+    loaded = load_flight(folder, wanted | _RAW)
+    shown = loaded.with_topics({key: table for key, table in loaded.topics.items() if key[0] not in _RAW})
     return Logged(loaded, canonical(shown))

@@ -73,6 +73,9 @@ _PANELS: Mapping[str, tuple[str, tuple[str, ...], str]] = {
     "coning": (VIBRATION, ("coning of the gyro",), "rad²"),
     "clipping": (VIBRATION, ("clipped samples, counted since the start",), ""),
     "imu_temperature": (VIBRATION, ("temperature of the IMU",), "°C"),
+    "gyro": (SENSORS, tuple(f"angular rate about {one}, measured" for one in _FRD), "rad/s"),
+    "accel": (SENSORS, tuple(f"specific force {one}, measured" for one in _FRD), "m/s²"),
+    "mag": (SENSORS, tuple(f"magnetic field {one}, measured" for one in _FRD), "G"),
     "baro_height": (SENSORS, ("height by the barometer",), "m"),
     "gnss_accuracy": (SENSORS, ("GNSS: accuracy of position, as the receiver says",), "m"),
     "gnss_speed_accuracy": (SENSORS, ("GNSS: accuracy of speed, as the receiver says",), "m/s"),
@@ -89,7 +92,6 @@ _PANELS: Mapping[str, tuple[str, tuple[str, ...], str]] = {
 """Panel → its group, the title of each of its axes, and the unit."""
 
 _OUTPUT_UNITS = ("rad", "m/s", "m")
-OUTPUT_TRACKING_AXES = len(_OUTPUT_UNITS)
 
 RESET_WORDS: Mapping[str, str] = {
     "horizontal_position": "horizontal position",

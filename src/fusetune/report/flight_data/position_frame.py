@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fusetune.px4.flight import TopicTable
+from fusetune.px4.local_map import LocalMap
 from fusetune.report.flight_data.content import Figures, Times
-from fusetune.report.flight_data.local_plane import local_plane
 
 _FIX_3D = 3
 _ORIGIN = ("latitude_deg", "longitude_deg", "altitude_m")
@@ -42,8 +42,8 @@ class PositionFrame:
         """Positions (N, 3) about another origin; as they are where one of both is not known."""
         if self.origin is None or reference is None or not np.isfinite(reference).all():
             return position
-        north, east = local_plane(np.array([reference[0]]), np.array([reference[1]]), *self.origin[:2])
-        return position + np.array([north[0], east[0], self.origin[2] - reference[2]])
+        north, east = LocalMap(*self.origin[:2]).to_local(*reference[:2])
+        return position + np.array([north, east, self.origin[2] - reference[2]])
 
     def of_vehicle(self, local: TopicTable) -> Figures:
         """Of `vehicle_local_position` (N, 3); a row whose origin the log does not tell is taken to have this one."""
@@ -54,9 +54,7 @@ class PositionFrame:
         told = np.isfinite(lat) & np.isfinite(lon) & ((lat != 0.0) | (lon != 0.0))
         if "xy_global" in local:
             told &= local["xy_global"].astype(bool)
-        north, east = local_plane(lat[told], lon[told], *self.origin[:2])
-        position[told, 0] += north
-        position[told, 1] += east
+        position[told, :2] += LocalMap(*self.origin[:2]).all_to_local(lat[told], lon[told])
         high = np.isfinite(altitude) & (local["z_global"].astype(bool) if "z_global" in local else told)
         position[high, 2] += self.origin[2] - altitude[high]
         return position
@@ -73,7 +71,8 @@ class PositionFrame:
         if self.origin is None or not set(_FIX) <= set(gnss):
             return Measured(time, velocity, None)
         lat, lon, altitude = (gnss[name][rows].astype(np.float64) for name in _FIX)
-        position = np.column_stack([*local_plane(lat, lon, *self.origin[:2]), self.origin[2] - altitude])
+        places = LocalMap(*self.origin[:2]).all_to_local(lat, lon)
+        position = np.column_stack([places, self.origin[2] - altitude])
         return Measured(time, velocity, position)
 
 

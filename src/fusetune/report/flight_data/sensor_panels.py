@@ -13,10 +13,10 @@ from fusetune.px4.layouts.vibration_metrics import vibrations
 from fusetune.report.flight_data.content import Figures, Panel, Series, with_gaps
 from fusetune.report.flight_data.logged import Logged
 from fusetune.report.flight_data.panel_names import (
-    OUTPUT_TRACKING_AXES,
     RATIOS,
     RESET_WORDS,
     STATUS_RATIOS,
+    axes_of,
     panel_name,
     status_ratio_name,
 )
@@ -40,7 +40,7 @@ def status_ratio_panel(logged: Logged) -> Iterator[Panel]:
 def output_tracking_panels(logged: Logged) -> Iterator[Panel]:
     """By how much the output predictor lags behind the filter."""
     status = logged.of_primary("estimator_status")
-    for axis in range(OUTPUT_TRACKING_AXES):
+    for axis in range(axes_of("output_tracking")):
         yield from _panel("output_tracking", _fields(status, {f"output_tracking_error[{axis}]": "as flown"}), axis)
 
 
@@ -73,6 +73,13 @@ def sensor_panels(logged: Logged, health: Sequence[Mapping[str, Any]], earth_fie
     health : rows of the health table, whose limits are drawn
     earth_field : strength of the earth's field as the filter holds it
     """
+    combined = logged.raw.topic("sensor_combined")
+    for panel, field in (("gyro", "gyro_rad"), ("accel", "accelerometer_m_s2")):
+        for axis in range(axes_of(panel)):
+            yield from _panel(panel, _fields(combined, {f"{field}[{axis}]": "IMU in use"}), axis)
+    for axis in range(axes_of("mag")):
+        measured = _fields(logged.topic("vehicle_magnetometer"), {f"magnetometer_ga[{axis}]": "magnetometer in use"})
+        yield from _panel("mag", measured, axis)
     yield from _panel("baro_height", _fields(logged.topic("vehicle_air_data"), {"baro_alt_meter": "barometer"}))
     gnss = logged.topic("vehicle_gps_position")
     yield from _panel(
@@ -180,5 +187,5 @@ def _panel(panel: str, series: Iterable[Series], axis: int = 0, limit: float | N
     known = tuple(one for one in series if np.any(np.isfinite(one.values)))
     if known:
         name = panel_name(panel, axis)
-        number = f"{panel}.{axis}" if panel == "output_tracking" else panel
+        number = f"{panel}.{axis}" if axes_of(panel) > 1 else panel
         yield Panel(number, name.group, name.title, name.unit, known, limit=limit)

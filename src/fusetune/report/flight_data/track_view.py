@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
 from fusetune.px4.flight import Flight
+from fusetune.px4.local_map import LocalMap
 from fusetune.report.flight_data.content import PlaneTrack, Span, TrackView
-from fusetune.report.flight_data.local_plane import local_plane
 from fusetune.report.flight_data.position_frame import PositionFrame
 from fusetune.report.flight_data.state_panels import Teller
 
@@ -43,7 +43,8 @@ def track_view(
     if not track.has_place:
         return TrackView(_local(track, flight), manoeuvres=manoeuvres)
     home = (track.lat[0], track.lon[0]) if mission is None else (mission["home"]["lat"], mission["home"]["lon"])
-    flown = _parted(PlaneTrack(track.time, *local_plane(track.lat, track.lon, *home), track.height, track.heading))
+    north, east = LocalMap(*home).all_to_local(track.lat, track.lon).T
+    flown = _parted(PlaneTrack(track.time, north, east, track.height, track.heading))
     fixes = _fixes(flight, home)
     sets = {} if frame is None or frame.origin is None else dict(_places(told, frame.origin, home))
     if track.is_above_takeoff:
@@ -56,10 +57,10 @@ def _places(
     told: Sequence[Teller], origin: tuple[float, float, float], home: tuple[float, float]
 ) -> Iterator[tuple[str, PlaneTrack]]:
     """About the home, heights above mean sea level, of all who are of a set."""
-    north, east = local_plane(np.array(origin[:1]), np.array(origin[1:2]), *home)
+    north, east = LocalMap(*home).to_local(*origin[:2])
     for one in told:
         if one.set is not None and np.any(np.isfinite(one.position)):
-            place = one.position + np.array([north[0], east[0], 0.0])
+            place = one.position + np.array([north, east, 0.0])
             nowhere = np.full(one.time.size, np.nan)
             yield one.set, _parted(PlaneTrack(one.time, place[:, 0], place[:, 1], origin[2] - place[:, 2], nowhere))
 
@@ -87,7 +88,8 @@ def _fixes(flight: Flight, home: tuple[float, float]) -> PlaneTrack | None:
         table[name][rows].astype(np.float64) for name in ("latitude_deg", "longitude_deg", "altitude_msl_m")
     )
     time = table["timestamp"][rows].astype(np.int64)
-    return PlaneTrack(time, *local_plane(lat, lon, *home), height, np.full(time.size, np.nan))
+    north, east = LocalMap(*home).all_to_local(lat, lon).T
+    return PlaneTrack(time, north, east, height, np.full(time.size, np.nan))
 
 
 def _above(fixes: PlaneTrack, flown: PlaneTrack) -> PlaneTrack:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+from fusetune.report.charts.timeline import timeline_chart
 from fusetune.report.counted import count_words
 from fusetune.report.figure_words import figure_words
 from fusetune.report.flight_results import Document, FlightResults
@@ -32,6 +33,7 @@ def health_table_section(results: FlightResults) -> str:
         parts.append(table(head, [_problem_row(rows, results) for rows in alike.values()], kind="cards findings"))
     else:
         parts.append(paragraph("No figure lies beyond its limit."))
+    parts.append(details("When they lie beyond their limits", timeline_chart(results) if problems else ""))
     groups: dict[str, list[Document]] = defaultdict(list)
     lacking = []
     for row in results.health:

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
-from fusetune.analyze.flight_files import CONFORMANCE_FILE, SENSOR_NOISE_FILE
+from fusetune.analyze.conformance.track_file import read_track
+from fusetune.analyze.flight_files import CONFORMANCE_FILE, SENSOR_NOISE_FILE, TRACK_FILE
 from fusetune.report.flight_page.answer import answer_section, causes_section
 from fusetune.report.flight_page.conformance_section import conformance_section
 from fusetune.report.flight_page.effects_section import effects_section
@@ -44,7 +45,7 @@ def build_flight_page(
         answer_section(results, bool(blob)),
         causes_section(results, bool(blob)),
         section("The flight over time", mount, id="viewer") if blob else "",
-        conformance_section(read_document(conformance)) if conformance.exists() else "",
+        _flown(conformance, Path(analyze_folder) / TRACK_FILE),
         effects_section(results),
         health_table_section(results),
         sensors_section(read_document(noise)) if noise.exists() else "",
@@ -57,6 +58,12 @@ def build_flight_page(
     Path(output).parent.mkdir(parents=True, exist_ok=True)
     blobs = [FlightBlob(results.flight, blob)] if blob else []
     write_page(output, head, [Tab("flight", "Flight", "\n".join(filter(None, sections)))], blobs)
+
+
+def _flown(conformance: Path, track: Path) -> str:
+    if not conformance.exists():
+        return ""
+    return conformance_section(read_document(conformance), read_track(track) if track.exists() else None)
 
 
 def _known(name: str, what: str) -> str:

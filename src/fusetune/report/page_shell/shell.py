@@ -12,7 +12,7 @@ from pathlib import Path
 from fusetune.report.markup import link
 from fusetune.report.page_shell.assets import joined_assets
 from fusetune.report.page_shell.glossary import glossary_list, with_terms_marked
-from fusetune.report.page_shell.text_pass import with_short_names
+from fusetune.report.page_shell.text_pass import with_own_ids, with_short_names
 from fusetune.storage.files import AnyPath, atomic_path
 
 VIEWER_CLASS = "flight-viewer"
@@ -73,7 +73,7 @@ def write_page(
     names : flights whose names are shortened in the text: whole → short
     """
     tabs = _with_words(tabs, names or {})
-    body = _tab_bar(tabs) + _main(tabs)
+    body = _tab_bar(tabs) + with_own_ids(_main(tabs))
     assets = joined_assets(viewer=VIEWER_CLASS in body)
     page = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
-from html import escape, unescape
+from html import escape
 
 _TAG = re.compile(r"(<[^>]*>)")
 _NAME = re.compile(r"</?([a-zA-Z][a-zA-Z0-9]*)")
 _VOID = frozenset(("area", "base", "br", "col", "hr", "img", "input", "link", "meta", "source", "wbr"))
 _DRAWN = "svg"
+
+_PICTURE_IDS = re.compile(r'aria-labelledby="([\w-]+)-t \1-d">.*?id="\1-t".*?id="\1-d"', re.DOTALL)
 
 Change = Callable[[str], str]
 
@@ -76,6 +79,13 @@ def with_short_names(html: str, names: Mapping[str, str]) -> str:
     )
 
 
-def plain_text(html: str) -> str:
-    """What is read of HTML."""
-    return unescape(re.sub(r"\s+", " ", _TAG.sub(" ", html))).strip()
+def with_own_ids(html: str) -> str:
+    """HTML in which pictures that are alike, and so have the same ids, have ids of their own."""
+    seen: Counter[str] = Counter()
+
+    def told(match: re.Match[str]) -> str:
+        key = match[1]
+        seen[key] += 1
+        return match[0] if seen[key] == 1 else match[0].replace(key, f"{key}-{seen[key]}")
+
+    return _PICTURE_IDS.sub(told, html)

@@ -10,7 +10,7 @@ from fusetune.report.charts.drift import drift_chart
 from fusetune.report.charts.flights_by_sets import flights_by_sets_chart
 from fusetune.report.charts.pareto import pareto_chart
 from fusetune.report.comparison import percent_change
-from fusetune.report.markup import Cell, bullets, details, number, paragraph, section, signed, table
+from fusetune.report.markup import Cell, CellLike, bullets, details, number, paragraph, section, signed, table
 from fusetune.report.results import Results
 from fusetune.report.sections.ranking_tables import (
     NOT_KNOWN,
@@ -42,8 +42,8 @@ def evidence_section(results: Results) -> str:
         "What the flights say of the sets",
         paragraph(
             "Every set was replayed on every flight, so the sets saw the same samples. They are judged by how far off "
-            "they predicted: aided, one step ahead; unaided, after seconds without GNSS; smoothed, against the velocity "
-            "that the whole flight makes likely. How large a set says its uncertainty is does not count."
+            "they predicted: aided, one step ahead; unaided, after seconds without GNSS; smoothed, against the "
+            "velocity that the whole flight makes likely. How large a set says its uncertainty is does not count."
         ),
         differences_chart(results),
         details("The ranking in figures", ranking_table(results)),
@@ -92,7 +92,7 @@ def _drift_table(results: Results, withheld: tuple[Withheld, ...], caption: str)
         head += ["change %"]
     rows = []
     for name in results.shown:
-        row: list[Cell | str] = [set_name(name, results)]
+        row: list[CellLike] = [set_name(name, results)]
         for _, summary in summaries:
             last = _horizons(summary)[-1]
             row += [number(_figure(summary, name, seconds, "mean")) for seconds in _horizons(summary)]
@@ -145,7 +145,9 @@ def holds_section(results: Results) -> str:
         return ""
     chosen, worth = validated["chosen"], validated["differences"]
     ordered = sorted(chosen, key=lambda flight: results.flights.index(flight) if flight in results.flights else -1)
-    rows = [(flight, set_name(chosen[flight], results), _worth(worth[flight])) for flight in ordered]
+    rows: list[tuple[CellLike, ...]] = [
+        (flight, set_name(chosen[flight], results), _worth(worth[flight])) for flight in ordered
+    ]
     rows.append((Cell("mean", "quiet"), Cell(""), signed(float(percent_change(validated["difference"])))))
     return section(
         title,

@@ -45,9 +45,9 @@ def findings_section(results: Results) -> str:
         head = ("", "what PX4 is told, and what the flights say", "what to do")
         parts += [paragraph(_INTRODUCTION, "note"), table(head, rows, kind="cards findings")]
     if noises:
-        head = ("source", "unit", "flights", "told", "size of the error", "interval", "a filter may want")
+        columns = ("source", "unit", "flights", "told", "size of the error", "interval", "a filter may want")
         text = paragraph(_NOISES)
-        parts.append(details("Noise of every source", text, table(head, [_noise_row(one) for one in noises])))
+        parts.append(details("Noise of every source", text, table(columns, [_noise_row(one) for one in noises])))
     return section("What PX4 is told, and what the data say", *parts, id="told-and-shown")
 
 

@@ -184,9 +184,9 @@ def single_flights_section(results: Results) -> str:
     head = ("flight", "scored s", "cut s", "because of")
     cuts = details("What is scored of each flight", table(head, rows))
     troubles = [row for name, summary in results.scoring.items() for row in _set_troubles(name, summary)]
-    head = ("flight", "set", "resets in flight", "lost sources", "faults", "note")
+    columns = ("flight", "set", "resets in flight", "lost sources", "faults", "note")
     text = f"What befell the sets: {count_words(len(troubles), 'case')}"
-    return section("What is scored", cuts, details(text, table(head, troubles)))
+    return section("What is scored", cuts, details(text, table(columns, troubles)))
 
 
 def _cut_row(name: str, results: Results) -> tuple[CellLike, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from fusetune.apply.missing_motion import THINNED
+from fusetune.apply.missing_motion_kinds import THINNED
 from fusetune.report.charts.power import power_chart
 from fusetune.report.markup import Cell, bullets, details, paragraph, section, table
 from fusetune.report.results import Results

@@ -43,7 +43,7 @@ def ranking_table(results: Results) -> str:
     if corrected not in results.ranking:
         corrected = "p_holm"
     head = ("set", "", "change %", "interval %", *(f"{aim} %" for aim in aims), "better on", "p", "P(best)")
-    rows = []
+    rows: list[tuple[CellLike, ...]] = []
     for one in results.ranking.to_dict("records"):
         # of what is as the present one there is nothing to say
         is_present = one["status"] in (PRESENT, SAME)
@@ -162,7 +162,7 @@ def criteria_table(results: Results) -> str:
         "timeouts": "lost sources",
         "faults": "flights with faults",
     }
-    rows = [
+    rows: list[tuple[CellLike, ...]] = [
         (set_name(one["name"], results), *(number(one[column]) for column in columns))
         for one in results.ranking.to_dict("records")
     ]

@@ -1,4 +1,4 @@
-/* What is drawn under and over the lines of a panel: ground, findings, bounds, limit, rejected samples, markers, events. */
+/* What lies under and over the lines of a panel: ground, findings, bounds, limit; rejected samples, markers, events. */
 (() => {
   "use strict";
   const viewer = (fusetune.viewer = fusetune.viewer || {});

@@ -97,7 +97,8 @@
       .map((band) => {
         const lasts = band.spans.reduce((sum, [t0, t1]) => sum + t1 - t0, 0);
         const names = [...new Set(band.spans.map((span) => span[2]).filter(Boolean))];
-        return `${band.label}${names.length ? ` (${names.join(", ")})` : ""}: ${viewer.words.share(lasts, model.stop - model.start)} of the log`;
+        const told = names.length ? `${band.label} (${names.join(", ")})` : band.label;
+        return `${told}: ${viewer.words.share(lasts, model.stop - model.start)} of the log`;
       })
       .join("; ");
   }

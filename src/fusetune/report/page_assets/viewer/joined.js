@@ -4,7 +4,7 @@
   const viewer = (fusetune.viewer = fusetune.viewer || {});
   const LOG_FLOOR = 1e-9; // zero has no place on a logarithmic axis
 
-  /* [times, values of the first series, …]: undefined where a series has no sample, null where it has one that is NaN.
+  /* [times, values of the first series, …]: undefined where a series has no sample, null where its sample is NaN.
      `places[k]` says where sample i of series k went. */
   viewer.joined = (all, { log = false } = {}) => {
     const distinct = [...new Set(all.map((data) => data.times))];

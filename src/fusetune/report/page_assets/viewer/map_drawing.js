@@ -1,4 +1,4 @@
-/* What stands on the map beside the track. `to` has the places of east and north on the canvas, and pixels per metre. */
+/* What stands on the map beside the track; `to` takes metres east and north to pixels. */
 (() => {
   "use strict";
   const viewer = (fusetune.viewer = fusetune.viewer || {});

@@ -1,4 +1,4 @@
-/* The one time axis of all panels, the strip and the map: what is in view, and where the cursor stands. Seconds of the log. */
+/* The one time axis of panels, strip and map: what is in view, and where the cursor stands. Seconds of the log. */
 (() => {
   "use strict";
   const viewer = (fusetune.viewer = fusetune.viewer || {});

@@ -69,10 +69,12 @@
   }
 
   function describedTrack(track) {
-    const { figure } = viewer.words;
+    const [high, wide, lowest, highest] = [track.box.high, track.box.wide, track.lowest, track.highest].map(
+      viewer.words.figure,
+    );
     return (
-      `Track from above: ${figure(track.box.high)} m from south to north, ${figure(track.box.wide)} m from west to east, ` +
-      `between ${figure(track.lowest)} and ${figure(track.highest)} m high.`
+      `Track from above: ${high} m from south to north, ${wide} m from west to east, ` +
+      `between ${lowest} and ${highest} m high.`
     );
   }
 
