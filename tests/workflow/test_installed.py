@@ -139,6 +139,8 @@ def test_from_three_logs_in_an_empty_folder_to_the_parameter_file(
     results = tmp_path / "results"
     assert (results / "report.html").stat().st_size > 0
     assert (results / "apply" / "best_params.params").stat().st_size > 0
+    # what jobs in an environment of conda's would import
+    assert (tmp_path / ".snakemake" / "fusetune_package" / "fusetune" / "packaged").samefile(Path(snakefile).parents[1])
     # the configuration that came with it is named as in a checkout
     assert '"config/config.yaml"' in (results / "apply" / "decision.json").read_text(encoding="utf-8")
     again = installed("-m", "snakemake", "--snakefile", snakefile, "--dry-run", cwd=tmp_path)

@@ -1,0 +1,33 @@
+# fusetune with all that it needs, in the locked versions and with the estimator compiled: docs/install.md.
+#
+#   docker build --tag fusetune .
+#   docker run --rm --user "$(id -u):$(id -g)" --volume "$PWD:/work" fusetune run
+ARG PYTHON=python:3.11-slim
+
+FROM ${PYTHON} AS built
+ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PATH=/opt/fusetune/bin:$PATH
+RUN python -m venv /opt/fusetune
+WORKDIR /sources
+# what changes seldom goes first, so that a changed source leaves it as it is
+COPY requirements.lock ./
+RUN pip install --no-deps --require-hashes -r requirements.lock
+COPY pyproject.toml setup.py MANIFEST.in README.md LICENSE ./
+COPY src src
+COPY workflow workflow
+COPY config config
+RUN pip install --no-deps --no-build-isolation . && rm -rf /sources/*
+
+FROM ${PYTHON}
+LABEL org.opencontainers.image.title="fusetune" \
+      org.opencontainers.image.description="Choose PX4 EKF2 parameters from flight logs, without ground truth" \
+      org.opencontainers.image.licenses="BSD-3-Clause"
+COPY --from=built /opt/fusetune /opt/fusetune
+# Compiled by root and read by everybody: nobody who runs the container could have changed what is loaded.
+ENV PATH=/opt/fusetune/bin:$PATH NUMBA_CACHE_DIR=/opt/fusetune/kernels HOME=/tmp
+RUN python -m fusetune.ekf2.replay.warm_up && useradd --uid 1000 --no-create-home fusetune
+USER fusetune
+# A folder of the host with `flights/` in it; results and state are written beside that.
+VOLUME /work
+WORKDIR /work
+ENTRYPOINT ["fusetune"]
+CMD ["--help"]
