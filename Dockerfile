@@ -15,16 +15,19 @@ COPY pyproject.toml setup.py MANIFEST.in README.md LICENSE ./
 COPY src src
 COPY workflow workflow
 COPY config config
-RUN pip install --no-deps --no-build-isolation . && rm -rf /sources/*
+# the wheel carries the estimator compiled for all processors with AVX2, if it is made on such a one
+RUN FUSETUNE_KERNELS=$([ "$(uname -m)" = x86_64 ] && grep -q avx2 /proc/cpuinfo && echo 1) \
+    pip wheel --no-deps --no-build-isolation --no-index --wheel-dir /wheels . \
+    && pip install --no-deps --no-index /wheels/*.whl
 
 FROM ${PYTHON}
 LABEL org.opencontainers.image.title="fusetune" \
       org.opencontainers.image.description="Choose PX4 EKF2 parameters from flight logs, without ground truth" \
       org.opencontainers.image.licenses="BSD-3-Clause"
 COPY --from=built /opt/fusetune /opt/fusetune
-# Compiled by root and read by everybody: nobody who runs the container could have changed what is loaded.
-ENV PATH=/opt/fusetune/bin:$PATH NUMBA_CACHE_DIR=/opt/fusetune/kernels HOME=/tmp
-RUN python -m fusetune.ekf2.replay.warm_up && useradd --uid 1000 --no-create-home fusetune
+# Whoever `--user` names has a place for caches.
+ENV PATH=/opt/fusetune/bin:$PATH HOME=/tmp
+RUN useradd --uid 1000 --no-create-home --home-dir /tmp fusetune
 USER fusetune
 # A folder of the host with `flights/` in it; results and state are written beside that.
 VOLUME /work
