@@ -2,10 +2,12 @@
 # make demonstration  … then looks whether it made all, found what is wrong with its vehicle, and would do nothing twice
 # make demo-loop      … then closes the loop once on a simulated vehicle: design, fly, study, apply, fly again, confirmed
 # make test           adds to .venv what development needs, where that is missing, then runs the tests
+# make browser        … then looks at the pages in Chromium, as a reader does, and judges them by axe-core
 # make lint           … then looks for slips, form, and imports that the house forbids
 # make types          … then checks the types
 # make wheel          builds a wheel into dist/; on Linux with an x86-64 processor it carries the estimator compiled
-# make with-upload    adds to .venv what requirements-upload.lock holds; likewise with-slurm, with-mlflow, with-dev
+# make docs           … then builds the documentation into site/, its notebooks run on the demonstration's flights
+# make with-upload    adds to .venv what requirements-upload.lock holds; likewise with-slurm, with-mlflow, with-browser, with-dev
 # These are the checks of a change; .ci/run and .github/workflows/checks.yml call them.
 CORES ?= 2
 PYTHON ?= $(shell command -v python3.11 || command -v python3 || command -v python)
@@ -31,7 +33,7 @@ unexport UV_COMPILE_BYTECODE
 # What the demonstration is for; with real logs the same files come.
 MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
 
-.PHONY: all setup test lint types demonstration demo-loop wheel lock clean
+.PHONY: all setup test browser lint types demonstration demo-loop docs wheel lock clean
 
 all: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -42,6 +44,23 @@ with-%: .venv/.with-% ;
 
 test: $(DEVELOPMENT)
 	$(BIN)/pytest -n $(CORES) --no-loadscope-reorder
+
+# Chromium and npm are the system's. Where they cannot be had the tests that need them are skipped, saying so.
+browser: $(DEVELOPMENT) .venv/.with-browser
+	@if ! { command -v chromium || command -v chromium-browser || command -v google-chrome; } >/dev/null; then \
+		if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+			echo "Installing Chromium ..."; apt-get update -qq && \
+			apt-get install -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null; \
+		else \
+			echo "There is no Chromium: install the package chromium (or Google Chrome) and run make browser again." >&2; \
+		fi; \
+	fi
+	@if command -v npm >/dev/null; then \
+		cd tests/browser && npm ci --ignore-scripts --no-audit --no-fund --silent; \
+	else \
+		echo "There is no npm: install Node.js, and accessibility is judged, too." >&2; \
+	fi
+	$(BIN)/pytest tests/browser
 
 lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .
@@ -61,6 +80,10 @@ demonstration: all
 		grep -q "$$name" results/apply/best_params.params || { echo "$$name is left wrong" >&2; exit 1; }; \
 	done
 	@$(BIN)/snakemake --cores 1 --dry-run | grep -q "Nothing to be done" || { echo "a second run would not be idle" >&2; exit 1; }
+
+# Fails where a link leads nowhere, a docstring cannot be read, or a cell of a notebook fails.
+docs: .venv/.with-docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 demo-loop: $(READY)
 	$(BIN)/python -m benchmarks.closed_loop --cores $(CORES)
@@ -102,7 +125,7 @@ $(READY): requirements.lock pyproject.toml
 lock:
 	$(LOCK) $(UPGRADE) --extra build --extra test --extra dev --output-file requirements-dev.lock
 	$(LOCK) $(UPGRADE) --extra build --constraint requirements-dev.lock --output-file requirements.lock
-	for extra in upload slurm mlflow; do \
+	for extra in upload slurm mlflow docs browser; do \
 		$(LOCK) $(UPGRADE) --extra $$extra --constraint requirements-dev.lock --output-file requirements-$$extra.lock || exit 1; \
 	done
 

@@ -118,10 +118,11 @@ def _measured(job: str, log: Path) -> dict[str, Any]:
     elif job == "analyse":
         work = _analysis(saved, analysis, steps)
     else:
-        from fusetune.report.figures.flight_figures import plot_flight
+        from fusetune.report.flight_data.write_blob import write_blob
 
         sets = [pset.name for pset in load_study(STUDY).sets]
-        work = lambda: plot_flight(saved, analysis, sets, log.with_suffix(".png"))  # noqa: E731
+        small, large = (log.with_suffix(suffix) for suffix in (".blob", ".large.blob"))
+        work = lambda: write_blob(saved, analysis, small, large, sets)  # noqa: E731
     begin = time.process_time()
     peak = _peak_of(work)
     return {"cpu_s": time.process_time() - begin, "peak": max(peak, *steps.values(), 0), "steps": steps}

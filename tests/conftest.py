@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 use_kernel_cache()
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-SHARING_FOLDERS = ("tests/workflow", "tests/ekf2", "tests/report")
+SHARING_FOLDERS = ("tests/workflow", "tests/ekf2", "tests/report", "tests/browser")
 """Folders whose files share what takes long to make: a run of the pipeline, compiled functions, a report."""
 
 

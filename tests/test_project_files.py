@@ -17,7 +17,7 @@ import fusetune
 from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 from fusetune.ekf2.compiled.kernel_locator import target_name
 
-CHECKS = ["lint", "types", "test", "demonstration"]
+CHECKS = ["lint", "types", "test", "demonstration", "docs", "browser"]
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,15 @@ def test_github_and_ci_call_the_checks_of_the_makefile_and_have_none_of_their_ow
         on_github += [command.replace("${{ matrix.check }}", check) for command in commands(job) for check in checks]
     assert sorted(on_github) == sorted(f"make {check}" for check in CHECKS)
     here = re.findall(r"^(make \w+)$", (project_root / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
-    assert here == ["make setup", "make lint", "make types", "make demonstration", "make test"]
+    assert here == [
+        "make setup",
+        "make lint",
+        "make types",
+        "make demonstration",
+        "make docs",
+        "make browser",
+        "make test",
+    ]
     made = subprocess.run(
         ["make", "--dry-run", "--always-make", *CHECKS], cwd=project_root, check=True, capture_output=True, text=True
     ).stdout

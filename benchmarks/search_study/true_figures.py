@@ -20,7 +20,7 @@ from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.scoring.metrics_table import MetricsTable, add_true_errors
 from fusetune.analyze.scoring.score_sets import SCORE_TOPICS
 from fusetune.analyze.scoring.settings import ScoringSettings
-from fusetune.analyze.scoring.true_errors import true_errors
+from fusetune.analyze.scoring.true_errors import Reference, true_errors
 from fusetune.analyze.scoring.window import ScoringWindow, scoring_window
 from fusetune.analyze.scoring.withheld_scores import add_true_drift
 from fusetune.px4.parameters.ekf2_parameters import as_float32
@@ -70,7 +70,7 @@ class JudgedFlight:
         if record.status != "ok" or not self._window.intervals:
             return np.full(len(FIGURES), np.nan)
         table = MetricsTable(self.prepared.flight.name)
-        errors = true_errors(record, record.states(), self._truth, self._window, self._scoring.confidence)
+        errors = true_errors(record, record.states(), Reference(self._truth), self._window, self._scoring.confidence)
         add_true_errors(table, record.name, errors)
         add_true_drift(table, record, self._truth, self._window)
         rows = {

@@ -214,6 +214,7 @@ def _local_position(made: MadeSet) -> pa.Table:
             "xy_reset_counter": counter,
             **{f"{kind}_reset_counter": np.zeros(time.size, np.int32) for kind in ("z", "vxy", "vz", "heading")},
             "xy_valid": np.ones(time.size, bool),
+            **{f"q_{part}": np.full(time.size, float(part == 0)) for part in range(4)},
         }
     )
 

@@ -146,11 +146,11 @@ def test_one_more_set_costs_only_its_own(
     former = replay_files(grown, "delayed")
     for file in former:
         file.write_bytes(b"of an earlier version")
-    kept = {name: pieces_of(grown)[key] for name, key in keys_of(grown).items()}
+    kept = {name: pieces_of(grown)[row] for name, row in rows_of(grown).items()}
     assert analyze(grown, list(SETS)) == ("delayed",)
     assert not any(file.exists() for file in former)
     after = pieces_of(grown)
-    assert {name: after[key] for name, key in keys_of(grown).items() if name in kept} == kept
+    assert {name: after[row] for name, row in rows_of(grown).items() if name in kept} == kept
     assert analyze(grown, list(SETS)) == ()
     for file in FLIGHT_FILES:
         assert (grown / file).read_bytes() == (whole / file).read_bytes(), file
@@ -160,29 +160,30 @@ def test_one_more_set_costs_only_its_own(
         assert flown == present, table
     # a damaged piece, or file, is made again
     with sqlite3.connect(grown / KEPT_SCORES_FILE) as database:
-        database.execute("UPDATE scores SET tables = 'spoiled' WHERE key = ?", (keys_of(grown)["narrow"],))
-    assert analyze(grown, list(SETS)) == ("narrow",)
+        database.execute("UPDATE kept SET tables = 'spoiled' WHERE number = ?", (rows_of(grown)["narrow"],))
+    # it was scored with the present set
+    assert analyze(grown, list(SETS)) == ("present", "narrow")
     (grown / KEPT_SCORES_FILE).write_bytes(b"no database at all, but long enough to look like one" * 100)
     assert analyze(grown, list(SETS)) == ("present", "delayed", "narrow")
     for file in FLIGHT_FILES:
         assert (grown / file).read_bytes() == (whole / file).read_bytes(), file
 
 
-def keys_of(folder: Path) -> dict[str, str]:
-    """The keys of the sets in the file that keeps scores."""
+def rows_of(folder: Path) -> dict[str, int]:
+    """The rows of the sets in the file that keeps scores."""
     with closing(sqlite3.connect(folder / KEPT_SCORES_FILE)) as database:
-        rows = database.execute("SELECT key, summary FROM scores").fetchall()
-    found = {key: json.loads(summary) for key, summary in rows}
-    by_overrides = {json.dumps(one["overrides"]): key for key, one in found.items() if "overrides" in one}
+        heads = database.execute("SELECT number, head FROM kept").fetchall()
+    found = [(number, one["summary"]) for number, head in heads for one in json.loads(head)]
+    by_overrides = {json.dumps(one["overrides"]): number for number, one in found if "overrides" in one}
     return {
         name: by_overrides[json.dumps(values)] for name, values in SETS.items() if json.dumps(values) in by_overrides
     }
 
 
-def pieces_of(folder: Path) -> dict[str, tuple]:
-    """What is kept under each key."""
+def pieces_of(folder: Path) -> dict[int, tuple]:
+    """What is kept in each row."""
     with closing(sqlite3.connect(folder / KEPT_SCORES_FILE)) as database:
-        return {row[0]: row for row in database.execute("SELECT * FROM scores")}
+        return {row[0]: row for row in database.execute("SELECT * FROM kept")}
 
 
 def test_a_replay_at_hand_is_as_good_as_one_made_anew(survey_flight: Flight) -> None:

@@ -11,7 +11,8 @@ from fusetune.analyze.delays.wrong_delays import JoinedDelay
 from fusetune.analyze.effects.estimate import Effect, Estimate
 from fusetune.analyze.effects.joined_effects import join_effects
 from fusetune.apply.evidence import AnalyzedFlight
-from fusetune.apply.missing_motion import DELAYS, LEVER_ARMS, MINUTES, NOISES, THINNED, missing_motion
+from fusetune.apply.missing_motion import missing_motion
+from fusetune.apply.missing_motion_kinds import DELAYS, LEVER_ARMS, MINUTES, NOISES, THINNED
 
 BRISK = {
     "seconds": 70.0, "horizontal_acceleration_m_s2": 3.7, "vertical_acceleration_m_s2": 1.0,

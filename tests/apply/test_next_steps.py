@@ -13,7 +13,8 @@ from fusetune.apply.candidates import Candidate
 from fusetune.apply.choice import Choice
 from fusetune.apply.delays import UNCONFIRMED
 from fusetune.apply.evidence import DISTRUSTED, AnalyzedFlight, NoEvidence
-from fusetune.apply.missing_motion import DELAYS, THINNED, MissingMotion
+from fusetune.apply.missing_motion import MissingMotion
+from fusetune.apply.missing_motion_kinds import DELAYS, THINNED
 from fusetune.apply.next_steps import (
     CONFIRM,
     FLY,

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +11,7 @@ import pytest
 
 from fusetune import __version__
 from fusetune.cli import main
-from fusetune.cli.command_line import COMMANDS
+from fusetune.cli.command_line import COMMANDS, parser
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -78,14 +80,48 @@ def test_simulate_names_the_sets_that_a_study_has(
     assert "paper1, paper2" in capsys.readouterr().err
 
 
-def test_the_readme_names_every_command(project_root: Path) -> None:
-    said = " ".join((project_root / "README.md").read_text(encoding="utf-8").split())
-    assert f"single steps: {', '.join(f'`{name}`' for name in COMMANDS)};" in said
+def test_the_manual_names_every_command_and_the_help_lists_it(
+    project_root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    manual = (project_root / "docs" / "command.md").read_text(encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    listed = capsys.readouterr().out
+    for name, command in COMMANDS.items():
+        assert f"`fusetune {name}" in manual, name
+        assert f"  {name:<12} {command.HELP}\n" in listed
 
 
 def test_every_file_of_the_folder_is_a_command_under_its_name(project_root: Path) -> None:
     files = {file.stem for file in (project_root / "src" / "fusetune" / "cli").glob("*.py")}
     assert files - {"__init__", "__main__", "command_line", "command", "lines"} == COMMANDS.keys()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_examples_of_a_command_are_command_lines_that_it_takes(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([name, "--help"])
+    assert ended.value.code == 0
+    printed = capsys.readouterr().out
+    for line, words in COMMANDS[name].EXAMPLES:
+        assert f"  {line}\n      {words}\n" in printed
+        for one in (part for part in re.split(r"&&|\||;", line) if part.strip().startswith("fusetune ")):
+            command, *arguments = shlex.split(one.partition(">")[0])[1:]
+            assert parser().parse_args([command, *arguments]).command == command
+
+
+def test_without_a_command_a_terminal_is_told_where_to_begin(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([])
+    assert ended.value.code == 2
+    assert "required: COMMAND" in capsys.readouterr().err
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert main([]) == 0
+    assert "fusetune run LOG…" in capsys.readouterr().out
 
 
 def test_a_command_that_is_not_run_loads_no_room(project_root: Path) -> None:

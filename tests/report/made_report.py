@@ -5,11 +5,10 @@ from typing import Any
 
 from tests.analyze.made_flight import MadeSet
 from tests.apply.study import make_study
+from tests.report.read_page import check_page
 
 from fusetune.apply.decide import decide
-from fusetune.report.figures.flight_figures import plot_flight
-from fusetune.report.figures.summary_figures import plot_summary
-from fusetune.report.page import build_report
+from fusetune.report.page import ReportInput, build_report
 from fusetune.storage.documents import write_document
 
 SETS = {
@@ -36,12 +35,13 @@ def make_report(
     for folder in folders if fidelity else ():
         write_document(folder / "fidelity.json", fidelity)
     decide(folders, table, root / "apply", sets=list(sets))
-    pictures = []
-    for folder in folders:
-        pictures.append(root / "report" / "flights" / f"{folder.name}.png")
-        plot_flight(root / "save" / folder.name, folder, list(sets), pictures[-1])
     for folder in folders if fidelity else ():
         (folder / "fidelity.json").unlink()
-    plot_summary(folders, root / "apply", root / "report")
-    build_report(table, folders, pictures, root / "apply", root / "report", root / "report.html")
-    return (root / "report.html").read_text(encoding="utf-8")
+    build_report(made_input(root), root / "report.html")
+    return check_page((root / "report.html").read_text(encoding="utf-8")).source
+
+
+def made_input(root: Path, **more: Any) -> ReportInput:
+    """What the report of a made study is built from."""
+    folders = sorted((root / "analyze").iterdir()) if (root / "analyze").is_dir() else []
+    return ReportInput(root / "flights.parquet", folders, root / "apply", **more)

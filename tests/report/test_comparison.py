@@ -1,12 +1,11 @@
 """Figures of the comparison by hand."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusetune.report.comparison import percent_change, robust_reach, sign_counts
-from fusetune.report.figures.difference_figures import flight_labels, shortened
+from fusetune.report.comparison import percent_change, robust_reach
+from fusetune.report.figures.difference_figures import shortened
 
 
 def test_a_difference_of_logarithms_is_a_percentage() -> None:
@@ -56,21 +55,6 @@ def test_the_limits_hold_zero_and_all_that_speaks_for_an_eligible_set(found: lis
     left, right = robust_reach(low, low + [one[1] for one in found], able)
     assert left < 0.0 < right
     assert (low[able] >= left).all()
-
-
-def test_signs_are_counted_and_tested() -> None:
-    better, worse, equal, p_value = sign_counts([-1.0] * 7 + [2.0, 0.0, np.nan])
-    assert (better, worse, equal) == (7, 1, 1)
-    # Two-sided binomial test, 7 of 8 at 1/2: 2 (8 + 1) / 256
-    assert p_value == pytest.approx(18 / 256)
-    assert sign_counts([0.0, 0.0]) == (0, 0, 2, 1.0)
-
-
-def test_long_names_of_flights_lose_what_they_share() -> None:
-    names = [f"a_vehicle_of_someone__log_{i}_2021-8-12-15-55-52" for i in (10, 13, 7)]
-    assert flight_labels(names) == [f"…{i}_2021-8-12-15-55-52" for i in (10, 13, 7)]
-    assert flight_labels(["short", "shorter"]) == ["short", "shorter"]
-    assert flight_labels(["x" * 50]) == [shortened("x" * 50)]
 
 
 def test_a_long_name_keeps_its_beginning_and_its_end() -> None:

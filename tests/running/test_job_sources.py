@@ -39,9 +39,6 @@ MADE_BY = {
     "flight_page": ("report", "apply", "diagnose", "save"),
     "all_sensors_page": ("report", "apply", "diagnose", "save"),
     "sensor_page": ("report", "apply", "diagnose", "save"),
-    "fleet_page": ("report", "apply", "diagnose", "save"),
-    "plot_flight": ("report", "apply", "score", "replay", "save"),
-    "plot_summary": ("report", "apply", "score", "replay", "save"),
     "build_report": ("report", "apply", "conformance", "diagnose", "score", "replay", "save"),
 }
 """Script → kind of job, and the kinds before it, of whose outcome it is made."""

@@ -7,6 +7,7 @@ a process that opens a file of the checkout writes that down.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -129,19 +130,26 @@ def test_from_three_logs_in_an_empty_folder_to_the_parameter_file(
     snakefile = installed("-c", asked, cwd=tmp_path).strip()
     assert "site-packages/fusetune/packaged" in snakefile
     logs = sorted((demonstration.folder / "results" / "execute").glob("*.ulg"))
-    (tmp_path / "flights").mkdir()
+    given = []
     for number, content in enumerate(
         (logs[0].read_bytes(), logs[1].read_bytes(), logs[0].read_bytes() + ONE_MORE_MESSAGE)
     ):
-        (tmp_path / "flights" / f"log{number}.ulg").write_bytes(content)
-    printed = installed("-m", "snakemake", "--snakefile", snakefile, "--cores", "2", cwd=tmp_path)
-    assert "3 flights, 0 refused" in printed
-    results = tmp_path / "results"
-    assert (results / "report.html").stat().st_size > 0
-    assert (results / "apply" / "best_params.params").stat().st_size > 0
+        given.append(tmp_path / "card" / f"log{number}.ulg")
+        given[-1].parent.mkdir(exist_ok=True)
+        given[-1].write_bytes(content)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    printed = installed("-m", "fusetune.cli", "run", *map(str, given), "--cores", "2", "--json", cwd=empty)
+    told = json.loads(printed[printed.index("{") : printed.rindex("}") + 1])
+    assert (told["flights"], told["refused"], told["simulated"]) == (3, 0, False)
+    for file in told["files"].values():
+        assert (empty / file).stat().st_size > 0
+    # logs stay where they are
+    assert [one.resolve() for one in sorted((empty / "flights").iterdir())] == given
     # what jobs in an environment of conda's would import
-    assert (tmp_path / ".snakemake" / "fusetune_package" / "fusetune" / "packaged").samefile(Path(snakefile).parents[1])
+    assert (empty / ".snakemake" / "fusetune_package" / "fusetune" / "packaged").samefile(Path(snakefile).parents[1])
     # the configuration that came with it is named as in a checkout
+    results = empty / "results"
     assert '"config/config.yaml"' in (results / "apply" / "decision.json").read_text(encoding="utf-8")
-    again = installed("-m", "snakemake", "--snakefile", snakefile, "--dry-run", cwd=tmp_path)
+    again = installed("-m", "snakemake", "--snakefile", snakefile, "--dry-run", cwd=empty)
     assert "Nothing to be done" in again

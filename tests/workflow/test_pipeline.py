@@ -17,7 +17,7 @@ from fusetune.ekf2.compiled.kernel_cache import kernel_cache
 
 SUMMARIES = dict.fromkeys(
     ("list_flights", "join_delays", "join_health", "join_fleet", "join_conformance", "decide", "keep_history",
-     "plot_summary", "fleet_page", "build_report", "all"), 1
+     "build_report", "all"), 1
 )  # fmt: skip
 DECISION = "results/apply/decision.json"
 PATIENCE_S = 300.0

@@ -52,6 +52,17 @@ def of_replayable_flights(patterns):
     return lambda wildcards: expand(patterns, flight=replayable_flights())
 
 
+def of_a_replayed_flight(file):
+    """Input function: a file of the flight of a job, where that is replayed."""
+
+    def files(wildcards):
+        when_delays_are_joined(wildcards)
+        replayed = wildcards.flight in replayable_flights()
+        return f"results/analyze/{wildcards.flight}/{file}" if replayed else []
+
+    return files
+
+
 @cache
 def read_in_state(function, path, state):
     return told_in_one_line(function, path)

@@ -1,10 +1,10 @@
-"""Draw a flight and its sensors, and write its page, where that is out of date."""
+"""Pack what the viewer shows of a flight, and write its page, where that is out of date."""
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from fusetune.report.flight_page.page import build_drawn_flight_page
+from fusetune.report.flight_data.write_blob import write_blob
+from fusetune.report.flight_page.page import build_flight_page
 from fusetune.running.job import keep_out, logged_job
 from fusetune.save.flight_folder import METADATA_FILE
 from fusetune.storage.files import sha256_of
@@ -14,21 +14,22 @@ if TYPE_CHECKING:
     snakemake: Any
 
 keep_out("pandas")
-with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
-    given, page = snakemake.input, Path(snakemake.output[0])
-    results = page.parents[2]
+with logged_job(snakemake.log[0]):
+    given, page, blob = snakemake.input, Path(snakemake.output.page), Path(snakemake.output.blob)
     ledger = Ledger(page.with_name(f".{page.stem}.made.json"))
-    # which log it was, and what is said of it, stand in its metadata
-    drawn = [Path(given.flight, METADATA_FILE), *given.told, given.track, given.conformance]
-    key = key_of([snakemake.params.code, snakemake.params.save_code, *map(sha256_of, drawn)])
-    if ledger.is_current(page.name, key, [page]):
+    # which log it was, and what is said of it, stand in its metadata; what was replayed, in its scores
+    shown = [Path(given.flight, METADATA_FILE), *given.told, given.track, given.conformance]
+    shown += [given.scores] if given.scores else []
+    params = snakemake.params
+    key = key_of([params.code, params.save_code, params.sets, *map(sha256_of, shown)])
+    if ledger.is_current(page.name, key, [page, blob]):
         print("up to date")
     else:
-        build_drawn_flight_page(
-            given.flight,
-            Path(given.diagnosis).parent,
-            figures,
-            page,
-            {"The decision": results / "report.html", "All flights": results / "fleet.html"},
-        )
-        ledger.record(page.name, key, [page])
+        analyzed = Path(given.diagnosis).parent
+        large = page.with_name(f".{page.stem}.large.blob")
+        try:
+            write_blob(given.flight, analyzed, blob, large, params.sets)
+            build_flight_page(analyzed, page, {"The decision": page.parents[2] / "report.html"}, large.read_bytes())
+        finally:
+            large.unlink(missing_ok=True)
+        ledger.record(page.name, key, [page, blob])

@@ -1,7 +1,6 @@
 """Draw the sensors of a flight, and write their page."""
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from fusetune.report.flight_page.sensor_page import build_sensor_page
@@ -11,11 +10,10 @@ if TYPE_CHECKING:
     snakemake: Any
 
 keep_out("pandas")
-with logged_job(snakemake.log[0]), TemporaryDirectory() as figures:
+with logged_job(snakemake.log[0]):
     build_sensor_page(
         snakemake.input.flight,
         Path(snakemake.input.noise).parent,
-        figures,
         snakemake.output[0],
         {"The flight": Path(snakemake.output[0]).parents[1] / "flights" / f"{snakemake.wildcards.flight}.html"},
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,15 +20,18 @@ from fusetune.analyze.replaying.store.parts import summary_file
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.scoring.kept_scores import kept_scores
 from fusetune.analyze.scoring.score_flight import scores_writer
-from fusetune.analyze.scoring.set_scores import SetScores, score_flight, score_set
+from fusetune.analyze.scoring.set_scores import SetScores, score_flight, score_together
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.yardstick import WITH_MEASURED_ANTENNA, ScoredFlight, Yardstick
-from fusetune.ekf2.replay.recording import FULL, Recording
+from fusetune.ekf2.replay.recording import FULL, TRACED, Recording
 from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.freed_memory import give_back_freed_memory
 from fusetune.storage.ledger import key_of
+
+MOST_TOGETHER = 16
+"""Sets that are scored at once: of more the figures of each cost no less."""
 
 SCRATCH_PREFIX = ".scoring-"
 """Of folders for the replays of longer ones."""
@@ -96,9 +99,9 @@ def write_scores(
         itself = key_of([keys[asked.present], ONBOARD])
         if outdated or not kept.has(itself):
             at_work = _SetsAtWork(asked, folder, flight, settings)
-            kept.keep(itself, score_flight(at_work.yardstick))
-            for name, scores in at_work.scores(outdated, threads):
-                kept.keep(keys[name], scores)
+            kept.keep({itself: score_flight(at_work.yardstick)})
+            for scores in at_work.scores(outdated, threads):
+                kept.keep({keys[name]: one for name, one in scores.items()})
         with scores_writer(folder) as writer:
             for name, key in keys.items():
                 writer.take(name, kept.scores(key))
@@ -127,26 +130,34 @@ class _SetsAtWork:
         present = read_set(self._folder, self._asked.present, self._spool)
         return Yardstick(scored, present, self._settings, self._antenna)
 
-    def scores(self, names: Sequence[str], threads: int) -> Iterator[tuple[str, SetScores]]:
-        """Scores of some sets, in their order."""
+    def scores(self, names: Sequence[str], threads: int) -> Iterator[dict[str, SetScores]]:
+        """Scores of some sets in their order, of as many at once as are scored together."""
         self.yardstick.make()
         give_back_freed_memory()
+        # each thread has its share
+        most = max(1, min(self._flight.prepared.sets_at_once, MOST_TOGETHER, len(names) // threads))
+        parts = [names[first : first + most] for first in range(0, len(names), most)]
         if threads <= 1:
-            for name in names:
-                yield name, self._scores(name, alone=True)
+            for part in parts:
+                yield self._scores(part, alone=True)
             return
         with ThreadPoolExecutor(threads) as pool:
-            yield from zip(names, pool.map(self._scores, names), strict=True)
+            yield from pool.map(self._scores, parts)
 
-    def _scores(self, name: str, alone: bool = False) -> SetScores:
-        with self._record(name) as record:
-            if alone:
+    def _scores(self, names: Sequence[str], alone: bool = False) -> dict[str, SetScores]:
+        # of small ones the next need the same memory again
+        is_large = self._flight.prepared.sets_at_once == 1
+        with ExitStack() as records:
+            replayed = [records.enter_context(self._record(name)) for name in names]
+            if alone and is_large:
                 # where several are at work the others may be replayed with them
                 self._flight.forget_schedules()
                 give_back_freed_memory()
-            scores = score_set(self.yardstick, record)
-        give_back_freed_memory()
-        return scores
+            scores = score_together(self.yardstick, replayed)
+            del replayed
+        if is_large:
+            give_back_freed_memory()
+        return dict(zip(names, scores, strict=True))
 
     @contextmanager
     def _record(self, name: str) -> Iterator[ReplayedSet]:
@@ -155,7 +166,7 @@ class _SetsAtWork:
             yield present
         elif self._antenna is not None and name == self._antenna.name:
             yield self._antenna
-        elif overrides is not None and recording is FULL and self._flight.prepared.is_long:
+        elif overrides is not None and recording is TRACED and self._flight.prepared.is_long:
             with TemporaryDirectory(prefix=SCRATCH_PREFIX, dir=self._folder) as scratch:
                 write_replay(self._flight.prepared, name, overrides, scratch)
                 yield read_set(scratch, name)

@@ -14,6 +14,7 @@ from typing import Any
 from fusetune.analyze.delays.wrong_delays import FEWEST_FLIGHTS, JoinedDelay
 from fusetune.analyze.effects.joined_effects import JoinedEffects
 from fusetune.apply.evidence import AnalyzedFlight
+from fusetune.apply.missing_motion_kinds import DELAYS, LEVER_ARMS, MINUTES, NOISES, THINNED
 from fusetune.design.missions.purpose import BRISK_M_S2, TURNING_DEG_S
 from fusetune.set_names import EFFECT_SETS
 
@@ -33,8 +34,6 @@ GNSS_HZ = 4.0
 SURE_ARM_M = 0.05
 """A lever arm whose interval reaches no further needs no other flight."""
 _AXES = "XYZ"
-
-DELAYS, NOISES, LEVER_ARMS, MINUTES, THINNED = "delays", "noises", "lever_arms", "minutes", "thinned_gnss"
 
 
 @dataclass(frozen=True)

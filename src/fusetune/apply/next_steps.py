@@ -12,7 +12,8 @@ from fusetune.apply.candidates import Candidate
 from fusetune.apply.choice import Choice
 from fusetune.apply.delays import UNCONFIRMED
 from fusetune.apply.evidence import DISTRUSTED, AnalyzedFlight
-from fusetune.apply.missing_motion import DELAYS, LEVER_ARMS, LOG_PROFILE, NOISES, THINNED, MissingMotion
+from fusetune.apply.missing_motion import LOG_PROFILE, MissingMotion
+from fusetune.apply.missing_motion_kinds import DELAYS, LEVER_ARMS, NOISES, THINNED
 from fusetune.apply.parameter_changes import ParameterChange
 from fusetune.apply.parameter_files.vehicle_changes import RefusedChange
 from fusetune.apply.power.power import ENOUGH, GAINS_PERCENT, LONGER_MINUTES, Power
@@ -31,10 +32,7 @@ LOG, LOAD, CONFIRM, FLY, STUDY, SEARCH, STOP, OWN_LOGS = (
 )  # fmt: skip
 
 SEARCH_COMMAND = "fusetune search flights/*.ulg --out results/search"
-STUDY_COMMAND = (
-    "cp results/apply/candidates.yaml config/studies/ && "
-    "snakemake --cores 2 --config study=config/studies/candidates.yaml"
-)
+STUDY_COMMAND = "cp results/apply/candidates.yaml candidates.yaml && fusetune run --study candidates.yaml"
 
 
 @dataclass(frozen=True)

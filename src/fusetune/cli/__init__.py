@@ -1,4 +1,4 @@
-"""The command `fusetune`: single steps of the pipeline on single files, one file for each sub-command."""
+"""The command `fusetune`: the whole pipeline and single steps of it, one file for each sub-command."""
 
 from fusetune.cli.command_line import main
 

@@ -8,6 +8,12 @@ from pathlib import Path
 from fusetune.cli.command import DONE
 
 HELP = "write flight cards: which parameter set to fly when, to print"
+EXAMPLES = (
+    (
+        "fusetune cards config/studies/paper_table11.yaml --flights 12 --out cards.html",
+        "twelve flights, two of each set",
+    ),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Protocol
 
 DONE = 0
@@ -30,9 +31,14 @@ class Command(Protocol):
     Attributes
     ----------
     HELP : what it does, in a line
+    EXAMPLES : command lines, each with what it is for
     """
 
     HELP: str
+
+    @property
+    def EXAMPLES(self) -> Sequence[tuple[str, str]]:
+        """They are read only."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Say what it takes."""

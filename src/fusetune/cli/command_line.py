@@ -11,42 +11,85 @@ from collections.abc import Mapping, Sequence
 from fusetune import __version__
 from fusetune.cli import (
     cards,
+    compare,
+    completion,
     confirm,
     conformance,
     covariance,
+    decide,
     design,
     diagnose,
     fidelity,
     history,
+    init,
     mission,
+    plot,
     replay,
+    report,
+    run,
     save,
+    score,
     search,
     simulate,
     study,
     upload,
 )
-from fusetune.cli.command import INTERRUPTED, NO_READER, USER_ERROR, Command
+from fusetune.cli.command import DONE, INTERRUPTED, NO_READER, USER_ERROR, Command
 from fusetune.errors import UserError
 
-COMMANDS: Mapping[str, Command] = {
-    "design": design,
-    "mission": mission,
-    "study": study,
-    "cards": cards,
-    "covariance": covariance,
-    "simulate": simulate,
-    "save": save,
-    "replay": replay,
-    "fidelity": fidelity,
-    "diagnose": diagnose,
-    "conformance": conformance,
-    "search": search,
-    "confirm": confirm,
-    "history": history,
-    "upload": upload,
+GROUPS: Mapping[str, Mapping[str, Command]] = {
+    "the whole pipeline": {
+        "init": init,
+        "run": run,
+        "decide": decide,
+        "report": report,
+        "compare": compare,
+        "history": history,
+    },
+    "single steps on logs": {
+        "diagnose": diagnose,
+        "score": score,
+        "search": search,
+        "plot": plot,
+        "conformance": conformance,
+        "save": save,
+        "replay": replay,
+        "fidelity": fidelity,
+        "confirm": confirm,
+    },
+    "before a flight": {
+        "design": design,
+        "mission": mission,
+        "study": study,
+        "cards": cards,
+        "covariance": covariance,
+        "simulate": simulate,
+    },
+    "the vehicle": {"upload": upload},
+    "this command": {"completion": completion},
 }
-"""In the order of the pipeline."""
+"""Sub-commands by what they are for."""
+
+COMMANDS: Mapping[str, Command] = {name: command for group in GROUPS.values() for name, command in group.items()}
+
+_STATUSES = """\
+exit status:
+  0    done
+  1    done as far as it goes: a log was refused, or what was asked for is not so (--help of each tells)
+  2    not done: the command or a file cannot be used, and one line says what to do
+  3    diagnose: a failure was found; upload: what was written is taken back
+  4    upload: not finished
+  130  interrupted
+  141  who read the output has gone"""
+
+_BEGIN = """\
+fusetune finds which EKF2 parameters a PX4 vehicle should fly with, from its logs.
+
+  fusetune run LOG…         the whole pipeline: best_params.params, and the page that says why
+  fusetune diagnose LOG…    what is wrong on these flights, and what to do about it
+  fusetune init DIR         a folder to go on in
+
+No logs at hand? `fusetune run` in an empty folder shows it on simulated flights. All commands: fusetune --help"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -54,7 +97,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # read when NumPy is first imported; the matrices are too small for threads, which would only cost time
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _print_any_name()
-    options = _parser().parse_args(arguments)
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if "_ARGCOMPLETE" in os.environ:
+        from fusetune.cli.output.completers import complete
+
+        complete(parser())
+    if not arguments and sys.stdout is not None and sys.stdout.isatty():
+        print(_BEGIN)
+        return DONE
+    options = parser().parse_args(arguments)
     try:
         status = COMMANDS[options.command].run(options)
         if sys.stdout is not None:
@@ -85,15 +136,49 @@ def _failed(message: str) -> int:
     return USER_ERROR
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+_KEEP_LINES = argparse.RawDescriptionHelpFormatter
+"""What stands around the options has lines of its own."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """All sub-commands with their options."""
+    whole = argparse.ArgumentParser(
         prog="fusetune",
-        description="Single steps of the pipeline; `snakemake` runs them all.",
-        epilog="Exit status: 0 all is done; 1 a log was refused, diagnose warns, confirm does not confirm; 2 the "
-        "command or a file is unusable; 3 diagnose found a failure, upload took all back; 4 upload is not finished.",
+        usage="fusetune COMMAND …    (fusetune COMMAND --help for its options and examples)",
+        description=_listed(),
+        epilog=_STATUSES,
+        formatter_class=_KEEP_LINES,
     )
-    parser.add_argument("--version", action="version", version=f"fusetune {__version__}")
-    commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
+    whole.add_argument("--version", action="version", version=f"fusetune {__version__}")
+    commands = whole.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS, prog="fusetune"
+    )
     for name, command in COMMANDS.items():
-        command.add_arguments(commands.add_parser(name, help=command.HELP))
-    return parser
+        own = commands.add_parser(
+            name, help=command.HELP, description=_wrapped(_sentence(command.HELP)), formatter_class=_KEEP_LINES
+        )
+        command.add_arguments(own)
+        own.epilog = "\n\n".join(filter(None, (_examples(command), own.epilog and _wrapped(own.epilog))))
+    return whole
+
+
+def _listed() -> str:
+    lines = ["Which EKF2 parameters a PX4 vehicle should fly with, from its flight logs."]
+    for group, commands in GROUPS.items():
+        lines += ["", f"{group}:", *(f"  {name:<12} {command.HELP}" for name, command in commands.items())]
+    return "\n".join(lines)
+
+
+def _sentence(words: str) -> str:
+    return f"{words[0].upper()}{words[1:]}."
+
+
+def _examples(command: Command) -> str:
+    lines = [f"  {line}\n      {words}" for line, words in command.EXAMPLES]
+    return "\n".join(["examples:", *lines])
+
+
+def _wrapped(text: str) -> str:
+    import textwrap
+
+    return textwrap.fill(text, 100)

@@ -9,6 +9,10 @@ from pathlib import Path
 from fusetune.cli.command import DONE, REFUSED
 
 HELP = "tell which flights flew a mission: waypoints, order, distance from its legs"
+EXAMPLES = (
+    ("fusetune conformance config/missions/survey.yaml flights/*.ulg", "who flew the survey, and how well"),
+    ("fusetune conformance survey.plan ~/logs --json", "for a script"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,11 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fusetune.cli.command import DONE, FOUND_FAILURE, USER_ERROR
+from fusetune.cli.output.numbers import from_zero
 
 if TYPE_CHECKING:
     from fusetune.analyze.diagnosis.diagnosed_logs import DiagnosedLog
 
 HELP = "tell what is wrong with a vehicle from its logs, since when, how sure, and what to do"
+EXAMPLES = (
+    ("fusetune diagnose flights/*.ulg", "what is wrong, and what to do about it"),
+    ("fusetune diagnose ~/sdcard/log --json > findings.json", "for a script"),
+)
 WARNS = 1
 """Exit status where there is no worse than a warning; of a log that tells nothing it is `USER_ERROR`, between the
 two."""
@@ -24,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print a JSON list with one object for each log")
     parser.add_argument(
         "--experiments",
-        type=_number,
+        type=from_zero,
         default=2,
         metavar="N",
         help="replay a flight at most N times with a claimed cause taken away (2)",
@@ -72,10 +77,3 @@ def _status(one: DiagnosedLog) -> int:
         return WARNS
     # what was hardly looked at is not said to be sound
     return USER_ERROR if one.not_replayed else DONE
-
-
-def _number(text: str) -> int:
-    """A whole number from 0."""
-    if not text.isascii() or not text.isdigit():
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0")
-    return int(text)

@@ -7,17 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fusetune.cli.command import DONE
+from fusetune.cli.output.json_document import add_json, print_document
 
 if TYPE_CHECKING:
     from fusetune.analyze.trust.fidelity import ReplayFidelity
 
 HELP = "compare replays with reference replays of the same flight"
+EXAMPLES = (("fusetune fidelity reference/flight_1 replays/flight_1", "how near a replay comes to PX4's own"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The two folders."""
     parser.add_argument("reference", type=Path, metavar="REFERENCE_DIR")
     parser.add_argument("replay", type=Path, metavar="REPLAY_DIR")
+    add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -25,10 +28,14 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.analyze.trust.fidelity import compare_folders, order_agreement
 
     results = compare_folders(options.reference, options.replay)
+    tau = order_agreement(results) if len(results) > 2 else None
+    if options.json:
+        print_document({"sets": results, "order_kendall_tau": tau})
+        return DONE
     for result in results:
         _print_fidelity(result)
-    if len(results) > 2:
-        print(f"order of the sets by NLL, Kendall tau: {order_agreement(results):.2f}")
+    if tau is not None:
+        print(f"order of the sets by NLL, Kendall tau: {tau:.2f}")
     return DONE
 
 

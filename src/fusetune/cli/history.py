@@ -6,9 +6,14 @@ import argparse
 from pathlib import Path
 
 from fusetune.cli.command import DONE
+from fusetune.cli.output.json_document import add_json, print_document
 from fusetune.errors import UserError
 
 HELP = "tell what was decided for a vehicle, when, and what it brought"
+EXAMPLES = (
+    ("fusetune history", "all vehicles"),
+    ("fusetune history PX4_FMU_V6X --json", "one of them, for a script"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "vehicle", nargs="?", metavar="VEHICLE", help="name or id, or how either begins; without it all vehicles"
     )
     parser.add_argument("--folder", type=Path, default=Path("results/history"), metavar="DIR")
+    add_json(parser)
     parser.add_argument(
         "--mlflow", type=Path, metavar="DIR", help="export studies, sets and figures to an MLflow store in this folder"
     )
@@ -42,6 +48,15 @@ def run(options: argparse.Namespace) -> int:
 
         runs = export_histories([history for _, history in kept], options.mlflow)
         print(f"{options.mlflow}: {counted(runs, 'run')} added. Look at them: {_look(options.mlflow)}")
+        return DONE
+    if options.json:
+        print_document(
+            [
+                {"file": file, "vehicle": history.decisions[-1].vehicle.in_words, "decisions": history.decisions}
+                | {"outcomes": history.outcomes}
+                for file, history in kept
+            ]
+        )
         return DONE
     for file, history in kept:
         changes = sum(one.is_change for one in history.decisions)

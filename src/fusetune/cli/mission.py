@@ -8,17 +8,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fusetune.cli.command import DONE
+from fusetune.cli.output.json_document import add_json, print_document
 
 if TYPE_CHECKING:
     from fusetune.design.missions.mission import Mission
     from fusetune.design.missions.outlook import Outlook, PlannedVehicle
 
 HELP = "check a mission or make one: legs, duration, battery, plan for QGroundControl, map"
+EXAMPLES = (
+    (
+        "fusetune mission config/missions/excite.yaml --out excite.plan --map excite.png",
+        "check it, write the plan, draw the map",
+    ),
+    ("fusetune mission --for EKF2_GPS_DELAY --home 47.4,8.5,490 --out delay.plan", "a mission that tells a delay"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Mission or what it is made of, vehicle, plan, map."""
-    parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="mission (.yaml) or plan (.plan)")
+    parser.add_argument("file", type=Path, nargs="?", metavar="MISSION", help="mission (.yaml) or plan (.plan)")
     parser.add_argument(
         "--shape",
         action="append",
@@ -35,9 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", metavar="NAME", help="name of the mission")
     parser.add_argument("--speed", type=float, metavar="M_S", help="horizontal speed (5)")
     parser.add_argument("--field", type=float, metavar="M", help="side of the square for a purpose (60)")
-    parser.add_argument("--vehicle", type=Path, metavar="FILE", help="vehicle to plan for (PX4's defaults)")
+    parser.add_argument("--vehicle", type=Path, metavar="VEHICLE.yaml", help="vehicle to plan for (PX4's defaults)")
     parser.add_argument("--out", type=Path, metavar="FILE.plan", help="plan to write")
     parser.add_argument("--map", type=Path, metavar="FILE.png", help="map and profile to draw, .png or .svg")
+    add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,16 +68,20 @@ def run(options: argparse.Namespace) -> int:
     mission = asked_mission(options.file, options.shape, purpose, options.home, **keys)
     vehicle = planned_vehicle(options.vehicle)
     found = outlook(mission, vehicle, file=options.file or "the mission")
-    for line in _lines(mission, found, vehicle):
-        print(line)
+    if not options.json:
+        print(*_lines(mission, found, vehicle), sep="\n")
     if options.out is not None:
         write_mission_plan(mission, options.out)
-        print(f"Plan, for QGroundControl: {options.out}")
+        if not options.json:
+            print(f"Plan, for QGroundControl: {options.out}")
     if options.map is not None:
         from fusetune.report.figures.mission_figure import draw_mission
 
         draw_mission(mission, vehicle.limits, options.map)
-        print(f"Map: {options.map}")
+        if not options.json:
+            print(f"Map: {options.map}")
+    if options.json:
+        print_document({"answer": found.answer, "outlook": found, "plan": options.out, "map": options.map})
     return DONE
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from fusetune.cli.command import DONE
 
 HELP = "replay parameter sets on a log"
+EXAMPLES = (("fusetune replay log.ulg --sets sets --out replays --start auto", "every set of the folder sets"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

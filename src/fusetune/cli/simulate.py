@@ -11,23 +11,32 @@ from fusetune.cli.command import DONE
 from fusetune.errors import UserError
 
 HELP = "fly a mission with a simulated vehicle and write its log"
+EXAMPLES = (
+    (
+        "fusetune simulate --mission survey.plan --vehicle config/vehicles/quadrotor.yaml --out flight.ulg",
+        "a log of a simulated flight",
+    ),
+)
 
 LARGEST_SEED = 2**53
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Mission, vehicle, the set that flies, faults, seed, log."""
-    parser.add_argument("--mission", type=Path, required=True, metavar="FILE")
-    parser.add_argument("--vehicle", type=Path, required=True, metavar="FILE")
-    parser.add_argument("--study", type=Path, metavar="FILE", help="study that holds the set to fly")
+    parser.add_argument("--mission", type=Path, required=True, metavar="MISSION")
+    parser.add_argument("--vehicle", type=Path, required=True, metavar="VEHICLE.yaml")
+    parser.add_argument("--study", type=Path, metavar="STUDY.yaml", help="study that holds the set to fly")
     parser.add_argument(
         "--set", metavar="NAME", help="set of the study to fly; without it the vehicle's own parameters"
     )
     parser.add_argument(
-        "--parameters", type=Path, metavar="FILE", help="parameter file that the vehicle has loaded (.params or .parm)"
+        "--parameters",
+        type=Path,
+        metavar="FILE.params",
+        help="parameter file that the vehicle has loaded (.params or .parm)",
     )
     parser.add_argument("--date", type=_date, metavar="YYYY-MM-DD", help="day of the flight; else that of the vehicle")
-    parser.add_argument("--faults", type=Path, metavar="FILE", help="YAML file with a list `faults`")
+    parser.add_argument("--faults", type=Path, metavar="FILE.yaml", help="YAML file with a list `faults`")
     parser.add_argument("--seed", type=_seed, default=1, metavar="NUMBER", help="whole number from 0 (1)")
     parser.add_argument("--out", type=Path, required=True, metavar="LOG.ulg")
 

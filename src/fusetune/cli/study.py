@@ -8,12 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fusetune.cli.command import DONE
+from fusetune.cli.output.json_document import add_json, print_document
+from fusetune.cli.output.tables import table_lines
 from fusetune.errors import UserError
 
 if TYPE_CHECKING:
     from fusetune.design.parameter_sets import ParameterSet
 
 HELP = "make the parameter sets of a study, or around what a log's vehicle flies, and print them"
+EXAMPLES = (
+    ("fusetune study config/studies/paper_table11.yaml --out sets", "its sets, as a table and as files"),
+    ("fusetune study --around log.ulg --out sets", "steps up and down from what this vehicle flies"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what this flight exercises, up and down from its values; with a study of that kind, what it names",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="takes SET.params and sets.parquet")
+    add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -53,6 +60,10 @@ def run(options: argparse.Namespace) -> int:
         found = study_around_log(options.around, study.around)
         study, left_out = replace(study, sets=found.sets), found.left_out
     write_study(study, options.out, options.out)
+    if options.json:
+        sets = {one.name: one.overrides for one in study.sets}
+        print_document({"sets": sets, "left_out": left_out, "folder": options.out})
+        return DONE
     print(*_table(study.sets), sep="\n")
     print(*(f"no {name}: {why}" for name, why in left_out.items()), sep="\n", end="\n" if left_out else "")
     return DONE
@@ -68,6 +79,4 @@ def _table(sets: Sequence[ParameterSet]) -> Iterator[str]:
         rows = [["set", *names]]
         for one in sets:
             rows.append([one.name, *(f"{one.overrides[name]:g}" if name in one.overrides else "–" for name in names)])
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+    yield from table_lines(rows)

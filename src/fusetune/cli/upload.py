@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from fusetune.apply.upload.uploading import Upload
 
 HELP = "write the decided parameters to the vehicle, verified, or take them back"
+EXAMPLES = (
+    ("fusetune upload --to udp:14550", "what results/apply/best_params.params changes, asked for first"),
+    ("fusetune upload --to /dev/ttyACM0 --rollback results/apply/rollback.params", "take it back"),
+)
 TAKEN_BACK = 3
 """Exit status where it did not work and what was written is taken back; `REFUSED` where nothing was written."""
 UNFINISHED = 4

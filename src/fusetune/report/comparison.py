@@ -1,11 +1,8 @@
 """Every set against the present one, as tables that figures and sections share."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy.special import bdtr
 
 from fusetune.apply.evidence import AIDED, AIMS, SMOOTHED, UNAIDED
 from fusetune.apply.statistics.rounding import without_rounding
@@ -113,12 +110,3 @@ def flight_changes(results: Results, column: str = "score") -> pd.DataFrame:
     names = [name for name in results.shown if name in scores.columns and name != results.present]
     differences = without_rounding(scores[names].to_numpy() - scores[[results.present]].to_numpy())
     return pd.DataFrame(percent_change(differences), index=scores.index, columns=names)
-
-
-def sign_counts(changes: Sequence[float]) -> tuple[int, int, int, float]:
-    """Flights on which a set is better, worse and equal, and the two-sided p-value of the sign test."""
-    values = np.asarray(changes, dtype=np.float64)
-    better, worse = int(np.count_nonzero(values < 0.0)), int(np.count_nonzero(values > 0.0))
-    # With equal chances both tails of the binomial distribution weigh the same.
-    p_value = min(2.0 * float(bdtr(min(better, worse), better + worse, 0.5)), 1.0) if better + worse else 1.0
-    return better, worse, int(np.count_nonzero(values == 0.0)), p_value

@@ -2,7 +2,8 @@
 
 import base64
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -10,6 +11,7 @@ from urllib.parse import quote
 
 from fusetune.storage.files import AnyPath
 
+_QUOTED = re.compile(r"`([^`]+)`")
 _MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 
 
@@ -22,6 +24,17 @@ class Cell:
     kind: str = ""
     link: str = ""
     hint: str = ""
+
+
+@dataclass(frozen=True)
+class Html:
+    """A table cell, or a part of one, that is HTML already: all text in it is escaped."""
+
+    html: str
+    kind: str = ""
+
+
+CellLike = Cell | Html | str
 
 
 def number(value: object, digits: int = 3, kind: str = "number") -> Cell:
@@ -43,38 +56,85 @@ def signed(value: object, digits: int = 1, kind: str = "number") -> Cell:
 
 def unit_cell(unit: str) -> Cell:
     """A unit beside a figure, powers of PX4's spelling raised."""
-    return Cell(unit.replace("^2", "²"), "quiet")
+    return Cell(raised(unit), "quiet")
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[Cell | str]], caption: str = "") -> str:
-    """A table that scrolls sideways on a small screen."""
-    parts = ['<div class="scroll"><table>']
-    if caption:
-        parts.append(f"<caption>{escape(caption)}</caption>")
-    kinds = [' class="number"' if _is_number(column) else "" for column in zip(*rows, strict=True)] or [""] * len(head)
-    titles = "".join(f"<th{kind}>{escape(text)}</th>" for text, kind in zip(head, kinds, strict=True))
-    parts.append(f"<thead><tr>{titles}</tr></thead><tbody>")
-    for row in rows:
-        parts.append("<tr>" + "".join(_cell(cell) for cell in row) + "</tr>")
-    parts.append("</tbody></table></div>")
-    return "".join(parts)
+def raised(unit: str) -> str:
+    """A unit whose powers are raised."""
+    return unit.replace("^2", "²").replace("^3", "³")
 
 
-def _is_number(column: Sequence[Cell | str]) -> bool:
-    return any(isinstance(cell, Cell) and "number" in cell.kind for cell in column)
+def table(
+    head: Sequence[str], rows: Sequence[Sequence[CellLike]], caption: str = "", kind: str = "", footer: str = ""
+) -> str:
+    """A table that scrolls sideways in its own box where it is too wide.
+
+    Parameters
+    ----------
+    kind : class of the style sheet; of a table that is `cards` each row is a card on a phone
+    footer : beneath, in a quiet voice
+    """
+    if not rows:
+        return ""
+    return grouped_table(head, {"": rows}, caption, kind, footer)
 
 
-def _cell(cell: Cell | str) -> str:
+def grouped_table(
+    head: Sequence[str],
+    groups: Mapping[str, Sequence[Sequence[CellLike]]],
+    caption: str = "",
+    kind: str = "",
+    footer: str = "",
+) -> str:
+    """A table whose rows stand in groups, each under its name."""
+    rows = [row for group in groups.values() for row in group]
+    numeric = [_is_number(column) for column in zip(*rows, strict=True)] if rows else [False] * len(head)
+    titles = "".join(
+        f'<th scope="col"{_class("number" if is_number else "")}>{escape(text)}</th>'
+        for text, is_number in zip(head, numeric, strict=True)
+    )
+    told = f"<caption>{_prose(caption)}</caption>" if caption else ""
+    bodies = []
+    for name, group in groups.items():
+        title = f'<tr class="group"><th scope="rowgroup" colspan="{len(head)}">{_prose(name)}</th></tr>' if name else ""
+        bodies.append(f"<tbody>{title}{''.join(_row(row, head) for row in group)}</tbody>")
+    below = f'<p class="note">{_prose(footer)}</p>' if footer else ""
+    inside = f"{told}<thead><tr>{titles}</tr></thead>{''.join(bodies)}"
+    return f'<div class="scroll"><table{_class(kind)}>{inside}</table></div>{below}'
+
+
+def _class(kind: str) -> str:
+    return f' class="{escape(kind)}"' if kind else ""
+
+
+def _row(row: Sequence[CellLike], head: Sequence[str]) -> str:
+    return "<tr>" + "".join(_cell(cell, title) for cell, title in zip(row, head, strict=True)) + "</tr>"
+
+
+def _is_number(column: Sequence[CellLike]) -> bool:
+    return any(not isinstance(cell, str) and "number" in cell.kind for cell in column)
+
+
+def _cell(cell: CellLike, title: str) -> str:
+    label = f' data-label="{escape(title)}"' if title else ""
     if isinstance(cell, str):
-        return f"<td>{_prose(cell)}</td>"
-    kind = f' class="{escape(cell.kind)}"' if cell.kind else ""
+        return f"<td{label}>{_prose(cell)}</td>"
+    if isinstance(cell, Html):
+        return f"<td{_class(cell.kind)}{label}>{cell.html}</td>"
     hint = f' title="{escape(cell.hint)}"' if cell.hint else ""
-    return f"<td{kind}{hint}>{link(cell.text, cell.link) if cell.link else escape(cell.text)}</td>"
+    inside = link(cell.text, cell.link) if cell.link else _prose(cell.text)
+    return f"<td{_class(cell.kind)}{label}{hint}>{inside}</td>"
 
 
-def link(text: str, page: AnyPath) -> str:
-    """Leads to another page, named relative to this one."""
-    return f'<a href="{quote(Path(page).as_posix())}">{escape(text)}</a>'
+def link(text: str, page: AnyPath, place: str = "") -> str:
+    """Leads to another page, named relative to this one, or to a place on it."""
+    target = quote(Path(page).as_posix()) + (f"#at={quote(place)}" if place else "")
+    return f'<a href="{target}">{escape(text)}</a>'
+
+
+def anchor(text: str, id: str) -> str:
+    """Leads to a place on this page, whichever tab it is in."""
+    return f'<a href="#{escape(id)}">{escape(text)}</a>'
 
 
 def figure(path: AnyPath, caption: str) -> str:
@@ -88,9 +148,20 @@ def figure(path: AnyPath, caption: str) -> str:
     )
 
 
-def section(title: str, *parts: str) -> str:
-    """A part of the page with its heading."""
-    return f"<section><h2>{escape(title)}</h2>{''.join(parts)}</section>"
+def section(title: str, *parts: str, id: str = "") -> str:
+    """A part of the page with its heading; empty where there is nothing in it."""
+    if not any(parts):
+        return ""
+    name = f' id="{escape(id)}"' if id else ""
+    return f"<section{name}><h2>{escape(title)}</h2>{''.join(parts)}</section>"
+
+
+def drawn(picture: str, caption: str = "") -> str:
+    """A picture that is HTML already (`fusetune.report.charts`), with words beneath; empty without a picture."""
+    if not picture:
+        return ""
+    words = f"<figcaption>{_prose(caption)}</figcaption>" if caption else ""
+    return f'<figure class="drawn">{picture}{words}</figure>'
 
 
 def paragraph(text: str, kind: str = "") -> str:
@@ -100,19 +171,29 @@ def paragraph(text: str, kind: str = "") -> str:
 
 
 def _prose(text: str) -> str:
-    """Escaped, no line break between a figure and its percent sign."""
-    return escape(text).replace(" %", "&nbsp;%")
+    """Escaped, names in back quotes as code, no line break between a figure and its percent sign."""
+    return _QUOTED.sub(r"<code>\1</code>", escape(text).replace(" %", "&nbsp;%"))
 
 
-def bullets(sentences: Sequence[str]) -> str:
+def prose(text: str) -> str:
+    """Escaped, for HTML that is put together elsewhere."""
+    return _prose(text)
+
+
+def bullets(sentences: Sequence[str], kind: str = "") -> str:
     """A list of plain sentences."""
-    return "<ul>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
+    return (
+        f"<ul{_class(kind)}>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
+    )
 
 
-def details(summary: str, *parts: str, kind: str = "") -> str:
-    """A part that opens on a click; printing opens all."""
-    mark = f' <span class="{escape(kind)}">●</span>' if kind else ""
-    return f"<details><summary>{escape(summary)}{mark}</summary>{''.join(parts)}</details>"
+def details(summary: str, *parts: str, kind: str = "", id: str = "") -> str:
+    """A part that opens on a click, and on paper; empty where there is nothing in it."""
+    if not any(parts):
+        return ""
+    mark = f' <span class="dot {escape(kind)}" aria-hidden="true"></span>' if kind else ""
+    name = f' id="{escape(id)}"' if id else ""
+    return f"<details{name}><summary>{escape(summary)}{mark}</summary>{''.join(parts)}</details>"
 
 
 def severity_mark(severity: str, words: str) -> str:

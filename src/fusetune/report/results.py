@@ -16,6 +16,7 @@ from fusetune.apply.ranking import NOT_ELIGIBLE, NOT_SCORED
 from fusetune.apply.sensitivity.files import NOTHING_TOLD, SENSITIVITY_FILE, ToldSensitivity, read_sensitivity
 from fusetune.px4.aid_sources import AID_SOURCES, AXES
 from fusetune.report.scored_samples import scored_samples
+from fusetune.report.set_styles import SetStyle, set_styles
 from fusetune.set_names import ONBOARD
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
@@ -55,12 +56,12 @@ class Results:
 
     @property
     def scored(self) -> tuple[str, ...]:
-        """Scored flights by name, those too that have no say in the decision."""
+        """Scored flights, those too that have no say in the decision."""
         return tuple(name for name, summary in self.scoring.items() if summary["status"] == "scored")
 
     @property
     def flights(self) -> tuple[str, ...]:
-        """Flights that decide, by name: what the figures and tables that compare the sets are made of."""
+        """Flights that decide: what the figures and tables that compare the sets are made of."""
         counted = _counted(self.decision)
         return tuple(name for name in self.scored if name in counted)
 
@@ -80,19 +81,37 @@ class Results:
         return self.status(name) in OUT
 
     @cached_property
+    def styles(self) -> dict[str, SetStyle]:
+        """The look of every set that was tried."""
+        return set_styles([*map(str, self.ranking["name"]), self.present], self.present, self.decision["chosen"])
+
+    @cached_property
+    def figure_rows(self) -> tuple[pd.DataFrame, dict[tuple[str, str, str], Any]]:
+        """Metrics of the shown sets, and where those of each source, axis and metric are: they are asked for hundreds
+        of times."""
+        shown = self.metrics[self.metrics["set"].isin(self.shown)]
+        places: Any = shown.groupby(["source", "axis", "metric"], observed=True).indices
+        return shown, places
+
+    @cached_property
     def _ranked(self) -> dict[str, dict[Hashable, Any]]:
         """Rows of the ranking by set: the figures ask for them hundreds of times."""
         return {row["name"]: row for row in self.ranking.to_dict("records")}
 
 
 def read_results(analyze_folders: Sequence[AnyPath], apply_folder: AnyPath) -> Results:
-    """Read the results of the rooms; nothing is searched for, only what is named is read."""
+    """Read the results of the rooms; nothing is searched for, only what is named is read.
+
+    Parameters
+    ----------
+    analyze_folders : in the order in which flights are shown
+    """
     apply_folder = Path(apply_folder)
     decision = read_document(apply_folder / "decision.json")
     ranking = read_table(apply_folder / "ranking.parquet").to_pandas()
     scoring, folders, metrics = {}, {}, []
     counted = _counted(decision)
-    for folder in sorted(map(Path, analyze_folders), key=lambda path: path.name):
+    for folder in map(Path, analyze_folders):
         summary = read_document(folder / "scoring.json")
         scoring[summary["flight"]] = summary
         folders[summary["flight"]] = folder
@@ -172,9 +191,8 @@ def pooled_samples(results: Results) -> list[PooledSamples]:
 
 def figure_values(results: Results, source: str, axis: str, metric: str) -> pd.DataFrame:
     """Rows of one figure for the shown sets: flight, set, value, lower, upper, n."""
-    metrics = results.metrics
-    rows = metrics[(metrics["source"] == source) & (metrics["axis"] == axis) & (metrics["metric"] == metric)]
-    return rows[rows["set"].isin(results.shown)]
+    metrics, rows = results.figure_rows
+    return metrics.take(rows.get((source, axis, metric), np.zeros(0, np.intp)))
 
 
 def as_flown(results: Results) -> pd.DataFrame:

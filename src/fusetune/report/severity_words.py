@@ -27,6 +27,9 @@ SEVERITY_COLOURS: Mapping[str, str] = {
 }
 """In pictures; page.css has the same for the text."""
 
+_MOMENT_S = 0.1
+"""What is shorter has no length to tell."""
+
 _EDGE_S = 2.0
 """A cause that begins or ends so near to take-off or landing holds from or to there."""
 
@@ -44,10 +47,16 @@ class FlightTimes:
         to_landing = until_s >= self.landing_s - _EDGE_S
         if from_take_off and to_landing:
             return "all of the flight"
-        start = "from take-off" if from_take_off else f"since {since_s:.1f} s"
-        if math.isfinite(self.take_off_s) and not from_take_off:
-            start += f" ({since_s - self.take_off_s:.0f} s after take-off)"
-        return f"{start} to landing" if to_landing else f"{start} until {until_s:.1f} s"
+        long = f"{until_s - since_s:.1f} s long"
+        if from_take_off:
+            return f"from take-off, {long}"
+        if math.isfinite(self.take_off_s):
+            start = f"{since_s - self.take_off_s:.1f} s after take-off"
+        else:
+            start = f"{since_s:.1f} s after the log began"
+        if until_s - since_s < _MOMENT_S:
+            return start
+        return f"{start}, {'to landing' if to_landing else long}"
 
 
 def rank(severity: str) -> int:

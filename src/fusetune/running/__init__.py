@@ -1,1 +1,1 @@
-"""Runs of the pipeline beside and after each other: locks, recovery, jobs of a cluster."""
+"""Runs of the pipeline: how one is started and followed, locks, recovery, jobs of a cluster."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +63,9 @@ def write_flight(
     write_document(target / METADATA_FILE, document, lines=True, allow_nan=False)
 
 
-def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None = None) -> Flight:
+def load_flight(
+    folder: str | os.PathLike[str], topics: Collection[str] | Mapping[str, Collection[str] | None] | None = None
+) -> Flight:
     """Read a flight from its folder.
 
     Parameters
@@ -71,7 +73,8 @@ def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None =
     folder
         As written by `write_flight`.
     topics
-        Names of the topics to read, all instances of each; `None` reads all. Names that the flight lacks are no error.
+        Names of the topics to read, all instances of each; `None` reads all. A mapping says of each, too, which columns
+        beside `timestamp` are read, `None` for all. Names that the flight lacks are no error.
 
     Raises
     ------
@@ -81,7 +84,11 @@ def load_flight(folder: str | os.PathLike[str], topics: Collection[str] | None =
     source = Path(folder)
     document = read_metadata(source)
     wanted = [entry for entry in document["topics"] if topics is None or entry["topic"] in topics]
-    tables = {(entry["topic"], entry["instance"]): _read_topic(source / entry["file"]) for entry in wanted}
+    columns = topics if isinstance(topics, Mapping) else {}
+    tables = {
+        (entry["topic"], entry["instance"]): _read_topic(source / entry["file"], columns.get(entry["topic"]))
+        for entry in wanted
+    }
     parameters = document["parameters"]
     return Flight(
         name=document["name"],
@@ -148,8 +155,9 @@ def _write_topic(file: Path, table: TopicTable) -> None:
     write_table(rows, file, compression="lz4", use_dictionary=False, write_statistics=False, store_schema=False)
 
 
-def _read_topic(file: Path) -> TopicTable:
-    table = read_table(file, remedy=_remedy(file))
+def _read_topic(file: Path, columns: Collection[str] | None = None) -> TopicTable:
+    chosen = None if columns is None else ["timestamp", *columns]
+    table = read_table(file, chosen, remedy=_remedy(file))
     return {
         name: np.ascontiguousarray(column.to_numpy())
         for name, column in zip(table.column_names, table.columns, strict=True)

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from fusetune.analyze.flight.reference_truth import odometry_reference, read_references, read_truth, rtk_reference
 from fusetune.analyze.metrics.attitude import interpolate_quaternion
-from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures
+from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures, true_attitude
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
-from fusetune.analyze.scoring.true_errors import true_errors
+from fusetune.analyze.scoring.true_errors import Reference, true_errors
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.px4.layouts.release_layouts import canonical
@@ -68,7 +68,7 @@ def test_motion_capture_with_a_north_and_an_origin_of_its_own(has_attitude: bool
         attitude = np.full_like(attitude, np.nan)
     truth = odometry_reference(odometry(own, turn.apply(velocity), attitude, 2), "mocap")
     assert truth is not None
-    found = figures(true_errors(record, states, truth, WINDOW, 0.95))
+    found = figures(true_errors(record, states, Reference(truth), WINDOW, 0.95))
     assert found["position_mean_removed", "all", "rmse"] == pytest.approx(0.0, abs=2e-3)
     assert found["velocity", "all", "rmse"] == pytest.approx(0.0, abs=2e-3)
     assert ("position", "all", "rmse") not in found
@@ -116,7 +116,7 @@ def test_an_rtk_receiver_beside_the_one_that_is_fused_is_the_truth() -> None:
     assert truth is not None
     assert truth.kind == "rtk"
     record, states = estimate(position, velocity, quaternions(heading))
-    found = figures(true_errors(record, states, truth, WINDOW, 0.95))
+    found = figures(true_errors(record, states, Reference(truth), WINDOW, 0.95))
     # Delay and lever arm are accounted for: 0.3 m at 0.63 rad/s would be 0.19 m/s.
     assert found["velocity", "all", "rmse"] == pytest.approx(0.0, abs=2e-3)
     assert found["position_mean_removed", "all", "rmse"] == pytest.approx(0.0, abs=2e-3)
@@ -161,7 +161,8 @@ def test_gazebo_attitude_differs_in_heading_alone_as_its_magnetic_field_does(nam
     time = own["timestamp_sample"].astype(np.int64)
     rest = (time > truth.time[0] + 1_600_000) & (time < truth.time[0] + 2_600_000)
     attitude = interpolate_quaternion(truth.attitude_time, truth.quaternion, time[rest])
-    found = {(one.axis, one.metric): one.value for one in attitude_figures(stacked(own, "q")[rest], attitude)}
+    told = attitude_figures(stacked(own, "q")[rest], true_attitude(attitude))
+    found = {(one.axis, one.metric): one.value for one in told}
     assert found["tilt", "rmse"] < 0.3
     # The field in the true frame against the declination of the estimator's model explains the heading.
     sampled = mag["timestamp_sample"].astype(np.int64)

@@ -5,7 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fusetune.analyze.metrics.attitude import error_in_ned
-from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures, nees_figures, vector_figures
+from fusetune.analyze.metrics.error_figures import (
+    ErrorFigure,
+    attitude_figures,
+    nees_figures,
+    track_of,
+    true_attitude,
+    vector_figures,
+)
 
 
 def by_name(figures: list[ErrorFigure]) -> dict[tuple[str, str], float]:
@@ -17,7 +24,8 @@ def quaternions(rotation: Rotation) -> np.ndarray:
 
 
 def test_components_have_mean_and_maximum_too() -> None:
-    figures = by_name(vector_figures("velocity", np.array([[1.0, 0.0, -3.0], [3.0, 0.0, 1.0]]), np.zeros((2, 3))))
+    error = np.array([[1.0, 0.0, -3.0], [3.0, 0.0, 1.0]])
+    figures = by_name(vector_figures("velocity", error, track_of(np.zeros((2, 3)))))
     assert figures["x", "mean_error"] == 2.0
     assert figures["z", "maximum_error"] == 3.0
     assert figures["z", "rmse"] == pytest.approx(np.sqrt(5.0))
@@ -28,7 +36,7 @@ def test_components_have_mean_and_maximum_too() -> None:
 def test_a_heading_offset_shows_as_its_mean() -> None:
     truth = Rotation.from_euler("ZYX", [[10.0, 5.0, 2.0], [170.0, -5.0, 1.0]], degrees=True)
     turned = Rotation.from_euler("Z", -6.0, degrees=True) * truth
-    figures = by_name(attitude_figures(quaternions(turned), quaternions(truth)))
+    figures = by_name(attitude_figures(quaternions(turned), true_attitude(quaternions(truth))))
     assert figures["heading", "mean_error"] == pytest.approx(-6.0)
     assert figures["all", "average_euclidean_error"] == pytest.approx(6.0)
     assert figures["all", "harmonic_error"] == pytest.approx(6.0)

@@ -7,7 +7,7 @@ import pyarrow as pa
 from tests.analyze.made_flight import MadeSet, at, make_flight
 
 from fusetune.analyze.replaying.store.reader import read_set
-from fusetune.analyze.scoring.block_scores import block_rows
+from fusetune.analyze.scoring.block_scores import block_rows, block_sums
 from fusetune.analyze.scoring.measurement_alignment import axes_together, sample_masks
 from fusetune.analyze.scoring.sample_scores import counted
 from fusetune.analyze.scoring.window import ScoringWindow
@@ -24,7 +24,7 @@ def test_blocks_add_up_and_are_paired(tmp_path: Path) -> None:
         sources = counted(read_set(folder, name), masks, window, 20.0)
         found = next(one for one in sources if ("gnss_vel", 0) in one)
         (velocity,) = axes_together(found.values())
-        tables.append(block_rows("flight", name, velocity, edges))
+        tables += block_rows("flight", {name: block_sums(velocity, edges)})
         samples[name] = velocity.samples[2]
     frame = pa.concat_tables(tables).to_pandas()
     frame = frame[frame["axis"] == 2]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,27 @@ def test_what_is_better_is_what_a_wrong_filter_does_worse(metric: InnovationMetr
     else:
         aim = {"nearer to 0": 0.0, "nearer to the number of axes": 1.0}[metric.better]
         assert abs(good - aim) < abs(bad - aim)
+
+
+def test_what_groups_share_of_an_axis_is_what_they_make_of_it_alone() -> None:
+    """To the bit: two axes of three, the middle one left out as well, of two sets."""
+    made = innovations(3, sets=2, seed=7)
+    arrays = (made.innovation, made.innovation_variance, made.test_ratio, made.rejected)
+    # of one set after the other
+    each = [np.ascontiguousarray(values.swapaxes(0, 1)).reshape(1, 6, -1) for values in arrays]
+    whole = Innovations(*each, lambda: [np.full((6, 1), 1.5)])
+    for places in ([0, 1], [0, 2], [0, 1, 2], [2]):
+        limits = [1.5] * len(places)
+        shared = Innovations.of_places(whole, 2, places, limits)
+        innovation, variance, ratio, rejected = (np.ascontiguousarray(values[places]) for values in arrays)
+        own = Innovations(innovation, variance, ratio, rejected, partial(list, limits), of_group=True)
+        for metric in INNOVATION_METRICS:
+            if metric.of_groups:
+                found, expected = metric.function(shared), metric.function(own)
+                parts = ("value", "lower", "upper") if isinstance(expected, Bounds) else ()
+                pairs = [(getattr(found, part), getattr(expected, part)) for part in parts] or [(found, expected)]
+                for one, other in pairs:
+                    np.testing.assert_array_equal(one, other, err_msg=metric.name)
 
 
 def innovations(axes: int, sets: int, seed: int) -> Innovations:

@@ -186,8 +186,8 @@ def test_a_source_that_only_another_set_fuses_has_figures_but_no_say(tmp_path: P
     table = MetricsTable("flight")
     masks = sample_masks(now, WINDOW)
     found = counted_at(other, masks, WINDOW, 20.0)
-    scores = score_samples(table, "other", found, masks, WINDOW, ScoringSettings())
-    assert set(scores.blocks["source"].to_pylist()) == {"gnss_vel", "gnss_pos"}
+    (scores,) = score_samples({"other": table}, [found], masks, WINDOW, ScoringSettings())
+    assert {one.source for one in scores.blocks} == {"gnss_vel", "gnss_pos"}
     figures = table.finished().to_pylist()
     assert {row["set"] for row in figures if row["source"] == "baro_hgt"} == {"other"}
     assert ("baro_hgt", 0) not in scores.costs

@@ -23,7 +23,7 @@ def states(time: np.ndarray, velocity: np.ndarray) -> FilterStates:
 
 def rows_of(mask: SmoothedMask, name: str, other: FilterStates, edges: list[int]) -> dict[tuple[int, int], dict]:
     differences = velocity_differences(mask.reference, other)
-    table = smoothed_rows("f", name, mask, differences, np.array(edges))
+    (table,) = smoothed_rows("f", {name: differences}, mask, np.array(edges))
     assert table.schema == SMOOTHED_SCHEMA
     found = {(row["axis"], row["block"]): row for row in table.to_pylist()}
     assert len(found) == table.num_rows

@@ -69,7 +69,7 @@ def test_the_worst_window_is_no_nearly_empty_one() -> None:
     given = samples([1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 100.0])
     edges = np.array([0, 4, 8, 12]) * SECOND
     table = MetricsTable("f")
-    add_worst_windows(table, "a", next(window_figures(given, edges)))
+    add_worst_windows({"a": table}, next(window_figures(given, edges)))
     rows = {row["metric"]: row["value"] for row in table.finished().to_pylist()}
     assert rows["worst_window_rms"] == 2.0
     assert rows["worst_window_nis"] == 4.0
@@ -79,7 +79,7 @@ def test_the_worst_window_is_no_nearly_empty_one() -> None:
 def test_rows_name_window_edges_and_samples() -> None:
     edges = np.array([0, 2, 4]) * SECOND
     figures = list(window_figures(samples([1.0, -1.0, 3.0, 4.0], [0.0, 0.0, 6.0, 0.0]), edges))
-    table = window_rows("f", "b", figures, edges).to_pylist()
+    (table,) = (rows.to_pylist() for rows in window_rows("f", {"b": figures}, edges))
     # two axes, and the group of both
     assert len(table) == 3 * 2 * 6
     row = next(one for one in table if (one["axis"], one["window"], one["metric"]) == ("y", 1, "rms_innovation"))

@@ -147,13 +147,14 @@ def test_outliers_are_winsorised_at_the_present_sets_limit() -> None:
     now = record("present", predicted(list(range(0, 80, 5)), [1.0] * 15 + [100.0]))
     other = record("other", predicted(list(range(0, 80, 5)), [2.0] * 15 + [50.0]))
     edges = np.array([0, 40, 80]) * SECOND
-    rows = withheld_rows("made", "present", own_gaps(gap_masks(now, WINDOW)), edges).to_pandas()
+    sets = {"present": own_gaps(gap_masks(now, WINDOW)), "other": counted(now, other)}
+    rows, beside = (table.to_pandas() for table in withheld_rows("made", sets, edges))
     # 5 robust standard deviations: 5 · 1.4826 · the median 1.0
     assert rows["error_winsorised"].max() == pytest.approx(5 * 1.4826)
     assert rows["error"].max() == 100.0
     assert rows.groupby("block")["start_us"].nunique().tolist() == [8, 8]
-    rows = withheld_rows("made", "other", counted(now, other), edges).to_pandas()
-    assert rows["error_winsorised"].max() == pytest.approx(5 * 1.4826)
+    assert (set(rows["set"]), set(beside["set"])) == ({"present"}, {"other"})
+    assert beside["error_winsorised"].max() == pytest.approx(5 * 1.4826)
 
 
 def test_growth_of_the_true_error_over_a_gap() -> None:

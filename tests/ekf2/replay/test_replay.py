@@ -12,7 +12,7 @@ from tests.ekf2.replay.px4_agreement import Limits, assert_replay_agrees
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.course import RUNS_PER_STRETCH
-from fusetune.ekf2.replay.recording import SCORING, joined, with_fields
+from fusetune.ekf2.replay.recording import SCORING, TRACED, joined, with_fields
 from fusetune.ekf2.replay.replay import replay, replay_into
 from fusetune.ekf2.replay.results import ReplaySummary
 from fusetune.px4.flight import Flight
@@ -243,5 +243,9 @@ def test_a_scoring_recording_has_the_figures_of_a_full_one(flight, result):
     assert len(steps) > 2
     kept = sorted({0, len(rows) - 1} | {row for step in steps for row in range(max(step - 2, 0), step + 1)})
     assert_equal_rows(scored.local_position, rows[kept])
+    traced = replay(build_inputs(flight), complete(flight.parameters.initial, {}, flight.release), recording=TRACED)
+    assert_equal_rows(traced.local_position, rows)
+    for name in ("innovations", "flags", "states"):
+        assert_equal_rows(getattr(traced, name), getattr(scored, name))
     for field in dataclasses.fields(ReplaySummary):
         assert getattr(scored, field.name) == getattr(result, field.name)

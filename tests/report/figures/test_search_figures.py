@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,7 +9,6 @@ from tests.report.made_search import made_search, part
 
 from fusetune.report.figures.found_figure import found_figure
 from fusetune.report.figures.gain_figures import kept_aside_figure, shrinkage_figure
-from fusetune.report.figures.search_figures import SEARCH_FIGURES, plot_search
 
 
 def places(axes: Axes, label: str) -> list[float]:
@@ -88,12 +85,3 @@ def test_parameters_on_a_ratio_axis_delays_on_their_own_with_what_each_part_foun
     dots = [line.get_xdata()[0] for line in ratios.lines if str(line.get_label()).startswith("with a part")]
     assert sorted(dots)[:2] == pytest.approx([-1.3219, -1.0], abs=1e-4)  # log2(0.12 / 0.3), log2(0.15 / 0.3)
     assert title(figure) == "1 of 3 parameters would change"
-
-
-def test_the_same_files_give_the_same_pictures(tmp_path: Path) -> None:
-    for folder in ("one", "two"):
-        (tmp_path / folder).mkdir()
-        plot_search(made_search(), tmp_path / folder)
-    assert sorted(one.name for one in (tmp_path / "one").iterdir()) == sorted(SEARCH_FIGURES)
-    for name in SEARCH_FIGURES:
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tests.report.made_health import END_S, LANDING_S, TAKE_OFF_S, logged_flight
 
-from fusetune.report.figures.timeline_figure import Bar, draw_timeline
+from fusetune.report.figures.timeline_figure import draw_timeline
+from fusetune.report.finding_bars import Bar
 
 BARS = (Bar("vibration", "fail", 20.0, 32.5), Bar("GNSS velocity: rejected", "warning", 29.0, 31.0, is_cause=False))
 

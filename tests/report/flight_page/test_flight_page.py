@@ -2,49 +2,44 @@
 
 from __future__ import annotations
 
-import re
+import base64
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PIL import Image
 from tests.report.made_health import LATE, SHAKEN, SILENT, health_rows, rejected, write_documents, write_log
+from tests.report.read_page import check_page, told
 
 from fusetune.analyze.diagnosis.diagnosis import Sign
 from fusetune.errors import UserError
-from fusetune.report.flight_page.page import TIMELINE_FILE, build_flight_page, plot_flight_timeline
+from fusetune.report.flight_data.blob import unpack
+from fusetune.report.flight_data.write_blob import pack_flight
+from fusetune.report.flight_page.page import build_flight_page
 from fusetune.storage.documents import write_document
 
 
-def page_of(folder: Path, figures: Path | None = None) -> str:
+def page_of(folder: Path, blob: bytes | None = None) -> str:
     output = folder.parent.parent / "report" / "flights" / f"{folder.name}.html"
-    build_flight_page(
-        folder, figures or folder / "no_figures", output, {"All flights": folder.parent.parent / "fleet.html"}
-    )
-    return output.read_text(encoding="utf-8")
-
-
-def told(page: str) -> str:
-    """What a reader sees, without pictures and style."""
-    body = re.sub(r'src="data:[^"]*"', "", page[page.index("<body>") :])
-    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", body).replace("&nbsp;", " "))
+    build_flight_page(folder, output, {"The decision": folder.parent.parent / "report.html"}, blob)
+    return check_page(output.read_text(encoding="utf-8")).source
 
 
 @pytest.fixture(scope="module")
 def shaken(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A flight with two causes and two figures beyond their limits, with its timeline."""
+    """A flight with two causes and two figures beyond their limits, shown over time."""
     root = tmp_path_factory.mktemp("results")
     problems = (rejected("gnss_vel_vertical", 0.2, 22.0, 30.0), rejected("baro_hgt", 0.02, 24.0, 25.0, "warning"))
     folder = write_documents(root / "analyze" / "shaken", (SHAKEN, LATE), health_rows(*problems))
-    plot_flight_timeline(write_log(root / "save" / "shaken"), folder, root / "figures" / TIMELINE_FILE)
-    return page_of(folder, root / "figures")
+    blob = pack_flight(write_log(root / "save" / "shaken"), folder)
+    assert blob
+    return page_of(folder, blob)
 
 
 def test_the_answer_stands_first(shaken: str) -> None:
     words = told(shaken)
     order = [
         "The &lt;frame&gt; shakes the IMU do not fly like this",
-        "since 20.0 s (10 s after take-off) until 32.5 s",
+        "10.0 s after take-off, 12.5 s long",
         "sure (97 %)",
         "Isolate the autopilot.",
         "Also: GNSS is later than PX4 is told worth knowing",
@@ -70,7 +65,9 @@ def test_an_experiment_is_no_evidence_and_told_apart(shaken: str) -> None:
     words = told(shaken)
     showed, tried = words.index("What the replay shows"), words.index("What was tried")
     assert "ACC_NOISE" not in words[showed:tried]
-    assert words[tried:].startswith("What was tried The replay with EKF2_ACC_NOISE 0.8 is no better")
+    assert words[tried:].startswith(
+        "What was tried and measured What was tried The replay with EKF2_ACC_NOISE 0.8 is no better"
+    )
 
 
 def test_a_cause_of_the_whole_flight_says_so(shaken: str) -> None:
@@ -79,18 +76,28 @@ def test_a_cause_of_the_whole_flight_says_so(shaken: str) -> None:
 
 
 def test_the_page_needs_no_network(shaken: str) -> None:
-    assert re.findall(r'href="([^"]*)"', shaken) == ["../../fleet.html"]
-    sources = re.findall(r'src="([^"]{0,22})', shaken)
-    assert sources == ["data:image/png;base64,"]
-    assert "http" not in re.sub(r'src="data:[^"]*"', "", shaken)
+    page = check_page(shaken)
+    assert {link for link in page.links if not link.startswith("#")} == {"../../report.html"}
     assert "<frame>" not in shaken
+
+
+def test_the_flight_is_shown_over_time_and_causes_lead_there(shaken: str, tmp_path: Path) -> None:
+    page = check_page(shaken)
+    (viewer,), (data,) = page.all("div", "flight-viewer"), page.all("script", "flight-data")
+    assert viewer.attributes["data-flight"] == data.attributes["data-flight"] == "shaken"
+    assert unpack(base64.b64decode(data.text)).header["flight"] == "shaken"
+    leads = [one for one in page.all("a") if one.attributes["href"] == "#viewer"]
+    assert [one.attributes["data-state"] for one in leads] == ["t=20.0,32.5", "t=10.0,50.0"]
+    without = page_of(write_documents(tmp_path / "analyze" / "flight", (SHAKEN,)))
+    assert "flight-viewer" not in without.partition("<body")[2]
+    assert "#viewer" not in without
 
 
 def test_problems_stand_before_passes_and_these_behind_a_click(shaken: str) -> None:
     health = shaken[shaken.index("Health of sensors and filter") :].replace("&nbsp;", " ")
     assert health.index("gnss_vel_vertical: samples rejected: 20 %") < health.index("baro_hgt: samples rejected: 2 %")
     assert health.index("baro_hgt: samples rejected") < health.index("<details>")
-    assert "22.0 to 30.0 s" in health
+    assert "12.0 s after take-off, 8.0 s long" in health
     assert health.index("<details>") < health.index("horizontal accuracy")
     assert "range finder: not in the log" in health[health.index("1 figure that this log does not tell") :]
 
@@ -189,16 +196,9 @@ def test_the_same_figure_of_several_instances_is_one_line(tmp_path: Path) -> Non
     assert "beyond it on instance 1, too" in table
 
 
-def test_pages_and_pictures_are_the_same_bytes_twice(tmp_path: Path) -> None:
+def test_the_page_is_of_the_same_bytes_twice(tmp_path: Path) -> None:
     folder = write_documents(tmp_path / "analyze" / "flight", (SHAKEN,))
-    log = write_log(tmp_path / "save" / "flight")
-    pictures = [tmp_path / name / TIMELINE_FILE for name in ("one", "two")]
-    for picture in pictures:
-        plot_flight_timeline(log, folder, picture)
-    assert pictures[0].read_bytes() == pictures[1].read_bytes()
-    with Image.open(pictures[0]) as image:
-        assert image.width == 1000
-    assert page_of(folder, pictures[0].parent) == page_of(folder, pictures[1].parent)
+    assert page_of(folder, b"blob") == page_of(folder, b"blob")
 
 
 def test_a_document_that_is_lost_or_of_something_else_is_named(tmp_path: Path) -> None:

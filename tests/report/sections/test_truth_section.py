@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from fusetune.report.results import Results, read_results
-from fusetune.report.sections.decision_sections import decision_section
-from fusetune.report.sections.truth_section import truth_sentence
+from fusetune.report.sections.first_screen import first_screen
+from fusetune.report.sections.truth_section import truth_section, truth_sentence
 
 
 @pytest.fixture
@@ -37,7 +37,8 @@ def test_a_truth_that_confirms_says_by_how_much(results: Results) -> None:
         "The truth of these flights is known; the decision never looks at it. It confirms the change: true error of "
         "velocity −25 % (0.2 to 0.15 m/s), attitude −10 % (1 to 0.9°)."
     )
-    assert sentence in decision_section(known).replace("&nbsp;", " ")
+    assert sentence in truth_section(known).replace("&nbsp;", " ")
+    assert "The known truth confirms the change." in first_screen(known)
 
 
 def test_a_truth_that_confirms_in_part_or_not_at_all_is_said_as_plainly(results: Results) -> None:
@@ -54,7 +55,7 @@ def test_without_a_change_or_a_truth_nothing_is_said(results: Results) -> None:
     kept = dataclasses.replace(known, decision=known.decision | {"status": "keep", "chosen": "present"})
     assert truth_sentence(kept) == ""
     assert truth_sentence(dataclasses.replace(known, metrics=known.metrics.iloc[:0])) == ""
-    assert "truth" not in decision_section(kept)
+    assert "truth" not in first_screen(kept)
 
 
 def test_errors_that_are_equal_confirm_nothing(results: Results) -> None:

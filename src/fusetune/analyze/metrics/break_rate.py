@@ -45,18 +45,29 @@ def break_rate(broken: npt.NDArray[np.bool_], confidence: float) -> Bounds:
     return clopper_pearson(np.count_nonzero(broken, axis=-1), broken.shape[-1], confidence)
 
 
-def _any_beyond(given: Innovations, limit: float) -> npt.NDArray[np.bool_]:
-    beyond = beyond_standard_deviations(given.innovation, given.innovation_variance, limit)
-    return np.logical_or.reduce(beyond, axis=0)
+def _beyond_3(given: Innovations) -> npt.NDArray[np.bool_]:
+    return beyond_standard_deviations(given.innovation, given.innovation_variance, 3)
 
 
-def _any_beyond_gate(given: Innovations) -> npt.NDArray[np.bool_]:
-    return np.logical_or.reduce(beyond_gate(given.test_ratio, given.rejected), axis=0)
+def _beyond_5(given: Innovations) -> npt.NDArray[np.bool_]:
+    return beyond_standard_deviations(given.innovation, given.innovation_variance, 5)
+
+
+def _beyond_gate(given: Innovations) -> npt.NDArray[np.bool_]:
+    return beyond_gate(given.test_ratio, given.rejected)
 
 
 def _metric(
-    limit: str, label: str, words: str, broken: Callable[[Innovations], npt.NDArray[np.bool_]], used: tuple[str, ...]
+    limit: str, label: str, words: str, beyond: Callable[[Innovations], npt.NDArray[np.bool_]], used: tuple[str, ...]
 ) -> InnovationMetric:
+    """`beyond` tells of each axis and sample, (D, S, N), whether it is beyond the limit."""
+
+    def any_beyond(given: Innovations) -> npt.NDArray[np.bool_]:
+        return np.logical_or.reduce(given.by_axis(beyond), axis=0)
+
+    def broken(given: Innovations) -> npt.NDArray[np.bool_]:
+        return given.once_if_few(any_beyond)
+
     return InnovationMetric(
         f"break_rate_{limit}",
         "1",
@@ -71,7 +82,7 @@ def _metric(
 
 
 METRICS = (
-    _metric("3sd", "3 σ", "3 σ", lambda given: _any_beyond(given, 3), ("report",)),
-    _metric("5sd", "5 σ", "5 σ", lambda given: _any_beyond(given, 5), ("report",)),
-    _metric("gate", "gate", "its gate", _any_beyond_gate, ("apply", "report")),
+    _metric("3sd", "3 σ", "3 σ", _beyond_3, ("report",)),
+    _metric("5sd", "5 σ", "5 σ", _beyond_5, ("report",)),
+    _metric("gate", "gate", "its gate", _beyond_gate, ("apply", "report")),
 )

@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtri
 
+from fusetune.analyze.metrics.innovation_metrics import squares
 from fusetune.analyze.metrics.metric import Bounds, InnovationMetric, Innovations, InWindow, mean_of_samples
 from fusetune.analyze.metrics.whiteness import independent_samples
 
@@ -66,19 +67,30 @@ def c_nis(innovation: Array, innovation_variance: Array) -> Array:
     ----------
     innovation, innovation_variance : (D, ..., N) arrays, components first, N ≥ 2
     """
-    dimension = innovation.shape[0]
-    nis = np.sum(np.square(innovation) / innovation_variance, axis=0)
+    return _c_nis(np.sum(np.square(innovation) / innovation_variance, axis=0), innovation.shape[0])
+
+
+def _c_nis(nis: Array, dimension: int) -> Array:
     with np.errstate(divide="ignore"):
         spread = np.abs(np.log(np.var(nis, axis=-1, ddof=1) / (2.0 * dimension)))
     return j_nis(mean_of_samples(nis), dimension) + spread
 
 
-def _nis_of_samples(given: Innovations) -> Array:
-    return np.asarray(np.sum(np.square(given.innovation) / given.innovation_variance, axis=0))
+def nis_of_axes(given: Innovations) -> Array:
+    """ν²/S of each axis and sample, (D, S, N)."""
+    return given.by_axis(squares) / given.innovation_variance
+
+
+def _summed_nis(given: Innovations) -> Array:
+    return np.asarray(np.sum(given.by_axis(nis_of_axes), axis=0))
+
+
+def _nis(given: Innovations) -> Array:
+    return given.once_if_few(_summed_nis)
 
 
 def _mean_nis(given: Innovations) -> Array:
-    return mean_nis(given.innovation, given.innovation_variance)
+    return mean_of_samples(_nis(given))
 
 
 def _paper_bounds(given: Innovations) -> Bounds:
@@ -93,7 +105,7 @@ METRICS = (
     InnovationMetric(
         "mean_nis", "1", "mean of ν²/S, summed over the axes, with χ² bounds for N samples (the paper's)",
         _paper_bounds, "nearer to the number of axes", ("apply", "report"),
-        window=InWindow("worst_window_nis", _nis_of_samples), on_ground=True,
+        window=InWindow("worst_window_nis", _nis), on_ground=True,
     ),
     InnovationMetric(
         "mean_nis_effective", "1", "the same with bounds for N_eff = N / (1 + 2 Σ ρ²) samples",
@@ -106,6 +118,6 @@ METRICS = (
     ),
     InnovationMetric(
         "c_nis", "1", "that plus \\|ln(var NIS / 2n)\\|",
-        lambda given: c_nis(given.innovation, given.innovation_variance), "lower", ("apply",),
+        lambda given: _c_nis(_nis(given), given.dimension), "lower", ("apply",),
     ),
 )  # fmt: skip

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.metrics.attitude import down_in_body, heading, wrap
 from fusetune.analyze.metrics.consistency import effective_bounds, paper_bounds
-from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
+from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric, mean_of_samples
 from fusetune.analyze.metrics.whiteness import autocorrelation, effective_samples, lag_limit
 
 Array = npt.NDArray[np.float64]
@@ -34,25 +35,26 @@ class ErrorFigure:
 
 
 def _harmonic(error: Array) -> float:
-    return float(1.0 / np.mean(1.0 / np.maximum(np.abs(error), 1e-12)))
+    return float(1.0 / mean_of_samples(1.0 / np.maximum(np.abs(error), 1e-12)))
 
 
 def _geometric(error: Array) -> float:
-    return float(np.exp(np.mean(np.log(np.maximum(np.abs(error), 1e-12)))))
+    return float(np.exp(mean_of_samples(np.log(np.maximum(np.abs(error), 1e-12)))))
 
 
 _RMSE: Metric[Array] = Metric(
-    "rmse", SOURCE_UNIT, "root mean square error", lambda error: np.sqrt(np.mean(np.square(error))), "lower",
+    "rmse", SOURCE_UNIT, "root mean square error", lambda error: np.sqrt(mean_of_samples(np.square(error))),
+    "lower",
     ("apply", "report"),
 )  # fmt: skip
-_MEAN: Metric[Array] = Metric("mean_error", SOURCE_UNIT, "mean error of an axis", np.mean, "nearer to 0")
+_MEAN: Metric[Array] = Metric("mean_error", SOURCE_UNIT, "mean error of an axis", mean_of_samples, "nearer to 0")
 _MAXIMUM: Metric[Array] = Metric(
     "maximum_error", SOURCE_UNIT, "largest error", lambda error: np.max(np.abs(error)), "lower"
 )
 
 NORM_METRICS: tuple[Metric[Array], ...] = (
     _RMSE,
-    Metric("average_euclidean_error", SOURCE_UNIT, "mean of the norm", np.mean, "lower"),
+    Metric("average_euclidean_error", SOURCE_UNIT, "mean of the norm", mean_of_samples, "lower"),
     Metric("harmonic_error", SOURCE_UNIT, "harmonic mean of the norm", _harmonic, "lower"),
     Metric("geometric_error", SOURCE_UNIT, "geometric mean of the norm", _geometric, "lower"),
     _MAXIMUM,
@@ -77,18 +79,31 @@ def norm_figures(quantity: str, axis: str, norm: Array) -> list[ErrorFigure]:
     return _figures(NORM_METRICS, quantity, axis, norm)
 
 
-def vector_figures(quantity: str, error: Array, true_velocity: Array) -> list[ErrorFigure]:
+@dataclass(frozen=True)
+class Track:
+    """Where a vehicle truly goes: at which of N times it moves, and M of these directions, north and east."""
+
+    moving: npt.NDArray[np.bool_]
+    direction: Array
+
+
+def track_of(true_velocity: Array) -> Track:
+    """The track of a NED velocity (N, 3), m/s."""
+    speed = np.hypot(true_velocity[:, 0], true_velocity[:, 1])
+    moving = speed > _SLOWEST_TRACK_M_S
+    return Track(moving, true_velocity[moving, :2] / speed[moving, None])
+
+
+def vector_figures(quantity: str, error: Array, track: Track) -> list[ErrorFigure]:
     """Figures of a NED error (N, 3): per axis, horizontal, 3-D, along and across the true track.
 
     Each axis has its RMSE, mean and maximum; horizontal and 3-D norms have those of `norm_figures`.
     """
     components = {"x": error[:, 0], "y": error[:, 1], "z": error[:, 2]}
-    speed = np.hypot(true_velocity[:, 0], true_velocity[:, 1])
-    moving = speed > _SLOWEST_TRACK_M_S
-    if moving.any():
-        direction = true_velocity[moving, :2] / speed[moving, None]
-        components["along_track"] = np.sum(error[moving, :2] * direction, axis=1)
-        components["cross_track"] = error[moving, 1] * direction[:, 0] - error[moving, 0] * direction[:, 1]
+    if track.direction.size:
+        moving, direction = error[track.moving], track.direction
+        components["along_track"] = moving[:, 0] * direction[:, 0] + moving[:, 1] * direction[:, 1]
+        components["cross_track"] = moving[:, 1] * direction[:, 0] - moving[:, 0] * direction[:, 1]
     figures = []
     for axis, values in components.items():
         figures += component_figures(quantity, axis, values)
@@ -101,11 +116,24 @@ def component_figures(quantity: str, axis: str, error: Array) -> list[ErrorFigur
     return _figures(COMPONENT_METRICS, quantity, axis, error)
 
 
-def attitude_figures(quaternion: Array, true_quaternion: Array) -> list[ErrorFigure]:
+class TrueAttitude(NamedTuple):
+    """Unit quaternions (N, 4), (w, x, y, z) body → NED; their headings (N,), and the down axis in the body (N, 3)."""
+
+    quaternion: Array
+    heading: Array
+    down: Array
+
+
+def true_attitude(quaternion: Array) -> TrueAttitude:
+    """What attitudes are compared with."""
+    return TrueAttitude(quaternion, heading(quaternion), down_in_body(quaternion))
+
+
+def attitude_figures(quaternion: Array, true: TrueAttitude) -> list[ErrorFigure]:
     """Figures of heading, tilt and total rotation, deg, of unit quaternions (N, 4), (w, x, y, z) body → NED."""
-    off = np.degrees(wrap(heading(quaternion) - heading(true_quaternion)))
-    dot = np.clip(np.abs(np.sum(quaternion * true_quaternion, axis=1)), 0.0, 1.0)
-    down = np.sum(down_in_body(quaternion) * down_in_body(true_quaternion), axis=1)
+    off = np.degrees(wrap(heading(quaternion) - true.heading))
+    dot = np.clip(np.abs(np.sum(quaternion * true.quaternion, axis=1)), 0.0, 1.0)
+    down = np.sum(down_in_body(quaternion) * true.down, axis=1)
     tilt = np.degrees(np.arccos(np.clip(down, -1.0, 1.0)))
     figures = component_figures("attitude_deg", "heading", off) + component_figures("attitude_deg", "tilt", tilt)
     return figures + norm_figures("attitude_deg", "all", np.degrees(2.0 * np.arccos(dot)))

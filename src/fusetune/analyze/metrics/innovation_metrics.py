@@ -45,8 +45,17 @@ def mean_innovation(innovation: Array) -> Array:
     return mean_of_samples(innovation)
 
 
+def squares(given: Innovations) -> Array:
+    """ν² of each axis and sample, (D, S, N)."""
+    return np.square(given.innovation)
+
+
 def _squared_norm(given: Innovations) -> Array:
-    return np.asarray(np.sum(np.square(given.innovation), axis=0))
+    return np.asarray(np.sum(given.by_axis(squares), axis=0))
+
+
+def _squared_norms(given: Innovations) -> Array:
+    return given.once_if_few(_squared_norm)
 
 
 METRICS = (
@@ -56,7 +65,7 @@ METRICS = (
     ),
     InnovationMetric(
         "rms_innovation", SOURCE_UNIT, "root mean square; of a group, of the norm",
-        lambda given: rms_norm(given.innovation), "lower", ("apply", "report"),
-        window=InWindow("worst_window_rms", _squared_norm, np.sqrt), on_ground=True,
+        lambda given: np.sqrt(mean_of_samples(_squared_norms(given))), "lower", ("apply", "report"),
+        window=InWindow("worst_window_rms", _squared_norms, np.sqrt), on_ground=True,
     ),
 )  # fmt: skip

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.analyze.metrics.consistency import nis_of_axes
 from fusetune.analyze.metrics.metric import InnovationMetric, Innovations, InWindow, mean_of_samples
 
 Array = npt.NDArray[np.float64]
@@ -23,7 +24,11 @@ NORMAL_CONSISTENCY = 1.4826
 
 def gaussian_nll(innovation: Array, innovation_variance: Array) -> Array:
     """½ (ν²/S + ln S + ln 2π) of each sample; smallest in the mean where S is the true variance."""
-    return 0.5 * (np.square(innovation) / innovation_variance + np.log(innovation_variance) + math.log(2.0 * math.pi))
+    return _gaussian_nll(np.square(innovation) / innovation_variance, np.log(innovation_variance))
+
+
+def _gaussian_nll(nis: Array, log_variance: Array) -> Array:
+    return 0.5 * (nis + log_variance + math.log(2.0 * math.pi))
 
 
 def student_t_nll(innovation: Array, innovation_variance: Array, dof: float = STUDENT_T_DOF) -> Array:
@@ -68,52 +73,82 @@ def profile_nll(mean_nis: Array, mean_log_variance: Array) -> Array:
         return 0.5 * np.log(mean_nis) + 0.5 * np.asarray(mean_log_variance)
 
 
-def _winsorised(given: Innovations) -> Array:
-    return np.stack([winsorised(nu, limit) for nu, limit in zip(given.innovation, given.winsor_limits(), strict=True)])
+def log_variance(given: Innovations) -> Array:
+    """ln S of each axis and sample, (D, S, N)."""
+    return np.log(given.innovation_variance)
+
+
+def clipped_nis(given: Innovations) -> Array:
+    """ν²/S of winsorised ν, of each axis and sample, (D, S, N)."""
+    axes = zip(given.innovation, given.winsor_limits(), strict=True)
+    return np.square(np.stack([winsorised(nu, limit) for nu, limit in axes])) / given.innovation_variance
+
+
+def gaussian_terms(given: Innovations) -> Array:
+    """`gaussian_nll` of each axis and sample, (D, S, N)."""
+    return _gaussian_nll(given.by_axis(nis_of_axes), given.by_axis(log_variance))
+
+
+def student_t_terms(given: Innovations) -> Array:
+    """`student_t_nll` of each axis and sample, (D, S, N)."""
+    return student_t_nll(given.innovation, given.innovation_variance)
+
+
+def _clipped_terms(given: Innovations) -> Array:
+    return _gaussian_nll(given.by_axis(clipped_nis), given.by_axis(log_variance))
+
+
+def _mean_of(terms: Callable[[Innovations], Array]) -> Callable[[Innovations], Array]:
+    """The mean of what each axis and sample gives, summed over the axes."""
+
+    def means(given: Innovations) -> Array:
+        return mean_of_samples(given.by_axis(terms))
+
+    return lambda given: _sum(given.by_axis(means))
+
+
+def _profile_of(nis: Callable[[Innovations], Array]) -> Callable[[Innovations], Array]:
+    """`profile_nll` of each axis, each scaled by itself, summed over the axes."""
+
+    def profiles(given: Innovations) -> Array:
+        return profile_nll(mean_of_samples(given.by_axis(nis)), given.by_axis(_mean_log_variance))
+
+    return lambda given: _sum(given.by_axis(profiles))
 
 
 def _mean_log_variance(given: Innovations) -> Array:
-    return mean_of_samples(np.log(given.innovation_variance))
+    return mean_of_samples(given.by_axis(log_variance))
 
 
 def _sum(values: Iterable[Array]) -> Array:
-    """Likelihoods of several axes: the sum of theirs, each axis winsorised and scaled by itself."""
+    """Likelihoods of several axes: the sum of theirs."""
     return functools.reduce(operator.add, values)
 
 
-def _mean(nll: Callable[[Array, Array], Array], innovation: Array, given: Innovations) -> Array:
-    return _sum(mean_of_samples(nll(*axis)) for axis in zip(innovation, given.innovation_variance, strict=True))
-
-
-def _profile(innovation: Array, given: Innovations) -> Array:
-    axes = zip(innovation, given.innovation_variance, given.once(_mean_log_variance), strict=True)
-    return _sum(profile_nll(mean_of_samples(np.square(nu) / s), log_s) for nu, s, log_s in axes)
-
-
-def _winsorised_nll(given: Innovations) -> Array:
-    return _sum(map(gaussian_nll, given.once(_winsorised), given.innovation_variance))
+def _clipped_nll(given: Innovations) -> Array:
+    return _sum(given.by_axis(_clipped_terms))
 
 
 METRICS = (
     InnovationMetric(
         "nll", "nat", "negative log-likelihood per sample",
-        lambda given: _mean(gaussian_nll, given.innovation, given), "lower", ("apply",),
+        _mean_of(gaussian_terms), "lower", ("apply",),
     ),
     InnovationMetric(
         "nll_student_t", "nat", "the same under Student's t with 5 degrees of freedom",
-        lambda given: _mean(student_t_nll, given.innovation, given), "lower",
+        _mean_of(student_t_terms), "lower",
     ),
     InnovationMetric(
         "nll_winsorised", "nat", "the same, clipped at 5 robust standard deviations of the present set's",
-        lambda given: _mean(gaussian_nll, given.once(_winsorised), given), "lower",
-        window=InWindow("worst_window_nll_winsorised", _winsorised_nll),
+        _mean_of(_clipped_terms), "lower",
+        window=InWindow("worst_window_nll_winsorised", _clipped_nll),
     ),
     InnovationMetric(
         "nll_profile", "nat", "the same with the best constant factor on S, less ½ + ½ ln 2π",
-        lambda given: _profile(given.innovation, given), "lower",
+        _profile_of(nis_of_axes), "lower",
     ),
     InnovationMetric(
         "nll_profile_winsorised", "nat", "that of clipped innovations",
-        lambda given: _profile(given.once(_winsorised), given), "lower",
+        _profile_of(clipped_nis), "lower",
     ),
 )  # fmt: skip

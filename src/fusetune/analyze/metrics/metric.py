@@ -20,6 +20,9 @@ Made = TypeVar("Made")
 SOURCE_UNIT = "unit of the source"
 """The unit of a figure that has that of the innovations themselves, or of the error of a quantity."""
 
+FEW_SAMPLES = 50_000
+"""Of so few what metrics share is kept for the next that asks."""
+
 Better = Literal["lower", "higher", "nearer to 0", "nearer to the number of axes", ""]
 
 
@@ -64,6 +67,8 @@ class Innovations:
         `fusetune.analyze.metrics.likelihood.winsor_limit`
     confidence : of intervals
     of_group : whether they stand for a group of axes, which may be one alone
+    whole, places : where they are of a group: all axes of the source, each by itself, of one set after the other, and
+        places of those of the group among the axes
     """
 
     innovation: Array
@@ -73,6 +78,8 @@ class Innovations:
     winsor_limits: Callable[[], Sequence[float | Array]]
     confidence: float = 0.95
     of_group: bool = False
+    whole: Innovations | None = None
+    places: slice | Sequence[int] = ()
     _made: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -89,6 +96,70 @@ class Innovations:
             self._made[function] = function(self)
         made: Made = self._made[function]
         return made
+
+    def once_if_few(self, function: Callable[[Innovations], Made]) -> Made:
+        """The same of what is as large as the innovations: of many samples it is made each time, and not kept."""
+        return self.once(function) if self.samples <= FEW_SAMPLES else function(self)
+
+    def by_axis(self, function: Callable[[Innovations], npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        """What a function gives of each axis by itself, (D, S, …): made once for all groups that the axis is in.
+
+        Parameters
+        ----------
+        function : makes (D, S, …) of innovations; of each axis what it makes of that axis alone
+        """
+        if self.samples > FEW_SAMPLES:
+            # not of all axes at once, which takes the more memory
+            each = [function(self._alone(axis)) for axis in range(self.dimension)]
+            return each[0] if len(each) == 1 else np.concatenate(each)
+        return self.once(function) if self.whole is None else self._of_group(self.whole.once(function)[0])
+
+    def _of_group(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """The axes of the group, (D, S, …), out of those of the source, of one set after the other."""
+        sets = self.innovation.shape[1]
+        return values.reshape(sets, -1, *values.shape[1:])[:, self.places].swapaxes(0, 1)
+
+    def _alone(self, axis: int) -> Innovations:
+        if self.dimension == 1:
+            return self
+        rows = slice(axis, axis + 1)
+        return Innovations(
+            self.innovation[rows],
+            self.innovation_variance[rows],
+            self.test_ratio[rows],
+            self.rejected[rows],
+            lambda: [self.winsor_limits()[axis]],
+            self.confidence,
+            self.of_group,
+        )
+
+    @classmethod
+    def of_places(cls, whole: Innovations, sets: int, places: Sequence[int], limits: Sequence[float]) -> Innovations:
+        """A group of axes.
+
+        Parameters
+        ----------
+        whole : all axes of the source, each by itself, (1, S A, N)
+        places : of those of the group among the A axes
+        limits : theirs
+        """
+        follow = [*places] == [*range(places[0], places[-1] + 1)]
+        taken: slice | Sequence[int] = slice(places[0], places[-1] + 1) if follow else places
+
+        def own(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            return values[0].reshape(sets, -1, values.shape[-1])[:, taken].swapaxes(0, 1)
+
+        return cls(
+            own(whole.innovation),
+            own(whole.innovation_variance),
+            own(whole.test_ratio),
+            own(whole.rejected),
+            lambda: limits,
+            whole.confidence,
+            of_group=True,
+            whole=whole,
+            places=taken,
+        )
 
 
 def mean_of_samples(values: Array) -> Array:

@@ -80,19 +80,24 @@ def _correlation(given: Innovations) -> Array:
     return autocorrelation(given.innovation / np.sqrt(given.innovation_variance), lag_limit(given.samples))
 
 
+def _independent(given: Innovations) -> Array:
+    """Number of independent samples of each axis, (D, S)."""
+    return effective_samples(given.by_axis(_correlation), given.samples)
+
+
 def independent_samples(given: Innovations) -> Array:
     """Number of independent samples, (S,); of a group of axes by the mean of their shares."""
-    found = effective_samples(given.once(_correlation), given.samples)
+    found = given.by_axis(_independent)
     return given.samples * np.mean(found / given.samples, axis=0) if given.of_group else found[0]
 
 
 def _ljung_box(given: Innovations) -> tuple[Array, Array]:
-    return ljung_box(given.once(_correlation)[0], given.samples)
+    return ljung_box(given.by_axis(_correlation)[0], given.samples)
 
 
 METRICS = (
     InnovationMetric(
-        "lag1_correlation", "1", "correlation of successive ν/√S", lambda given: given.once(_correlation)[0, :, 0],
+        "lag1_correlation", "1", "correlation of successive ν/√S", lambda given: given.by_axis(_correlation)[0, :, 0],
         "nearer to 0", ("apply",), of_groups=False,
     ),
     InnovationMetric(

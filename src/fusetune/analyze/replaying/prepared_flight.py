@@ -138,6 +138,11 @@ class PreparedFlight:
         """Whether what follows from it is too large to keep all in memory."""
         return len(self.inputs.arrays.imu) > MOST_IN_MEMORY
 
+    @property
+    def sets_at_once(self) -> int:
+        """How many sets' replays take no more memory than one of a flight that is just not long."""
+        return max(1, MOST_IN_MEMORY // max(1, len(self.inputs.arrays.imu)))
+
     def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the summary of a replay: how it started and what was reconstructed."""
         warm = result.warm_start_us is not None

@@ -21,13 +21,8 @@ from fusetune.analyze.replaying.replayed_set import (
 )
 from fusetune.analyze.replaying.samples import AxisSamples, SortedSamples, SourceAxis, gate_of
 from fusetune.analyze.replaying.settings import ReplaySettings
-from fusetune.analyze.replaying.store.columns import (
-    PREDICTED_TABLES,
-    flags_table,
-    local_position_table,
-)
+from fusetune.analyze.replaying.store.columns import flag_columns, gap_columns, prediction_columns
 from fusetune.analyze.replaying.store.parts import TABLES, summary_file, table_file
-from fusetune.analyze.replaying.store.reader import columns_of
 from fusetune.analyze.replaying.store.writer import finish_replay, replay_writer
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
 from fusetune.ekf2.replay.recording import (
@@ -38,16 +33,13 @@ from fusetune.ekf2.replay.recording import (
     RecordArrays,
     Recording,
     joined_rows,
-    with_fields,
 )
 from fusetune.ekf2.replay.results import ReplaySummary
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.documents import read_document, write_document
 from fusetune.storage.files import AnyPath, atomic_path
 
-_LOCAL_POSITION = np.dtype(
-    [(name, LOCAL_POSITION_ROW[name]) for name in LOCAL_POSITION_ROW.names or () if name != "q"], align=True
-)
+_LOCAL_POSITION = tuple(name for name in LOCAL_POSITION_ROW.names or () if name != "q")
 """What is kept in memory of the published position."""
 
 
@@ -59,7 +51,7 @@ def replay_set(
     Parameters
     ----------
     name, overrides : of the set; parameters in which it differs from the log's own
-    recording : `SCORING` leaves out the states' IMU steps, and the published position but around resets
+    recording : all but `FULL` leave out the states' IMU steps; `SCORING` the published position but around resets, too
     """
     params = prepared.parameters(overrides)
     kept = _Kept(recording)
@@ -68,19 +60,18 @@ def replay_set(
     parameters = values_of(document, "params")
     changed = prepared.reconstructed.changed
     measured = partial(prepared.measured, params=params, of=summary) if changed else None
-    withheld, gaps = (partial(columns_of, to_table(summary.gaps)) for to_table in PREDICTED_TABLES.values())
     return ReplayedSet(
         name=name,
         parameters=parameters,
         overrides=values_of(document, "overrides"),
         summary=document,
         samples=kept.samples(parameters, measured),
-        flags=columns_of(flags_table(joined_rows(kept.flags, FLAGS_ROW))),
-        local_position=columns_of(local_position_table(joined_rows(kept.local_position, _LOCAL_POSITION))),
+        flags=flag_columns(joined_rows(kept.flags, FLAGS_ROW)),
+        local_position=kept.positions(),
         states=partial(joined_states, kept.states),
         steps=partial(joined_steps, kept.states) if recording is FULL else None,
-        withheld=withheld,
-        gaps=gaps,
+        withheld=partial(prediction_columns, summary.gaps),
+        gaps=partial(gap_columns, summary.gaps),
     )
 
 
@@ -91,7 +82,7 @@ class _Kept:
         self._recording = recording
         self.innovations: list[np.ndarray] = []
         self.states: list[Columns] = []
-        self.local_position: list[np.ndarray] = []
+        self.local_position: list[Columns] = []
         self.flags: list[np.ndarray] = []
 
     def take(self, rows: RecordArrays) -> None:
@@ -101,8 +92,14 @@ class _Kept:
         else:
             states = {name: rows.states[name] for name in STATE_BLOCKS}
         self.states.append({"time": rows.states["timestamp_sample"].copy(), **states})
-        self.local_position.append(with_fields(rows.local_position, _LOCAL_POSITION.names or ()))
+        self.local_position.append({name: np.array(rows.local_position[name]) for name in _LOCAL_POSITION})
         self.flags.append(rows.flags)
+
+    def positions(self) -> Columns:
+        """The published position."""
+        nothing = {name: np.zeros(0, LOCAL_POSITION_ROW[name]) for name in _LOCAL_POSITION}
+        pieces = [nothing, *self.local_position]
+        return {name: np.concatenate([one[name] for one in pieces]) for name in _LOCAL_POSITION}
 
     def samples(
         self, parameters: Mapping[str, float], measured: Callable[[np.ndarray], np.ndarray] | None

@@ -11,7 +11,7 @@ from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import SourceAxis
 from fusetune.analyze.scoring.filter_events import ON_GROUND, FilterEvents
-from fusetune.analyze.scoring.measurement_alignment import Counted, axes_together
+from fusetune.analyze.scoring.measurement_alignment import Counted, sets_together
 from fusetune.analyze.scoring.metrics_table import MetricsTable, add_innovation_metrics
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow, after, cuts_within
@@ -53,17 +53,22 @@ def ground_window(
 
 
 def add_ground_metrics(
-    table: MetricsTable, set_name: str, sources: Iterable[Mapping[SourceAxis, Counted]], settings: ScoringSettings
+    tables: Mapping[str, MetricsTable],
+    sources: Sequence[Iterable[Mapping[SourceAxis, Counted]]],
+    settings: ScoringSettings,
 ) -> None:
     """Append the metrics that are given of the ground, of every source and axis, named `ground_…`.
 
     Parameters
     ----------
-    sources : samples of the set on the ground
+    tables : of each of the sets, by name
+    sources : samples of each set on the ground, source by source
     """
-    for found in sources:
-        for together in axes_together(found.values(), settings.confidence):
-            add_innovation_metrics(table, set_name, together, _ON_GROUND, GROUND)
+    names = [*tables]
+    for found in zip(*sources, strict=True):
+        for places, together in sets_together([one.values() for one in found], settings.confidence):
+            own = {names[place]: tables[names[place]] for place in places}
+            add_innovation_metrics(own, together, _ON_GROUND, GROUND)
 
 
 def add_ground_events(table: MetricsTable, set_name: str, events: FilterEvents, ground: ScoringWindow) -> None:

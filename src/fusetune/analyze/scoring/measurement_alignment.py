@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.metrics.likelihood import winsor_limit
-from fusetune.analyze.metrics.metric import Innovations
+from fusetune.analyze.metrics.metric import FEW_SAMPLES, Innovations
 from fusetune.analyze.replaying.measurement_times import match, measurement_time
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis, gate_of
@@ -26,9 +27,6 @@ from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES, AidSource
 _TOLERANCE = 0.4
 """Two samples are one measurement when they are nearer than this share of the median spacing."""
 
-_FEW_SAMPLES = 50_000
-"""Of so few what groups of axes are made of is kept for the next who asks."""
-
 
 @dataclass(frozen=True, eq=False)
 class SampleMask:
@@ -38,7 +36,7 @@ class SampleMask:
     ----------
     time : (N,) µs, of the measurement
     tolerance : how near to one its like must be, µs
-    row : (N,) of that set's samples
+    row : (N,) of that set's samples, ascending
     innovation : (N,) that set's
     """
 
@@ -168,10 +166,18 @@ def _is_usable(samples: AxisSamples) -> npt.NDArray[np.bool_]:
 
 def _matched(mask: SampleMask, samples: AxisSamples, record: ReplayedSet, window: ScoringWindow) -> _Matched:
     time = measurement_time(samples, mask.source, record.parameters)
-    row = match(mask.time, time, mask.tolerance)
+    row = _rows_of(mask, time)
     lacking = (row < 0) | ~_is_usable(samples)[row] | (mask.time < time[np.argmax(samples.fused)])
     after_reset = window.after_own_reset(record.name, mask.time) & ~lacking
     return _Matched(lacking, after_reset, record.name in window.own_resets, row)
+
+
+def _rows_of(mask: SampleMask, time: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Index into `time`, ascending, of the sample that is each of the mask's measurements; −1 where there is none."""
+    # a set with the delays of the one that the mask is of has the same measurements, in the same places
+    if mask.row[-1] < time.size and np.array_equal(time[mask.row], mask.time):
+        return mask.row.astype(np.int64)
+    return match(mask.time, time, mask.tolerance)
 
 
 def _charged_figures(
@@ -203,31 +209,51 @@ def _single(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class AxesTogether:
-    """Axes of one source that share their times, of one set; `confidence` is that of intervals."""
+    """Axes of one source that share their times, of one set or of several at the same measurements.
+
+    Attributes
+    ----------
+    samples : of one set after the other, each with the same axes
+    confidence : of intervals
+    sets : number of sets
+    """
 
     source: str
     samples: tuple[CountedSamples, ...]
     confidence: float = np.nan
+    sets: int = 1
+
+    @property
+    def masks(self) -> tuple[SampleMask, ...]:
+        """Of the axes."""
+        return tuple(one.mask for one in self.samples[: len(self.samples) // self.sets])
 
     @property
     def axes(self) -> list[int]:
-        return [one.mask.axis for one in self.samples]
+        return [mask.axis for mask in self.masks]
 
     @property
     def time(self) -> npt.NDArray[np.int64]:
         """(N,) µs"""
         return self.samples[0].mask.time
 
+    def samples_of_sets(self) -> list[tuple[CountedSamples, ...]]:
+        """Of one set after the other."""
+        axes = len(self.masks)
+        return [self.samples[first : first + axes] for first in range(0, len(self.samples), axes)]
+
     @cached_property
     def innovations(self) -> Innovations:
-        """Each axis by itself, what metrics are made of, (1, A, N)."""
+        """Each axis of each set by itself, what metrics are made of, (1, S A, N)."""
         limits = np.array([one.mask.winsor_limit for one in self.samples])[:, None]
-        figures = [np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES]
-        return _innovations(figures, [limits], self.confidence)
+        innovation, variance, ratio, rejected = (
+            np.stack([getattr(one, name) for one in self.samples])[None] for name in FIGURES
+        )
+        return Innovations(innovation, variance, ratio, rejected, lambda: [limits], self.confidence)
 
     def groups(self) -> Iterable[tuple[str, Innovations]]:
-        """Groups of axes (horizontal, vertical, all) that are all here, (D, 1, N), by name."""
-        return self._groups.items() if self.time.size <= _FEW_SAMPLES else self._each_group()
+        """Groups of axes (horizontal, vertical, all) that are all here, (D, S, N), by name."""
+        return self._groups.items() if self.time.size <= FEW_SAMPLES else self._each_group()
 
     @cached_property
     def _groups(self) -> Mapping[str, Innovations]:
@@ -239,10 +265,9 @@ class AxesTogether:
                 yield name, self._group(axes)
 
     def _group(self, axes: Sequence[int]) -> Innovations:
-        members = [self.samples[self.axes.index(axis)] for axis in axes]
-        limits = [one.mask.winsor_limit for one in members]
-        figures = [np.stack([getattr(one, name) for one in members])[:, None] for name in FIGURES]
-        return _innovations(figures, limits, self.confidence, of_group=True)
+        places = [self.axes.index(axis) for axis in axes]
+        limits = [self.samples[place].mask.winsor_limit for place in places]
+        return Innovations.of_places(self.innovations, self.sets, places, limits)
 
     def of_masks(self, masks: Masks) -> AxesTogether | None:
         """Those of the axes whose measurements are those of some masks; None where none are."""
@@ -250,13 +275,6 @@ class AxesTogether:
         if not kept:
             return None
         return self if len(kept) == len(self.samples) else replace(self, samples=kept)
-
-
-def _innovations(
-    figures: Sequence[npt.NDArray], limits: Sequence[float | npt.NDArray], confidence: float, *, of_group: bool = False
-) -> Innovations:
-    innovation, variance, ratio, rejected = figures
-    return Innovations(innovation, variance, ratio, rejected, lambda: limits, confidence, of_group)
 
 
 def axes_together(samples: Iterable[Counted], confidence: float = np.nan) -> Iterator[AxesTogether]:
@@ -268,3 +286,22 @@ def axes_together(samples: Iterable[Counted], confidence: float = np.nan) -> Ite
             found.setdefault((mask.source, id(mask.time)), []).append(one.samples)
     for (source, _), members in found.items():
         yield AxesTogether(source, tuple(members), confidence)
+
+
+def sets_together(
+    each: Sequence[Iterable[Counted]], confidence: float = np.nan
+) -> Iterator[tuple[tuple[int, ...], AxesTogether]]:
+    """What several sets have of one source, those at the same measurements together; with the places of the sets.
+
+    What there is of one set comes in the order of `axes_together`.
+    """
+    alike: dict[tuple[tuple[int, ...], ...], list[tuple[int, list[AxesTogether]]]] = {}
+    for place, samples in enumerate(each):
+        found = [*axes_together(samples, confidence)]
+        alike.setdefault(tuple(tuple(map(id, one.masks)) for one in found), []).append((place, found))
+    for members in alike.values():
+        places = tuple(place for place, _ in members)
+        for together in zip(*(own for _, own in members), strict=True):
+            joined = tuple(chain.from_iterable(one.samples for one in together))
+            # another one than is kept here: what it makes of its samples goes with it
+            yield places, replace(together[0], samples=joined, sets=len(together))

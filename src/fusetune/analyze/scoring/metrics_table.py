@@ -12,6 +12,7 @@ import pyarrow as pa
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.metrics.error_figures import ErrorFigure
 from fusetune.analyze.metrics.metric import Bounds, InnovationMetric, Innovations
+from fusetune.analyze.scoring.columns import repeated
 from fusetune.analyze.scoring.filter_events import EVENT_METRICS, SERVICE_METRICS, FilterEvents
 from fusetune.analyze.scoring.measurement_alignment import AxesTogether
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
@@ -30,7 +31,8 @@ class MetricsTable:
     """Rows under construction."""
 
     flight: str
-    _rows: list[tuple] = field(default_factory=list)
+    _names: list[tuple[str, str, str, str]] = field(default_factory=list)
+    _figures: list[Sequence[float]] = field(default_factory=list)
 
     def add(
         self,
@@ -44,20 +46,38 @@ class MetricsTable:
         upper: float = np.nan,
     ) -> None:
         """Append one figure."""
-        self._rows.append((self.flight, set_name, source, axis, metric, value, lower, upper, n))
+        self._names.append((set_name, source, axis, metric))
+        self._figures.append((value, lower, upper, n))
+
+    def add_all(
+        self, set_name: str, source: str, axes: Sequence[str], metrics: Sequence[str], figures: npt.NDArray
+    ) -> None:
+        """Append of one axis after the other all metrics; `figures` are (A, M, 4): value, lower, upper, n."""
+        self._names += [(set_name, source, axis, metric) for axis in axes for metric in metrics]
+        self._figures += figures.reshape(-1, figures.shape[-1]).tolist()
+
+    def __len__(self) -> int:
+        return len(self._names)
 
     def finished(self) -> pa.Table:
-        columns = zip(*self._rows, strict=True) if self._rows else [()] * len(METRICS_SCHEMA)
-        arrays = {
-            field.name: np.array(values, np.float64) if field.type == pa.float64() else list(values)
-            for field, values in zip(METRICS_SCHEMA, columns, strict=True)
-        }
-        return pa.table(arrays, schema=METRICS_SCHEMA)
+        return finished_tables([self])
+
+
+def finished_tables(tables: Sequence[MetricsTable]) -> pa.Table:
+    """The rows of several tables, one after the other."""
+    names = [row for one in tables for row in one._names]
+    figures = np.array([row for one in tables for row in one._figures], np.float64).reshape(-1, 4)
+    texts = zip(*names, strict=True) if names else [()] * 4
+    columns = [
+        pa.concat_arrays([repeated(one.flight, len(one)) for one in tables]),
+        *(pa.array(values, pa.string()) for values in texts),
+        *(pa.array(np.ascontiguousarray(column)) for column in figures.T),
+    ]
+    return pa.table(columns, schema=METRICS_SCHEMA)
 
 
 def add_innovation_metrics(
-    table: MetricsTable,
-    set_name: str,
+    tables: Mapping[str, MetricsTable],
     samples: AxesTogether,
     metrics: Sequence[InnovationMetric] = INNOVATION_METRICS,
     prefix: str = "",
@@ -66,6 +86,7 @@ def add_innovation_metrics(
 
     Parameters
     ----------
+    tables : of each of the sets, by name
     samples : nothing is told of too few
     metrics : by default all
     prefix : to the names of the metrics
@@ -73,15 +94,14 @@ def add_innovation_metrics(
     if samples.time.size < FEWEST_SAMPLES:
         return
     axes = [AXES[axis] for axis in samples.axes]
-    _add_figures(table, set_name, samples.source, axes, samples.innovations, metrics, prefix)
+    _add_figures(tables, samples.source, axes, samples.innovations, metrics, prefix)
     of_groups = [metric for metric in metrics if metric.of_groups]
     for group, given in samples.groups():
-        _add_figures(table, set_name, samples.source, [group], given, of_groups, prefix)
+        _add_figures(tables, samples.source, [group], given, of_groups, prefix)
 
 
 def _add_figures(
-    table: MetricsTable,
-    set_name: str,
+    tables: Mapping[str, MetricsTable],
     source: str,
     axes: Sequence[str],
     given: Innovations,
@@ -89,18 +109,17 @@ def _add_figures(
     prefix: str,
 ) -> None:
     """Of one axis or group after the other, all metrics."""
-    unknown = [np.nan] * len(axes)
-    found = []
-    for metric in metrics:
+    figures = np.full((len(tables), len(axes), len(metrics), 4), np.nan)
+    for place, metric in enumerate(metrics):
         value = metric.function(given)
-        n = [float(given.samples)] * len(axes) if metric.samples is None else metric.samples(given).tolist()
-        if isinstance(value, Bounds):
-            found.append((value.value.tolist(), n, value.lower.tolist(), value.upper.tolist()))
-        else:
-            found.append((value.tolist(), n, unknown, unknown))
-    for place, axis in enumerate(axes):
-        for metric, (values, n, lower, upper) in zip(metrics, found, strict=True):
-            table.add(set_name, source, axis, prefix + metric.name, values[place], n[place], lower[place], upper[place])
+        n = given.samples if metric.samples is None else metric.samples(given).reshape(figures.shape[:2])
+        told = (value.value, value.lower, value.upper) if isinstance(value, Bounds) else (value,)
+        for column, values in enumerate(told):
+            figures[:, :, place, column] = values.reshape(figures.shape[:2])
+        figures[:, :, place, 3] = n
+    names = [prefix + metric.name for metric in metrics]
+    for (name, table), own in zip(tables.items(), figures, strict=True):
+        table.add_all(name, source, axes, names, own)
 
 
 def add_events(table: MetricsTable, set_name: str, events: FilterEvents) -> None:

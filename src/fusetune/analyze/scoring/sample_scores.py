@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import pyarrow as pa
 
 from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.analyze.replaying.samples import AxisSamples, SourceAxis
-from fusetune.analyze.scoring.block_scores import BLOCK_SCHEMA, block_rows
+from fusetune.analyze.scoring.block_scores import BlockSums, block_sums
 from fusetune.analyze.scoring.charges import EvidenceCost
 from fusetune.analyze.scoring.measurement_alignment import (
     Counted,
@@ -21,16 +21,17 @@ from fusetune.analyze.scoring.measurement_alignment import (
     counted_samples,
     own_samples,
     sample_masks,
+    sets_together,
     source_masks,
 )
 from fusetune.analyze.scoring.metrics_table import MetricsTable, add_innovation_metrics
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.analyze.scoring.window_scores import (
+    WindowFigures,
     add_worst_windows,
     window_edges,
     window_figures,
-    window_rows,
 )
 from fusetune.px4.aid_sources import MEASURED_SOURCES
 from fusetune.set_names import ONBOARD
@@ -54,14 +55,14 @@ SAMPLES_SCHEMA = pa.schema(
 """One row per set and measurement; `winsor_limit` is the limit beyond which the innovations of all sets count as it."""
 
 
-class SampleScores(NamedTuple):
-    """Rows of `scores.parquet`, `windows.parquet` and `samples.parquet`, and what the set cost itself, by source and
-    axis."""
+@dataclass
+class SampleScores:
+    """What is made of the samples of one set; `costs` is what it cost itself, by source and axis."""
 
-    blocks: pa.Table
-    windows: pa.Table
-    samples: pa.Table
-    costs: Mapping[SourceAxis, EvidenceCost]
+    blocks: list[BlockSums] = field(default_factory=list)
+    windows: list[WindowFigures] = field(default_factory=list)
+    samples: list[CountedSamples] = field(default_factory=list)
+    costs: dict[SourceAxis, EvidenceCost] = field(default_factory=dict)
 
 
 OfSource = Mapping[SourceAxis, Counted]
@@ -71,7 +72,8 @@ OfSource = Mapping[SourceAxis, Counted]
 def counted(record: ReplayedSet, masks: Masks, window: ScoringWindow, max_lacking_percent: float) -> Iterator[OfSource]:
     """Samples of a set at the masks, and of sources that these do not have at the set's own measurements.
 
-    One source comes after the other, so that those of an hour's flight are not in memory at once.
+    One of `MEASURED_SOURCES` comes after the other, with what there is of it, so that those of an hour's flight are not
+    in memory at once.
     """
     for source in MEASURED_SOURCES.values():
         found: dict[SourceAxis, Counted] = {}
@@ -83,13 +85,12 @@ def counted(record: ReplayedSet, masks: Masks, window: ScoringWindow, max_lackin
                 found[key] = counted_samples(masks[key], record, window, max_lacking_percent)
             elif key in own:
                 found[key] = _own(own[key], record)
-        if found:
-            yield found
+        yield found
 
 
 def counted_of_its_own(record: ReplayedSet, masks: Masks) -> Iterator[OfSource]:
-    """Samples of the set that the masks are of, one source after the other."""
-    for source in dict.fromkeys(source for source, _ in masks):
+    """Samples of the set that the masks are of, one of `MEASURED_SOURCES` after the other."""
+    for source in MEASURED_SOURCES:
         yield {key: _own(mask, record) for key, mask in masks.items() if key[0] == source}
 
 
@@ -98,53 +99,52 @@ def _own(mask: SampleMask, record: ReplayedSet) -> Counted:
 
 
 def score_samples(
-    table: MetricsTable,
-    set_name: str,
-    sources: Iterable[OfSource],
+    tables: Mapping[str, MetricsTable],
+    sources: Sequence[Iterable[OfSource]],
     masks: Masks,
     window: ScoringWindow,
     settings: ScoringSettings,
-) -> SampleScores:
-    """Append the figures of every source and axis, and of their groups; sums of blocks and windows.
+) -> list[SampleScores]:
+    """Append the figures of every source and axis, and of their groups; sums of blocks and windows of each set.
 
     Sources that the present set does not fuse have figures, but no blocks: on them no set can be compared with it.
 
     Parameters
     ----------
-    sources : the set's samples
+    tables : of each of the sets, by name
+    sources : the samples of each set, source by source
     masks : of the present set
     """
     edges, wide_edges = window.block_edges(settings.block_s), window_edges(window, settings.window_s)
-    blocks, windows = [], []
-    samples: list[CountedSamples] = []
-    costs: dict[SourceAxis, EvidenceCost] = {}
-    for found in sources:
-        costs |= {key: one.cost for key, one in found.items() if key in masks}
-        for together in axes_together(found.values(), settings.confidence):
-            add_innovation_metrics(table, set_name, together)
+    names, scores = [*tables], [SampleScores() for _ in tables]
+    for found in zip(*sources, strict=True):
+        for own, one in zip(scores, found, strict=True):
+            own.costs |= {key: counted.cost for key, counted in one.items() if key in masks}
+        for places, together in sets_together([one.values() for one in found], settings.confidence):
+            alike = {names[place]: tables[names[place]] for place in places}
+            of_sets = [scores[place] for place in places]
+            add_innovation_metrics(alike, together)
             compared = together.of_masks(masks)
             if compared is not None:
-                blocks.append(block_rows(table.flight, set_name, compared, edges))
+                for own, sums in zip(of_sets, block_sums(compared, edges), strict=True):
+                    own.blocks.append(sums)
             for figures in window_figures(together, wide_edges):
-                add_worst_windows(table, set_name, figures)
-                windows.append(figures)
+                add_worst_windows(alike, figures)
+                for own, of_set in zip(of_sets, figures.of_sets(), strict=True):
+                    own.windows.append(of_set)
             # of what is sampled at every update the samples would fill the disk, and no plot shows them
             if not MEASURED_SOURCES[together.source].every_update:
-                samples += together.samples
+                for own, samples in zip(of_sets, together.samples_of_sets(), strict=True):
+                    own.samples += samples
             is_large = together.time.size > _MANY_SAMPLES
             # with what its figures were made of: the next source's need the room
             del together, compared
             if is_large:
                 give_back_freed_memory()
-    return SampleScores(
-        pa.concat_tables(blocks) if blocks else BLOCK_SCHEMA.empty_table(),
-        window_rows(table.flight, set_name, windows, wide_edges),
-        _sample_rows(set_name, samples),
-        costs,
-    )
+    return scores
 
 
-def _sample_rows(set_name: str, samples: list[CountedSamples]) -> pa.Table:
+def sample_rows(set_name: str, samples: Sequence[CountedSamples]) -> pa.Table:
     """Rows of `samples.parquet` of one set."""
     counts = [one.mask.time.size for one in samples]
     names = list(dict.fromkeys(one.mask.source for one in samples))
@@ -187,4 +187,4 @@ def add_onboard(
     record = ReplayedSet(ONBOARD, parameters, {}, {}, onboard, {}, {})
     for found in counted_of_its_own(record, sample_masks(record, window)):
         for together in axes_together(found.values(), settings.confidence):
-            add_innovation_metrics(table, ONBOARD, together)
+            add_innovation_metrics({ONBOARD: table}, together)

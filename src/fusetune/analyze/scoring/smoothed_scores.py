@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +13,14 @@ import pyarrow as pa
 from fusetune.analyze.metrics.attitude import interpolate
 from fusetune.analyze.metrics.likelihood import winsor_limit
 from fusetune.analyze.replaying.replayed_set import FilterStates
-from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of, repeated
+from fusetune.analyze.scoring.columns import (
+    FLIGHT_AND_SET,
+    SOURCE_AND_AXIS,
+    columns_of,
+    parted,
+    repeated,
+    texts_repeated,
+)
 from fusetune.analyze.smoothing.smoothed_velocity import SmoothedVelocity
 
 SMOOTHED_SCHEMA = pa.schema(
@@ -59,38 +67,42 @@ class SmoothedMask:
 
 
 def smoothed_rows(
-    flight: str, set_name: str, mask: SmoothedMask, differences: npt.NDArray[np.float64], edges: npt.NDArray[np.int64]
-) -> pa.Table:
-    """Rows of `SMOOTHED_SCHEMA` of one set.
+    flight: str,
+    differences: Mapping[str, npt.NDArray[np.float64]],
+    mask: SmoothedMask,
+    edges: npt.NDArray[np.int64],
+) -> Iterator[pa.Table]:
+    """Rows of `SMOOTHED_SCHEMA` of each set.
 
     Parameters
     ----------
-    differences : (K, 3) `velocity_differences` of the set
+    differences : (K, 3) `velocity_differences` of each set, by name
     edges : of the blocks, µs
     """
     time, source = mask.reference.time, mask.reference.source
     block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, edges.size - 2)
     starts = np.flatnonzero(np.r_[True, (np.diff(block) != 0) | (np.diff(time // _TOGETHER_US) != 0)])
     counts = np.diff(np.r_[starts, block.size])
-    axes = differences.shape[1]
-    rows = axes * starts.size
-    limits = mask.winsor_limits[:, None]
-    values = np.ascontiguousarray(differences.T)
-    return pa.table(
+    sets, axes = len(differences), mask.present.shape[1]
+    of_set = axes * starts.size
+    limits = np.tile(mask.winsor_limits, sets)[:, None]
+    values = np.concatenate([one.T for one in differences.values()])
+    table = pa.table(
         {
-            "flight": repeated(flight, rows),
-            "set": repeated(set_name, rows),
-            "source": repeated(source, rows),
-            "axis": pa.array(np.repeat(np.arange(axes, dtype=np.int32), starts.size)),
-            "block": pa.array(np.tile(block[starts].astype(np.int32), axes)),
-            "start_us": pa.array(np.tile(time[starts], axes)),
-            "stop_us": pa.array(np.tile(time[starts + counts - 1], axes)),
-            "n": pa.array(np.tile(counts.astype(np.int64), axes)),
+            "flight": repeated(flight, sets * of_set),
+            "set": texts_repeated([*differences], np.full(sets, of_set)),
+            "source": repeated(source, sets * of_set),
+            "axis": pa.array(np.tile(np.repeat(np.arange(axes, dtype=np.int32), starts.size), sets)),
+            "block": pa.array(np.tile(block[starts].astype(np.int32), sets * axes)),
+            "start_us": pa.array(np.tile(time[starts], sets * axes)),
+            "stop_us": pa.array(np.tile(time[starts + counts - 1], sets * axes)),
+            "n": pa.array(np.tile(counts.astype(np.int64), sets * axes)),
             "sum_squares": pa.array(_sums(values, starts)),
             "sum_squares_winsorised": pa.array(_sums(np.clip(values, -limits, limits), starts)),
         },
         schema=SMOOTHED_SCHEMA,
     )
+    return parted(table, [of_set] * sets)
 
 
 def _sums(values: npt.NDArray[np.float64], starts: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:

@@ -1,6 +1,8 @@
 """Errors of a replay against a reference, on the scored part of the flight."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -8,7 +10,16 @@ import numpy.typing as npt
 from fusetune.analyze.flight.reference_truth import EARTH_RADIUS_M, Truth, read_references, read_truth
 from fusetune.analyze.metrics.attitude import error_in_ned as attitude_error
 from fusetune.analyze.metrics.attitude import heading, interpolate, interpolate_quaternion, wrap
-from fusetune.analyze.metrics.error_figures import ErrorFigure, attitude_figures, nees_figures, vector_figures
+from fusetune.analyze.metrics.error_figures import (
+    ErrorFigure,
+    Track,
+    TrueAttitude,
+    attitude_figures,
+    nees_figures,
+    track_of,
+    true_attitude,
+    vector_figures,
+)
 from fusetune.analyze.replaying.replayed_set import FilterStates, ReplayedSet
 from fusetune.analyze.scoring.window import ScoringWindow
 from fusetune.quaternions import multiply, rotation_matrix
@@ -29,6 +40,34 @@ __all__ = [
 Array = npt.NDArray[np.float64]
 
 
+MOST_KEPT_TIMES = 100_000
+"""Some ten minutes of flight."""
+
+Made = TypeVar("Made")
+
+
+class Reference:
+    """A reference, and what follows from it at the times at which sets are compared with it.
+
+    Sets that are updated alike have the same times, so what was made for one is kept for the next.
+    """
+
+    def __init__(self, truth: Truth) -> None:
+        self.truth = truth
+        self._kept: dict[str, tuple[npt.NDArray[np.int64], Any]] = {}
+
+    def at(self, time: npt.NDArray[np.int64], what: str, make: Callable[[], Made]) -> Made:
+        """What is made of the reference at times (N,), µs."""
+        kept = self._kept.get(what)
+        if kept is not None and np.array_equal(kept[0], time):
+            made: Made = kept[1]
+            return made
+        made = make()
+        if time.size <= MOST_KEPT_TIMES:
+            self._kept[what] = time, made
+        return made
+
+
 @dataclass(frozen=True)
 class _Outputs:
     """Published position and velocity of a replay, (N, 3), at the times at which they hold, µs."""
@@ -38,8 +77,16 @@ class _Outputs:
     velocity: Array
 
 
+class _TrueMotion(NamedTuple):
+    """Position, velocity (N, 3) and track of a reference."""
+
+    position: Array
+    velocity: Array
+    track: Track
+
+
 def true_errors(
-    record: ReplayedSet, states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
+    record: ReplayedSet, states: FilterStates, reference: Reference, window: ScoringWindow, confidence: float
 ) -> list[ErrorFigure]:
     """All figures of one replay against one reference.
 
@@ -54,31 +101,31 @@ def true_errors(
     tilt, heading, total rotation), and NEES of velocity, of the horizontal position with its mean offset removed, and
     of the attitude. Quantities that the reference does not know are missing.
     """
-    if truth.own_north:
-        truth = _turned_north(truth, states, window)
+    if reference.truth.own_north:
+        reference = Reference(_turned_north(reference.truth, states, window))
     # one after the other, so that no two are in memory with what they are made of
     return [
-        *_position_figures(record, states, _outputs(record, states, truth, window), truth, confidence),
-        *_velocity_figures(states, truth, window, confidence),
-        *_attitude_figures(states, truth, window, confidence),
+        *_position_figures(record, states, _outputs(record, states, reference, window), reference, confidence),
+        *_velocity_figures(states, reference, window, confidence),
+        *_attitude_figures(states, reference, window, confidence),
     ]
 
 
-def _outputs(record: ReplayedSet, states: FilterStates, truth: Truth, window: ScoringWindow) -> _Outputs:
-    local = record.local_position
+def _outputs(record: ReplayedSet, states: FilterStates, reference: Reference, window: ScoringWindow) -> _Outputs:
+    local, truth = record.local_position, reference.truth
     # The output predictor carries the state from the fusion horizon to `timestamp`; that is when it holds.
     time = local["timestamp"].astype(np.int64)
-    rows = window.contains(time) & truth.known_at(time)
-    time = time[rows]
+    rows = reference.at(time, "outputs", lambda: np.flatnonzero(window.contains(time) & truth.known_at(time)))
     position, velocity = (
         np.column_stack([local[name][rows] for name in names]).astype(np.float64)
         for names in (("x", "y", "z"), ("vx", "vy", "vz"))
     )
-    if any(truth.lever_arm) and time.size > 1:
-        arm = _arm(states, truth, time)
+    scored = time[rows]
+    if any(truth.lever_arm) and scored.size > 1:
+        arm = _arm(states, truth, scored)
         position = position + arm
-        velocity = velocity + np.gradient(arm, time * 1e-6, axis=0)
-    return _Outputs(time, position, velocity)
+        velocity = velocity + np.gradient(arm, scored * 1e-6, axis=0)
+    return _Outputs(scored, position, velocity)
 
 
 def _arm(states: FilterStates, truth: Truth, at: npt.NDArray[np.int64]) -> Array:
@@ -88,7 +135,7 @@ def _arm(states: FilterStates, truth: Truth, at: npt.NDArray[np.int64]) -> Array
 
 
 def _position_figures(
-    record: ReplayedSet, states: FilterStates, outputs: _Outputs, truth: Truth, confidence: float
+    record: ReplayedSet, states: FilterStates, outputs: _Outputs, reference: Reference, confidence: float
 ) -> list[ErrorFigure]:
     time, position, velocity = outputs.time, outputs.position, outputs.velocity
     # of an hour's flight each of these is 10 MB: what has served goes
@@ -96,25 +143,33 @@ def _position_figures(
     figures: list[ErrorFigure] = []
     if time.size < 2:
         return figures
-    known = truth.velocity if truth.velocity.size else np.gradient(truth.position, truth.time * 1e-6, axis=0)
-    true_velocity = interpolate(truth.time, known, time)
+    truth = reference.truth
+    true = reference.at(time, "motion", lambda: _true_motion(truth, time))
     if truth.velocity.size:
-        figures += vector_figures("velocity", velocity - true_velocity, true_velocity)
-    del known, velocity
-    error = position - interpolate(truth.time, truth.position, time)
+        figures += vector_figures("velocity", velocity - true.velocity, true.track)
+    del velocity
+    error = position - true.position
     del position
+    track = true.track
+    del true
     offset = _origin_offset(record, truth)
     if offset is not None:
-        figures += vector_figures("position", error + offset, true_velocity)
+        figures += vector_figures("position", error + offset, track)
     centred = error - error.mean(axis=0)
     del error
-    figures += vector_figures("position_mean_removed", centred, true_velocity)
-    del true_velocity
+    figures += vector_figures("position_mean_removed", centred, track)
+    del track
     # The variance is that of the fusion horizon, some 0.1 s earlier, over which it hardly changes.
     variance = interpolate(states.time, states.position_variance[:, :2], time)
     return figures + nees_figures(
         "position_mean_removed", "horizontal", time, centred[:, :2], variance, confidence, fitted=2
     )
+
+
+def _true_motion(truth: Truth, time: npt.NDArray[np.int64]) -> _TrueMotion:
+    known = truth.velocity if truth.velocity.size else np.gradient(truth.position, truth.time * 1e-6, axis=0)
+    velocity = interpolate(truth.time, known, time)
+    return _TrueMotion(interpolate(truth.time, truth.position, time), velocity, track_of(velocity))
 
 
 def _origin_offset(record: ReplayedSet, truth: Truth) -> Array | None:
@@ -128,30 +183,47 @@ def _origin_offset(record: ReplayedSet, truth: Truth) -> Array | None:
 
 
 def _velocity_figures(
-    states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
+    states: FilterStates, reference: Reference, window: ScoringWindow, confidence: float
 ) -> list[ErrorFigure]:
-    rows = window.contains(states.time) & truth.known_at(states.time)
-    if np.count_nonzero(rows) < 2 or not truth.velocity.size:
+    truth = reference.truth
+    if not truth.velocity.size:
+        return []
+
+    def known() -> tuple[npt.NDArray[np.int64], Array]:
+        rows = np.flatnonzero(window.contains(states.time) & truth.known_at(states.time))
+        return rows, interpolate(truth.time, truth.velocity, states.time[rows])
+
+    rows, true_velocity = reference.at(states.time, "velocity", known)
+    if rows.size < 2:
         return []
     time, velocity = states.time[rows], states.velocity[rows]
     if any(truth.lever_arm):
         velocity = velocity + np.gradient(_arm(states, truth, time), time * 1e-6, axis=0)
-    error = velocity - interpolate(truth.time, truth.velocity, time)
-    return nees_figures("velocity", "all", time, error, states.velocity_variance[rows], confidence)
+    return nees_figures("velocity", "all", time, velocity - true_velocity, states.velocity_variance[rows], confidence)
 
 
 def _attitude_figures(
-    states: FilterStates, truth: Truth, window: ScoringWindow, confidence: float
+    states: FilterStates, reference: Reference, window: ScoringWindow, confidence: float
 ) -> list[ErrorFigure]:
-    rows = window.contains(states.time) & truth.known_at(states.time, attitude=True)
-    if np.count_nonzero(rows) < 2:
+    truth = reference.truth
+
+    def known() -> tuple[npt.NDArray[np.int64], TrueAttitude | None]:
+        rows = np.flatnonzero(window.contains(states.time) & truth.known_at(states.time, attitude=True))
+        if rows.size < 2:
+            return rows, None
+        time = states.time[rows]
+        return rows, true_attitude(interpolate_quaternion(truth.attitude_time, truth.quaternion, time))
+
+    rows, true = reference.at(states.time, "attitude", known)
+    if true is None:
         return []
-    time, attitude = states.time[rows], states.quaternion[rows]
-    true_attitude = interpolate_quaternion(truth.attitude_time, truth.quaternion, time)
-    figures = attitude_figures(attitude, true_attitude)
-    error = attitude_error(attitude, true_attitude)
-    del attitude, true_attitude
-    return figures + nees_figures("attitude", "all", time, error, states.attitude_variance[rows], confidence)
+    attitude = states.quaternion[rows]
+    figures = attitude_figures(attitude, true)
+    error = attitude_error(attitude, true.quaternion)
+    del attitude, true
+    return figures + nees_figures(
+        "attitude", "all", states.time[rows], error, states.attitude_variance[rows], confidence
+    )
 
 
 def _turned_north(truth: Truth, states: FilterStates, window: ScoringWindow) -> Truth:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import repeat
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ import pyarrow as pa
 
 from fusetune.analyze.metrics.declared import INNOVATION_METRICS
 from fusetune.analyze.metrics.metric import Innovations
-from fusetune.analyze.scoring.columns import BY_AXIS, columns_of, repeated
+from fusetune.analyze.scoring.columns import BY_AXIS, columns_of, parted, repeated, texts_repeated
 from fusetune.analyze.scoring.measurement_alignment import AxesTogether
 from fusetune.analyze.scoring.metrics_table import FEWEST_SAMPLES, MetricsTable
 from fusetune.analyze.scoring.parts import Parts, parts_of
@@ -45,13 +46,24 @@ class WindowFigures:
     Attributes
     ----------
     axes : names of the axes (A,), or of the group
-    values : by metric, (A, W)
+    values : by metric, (A, W); of several sets of one after the other, (S A, W)
     """
 
     source: str
     axes: tuple[str, ...]
     parts: Parts
     values: dict[str, Array]
+
+    @property
+    def rows(self) -> int:
+        """Of the table, where they are of one set."""
+        return len(self.axes) * self.parts.number.size * len(self.values)
+
+    def of_sets(self) -> Iterator[WindowFigures]:
+        """Of one set after the other."""
+        rows = len(self.axes)
+        for first in range(0, len(next(iter(self.values.values()))), rows):
+            yield replace(self, values={name: values[first : first + rows] for name, values in self.values.items()})
 
 
 def window_edges(window: ScoringWindow, length_s: float) -> npt.NDArray[np.int64]:
@@ -89,25 +101,32 @@ def window_figures(samples: AxesTogether, edges: npt.NDArray[np.int64]) -> Itera
 
 def _figures(given: Innovations, parts: Parts) -> dict[str, Array]:
     def mean(values: npt.NDArray) -> Array:
-        return np.add.reduceat(values.astype(np.float64), parts.starts, axis=-1) / parts.counts
+        return np.add.reduceat(values.astype(np.float64, copy=False), parts.starts, axis=-1) / parts.counts
 
     return {name: window.of_mean(mean(window.score(given))) for name, window in _METRICS.items()}
 
 
-def add_worst_windows(table: MetricsTable, set_name: str, figures: WindowFigures) -> None:
-    """Append the largest figure of any window; windows with few samples do not count."""
+def add_worst_windows(tables: Mapping[str, MetricsTable], figures: WindowFigures) -> None:
+    """Append the largest figure of any window to the table of each set; windows with few samples do not count."""
     counts = figures.parts.counts
     full = counts >= _FULL_ENOUGH * counts.max()
-    worst = {window.worst: figures.values[name][:, full].max(axis=1).tolist() for name, window in _METRICS.items()}
-    for place, axis in enumerate(figures.axes):
-        for name, values in worst.items():
-            table.add(set_name, figures.source, axis, name, values[place], float(counts.sum()))
+    rows = np.full((len(tables), len(figures.axes), len(_METRICS), 4), np.nan)
+    for place, name in enumerate(_METRICS):
+        rows[:, :, place, 0] = figures.values[name][:, full].max(axis=1).reshape(rows.shape[:2])
+    rows[..., 3] = float(counts.sum())
+    names = [window.worst for window in _METRICS.values()]
+    for (name, table), own in zip(tables.items(), rows, strict=True):
+        table.add_all(name, figures.source, figures.axes, names, own)
 
 
-def window_rows(flight: str, set_name: str, figures: Sequence[WindowFigures], edges: npt.NDArray[np.int64]) -> pa.Table:
-    """Rows of `windows.parquet`, in the order axis, window, metric."""
+def window_rows(
+    flight: str, of_sets: Mapping[str, Sequence[WindowFigures]], edges: npt.NDArray[np.int64]
+) -> Iterator[pa.Table]:
+    """Rows of `windows.parquet` of each set, in the order axis, window, metric."""
+    figures = [one for found in of_sets.values() for one in found]
     if not figures:
-        return WINDOW_SCHEMA.empty_table()
+        return repeat(WINDOW_SCHEMA.empty_table(), len(of_sets))
+    sets = [name for name, found in of_sets.items() for one in found for _ in one.axes]
     windows = [one.parts.number.size for one in figures for _ in one.axes]
     values = np.concatenate([np.stack(list(one.values.values()), axis=-1).ravel() for one in figures])
     number = np.concatenate([one.parts.number for one in figures for _ in one.axes])
@@ -117,12 +136,12 @@ def window_rows(flight: str, set_name: str, figures: Sequence[WindowFigures], ed
     rows = np.array(windows) * metrics
     of_metrics = np.tile(np.arange(metrics, dtype=np.int32), number.size)
     window = np.repeat(number, metrics)
-    return pa.table(
+    table = pa.table(
         {
             "flight": repeated(flight, values.size),
-            "set": repeated(set_name, values.size),
-            "source": _taken([one.source for one in figures for _ in one.axes], rows),
-            "axis": _taken([axis for one in figures for axis in one.axes], rows),
+            "set": texts_repeated(sets, rows),
+            "source": texts_repeated([one.source for one in figures for _ in one.axes], rows),
+            "axis": texts_repeated([axis for one in figures for axis in one.axes], rows),
             "window": pa.array(window.astype(np.int32)),
             "start_us": pa.array(edges[window]),
             "stop_us": pa.array(edges[window + 1]),
@@ -132,7 +151,4 @@ def window_rows(flight: str, set_name: str, figures: Sequence[WindowFigures], ed
         },
         schema=WINDOW_SCHEMA,
     )
-
-
-def _taken(names: Sequence[str], rows: npt.NDArray[np.int64]) -> pa.Array:
-    return pa.array(names, pa.string()).take(pa.array(np.repeat(np.arange(len(names), dtype=np.int32), rows)))
+    return parted(table, [sum(one.rows for one in found) for found in of_sets.values()])

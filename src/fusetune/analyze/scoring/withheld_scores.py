@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import repeat
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,14 @@ from fusetune.analyze.metrics.metric import SOURCE_UNIT, Metric
 from fusetune.analyze.replaying.replayed_set import Columns, ReplayedSet
 from fusetune.analyze.replaying.samples import SourceAxis
 from fusetune.analyze.scoring.charges import EvidenceCost, OwnEvidence, charged
-from fusetune.analyze.scoring.columns import FLIGHT_AND_SET, SOURCE_AND_AXIS, columns_of, repeated
+from fusetune.analyze.scoring.columns import (
+    FLIGHT_AND_SET,
+    SOURCE_AND_AXIS,
+    columns_of,
+    parted,
+    repeated,
+    texts_repeated,
+)
 from fusetune.analyze.scoring.metrics_table import MetricsTable
 from fusetune.analyze.scoring.true_errors import Truth, interpolate
 from fusetune.analyze.scoring.window import ScoringWindow
@@ -193,7 +201,9 @@ def _matched(
     since = np.repeat([record.first_fused.get((mask.source, 0), never) for mask in masks], counts)
     absent = table["key"][row] != key
     lacking = absent | ~_is_usable(table)[row] | (start < since)
-    alone = absent & (start >= since) & np.isin(key // _HORIZONS, table["key"] // _HORIZONS)
+    alone = absent & (start >= since)
+    if alone.any():
+        alone &= np.isin(key // _HORIZONS, table["key"] // _HORIZONS)
     after_reset = window.after_own_reset(record.name, start) & ~lacking
     error, variance = table["innovation"][row], table["innovation_variance"][row]
     return _parted(counts, lacking, after_reset, resets, error, variance, alone)
@@ -219,8 +229,8 @@ def _is_usable(table: Mapping[str, npt.NDArray]) -> npt.NDArray[np.bool_]:
 
 def _by_key(table: Columns) -> dict[str, npt.NDArray]:
     """Columns of one set's predictions, in ascending order of a key that names gap, source, axis and horizon."""
-    sources = list(AID_SOURCES)
-    source = np.array([sources.index(name) if name in AID_SOURCES else -1 for name in table["source"]], np.int64)
+    numbers = {name: number for number, name in enumerate(AID_SOURCES)}
+    source = np.array([numbers.get(name, -1) for name in table["source"]], np.int64)
     horizon_ds = np.rint(table["horizon_s"] * 10.0).astype(np.int64)
     key = ((table["start"] * 64 + source) * 4 + table["axis"]) * _HORIZONS + horizon_ds
     order = np.argsort(key, kind="stable")
@@ -245,32 +255,31 @@ def _in_use(record: ReplayedSet, source: str, start: npt.NDArray[np.int64]) -> n
     return (last <= start) & (start - last <= _STALE_US)
 
 
-def withheld_rows(flight: str, set_name: str, gaps: Sequence[CountedGaps], edges: npt.NDArray[np.int64]) -> pa.Table:
-    """The predictions of a set as rows of `WITHHELD_SCHEMA`, with the block that each gap begins in."""
-    gaps = [one for one in gaps if one.is_compared]
+def withheld_rows(
+    flight: str, of_sets: Mapping[str, Sequence[CountedGaps]], edges: npt.NDArray[np.int64]
+) -> Iterator[pa.Table]:
+    """The predictions of each set as rows of `WITHHELD_SCHEMA`, with the block that each gap begins in."""
+    compared = {name: [one for one in found if one.is_compared] for name, found in of_sets.items()}
+    gaps = [one for found in compared.values() for one in found]
     if not gaps:
-        return WITHHELD_SCHEMA.empty_table()
+        return repeat(WITHHELD_SCHEMA.empty_table(), len(of_sets))
     counts = np.array([one.error.size for one in gaps])
-    rows = int(counts.sum())
+    sets = [name for name, found in compared.items() for _ in found]
 
     def joined(name: str) -> npt.NDArray:
         return np.concatenate([getattr(one.mask, name) for one in gaps])
-
-    def texts(name: str) -> pa.Array:
-        which = np.repeat(np.arange(counts.size, dtype=np.int32), counts)
-        return pa.array([getattr(one.mask, name) for one in gaps], pa.string()).take(pa.array(which))
 
     start, error = joined("start"), np.concatenate([one.error for one in gaps])
     block = np.clip(np.searchsorted(edges, start, side="right") - 1, 0, edges.size - 2)
     limit = np.repeat([one.mask.winsor_limit for one in gaps], counts)
     columns = {
-        "flight": repeated(flight, rows),
-        "set": repeated(set_name, rows),
-        "sensor": texts("sensor"),
+        "flight": repeated(flight, int(counts.sum())),
+        "set": texts_repeated(sets, counts),
+        "sensor": texts_repeated([one.mask.sensor for one in gaps], counts),
         "gap": pa.array(joined("gap").astype(np.int32)),
         "start_us": pa.array(start),
         "block": pa.array(block.astype(np.int32)),
-        "source": texts("source"),
+        "source": texts_repeated([one.mask.source for one in gaps], counts),
         "axis": pa.array(np.repeat(np.array([one.mask.axis for one in gaps], np.int32), counts)),
         "horizon_s": pa.array(np.repeat(np.array([one.mask.horizon_s for one in gaps]), counts)),
         "n": pa.array(joined("n").astype(np.int32)),
@@ -278,7 +287,8 @@ def withheld_rows(flight: str, set_name: str, gaps: Sequence[CountedGaps], edges
         "error_winsorised": pa.array(np.clip(error, -limit, limit)),
         "variance": pa.array(np.concatenate([one.variance for one in gaps])),
     }
-    return pa.table(columns, schema=WITHHELD_SCHEMA)
+    table = pa.table(columns, schema=WITHHELD_SCHEMA)
+    return parted(table, [sum(one.error.size for one in found) for found in compared.values()])
 
 
 def add_withheld_metrics(table: MetricsTable, set_name: str, gaps: Sequence[CountedGaps]) -> None:

@@ -21,11 +21,12 @@ from fusetune.analyze.scoring.ground_metrics import ground_window
 from fusetune.analyze.scoring.measurement_alignment import Masks, sample_masks
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.scoring.smoothed_scores import STEP_US, SmoothedMask, velocity_differences
+from fusetune.analyze.scoring.true_errors import Reference
 from fusetune.analyze.scoring.window import ScoringWindow, after, end_of_warm_up, scoring_window
 from fusetune.analyze.scoring.withheld_scores import GapMask, gap_masks
 from fusetune.analyze.sensors.source_whiteness import Whiteness, source_whiteness
 from fusetune.analyze.smoothing.smoothed_velocity import smoothed_velocity
-from fusetune.ekf2.replay.recording import FULL, SCORING, Recording
+from fusetune.ekf2.replay.recording import SCORING, TRACED, Recording
 from fusetune.px4.flight import Flight
 from fusetune.set_names import ANTENNA_MENDED, mended_name
 
@@ -140,10 +141,15 @@ class Yardstick:
             return ()
         return tuple(read_references(self.flight, self.present.fused_sources, self.present.parameters))
 
+    @cached_property
+    def known_references(self) -> tuple[Reference, ...]:
+        """The same with what sets share of them."""
+        return tuple(map(Reference, self.references))
+
     @property
     def recording(self) -> Recording:
         """How much a replay has to record for its scores: errors need the published position at every update."""
-        return FULL if self.references else SCORING
+        return TRACED if self.references else SCORING
 
     @cached_property
     def smoothed(self) -> SmoothedMask | None:
@@ -157,7 +163,7 @@ class Yardstick:
     def make(self) -> None:
         """Make all that scores ask for, so that several threads find it made."""
         if self.window.intervals:
-            _ = self.masks, self.gaps, self.whiteness, self.references, self.smoothed
+            _ = self.masks, self.gaps, self.whiteness, self.known_references, self.smoothed
         _ = self.ground_masks, self.present.first_fused, self.present.reset_times
         # the references stand for it
         rest = {key: table for key, table in self.flight.topics.items() if key[0] not in GROUND_TRUTH_TOPICS}

@@ -16,13 +16,10 @@ import numpy.typing as npt
 from scipy.stats import rankdata, theilslopes
 
 from fusetune.apply.fleet.flights import OF_FLIGHT, FigureName, FleetFlight, FleetTable
+from fusetune.apply.fleet.levels import FEWEST_A_SIDE, LEVEL
 
 Array = npt.NDArray[np.float64]
 
-LEVEL = 0.05
-"""Chance that anything is named at all in a fleet in which nothing changes, for steps and for drifts each."""
-FEWEST_A_SIDE = 3
-"""A change shows in so many flights before and after; of fewer it is an outlier."""
 SHUFFLES = 1999
 _PER_FLIGHTS = 10
 

@@ -13,13 +13,10 @@ from scipy.stats import false_discovery_control, t
 
 from fusetune.apply.fleet.distribution import robust_scale
 from fusetune.apply.fleet.flights import OF_FLIGHT, SEVERITIES, FleetTable
+from fusetune.apply.fleet.levels import FALSE_SHARE, FEWEST_FLIGHTS
 
-FEWEST_FLIGHTS = 10
-"""Of fewer flights the spread is too little known for one of them to stand out."""
 SMALLEST_Z = 3.5
 """From here on Iglewicz and Hoaglin (How to detect and handle outliers, 1993) label a value; chance asks for more."""
-FALSE_SHARE = 0.05
-"""Of what is named, at most so much is chance."""
 
 MOST_ALIKE = 0.2
 """Of a vehicle's flights, as many may be unlike the others in a figure; more are a kind of their own."""

@@ -25,11 +25,15 @@ from fusetune.ekf2.replay.recording import (
     IS_FULL,
     IS_GAP,
     IS_SCORING,
+    IS_TRACED,
+    SCORING,
+    TRACED,
     RecordArrays,
     Recording,
     RecordRoom,
     allocate_records,
     copied,
+    copied_bytes,
     joined,
     new_recorder,
     views_of,
@@ -40,6 +44,8 @@ from fusetune.px4.flight import ParameterChange
 from fusetune.px4.layouts.logged_state import LoggedState
 
 RUNS_PER_STRETCH = 8192
+
+_MODES = {FULL: IS_FULL, SCORING: IS_SCORING, TRACED: IS_TRACED}
 
 
 class PlannedGap(NamedTuple):
@@ -64,7 +70,7 @@ class Course:
     ):
         self.inputs, self.changes, self.handovers = inputs, changes, handovers
         self.notes = notes_of(params[0], changes)
-        self.mode = IS_FULL if recording is FULL else IS_SCORING
+        self.mode = _MODES[recording]
         self._main = _estimator(zeros_on_cache_lines(EKF), params, new_recorder(self.mode))
         self._branch = self._main
 
@@ -102,7 +108,7 @@ class Course:
         self.schedule = schedule
         for begin, end in self.stretches(0, 1):
             self.advance(begin, end)
-        fresh = self.ekf.copy()
+        fresh = copied_bytes(self.ekf)
         for begin, end in self.stretches(1, run):
             self.advance(begin, end)
         take_over(self.ekf, fresh, self.params[0], self.inputs, state)
@@ -123,7 +129,7 @@ class Course:
         """Another course that starts where this one is."""
         other = copy(self)
         ekf = zeros_on_cache_lines(EKF)
-        ekf[:] = self.ekf
+        ekf.view(np.uint8)[:] = self.ekf.view(np.uint8)
         other._main = other._branch = _estimator(ekf, self.params.copy(), self.recorder.copy())
         return other
 
@@ -180,11 +186,11 @@ class Course:
         found = self._process(start, stop, room, is_last, gaps)
         done = self.recorder[0]
         position = room.local_position[: done["position_rows"]]
-        states = room.scored_states if self.mode == IS_SCORING else room.states
+        states = room.states if self.mode == IS_FULL else room.scored_states
         rows = RecordArrays(
             copied(room.innovations[: done["innovation_rows"]]),
             states[: done["state_rows"]],
-            position if self.mode == IS_FULL else copied(position),
+            copied(position) if self.mode == IS_SCORING else position,
             copied(room.flags[: done["flag_rows"]]),
         )
         return rows, found
@@ -210,7 +216,7 @@ class Course:
             self._main, self._branch, self.inputs.arrays, self.schedule.tables, self.notes, room, planned, gap_room,
             start, stop, is_last,
         )  # fmt: skip
-        return [_gap_rows(gap, gap_room) for gap in planned]
+        return _gap_rows(planned, gap_room)
 
 
 class GapRows(NamedTuple):
@@ -221,10 +227,17 @@ class GapRows(NamedTuple):
     local_position: np.ndarray
 
 
-def _gap_rows(gap: np.void, room: RecordRoom) -> GapRows:
-    innovations = room.innovations[gap["innovations_from"] : gap["innovations_to"]]
-    position = room.local_position[gap["positions_from"] : gap["positions_to"]]
-    return GapRows(int(gap["start_us"]), copied(innovations), copied(position))
+def _gap_rows(gaps: np.ndarray, room: RecordRoom) -> list[GapRows]:
+    if not len(gaps):
+        return []
+    # the rows of one gap follow those of the one before
+    innovations = copied(room.innovations[: gaps[-1]["innovations_to"]])
+    positions = copied(room.local_position[: gaps[-1]["positions_to"]])
+    edges = ("start_us", "innovations_from", "innovations_to", "positions_from", "positions_to")
+    return [
+        GapRows(start_us, innovations[first:stop], positions[begin:end])
+        for start_us, first, stop, begin, end in gaps[[*edges]].tolist()
+    ]
 
 
 def _estimator(ekf: np.ndarray, params: np.ndarray, recorder: np.ndarray) -> Estimator:

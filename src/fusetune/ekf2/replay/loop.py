@@ -103,12 +103,12 @@ def run_estimator(main, branch, inputs, schedule, notes, room, gaps, gap_room, s
     """
     ekf, params = main.ekf[0], main.params[0]
     updates, events = schedule.updates, schedule.events
-    number, last = first_at(updates, start), first_at(updates, stop)
-    event = first_at(events, start)
+    number, last = first_at(updates.run, start), first_at(updates.run, stop)
+    event = first_at(events.run, start)
     if start == 0 and stop > 0:
         event = _handle_events(ekf, params, inputs, schedule, event, 0)
         _switch_on(ekf, params, schedule.lengths[0])
-    place = _first_of_update(schedule.actions, number)
+    place = first_at(schedule.actions.update, number)
     sample, from_run, gap = start, start, 0
     while True:
         while gap < len(gaps) and gaps[gap].first_update == number:
@@ -194,19 +194,6 @@ def _continue_into_gap(main, branch, inputs, schedule, notes, gap, room, place, 
 
 
 @kernel
-def _first_of_update(actions, update):
-    """Index of the first action of an update, or of a later one."""
-    low, high = 0, len(actions)
-    while low < high:
-        middle = (low + high) // 2
-        if actions[middle].update < update:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@kernel
 def _switch_on(ekf, params, lengths):
     ekf.buffers.imu_length = lengths.imu_length
     ekf.buffers.observation_length = lengths.observation_length
@@ -246,7 +233,7 @@ def _set_clock(ekf, inputs, schedule, stop):
     if stop == 0:
         return
     ekf.time_latest_us = inputs.imu[stop - 1].time_us
-    newest = first_at(schedule.intervals, stop) - 1
+    newest = first_at(schedule.intervals.run, stop) - 1
     if newest < 0:
         ekf.time_delayed_us = inputs.imu[0].time_us
         return

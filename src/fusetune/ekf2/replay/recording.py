@@ -157,8 +157,9 @@ RECORDER_MEMORY = np.dtype(
 """What the recorder knows between two updates; `published` holds that of the last three in turn, `sources` a bit for
 each aid source that is recorded."""
 
-IS_FULL, IS_SCORING, IS_GAP = range(3)
-"""What `mode` says: everything is kept, or what scores need, or of that what is told of a gap."""
+IS_FULL, IS_SCORING, IS_GAP, IS_TRACED = range(4)
+"""What `mode` says: everything is kept, or what scores need, or of that what is told of a gap, or scores and all of the
+local position."""
 
 
 class Recording(Enum):
@@ -170,9 +171,11 @@ class Recording(Enum):
     """What scores are made of, the same figures: innovations and flags; of the states SCORED_STATE_ROW; of the local
     position the first and the last row, and around every step of a reset counter the row of the step and the two
     before it."""
+    TRACED = "traced"
+    """As SCORING, but of the local position every row: errors against a reference are told of them."""
 
 
-FULL, SCORING = Recording
+FULL, SCORING, TRACED = Recording
 
 
 class RecordArrays(NamedTuple):
@@ -232,9 +235,9 @@ def new_recorder(mode: int) -> np.ndarray:
 def allocate_records(updates: int, mode: int) -> RecordRoom:
     """Room for as many updates, whatever they publish.
 
-    Rows of states, and in a full recording those of the position, are the caller's. The others lie where the next call
-    of this thread for the same kind of recording puts its own: to ask the system for them anew takes longer than to
-    fill them.
+    Rows of states, and where all are recorded those of the position, are the caller's. The others lie where the next
+    call of this thread for the same kind of recording puts its own: to ask the system for them anew takes longer than
+    to fill them.
     """
     # a step has two rows before it, which may be of the stretch before; the last row may come after a step
     positions = updates + PUBLISHED_KEPT
@@ -242,10 +245,10 @@ def allocate_records(updates: int, mode: int) -> RecordRoom:
         _shared_room(updates * MAX_ROWS_PER_UPDATE, INNOVATION_ROW, mode == IS_GAP),
         _zero_rows(updates if mode == IS_FULL else 0, STATE_ROW),
         _zero_rows(positions, LOCAL_POSITION_ROW)
-        if mode == IS_FULL
+        if mode in (IS_FULL, IS_TRACED)
         else _shared_room(positions, LOCAL_POSITION_ROW, mode == IS_GAP),
         _shared_room(updates, FLAGS_ROW, mode == IS_GAP),
-        _zero_rows(updates if mode == IS_SCORING else 0, SCORED_STATE_ROW),
+        _zero_rows(updates if mode in (IS_SCORING, IS_TRACED) else 0, SCORED_STATE_ROW),
     )
 
 
@@ -263,10 +266,15 @@ def _shared_room(count: int, row: np.dtype, of_gaps: bool) -> np.ndarray:
 
 def copied(rows: np.ndarray) -> np.ndarray:
     """A copy of rows out of the room for them; what lies between their fields, whatever it was, is zero."""
-    whole = joined_rows([rows], rows.dtype)
+    whole = copied_bytes(rows)
     for first, last in _paddings(rows.dtype):
         whole.view(np.uint8).reshape(-1, rows.dtype.itemsize)[:, first:last] = 0
     return whole
+
+
+def copied_bytes(rows: np.ndarray) -> np.ndarray:
+    """A copy of contiguous rows at once, not field by field."""
+    return rows.view(np.uint8).copy().view(rows.dtype)
 
 
 @cache
@@ -326,7 +334,10 @@ def record_update(ekf, params, views, recorder, records, timestamp):
         _record_position(now, recorder, records.local_position)
     else:
         _record_scored_states(ekf, records.scored_states[recorder.state_rows])
-        _record_position_of_steps(recorder, records.local_position)
+        if recorder.mode == IS_TRACED:
+            _record_position(now, recorder, records.local_position)
+        else:
+            _record_position_of_steps(recorder, records.local_position)
     recorder.state_rows += 1
     recorder.diverged |= not _is_finite(ekf)
     _record_flags(views, recorder, records.flags, timestamp)

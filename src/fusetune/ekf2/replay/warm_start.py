@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -75,13 +76,7 @@ def take_over(ekf: np.ndarray, fresh: np.ndarray, params: np.void, inputs: Estim
     params : EKF2_PARAMETERS record that is replayed
     state : of the vehicle; it is carried on to the horizon with the IMU samples in between
     """
-    arrived = ekf.copy()
-    ekf[:] = fresh
-    for name in CARRIED:
-        ekf[name] = arrived[name]
-    for name in ekf["sensors"].dtype.names or ():
-        for part in OF_THE_FILTER:
-            ekf["sensors"][name][part] = fresh["sensors"][name][part]
+    np.copyto(ekf.view(np.uint8), fresh.view(np.uint8), where=_bytes_of_the_filter(ekf.dtype))
     e = ekf[0]
     e["filter_initialised"] = True
     _set_state(e, params, inputs, state)
@@ -94,8 +89,35 @@ def take_over(ekf: np.ndarray, fresh: np.ndarray, params: np.void, inputs: Estim
     _align_output(e)
 
 
+@cache
+def _bytes_of_the_filter(record: np.dtype) -> np.ndarray:
+    """True for the bytes of an EKF record that are the filter's own."""
+    own = np.ones(record.itemsize, np.bool_)
+    for name in CARRIED:
+        own[_bytes_of(record, name)] = False
+    sensors = record["sensors"]
+    for name in sensors.names or ():
+        for part in OF_THE_FILTER:
+            own[_bytes_of(record, "sensors", name, part)] = True
+    return own
+
+
+def _bytes_of(record: np.dtype, *names: str) -> slice:
+    """Where a field of a field … of a record lies."""
+    start = 0
+    for name in names:
+        assert record.fields is not None, "only the last one is a plain value"
+        record, offset = record.fields[name][:2]
+        start += offset
+    return slice(start, start + record.itemsize)
+
+
 def _set_state(e: np.void, params: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
-    q, velocity, position = _carried_on(state, inputs.arrays.imu, int(e["time_delayed_us"]))
+    until = int(e["time_delayed_us"])
+    # the state stays as long as what was made of it, so that its number is no other's
+    _, (q, velocity, position) = inputs.memo.get(
+        ("carried on", id(state), until), lambda: (state, _carried_on(state, inputs.arrays.imu, until))
+    )
     e["q"], e["vel"] = q, velocity
     e["R_to_earth"] = rotation_matrix(q)
     origin = e["origin"]
@@ -148,9 +170,10 @@ def _turned(q: np.ndarray, turn: np.ndarray) -> np.ndarray:
 
 
 def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Product (4,) of two quaternions (w, x, y, z), by vectors; the last bits of `multiply` differ."""
-    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
-    return np.array([p[0] * q[0] - p[1:] @ q[1:], *vector])
+    """Products (…, 4) of a quaternion (w, x, y, z) with others, by vectors; the last bits of `multiply` differ."""
+    scalar = p[0] * q[..., 0] - np.vecdot(p[1:], q[..., 1:])
+    vector = p[0] * q[..., 1:] + q[..., :1] * p[1:] + np.cross(p[1:], q[..., 1:])
+    return np.concatenate([np.expand_dims(scalar, -1), vector], axis=-1)
 
 
 def _set_variances(e: np.void, params: np.void, state: LoggedState) -> None:
@@ -240,7 +263,8 @@ def _set_baro(e: np.void, inputs: EstimatorInputs) -> None:
     if not len(samples):
         e["cs"]["baro_hgt"] = e["cs_prev"]["baro_hgt"] = False
         return
-    height = float(np.interp(int(e["time_delayed_us"]), samples["time_us"], samples["hgt"]))
+    now = int(e["time_delayed_us"])
+    height = inputs.memo.get(("barometer at", now), lambda: float(np.interp(now, samples["time_us"], samples["hgt"])))
     e["baro"]["lpf"] = height
     e["baro"]["counter"] = int(e["buffers"]["observation_length"]) + 1
     e["baro_b_est"]["bias"] = height - e["gpos_alt"]
@@ -254,7 +278,7 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
     mag = e["mag"]
     if e["origin"]["lat_lon_valid"] and knows_field(state):
         place = math.degrees(e["gpos_lat"]), math.degrees(e["gpos_lon"])
-        declination, inclination, strength = field_at(*place)
+        declination, inclination, strength = inputs.memo.get(("field at", place), lambda: field_at(*place))
         mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = declination, inclination, strength
         earth_field_vector.py_func(declination, inclination, strength, mag["wmm_earth_field"])
         mag["wmm_time_last_checked"] = now
@@ -262,7 +286,10 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
         e["mag_I"], e["mag_B"] = state.mag_earth, state.mag_body
     samples = inputs.arrays.mag
     if len(samples):
-        mag["lpf"] = [np.interp(now, samples["time_us"], samples["mag"][:, axis]) for axis in range(3)]
+        mag["lpf"] = inputs.memo.get(
+            ("magnetometer at", now),
+            lambda: [np.interp(now, samples["time_us"], samples["mag"][:, axis]) for axis in range(3)],
+        )
         mag["counter"] = MAG_SAMPLES_SEEN
     mag["flt_mag_align_start_time"] = now
     mag["time_last_check_failing"] = max(now - MAG_HEALTHY_US, 1)
@@ -271,14 +298,13 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
 def _align_output(e: np.void) -> None:
     """Turn and move the output predictor's history so that it agrees with the filter at the horizon."""
     output = e["output"]
-    oldest = output["history"][int(output["tail"])]
+    oldest = output["history"][int(output["tail"])].copy()
     turn = quaternion_product(e["q"], conjugate(oldest["q"]))
     matrix = rotation_matrix(turn / np.linalg.norm(turn))
-    start = oldest["vel"].copy()
-    for i in range(int(output["size"])):
-        sample = output["history"][i]
-        sample["q"] = quaternion_product(turn, sample["q"])
-        sample["vel"] = start + matrix @ (sample["vel"] - start)
+    start = oldest["vel"]
+    samples = output["history"][: int(output["size"])]
+    samples["q"] = quaternion_product(turn, samples["q"])
+    samples["vel"] = start + np.matmul(matrix, (samples["vel"] - start)[..., None])[..., 0]
     output["vel_offset"] = e["vel"] - start
     output["pos_offset"] = -oldest["pos"]
     output["ref_lat"], output["ref_lon"], output["ref_alt"] = e["gpos_lat"], e["gpos_lon"], e["gpos_alt"]

@@ -51,12 +51,12 @@ def value_at(steps, run):
 
 
 @kernel
-def first_at(rows, run):
-    """Index of the first of rows in order of their runs that is at or after a run."""
-    low, high = 0, len(rows)
+def first_at(numbers, number):
+    """Index of the first of ascending numbers, of runs or updates, that is not below one."""
+    low, high = 0, len(numbers)
     while low < high:
         middle = (low + high) // 2
-        if rows[middle].run < run:
+        if numbers[middle] < number:
             low = middle + 1
         else:
             high = middle

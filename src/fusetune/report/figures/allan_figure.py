@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from fusetune.analyze.sensor_noise.allan import KINDS, AllanCurve
-from fusetune.analyze.sensor_noise.allan_fit import NAMES, AllanFigures, freedom_of_mixture, interval
+from fusetune.analyze.sensor_noise.allan import AllanCurve
+from fusetune.analyze.sensor_noise.allan_fit import AllanFigures, freedom_of_mixture, interval
 from fusetune.analyze.sensor_noise.allan_model import FLAT
 from fusetune.analyze.sensor_noise.pooled import PooledSensor
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise
 from fusetune.analyze.sensor_noise.sensor_series import Sensor
 from fusetune.report.figures.drawing import empty_figure, new_figure
+from fusetune.report.sensor_shapes import allan_words
 
 MEASURED_COLOUR, FITTED_COLOUR = "#0072B2", "#D55E00"
 _COLUMNS = 3
-_UNITS: Mapping[str, str] = {"white": "/√Hz", "flicker": "", "walk": "/√s"}
-_SIGNS: Mapping[str, str] = {"white": "N", "flicker": "B", "walk": "K"}
 NOT_STILL = (
     "Nowhere in this log does the vehicle stand still for three seconds: the noise at rest is not known.\n"
     "A log from boot on (SDLOG_MODE 2), with the vehicle left alone before arming, tells it."
 )
 
 
-def draw_allan(noise: SensorNoise) -> Figure:
-    """Of one flight."""
-    return _draw([(one.sensor, one.curve, one.figures) for one in noise.sensors.values()])
+def draw_allan(noise: SensorNoise, columns: int = _COLUMNS) -> Figure:
+    """Of one flight, so many panels side by side."""
+    return _draw([(one.sensor, one.curve, one.figures) for one in noise.sensors.values()], columns)
 
 
 def draw_pooled_allan(pooled: tuple[PooledSensor, ...]) -> Figure:
@@ -37,11 +34,11 @@ def draw_pooled_allan(pooled: tuple[PooledSensor, ...]) -> Figure:
     return _draw([(one.sensor, one.curve, one.figures) for one in pooled if one.curve and one.figures])
 
 
-def _draw(found: list[tuple[Sensor, AllanCurve, AllanFigures]]) -> Figure:
+def _draw(found: list[tuple[Sensor, AllanCurve, AllanFigures]], most: int = _COLUMNS) -> Figure:
     shown = [one for one in found if len(one[1].factors)]
     if not shown:
         return empty_figure(NOT_STILL)
-    columns = min(_COLUMNS, len(shown))
+    columns = min(most, len(shown))
     rows = -(-len(shown) // columns)
     width, height = 3.6 * columns, 3.2 * rows
     figure = new_figure(width, height, layout=None)
@@ -74,18 +71,13 @@ def _curve(axes: Axes, sensor: Sensor, curve: AllanCurve, figures: AllanFigures)
     axes.set_xlabel("averaging time τ [s]")
     axes.set_ylabel(f"Allan deviation [{sensor.unit}]")
     axes.set_title(f"{sensor.label}, longest {curve.longest_s:.0f} s")
-    axes.text(0.04, 0.04, _words(sensor, figures), ha="left", va="bottom", fontsize=6.5, transform=axes.transAxes)
+    axes.text(
+        0.04,
+        0.04,
+        "\n".join(allan_words(sensor, figures)),
+        ha="left",
+        va="bottom",
+        fontsize=6.5,
+        transform=axes.transAxes,
+    )
     axes.legend(loc="upper right", fontsize=7)
-
-
-def _words(sensor: Sensor, figures: AllanFigures) -> str:
-    lines = []
-    for kind in KINDS:
-        figure, unit = figures.of(kind), f"{sensor.unit}{_UNITS[kind]}"
-        if figure.value is not None:
-            lines.append(f"{_SIGNS[kind]} = {figure.value:.3g} ({figure.low:.3g} to {figure.high:.3g}) {unit}")
-        elif figure.high is not None:
-            lines.append(f"{_SIGNS[kind]} not told, at most {figure.high:.2g} {unit}")
-        else:
-            lines.append(f"{NAMES[kind]} not told")
-    return "\n".join(lines)

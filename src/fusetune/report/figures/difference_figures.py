@@ -1,9 +1,9 @@
 """Figures of the comparison with the present set: forest plot, flights by sets, aided against unaided."""
 
 import math
+import textwrap
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 
 from fusetune.apply.evidence import AIDED, UNAIDED
 from fusetune.apply.pareto import pareto_front
+from fusetune.report.change_cells import cell_words, colour_reach
 from fusetune.report.comparison import (
     AIM_LABELS,
     SCORE,
@@ -22,6 +23,7 @@ from fusetune.report.comparison import (
 )
 from fusetune.report.figures.drawing import GOOD_COLOUR, PRESENT_COLOUR, empty_figure, label_sets, minus, new_figure
 from fusetune.report.figures.set_styles import SetStyle, set_styles, status_colour
+from fusetune.report.flight_names import short_names
 from fusetune.report.results import OUT, Results
 
 Limits = tuple[float, float]
@@ -29,6 +31,7 @@ Limits = tuple[float, float]
 NOTHING_TO_COMPARE = "Only the present set was scored: there is nothing to compare."
 
 _ANNOTATED_CELLS = 240
+_TITLE_WIDTH = 18
 _LONGEST_NAME = 30
 
 
@@ -78,7 +81,7 @@ def _forest(axes: Axes, results: Results, aim: str, names: list[str]) -> None:
             _beyond(axes, row, one["change"], left, right)
     axes.axvline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
     axes.set_xlim(left, right)
-    axes.set_title(AIM_LABELS[aim])
+    axes.set_title(textwrap.fill(AIM_LABELS[aim], _TITLE_WIDTH))
 
 
 def _beyond(axes: Axes, row: int, change: float, left: float, right: float) -> None:
@@ -95,14 +98,14 @@ def flights_by_sets(results: Results) -> Figure:
     if changes.empty or not len(changes.columns):
         return empty_figure(NOTHING_TO_COMPARE)
     values = changes.to_numpy()
-    labels = flight_labels([str(name) for name in changes.index])
+    labels = list(short_names(map(str, changes.index)).values())
     numbered = [f"{label}  {i}" for i, label in enumerate(labels, start=1)]
     label_inches = 0.3 + 0.066 * max(map(len, numbered))
     # no narrower than its title
     width = max(label_inches + 1.2 + 0.6 * len(changes.columns), 3.8)
     figure = new_figure(width, max(1.3 + 0.25 * len(numbered), 2.3))
     axes = figure.add_subplot()
-    limit = _colour_limit(values)
+    limit = colour_reach(values)
     image = axes.imshow(values, cmap="PuOr_r", vmin=-limit, vmax=limit, aspect="auto")
     names = [shortened(name) for name in changes.columns]
     axes.set_xticks(range(len(names)), names, rotation=35, ha="right", rotation_mode="anchor")
@@ -111,28 +114,13 @@ def flights_by_sets(results: Results) -> Figure:
     if values.size <= _ANNOTATED_CELLS:
         for (row, column), value in np.ndenumerate(values):
             colour = "white" if abs(value) > 0.7 * limit else "black"
-            axes.text(column, row, _percent_text(value), ha="center", va="center", fontsize=7, color=colour)
+            axes.text(column, row, cell_words(value), ha="center", va="center", fontsize=7, color=colour)
     beyond = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
         (bool(np.nanmin(values) < -limit), bool(np.nanmax(values) > limit)), "neither"
     )
-    figure.colorbar(image, ax=axes, label="change of the prediction error [%]", extend=beyond)
+    figure.colorbar(image, ax=axes, label="change [%]", extend=beyond)
     figure.suptitle("Per flight against the present set; below 0 is better", fontsize=9, x=0.01, ha="left")
     return figure
-
-
-def _colour_limit(values: npt.NDArray[np.float64]) -> float:
-    """Reach of the colours: a hopeless set takes the end of the scale and leaves the others theirs."""
-    typical = np.nanmedian(np.abs(values), axis=0)
-    shown = np.abs(values)[:, typical <= 3.0 * max(float(np.nanmedian(typical)), 0.3)]
-    return max(float(np.nanquantile(shown, 0.9)), 1.0)
-
-
-def _percent_text(value: float) -> str:
-    if math.isnan(value):
-        return "–"
-    if value == 0.0:
-        return "="
-    return minus(f"{value:+.0f}" if abs(value) >= 9.5 else f"{value:+.1f}")
 
 
 def pareto(results: Results) -> Figure:
@@ -198,13 +186,3 @@ def shortened(name: str, longest: int = _LONGEST_NAME) -> str:
         return name
     head = (longest - 1) // 3
     return f"{name[:head]}…{name[-(longest - 1 - head) :]}"
-
-
-def flight_labels(names: list[str]) -> list[str]:
-    """Names of flights without the beginning that they share, where they are long."""
-    if max(map(len, names)) <= _LONGEST_NAME:
-        return names
-    # What the first and the last in alphabetical order share, all between them share.
-    first, last = min(names), max(names)
-    shared = next((i for i, pair in enumerate(zip(first, last, strict=False)) if pair[0] != pair[1]), 0)
-    return [shortened(f"…{name[shared:]}" if shared > 3 else name) for name in names]

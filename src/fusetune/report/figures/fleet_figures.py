@@ -1,4 +1,4 @@
-"""Figures of a fleet: each over the flights in the order of time, and what its histogram shows."""
+"""Figures of a fleet: each over the flights in the order of time."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ from matplotlib.ticker import MaxNLocator
 from fusetune.apply.fleet.flights import SEVERITIES, FleetTable
 from fusetune.report.figure_words import figure_words
 from fusetune.report.figures.drawing import decades, label_margins, new_figure
-from fusetune.report.figures.histogram_panels import LIMIT_COLOUR, HistogramPanel
+from fusetune.report.fleet.shown_figures import is_within_reach
 from fusetune.report.severity_words import SEVERITY_COLOURS
 
 Array = npt.NDArray[np.float64]
 
 _OTHERS_COLOUR = "#8F9BA8"
+_LIMIT_COLOUR = "#CC0000"
 _COLUMNS = 3
 _PANEL_INCH = (3.35, 1.75)
 _TITLE_WIDTH = 52
 _MARKED = ("fail", "warning")
 _DECADES = 50.0
-_WITHIN_REACH = 4.0
-"""A limit that is so many times farther than the largest value would flatten all, and is left out."""
 
 
 def draw_trends(table: FleetTable, columns: Sequence[int], changes: Sequence[Mapping[str, Any]]) -> Figure:
@@ -55,8 +54,8 @@ def draw_trends(table: FleetTable, columns: Sequence[int], changes: Sequence[Map
             axes.plot(np.flatnonzero(beyond), values[beyond], "o", markerfacecolor="none", markersize=7,
                       markeredgecolor=SEVERITY_COLOURS[severity], markeredgewidth=1.2)  # fmt: skip
         _steps(axes, table, rows, column, [one for one in changes if (one["id"], one["unit"]) == (name.id, name.unit)])
-        if name.limit is not None and _is_within_reach(name.limit, values):
-            axes.axhline(name.limit, color=LIMIT_COLOUR, linewidth=0.9, linestyle="--")
+        if name.limit is not None and is_within_reach(name.limit, values):
+            axes.axhline(name.limit, color=_LIMIT_COLOUR, linewidth=0.9, linestyle="--")
         axes.set_xlim(-0.6, rows.size - 0.4)
         axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
         if _spans_decades(values):
@@ -106,27 +105,6 @@ def _steps(
             axes.plot([start - 0.4, stop - 0.6], [median, median], color="#222222", linewidth=1.3)
         for edge in edges:
             axes.axvline(edge - 0.5, color="#222222", linewidth=0.8, linestyle=":")
-
-
-def histogram_panel(one: Mapping[str, Any]) -> HistogramPanel:
-    """A figure of `fleet.json`: counts, median, middle 90 %, limit, and how many lie beyond the bins."""
-    found, spread = one["histogram"], one["distribution"]
-    beyond = [f"{found[side]} {side}" for side in ("below", "above") if found[side]]
-    reachable = _is_within_reach(one["limit"], np.array([found["edges"][0], found["edges"][-1]]))
-    return HistogramPanel(
-        title=_title(one["id"], one["unit"]),
-        edges=found["edges"],
-        counts=found["counts"],
-        usual=(spread["p05"], spread["p95"]),
-        median=spread["median"],
-        limit=one["limit"] if reachable else None,
-        note=f"{spread['n']} flights" + "".join(f", {words}" for words in beyond),
-    )
-
-
-def _is_within_reach(limit: float | None, values: Array) -> bool:
-    known = values[np.isfinite(values)]
-    return limit is not None and known.size > 0 and abs(limit) <= _WITHIN_REACH * max(float(np.abs(known).max()), 1e-12)
 
 
 def _title(figure: str, unit: str) -> str:

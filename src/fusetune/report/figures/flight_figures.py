@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from fusetune.analyze.flight.ground_truth import Truth, read_truth
 from fusetune.analyze.flight_files import SAMPLES_FILE, SCORING_FILE
@@ -22,10 +23,8 @@ from fusetune.report.figures.drawing import (
     decades,
     drawn_rows,
     empty_figure,
-    figure_style,
     label_margins,
     new_figure,
-    save_png,
     set_colours,
     set_title,
 )
@@ -81,37 +80,32 @@ def _reported_samples(folder: Path, name: str, parameters: Mapping[str, float]) 
     return {key: whole[key] for key in whole if key[0] in SOURCES}
 
 
-def plot_flight(
-    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str], output: AnyPath, *, present: str = PRESENT
-) -> None:
-    """Draw one flight as a PNG.
+def overview_figure(
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str], *, present: str = PRESENT
+) -> Figure:
+    """Draw one flight.
 
     Parameters
     ----------
     flight_folder : `results/save/<flight>`
     analyze_folder : `results/analyze/<flight>` with the replay of the present set, `scoring.json` and `samples.parquet`
     sets : names of the sets; the present one and the first seven others are drawn, these where they are scored
-    output : the picture
     """
-    output = Path(output)
-    output.parent.mkdir(parents=True, exist_ok=True)
     data = _FlightData(Path(flight_folder), Path(analyze_folder), sets, present)
-    with figure_style():
-        if present not in data.sets:
-            reason = data.summary["sets"][present]["reason"]
-            save_png(empty_figure(f"The replay of the present set did not come to its end: {reason}"), output)
-            return
-        figure = new_figure(10.0, 6.8, layout=None)
-        margins = {"left": 0.06, "right": 0.985, "bottom": 0.07, "top": 0.965, "hspace": 0.42, "wspace": 0.24}
-        grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25), **margins)
-        colours = set_colours(data.sets, present)
-        _track(figure.add_subplot(grid[0:2, 0]), data)
-        _height(figure.add_subplot(grid[2, 0]), data)
-        first = figure.add_subplot(grid[0, 1])
-        _ratios_by_source(first, data)
-        _ratios_by_set(figure.add_subplot(grid[1, 1], sharex=first), data, colours)
-        _breaks(figure.add_subplot(grid[2, 1], sharex=first), data, colours)
-        save_png(figure, output)
+    if present not in data.sets:
+        reason = data.summary["sets"][present]["reason"]
+        return empty_figure(f"The replay of the present set did not come to its end: {reason}")
+    figure = new_figure(10.0, 6.8, layout=None)
+    margins = {"left": 0.06, "right": 0.985, "bottom": 0.07, "top": 0.965, "hspace": 0.42, "wspace": 0.24}
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25), **margins)
+    colours = set_colours(data.sets, present)
+    _track(figure.add_subplot(grid[0:2, 0]), data)
+    _height(figure.add_subplot(grid[2, 0]), data)
+    first = figure.add_subplot(grid[0, 1])
+    _ratios_by_source(first, data)
+    _ratios_by_set(figure.add_subplot(grid[1, 1], sharex=first), data, colours)
+    _breaks(figure.add_subplot(grid[2, 1], sharex=first), data, colours)
+    return figure
 
 
 def _track(axes: Axes, data: _FlightData) -> None:

@@ -61,7 +61,8 @@ def _largest(axes: Sequence[Ratios], since: int = 0) -> Ratios:
     """Of those at one time."""
     times, places = np.unique(np.concatenate([time for time, _ in axes]), return_inverse=True)
     ratios = np.full(times.size, SMALLEST_RATIO)
-    np.maximum.at(ratios, places, np.concatenate([ratio for _, ratio in axes]).astype(np.float64))
+    with np.errstate(invalid="ignore"):
+        np.maximum.at(ratios, places, np.concatenate([ratio for _, ratio in axes]).astype(np.float64))
     return times[times >= since], ratios[times >= since]
 
 

@@ -1,6 +1,5 @@
 """Figures of the innovations over all flights: RMS, box plots, consistency with both bounds, fusion breaks."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,18 +8,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from fusetune.analyze.metrics import break_rate
 from fusetune.analyze.metrics.break_rate import clopper_pearson
-from fusetune.apply.paper_mode import PAPER_VARIABLES
-from fusetune.px4.aid_sources import AID_SOURCES, AXES, REPORTED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.report.figures.drawing import PRESENT_COLOUR, empty_figure, label_sets, new_figure, panel_grid
-from fusetune.report.figures.set_styles import status_colour
+from fusetune.report.figures.set_styles import set_styles, status_colour
+from fusetune.report.innovation_tables import (
+    BREAK_METRICS,
+    CONSISTENT_WHISKER,
+    box_figures,
+    break_sources,
+    consistency_rows,
+    pooled_breaks,
+    rms_table,
+)
 from fusetune.report.results import PooledSamples, Results, figure_values
 
-_CONSISTENCY_GROUPS = tuple((source.name, source.groups[-1][0]) for source in REPORTED_SOURCES)
-_BREAK_METRICS = {metric.name: metric.label for metric in break_rate.METRICS}
 _BREAK_STYLES = (("#56B4E9", -0.22), ("#E69F00", 0.0), ("#D55E00", 0.22))
-_WHISKERS = (5.0, 25.0, 50.0, 75.0, 95.0)
 
 
 def rms_by_variable(results: Results) -> Figure:
@@ -32,13 +35,14 @@ def rms_by_variable(results: Results) -> Figure:
         return empty_figure("No GNSS, height or magnetometer innovations were scored.")
     figure = new_figure(7.2, 0.9 + 0.36 * len(shown) + 0.14 * (len(results.shown) // 4))
     axes = figure.add_subplot()
-    markers = "osD^vP*Xd<>hp"
+    styles = set_styles(results)
     others = [name for name in table.columns if name != results.present]
     offsets = np.linspace(-0.25, 0.25, max(len(others), 1))
     for i, name in enumerate(others):
         ratio = 100.0 * (table.loc[shown, name] / base[shown] - 1.0)
         rows = np.arange(len(shown)) + offsets[i]
-        axes.plot(ratio, rows, markers[i % len(markers)], markersize=4, label=name, alpha=0.9)
+        look = styles[name]
+        axes.plot(ratio, rows, look.marker, color=look.colour, markersize=4, label=name, alpha=0.9)
     axes.axvline(0.0, color=PRESENT_COLOUR, linewidth=1.0)
     label_sets(axes, shown)
     axes.set_xscale("symlog", linthresh=20.0)
@@ -49,20 +53,6 @@ def rms_by_variable(results: Results) -> Figure:
     if others:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
-
-
-def rms_table(results: Results) -> pd.DataFrame:
-    """RMS innovation by variable (rows, names of the paper's table 12) and set (columns), mean over flights."""
-    columns = {}
-    for name in results.shown:
-        column = {}
-        for variable, places in PAPER_VARIABLES.items():
-            values = [figure_values(results, *place, "rms_innovation") for place in places]
-            found = [rows.loc[rows["set"] == name, "value"] for rows in values]
-            known = next((rows for rows in found if len(rows)), None)
-            column[variable] = math.nan if known is None else float(known.mean())
-        columns[name] = column
-    return pd.DataFrame(columns, index=list(PAPER_VARIABLES))
 
 
 def boxes(results: Results, pooled: Sequence[PooledSamples], *, normalised: bool) -> Figure:
@@ -78,11 +68,11 @@ def boxes(results: Results, pooled: Sequence[PooledSamples], *, normalised: bool
 
 
 def _boxes(axes: Axes, samples: PooledSamples, results: Results, normalised: bool) -> None:
-    values = samples.normalised if normalised else samples.innovation
+    found = box_figures(samples, results.shown, normalised=normalised)
     vetoed = {name for name in results.shown if results.is_ruled_out(name)}
-    rows = np.array([row for row, name in enumerate(results.shown) if name in values])
+    rows = np.array([row for row, name in enumerate(results.shown) if name in found])
     names = [results.shown[row] for row in rows]
-    low, q1, median, q3, high = np.array([np.percentile(values[name], _WHISKERS) for name in names]).T
+    low, q1, median, q3, high = np.array(list(found.values())).T
     colours = [status_colour(results, name) for name in names]
     axes.hlines(rows, low, high, color=colours, linewidth=1.0)
     boxes = axes.barh(rows, q3 - q1, left=q1, height=0.6, color=colours, edgecolor=colours, linewidth=0.8)
@@ -94,9 +84,9 @@ def _boxes(axes: Axes, samples: PooledSamples, results: Results, normalised: boo
     reach = float(max(0.0, q3.max(), -q1.min(), *high[kept], *-low[kept]))
     axes.axvline(0.0, color="#888888", linewidth=0.6)
     if normalised:
-        for limit in (-1.64, 1.64):
+        for limit in (-CONSISTENT_WHISKER, CONSISTENT_WHISKER):
             axes.axvline(limit, color="#009E73", linewidth=0.8, linestyle="--")
-        reach = max(reach, 1.64)
+        reach = max(reach, CONSISTENT_WHISKER)
         axes.set_xlabel("ν / √S [–]")
     else:
         axes.set_xlabel(f"innovation [{AID_SOURCES[samples.source].unit}]")
@@ -106,11 +96,7 @@ def _boxes(axes: Axes, samples: PooledSamples, results: Results, normalised: boo
 
 def consistency(results: Results) -> Figure:
     """Mean NIS per flight and set, divided by its expectation, with the χ² bounds of both kinds."""
-    groups = []
-    for source, axis in _CONSISTENCY_GROUPS:
-        rows = figure_values(results, source, axis, "mean_nis_effective")
-        if len(rows):
-            groups.append((source, axis, rows))
+    groups = consistency_rows(results)
     if not groups:
         return empty_figure("No aid source has enough samples for a consistency check.")
     title = "Mean NIS / expectation, a dot per flight (filled: inside its bounds); left: too cautious, right: too sure"
@@ -153,7 +139,7 @@ def _plain_log_ticks(axes: Axes) -> None:
 
 def breaks(results: Results) -> Figure:
     """Fusion break rates at 3 σ, 5 σ and the gate per source and set, all flights together, with intervals."""
-    sources = [name for name, _ in _CONSISTENCY_GROUPS if len(figure_values(results, name, "x", "break_rate_gate"))]
+    sources = break_sources(results)
     if not sources:
         return empty_figure("No fusion breaks could be counted.")
     confidence = results.decision["rule"]["confidence"]
@@ -168,8 +154,8 @@ def breaks(results: Results) -> Figure:
 
 def _break_panel(axes: Axes, results: Results, source: str) -> None:
     confidence = results.decision["rule"]["confidence"]
-    for (metric, label), (colour, offset) in zip(_BREAK_METRICS.items(), _BREAK_STYLES, strict=True):
-        pooled = _pooled_breaks(results, source, metric)
+    for (metric, label), (colour, offset) in zip(BREAK_METRICS.items(), _BREAK_STYLES, strict=True):
+        pooled = pooled_breaks(results, source, metric)
         bounds = [(row + offset, clopper_pearson(*pooled[name], confidence))
                   for row, name in enumerate(results.shown) if name in pooled]  # fmt: skip
         rows = [row for row, _ in bounds]
@@ -185,12 +171,3 @@ def _break_panel(axes: Axes, results: Results, source: str) -> None:
     axes.minorticks_off()
     axes.set_title(AID_SOURCES[source].label)
     axes.set_xlabel("samples beyond the limit [%]")
-
-
-def _pooled_breaks(results: Results, source: str, metric: str) -> dict[str, tuple[int, int]]:
-    """Breaks and samples by set over all axes and flights."""
-    axes = AXES[: AID_SOURCES[source].axes]
-    rows = pd.concat([figure_values(results, source, axis, metric) for axis in axes])
-    counts = (rows["value"] * rows["n"]).groupby(rows["set"], observed=True).sum()
-    samples = rows["n"].groupby(rows["set"], observed=True).sum()
-    return {str(name): (round(counts[name]), round(samples[name])) for name in samples.index}

@@ -11,22 +11,25 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.stats import norm
 
-from fusetune.analyze.flight.intervals import Interval
 from fusetune.analyze.sensor_noise.distribution import (
-    BEYOND_3_SIGMA,
     HISTOGRAM_EDGES,
     OUTLIER,
     QUANTILES,
     Distribution,
-    deviations,
-    outlying,
-    standardised,
 )
 from fusetune.analyze.sensor_noise.pooled import PooledSensor
 from fusetune.analyze.sensor_noise.sensor_character import SensorCharacter
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise
 from fusetune.analyze.sensor_noise.sensor_series import SensorName
 from fusetune.report.figures.drawing import new_figure
+from fusetune.report.sensor_shapes import (
+    beyond_words,
+    envelope_rows,
+    interval_seconds,
+    normal_quantiles,
+    outliers,
+    standardised_deviations,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -34,7 +37,6 @@ AXIS_COLOURS = ("#0072B2", "#D55E00", "#009E73")
 REST_COLOUR, FLIGHT_COLOUR = "#009E73", "#56B4E9"
 OUTLIER_COLOUR = "#CC0000"
 _MOST_POINTS = 3000
-_QUANTILE_POINTS = 400
 
 
 def draw_sensor(noise: SensorNoise, name: SensorName) -> Figure:
@@ -99,44 +101,18 @@ def _sequence(axes: Axes, noise: SensorNoise, character: SensorCharacter, row: i
     time = (series.time - noise.start_timestamp) * 1e-6
     values = series.values[:, row]
     for start, stop in noise.still:
-        axes.axvspan(*_seconds(noise, (start, stop)), color=REST_COLOUR, alpha=0.15, linewidth=0.0)
+        axes.axvspan(*interval_seconds(noise, (start, stop)), color=REST_COLOUR, alpha=0.15, linewidth=0.0)
     for start, stop in noise.airborne:
-        axes.axvspan(*_seconds(noise, (start, stop)), color=FLIGHT_COLOUR, alpha=0.12, linewidth=0.0)
-    shown = _envelope(values)
+        axes.axvspan(*interval_seconds(noise, (start, stop)), color=FLIGHT_COLOUR, alpha=0.12, linewidth=0.0)
+    shown = envelope_rows(values, _MOST_POINTS)
     axes.plot(time[shown], values[shown], color=AXIS_COLOURS[row], linewidth=0.6)
-    wild = _outliers(noise, character)[:, row]
+    wild = outliers(noise, character)[:, row]
     axes.plot(time[wild], values[wild], "x", color=OUTLIER_COLOUR, markersize=4.0, markeredgewidth=0.9)
     if wild.any():
         words = f"{wild.sum()} outlier{'s' if wild.sum() > 1 else ''} (×)"
         axes.text(0.995, 0.93, words, ha="right", va="top", transform=axes.transAxes, fontsize=7)
     axes.set_ylabel(f"{character.sensor.axes[row]} [{character.sensor.unit}]")
     axes.margins(x=0.01)
-
-
-def _seconds(noise: SensorNoise, interval: Interval) -> tuple[float, float]:
-    return (interval[0] - noise.start_timestamp) * 1e-6, (interval[1] - noise.start_timestamp) * 1e-6
-
-
-def _envelope(values: Array) -> npt.NDArray[np.int64]:
-    """Rows to draw: of each of up to 1500 parts the smallest and the largest value."""
-    parts = _MOST_POINTS // 2
-    if len(values) <= _MOST_POINTS:
-        return np.arange(len(values))
-    size = len(values) // parts
-    folded = values[: parts * size].reshape(parts, size)
-    first = np.arange(parts) * size
-    return np.unique(np.concatenate([first + folded.argmin(axis=1), first + folded.argmax(axis=1)]))
-
-
-def _outliers(noise: SensorNoise, character: SensorCharacter) -> npt.NDArray[np.bool_]:
-    """(N, axes): at rest and in flight each by its own spread."""
-    series = character.series
-    found = np.zeros(series.values.shape, np.bool_)
-    for intervals in (noise.still, noise.airborne):
-        rows = np.flatnonzero(series.inside(intervals))
-        if len(rows):
-            found[rows] = outlying(deviations(series.values[rows]))
-    return found
 
 
 def _boxes(axes: Axes, character: SensorCharacter) -> None:
@@ -207,21 +183,15 @@ def _histogram(axes: Axes, counts: dict[str, Array]) -> None:
 
 def _normality(axes: Axes, noise: SensorNoise, character: SensorCharacter) -> None:
     """Quantiles against those of a normal distribution, and how many times more samples lie beyond three sigma."""
-    said = []
+    said: list[str] = []
     for label, intervals, parts, colour in (
         ("at rest", noise.still, character.at_rest, REST_COLOUR),
         ("in flight", noise.airborne, character.in_flight, FLIGHT_COLOUR),
     ):
         if not parts:
             continue
-        scaled = _standardised(character, intervals)
-        share = np.unique(
-            np.concatenate([np.linspace(0.0, 1.0, _QUANTILE_POINTS), norm.cdf(np.linspace(-4.0, 4.0, 60))])
-        )
-        share = share[(share > 0.5 / len(scaled)) & (share < 1.0 - 0.5 / len(scaled))]
-        axes.plot(norm.ppf(share), np.quantile(scaled, share), color=colour, linewidth=1.3)
-        beyond = np.mean([one.beyond_3_sigma for one in parts]) / BEYOND_3_SIGMA
-        said.append(f"{label}: beyond 3σ\n{beyond:.1f} × normal")
+        axes.plot(*normal_quantiles(standardised_deviations(character, intervals)), color=colour, linewidth=1.3)
+        said += beyond_words(label, parts)
     axes.plot([-4.0, 4.0], [-4.0, 4.0], color="#222222", linewidth=0.8, linestyle="--")
     axes.text(0.04, 0.96, "\n".join(said), ha="left", va="top", fontsize=7, transform=axes.transAxes)
     axes.set_xlim(-4.2, 4.2)
@@ -229,11 +199,3 @@ def _normality(axes: Axes, noise: SensorNoise, character: SensorCharacter) -> No
     axes.set_xlabel("normal quantile")
     axes.set_ylabel("sample quantile")
     axes.set_title("Normality")
-
-
-def _standardised(character: SensorCharacter, intervals: Sequence[Interval]) -> Array:
-    """Deviations of all axes, each by its own robust standard deviation."""
-    series = character.series
-    pieces = series.pieces(intervals, 5.0 * series.step_s)
-    deviation = np.concatenate([deviations(one)[2:-2] for one in pieces])
-    return standardised(deviation).ravel()

@@ -1,11 +1,26 @@
 """How a set looks in every figure: by its part in the decision, or by a colour and marker of its own."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fusetune.report.figures.drawing import CANDIDATE_COLOUR, CHOSEN_COLOUR, PRESENT_COLOUR, VETOED_COLOUR, set_colours
+from fusetune.report.figures.drawing import CANDIDATE_COLOUR, CHOSEN_COLOUR, PRESENT_COLOUR, VETOED_COLOUR
 from fusetune.report.results import Results
 
-_MARKERS = "osD^vP*X"
+PRINT_COLOURS = ("#17202a", "#0072b2", "#d55e00", "#009e73", "#b85a8d", "#c27c00", "#2f8fc9", "#8f8300")
+"""Of Okabe and Ito, dark enough for paper, by the number that a set's look has (`fusetune.report.set_styles`)."""
+
+MATPLOTLIB_MARKERS: Mapping[str, str] = {
+    "circle": "o",
+    "square": "s",
+    "diamond": "D",
+    "triangle": "^",
+    "down": "v",
+    "plus": "P",
+    "cross": "X",
+    "star": "*",
+}
 
 
 @dataclass(frozen=True)
@@ -27,10 +42,13 @@ def status_colour(results: Results, name: str) -> str:
 
 
 def set_styles(results: Results) -> dict[str, SetStyle]:
-    """A look for each shown set that it keeps in all figures; colours come again with another marker."""
-    colours = set_colours(results.shown, results.present)
-    styles = {results.present: SetStyle(PRESENT_COLOUR, "o", 2.4)}
-    for index, name in enumerate((name for name in results.shown if name != results.present), start=1):
-        width = 2.0 if name == results.decision["chosen"] else 1.1
-        styles[name] = SetStyle(colours[name], _MARKERS[index % len(_MARKERS)], width)
-    return styles
+    """The look of each shown set, the same as on the pages."""
+    widths = {results.decision["chosen"]: 2.0} | {results.present: 2.4}
+    return {
+        name: SetStyle(
+            PRINT_COLOURS[results.styles[name].index],
+            MATPLOTLIB_MARKERS[results.styles[name].marker],
+            widths.get(name, 1.1),
+        )
+        for name in results.shown
+    }

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fusetune.analyze.sensor_noise.motor_harmonics import MotorTone
 from fusetune.analyze.sensor_noise.sensor_character import SensorCharacter
 from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise
 from fusetune.analyze.sensor_noise.spectrum import LOWEST_TONE_HZ
 from fusetune.report.figures.drawing import empty_figure, new_figure
 from fusetune.report.figures.sensor_figures import FLIGHT_COLOUR, REST_COLOUR
+from fusetune.report.sensor_shapes import tone_words, vibration_title
 
 _MOST_TONES = 4
+_TITLE_WIDTH = 34
 
 
 def draw_spectra(noise: SensorNoise) -> Figure:
@@ -46,7 +49,7 @@ def _spectrum(axes: Axes, character: SensorCharacter) -> None:
             place = int(np.argmin(np.abs(flight.frequency_hz - one.tone.frequency_hz)))
             around = level[max(place - 3, 0) : place + 4].max()
             axes.annotate(
-                _words(one),
+                "\n".join(tone_words(one)),
                 (one.tone.frequency_hz, around),
                 xytext=(0, 6),
                 textcoords="offset points",
@@ -61,20 +64,5 @@ def _spectrum(axes: Axes, character: SensorCharacter) -> None:
     axes.margins(y=0.15)
     axes.set_xlabel("frequency [Hz] (grey: motion)")
     axes.set_ylabel(f"density, axes together [{unit}/√Hz]")
-    axes.set_title(_title(character))
+    axes.set_title(textwrap.fill(vibration_title(character), _TITLE_WIDTH, break_on_hyphens=False))
     axes.legend(loc="lower left", fontsize=7)
-
-
-def _words(one: MotorTone) -> str:
-    words = f"{one.tone.frequency_hz:.0f} Hz"
-    if one.multiple:
-        words += f"\n{one.multiple} ×"
-    return words + ("\nfolded" if one.folded else "")
-
-
-def _title(character: SensorCharacter) -> str:
-    vibration = character.vibration
-    if vibration is None or vibration.ratio is None:
-        return character.sensor.label
-    limited = ", vibration-limited" if vibration.limited else ""
-    return f"{character.sensor.label}: {vibration.ratio:.1f} × in flight{limited}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from fusetune.px4.aid_sources import AID_SOURCES, MEASURED_SOURCES
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.report.figures.drawing import decades, drawn_rows, label_margins, new_figure, set_title
+from fusetune.report.finding_bars import Bar
 from fusetune.report.severity_words import SEVERITY_COLOURS
 
 AID_TOPICS = tuple(source.topic for source in MEASURED_SOURCES.values())
@@ -43,17 +43,6 @@ _LANE_INCH = 0.2
 _FEW = 2
 """An estimator of which the log holds so many times more samples than of the primary one is drawn instead."""
 _SHADED = ("fail", "warning")
-
-
-@dataclass(frozen=True)
-class Bar:
-    """A finding over time, s from the start of the log."""
-
-    words: str
-    severity: str
-    since_s: float
-    until_s: float
-    is_cause: bool = True
 
 
 def draw_timeline(logged: Flight, bars: Sequence[Bar]) -> Figure:

@@ -9,20 +9,25 @@ from html import escape
 from typing import Any
 
 from fusetune.report.counted import count_words
-from fusetune.report.flight_page.flight_results import Document, FlightResults
 from fusetune.report.flight_page.measured_words import figure_in_words
-from fusetune.report.markup import bullets, number, paragraph, section, severity_mark
+from fusetune.report.flight_results import Document, FlightResults
+from fusetune.report.markup import bullets, details, number, paragraph, section, severity_mark
 from fusetune.report.severity_words import SEVERITY_WORDS, FlightTimes, confidence_words, worst_of
 
 _NAMED_ROWS = 3
 
 
-def answer_section(results: FlightResults) -> str:
-    """The answer in a box: the cause that explains most, when, how sure, what to do."""
+def answer_section(results: FlightResults, is_shown: bool = False) -> str:
+    """The answer in a box: the cause that explains most, when, how sure, what to do.
+
+    Parameters
+    ----------
+    is_shown : whether the flight over time stands on the page, so that causes lead to where they hold
+    """
     if not results.is_readable:
         return _box("warning", "This log cannot be read", _refusals(results, "Nothing can be told of the flight:"))
     if results.diagnoses:
-        return _found(results)
+        return _found(results, is_shown)
     if results.problems:
         return _unexplained(results)
     if results.refusals:
@@ -33,10 +38,10 @@ def answer_section(results: FlightResults) -> str:
     return _box("pass", title, paragraph(text + "stands at the end of the health table."))
 
 
-def _found(results: FlightResults) -> str:
+def _found(results: FlightResults, is_shown: bool) -> str:
     first, *others = results.diagnoses
     severity = worst_of(list(results.diagnoses))
-    facts = _facts(first, results.times) + _what_to_do(first)
+    facts = _facts(first, results.times, is_shown) + _what_to_do(first)
     also = ""
     if others:
         also = "<p>Also: " + "; ".join(_heading(one) for one in others) + ".</p>"
@@ -92,42 +97,50 @@ def _heading(diagnosis: Document) -> str:
     return f"{escape(diagnosis['cause'].strip().rstrip('.'))} {severity_mark(severity, SEVERITY_WORDS[severity])}"
 
 
-def causes_section(results: FlightResults) -> str:
+def causes_section(results: FlightResults, is_shown: bool = False) -> str:
     """Each cause: what was seen, what the replay showed, values; empty where there is none."""
     if not results.diagnoses:
         return ""
     order = "What explains most of the trouble stands first." if len(results.diagnoses) > 1 else ""
-    parts = [_cause(one, results.times, is_told=place == 0) for place, one in enumerate(results.diagnoses)]
-    return section("Why", paragraph(order, "note") if order else "", *parts)
+    parts = [_cause(one, results.times, place == 0, is_shown) for place, one in enumerate(results.diagnoses)]
+    causes = f'<div class="causes">{"".join(parts)}</div>'
+    return section("Why", paragraph(order, "note") if order else "", causes, id="why")
 
 
-def _cause(diagnosis: Document, times: FlightTimes, is_told: bool) -> str:
+def _cause(diagnosis: Document, times: FlightTimes, is_told: bool, is_shown: bool) -> str:
     """One cause; when, how sure and what to do are left out where the head of the page has told them."""
     seen = [one for one in diagnosis["evidence"] if one["origin"] != "replay"]
     replayed = [one for one in diagnosis["evidence"] if one["origin"] == "replay"]
     tried = diagnosis.get("experiment")
     parts = [
-        "" if is_told else _facts(diagnosis, times),
+        "" if is_told else _facts(diagnosis, times, is_shown) + _what_to_do(diagnosis),
         _headed("What the log shows", bullets([_sign(one) for one in seen])),
         _headed("What the replay shows", bullets([_sign(one) for one in replayed])),
-        _headed("What was tried", paragraph(_sentence(_capital(tried["words"]))) if tried else ""),
-        _headed("Values to set", bullets(list(_values_to_set(diagnosis["values"])))),
-        _headed("Measured", bullets(list(_measured(diagnosis["values"])))),
-        "" if is_told else _headed("What to do", _what_to_do(diagnosis)),
-        paragraph(f"The signs are known from: {diagnosis['source']}", "note") if diagnosis["source"] else "",
+        details(
+            "What was tried and measured",
+            _headed("What was tried", paragraph(_sentence(_capital(tried["words"]))) if tried else ""),
+            _headed("Values to set", bullets(list(_values_to_set(diagnosis["values"])))),
+            _headed("Measured", bullets(list(_measured(diagnosis["values"])))),
+            paragraph(f"The signs are known from: {diagnosis['source']}", "note") if diagnosis["source"] else "",
+        ),
     ]
     kind = f"cause is-{diagnosis['severity']}"
-    return f'<div class="{kind}" id="{escape(diagnosis["id"])}"><h3>{_heading(diagnosis)}</h3>{"".join(parts)}</div>'
+    return (
+        f'<div class="{kind}" id="cause-{escape(diagnosis["id"])}"><h3>{_heading(diagnosis)}</h3>{"".join(parts)}</div>'
+    )
 
 
 def _headed(title: str, inside: str) -> str:
     return f"<h4>{escape(title)}</h4>{inside}" if inside else ""
 
 
-def _facts(diagnosis: Document, times: FlightTimes) -> str:
-    when = times.in_words(diagnosis["since_s"], diagnosis["until_s"])
-    facts = (("when", when), ("how sure", confidence_words(diagnosis["confidence"])))
-    return '<dl class="facts">' + "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts) + "</dl>"
+def _facts(diagnosis: Document, times: FlightTimes, is_shown: bool) -> str:
+    since, until = diagnosis["since_s"], diagnosis["until_s"]
+    when = escape(times.in_words(since, until))
+    if is_shown:
+        when = f'<a href="#viewer" data-state="t={since:.1f},{until:.1f}">{when}</a>'
+    sure = escape(confidence_words(diagnosis["confidence"]))
+    return f'<dl class="facts"><dt>when</dt><dd>{when}</dd><dt>how sure</dt><dd>{sure}</dd></dl>'
 
 
 def _what_to_do(diagnosis: Document) -> str:

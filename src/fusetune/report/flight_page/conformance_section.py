@@ -2,44 +2,37 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
+from fusetune.analyze.conformance.flown_track import FlownTrack
 from fusetune.analyze.conformance.words import TRACK_WORDS, leg_name
 from fusetune.analyze.flight.manoeuvre_classes import FLOWN_CLASSES
-from fusetune.report.flight_page.flight_results import Document
-from fusetune.report.markup import Cell, details, figure, number, paragraph, section, signed, table
-from fusetune.storage.files import AnyPath
-
-_CAPTION = (
-    "From above, and the height over time. Colours: manoeuvres. Dashed: the mission, with its waypoints by number."
-)
+from fusetune.report.charts.conformance import conformance_chart
+from fusetune.report.flight_results import Document
+from fusetune.report.markup import Cell, details, number, paragraph, section, signed, table
 
 
-def conformance_section(document: Document, picture: AnyPath) -> str:
-    """The verdict of each mission, the map, waypoints and legs in tables behind a click.
+def conformance_section(document: Document, track: FlownTrack | None) -> str:
+    """The verdict of each mission, the map, manoeuvres, waypoints and legs in tables behind a click.
 
     Parameters
     ----------
     document : `conformance.json`
-    picture : the map; left out where it does not exist
+    track : of the flight; None where none was logged
     """
-    picture = Path(picture)
     missions = document["missions"]
     if document["why_not_compared"]:
         parts = [paragraph(f"It was compared with no mission: {document['why_not_compared']}.")]
     else:
         parts = [paragraph(_verdict(one)) for one in missions]
-    if picture.exists():
-        parts.append(figure(picture, _CAPTION))
-    parts.append(_manoeuvre_table(document))
+    parts.append(details("From above, by manoeuvre", conformance_chart(track, document)))
+    parts.append(details("How long it did what", _manoeuvre_table(document)))
     flown = next((one for one in missions if one["mission"] == document["flown"]), None)
     if flown is not None:
-        track = TRACK_WORDS[document["track"]]
-        text = f"Places are those of {track}, and off by what the GNSS receiver is off by for minutes."
+        words = TRACK_WORDS[document["track"]]
+        text = f"Places are those of {words}, and off by what the GNSS receiver is off by for minutes."
         parts.append(paragraph(text, "note"))
         parts.append(details("Its legs", _leg_table(flown)))
         parts.append(details("Its waypoints", _waypoint_table(flown, document["start_us"])))
-    return section("What was flown", *parts)
+    return section("What was flown", *parts, id="flown")
 
 
 def _verdict(mission: Document) -> str:

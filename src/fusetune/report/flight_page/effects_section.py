@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fusetune.report.counted import count_words
-from fusetune.report.flight_page.flight_results import Document, FlightResults
+from fusetune.report.flight_results import Document, FlightResults
 from fusetune.report.markup import Cell, details, number, paragraph, section, table, unit_cell
 from fusetune.report.severity_words import worst_of
 
@@ -55,7 +55,7 @@ def effects_section(results: FlightResults) -> str:
         rows = [(_words(one["id"]), str(one["refusal"])) for one in refused]
         count = f"{count_words(len(rows), 'effect')} that this flight does not tell, and what to fly"
         parts.append(details(count, table(("effect", "why not, and what to fly"), rows)))
-    return section("What could be set from this flight", *parts)
+    return section("What could be set from this flight", *parts, id="effects")
 
 
 def _words(effect: str) -> str:

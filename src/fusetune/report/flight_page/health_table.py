@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+from fusetune.report.charts.timeline import timeline_chart
 from fusetune.report.counted import count_words
 from fusetune.report.figure_words import figure_words
-from fusetune.report.flight_page.flight_results import Document, FlightResults
-from fusetune.report.markup import Cell, details, number, paragraph, section, table
+from fusetune.report.flight_results import Document, FlightResults
+from fusetune.report.markup import Cell, CellLike, Html, details, number, paragraph, section, severity_mark, table
 from fusetune.report.severity_words import rank
 
 _TOLD = {"fail": "fail", "warning": "warning", "note": "note"}
@@ -29,9 +30,10 @@ def health_table_section(results: FlightResults) -> str:
         alike: dict[str, list[Document]] = defaultdict(list)
         for row in problems:
             alike[row["id"]].append(row)
-        parts.append(table(head, [_problem_row(rows, results) for rows in alike.values()]))
+        parts.append(table(head, [_problem_row(rows, results) for rows in alike.values()], kind="cards findings"))
     else:
         parts.append(paragraph("No figure lies beyond its limit."))
+    parts.append(details("When they lie beyond their limits", timeline_chart(results) if problems else ""))
     groups: dict[str, list[Document]] = defaultdict(list)
     lacking = []
     for row in results.health:
@@ -46,20 +48,20 @@ def health_table_section(results: FlightResults) -> str:
         parts.append(
             details(f"{count_words(len(lacking), 'figure')} that this log does not tell", table(("why",), told))
         )
-    return section("Health of sensors and filter", *parts)
+    return section("Health of sensors and filter", *parts, id="health")
 
 
-def _problem_row(alike: list[Document], results: FlightResults) -> tuple[Cell | str, ...]:
+def _problem_row(alike: list[Document], results: FlightResults) -> tuple[CellLike, ...]:
     """A figure that lies beyond its limit, the worst of the instances told."""
     row, *others = alike
     when = results.since_start_s(row)
     words = str(row["found"]) + (" (from the replay)" if row["origin"] == "replay" else "")
     also = ", ".join(str(one["instance"]) for one in others if one["instance"] is not None)
     return (
-        Cell(_TOLD[row["severity"]], f"short is-{row['severity']}"),
+        Html(severity_mark(row["severity"], _TOLD[row["severity"]]), "short"),
         words + (f"; beyond it on instance {also}, too" if also else ""),
         _limit(row),
-        Cell("" if when is None else _span(*when), "short"),
+        Cell("" if when is None else results.times.in_words(*when)),
         str(row["remedy"]),
     )
 
@@ -76,10 +78,6 @@ def _in_unit(row: Document, value: float | None) -> float | None:
 def _limit(row: Document) -> Cell:
     told = number(_in_unit(row, row["threshold"]))
     return told if row["threshold"] is None else Cell(f"{told.text} {_unit(row)}".rstrip(), f"{told.kind} short")
-
-
-def _span(start: float, stop: float) -> str:
-    return f"{start:.1f} s" if stop - start < 0.1 else f"{start:.1f} to {stop:.1f} s"
 
 
 def _group(group: str, rows: list[Document]) -> str:

@@ -8,22 +8,26 @@ from typing import Any
 
 from fusetune.analyze.flight_files import HEALTH_FILE, SENSOR_NOISE_FILE
 from fusetune.analyze.sensor_noise.pooled import pooled_sensors
-from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise_of
-from fusetune.report.figures.noise_figures import plot_pooled_sensors, plot_sensor_noise
+from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise, sensor_noise_of
+from fusetune.report.charts.sensors import (
+    allan_chart,
+    pooled_allan_chart,
+    pooled_sensor_chart,
+    sensor_chart,
+    spectra_chart,
+)
+from fusetune.report.counted import count_words
+from fusetune.report.flight_names import short_names
 from fusetune.report.flight_page.sensors_section import sensors_section
-from fusetune.report.html_page import PageHead, page_links, write_page
-from fusetune.report.markup import figure, paragraph, section
+from fusetune.report.markup import details, paragraph, section
+from fusetune.report.page_shell.shell import PageHead, Tab, page_links, write_page
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
-
-_POOLED = "Boxes of each flight, at rest and in flight, and the histogram of all in standard deviations."
-_POOLED_ALLAN = "From all times of standing still: noise density, bias instability, random walk."
 
 
 def build_sensor_page(
     flight_folder: AnyPath,
     analyze_folder: AnyPath,
-    figure_folder: AnyPath,
     output: AnyPath,
     pages: Mapping[str, AnyPath] | None = None,
 ) -> None:
@@ -33,7 +37,6 @@ def build_sensor_page(
     ----------
     flight_folder : `results/save/<flight>`
     analyze_folder : `results/analyze/<flight>` with `sensor_noise.json`
-    figure_folder : takes the figures
     output : `results/report/sensors/<flight>.html`
     pages : words → other pages that it leads to
 
@@ -43,17 +46,24 @@ def build_sensor_page(
         The saved flight or the document is missing or damaged.
     """
     told = read_document(Path(analyze_folder) / SENSOR_NOISE_FILE)
-    if told["sensors"]:
-        plot_sensor_noise(sensor_noise_of(flight_folder), figure_folder)
-    nothing = paragraph("Nothing of this log's sensors could be read.")
-    sections = (page_links(pages or {}, output), sensors_section(told, figure_folder) or nothing)
+    pictures = _pictures(sensor_noise_of(flight_folder), told["sensors"]) if told["sensors"] else ""
+    html = sensors_section(told, pictures) or paragraph("Nothing of this log's sensors could be read.")
+    heading = f"{told['flight']}: its sensors"
+    head = PageHead(heading, heading, "at rest and in flight", page_links(pages or {}, output))
     Path(output).parent.mkdir(parents=True, exist_ok=True)
-    write_page(output, PageHead(told["flight"], f"{told['flight']}: its sensors", "at rest and in flight"), sections)
+    write_page(output, head, [Tab("sensors", "Sensors", html)])
+
+
+def _pictures(noise: SensorNoise, told: Mapping[str, Mapping[str, Any]]) -> str:
+    drawn = {"Allan deviation": allan_chart(noise), "Spectra": spectra_chart(noise)}
+    for name in noise.sensors:
+        one = told[name]
+        drawn[f"{one['sensor']}: {one['topic']}"] = sensor_chart(noise, name)
+    return "".join(details(title, picture) for title, picture in drawn.items())
 
 
 def build_pooled_sensor_page(
     flight_folders: Sequence[AnyPath],
-    figure_folder: AnyPath,
     output: AnyPath,
     pages: Mapping[str, AnyPath] | None = None,
 ) -> None:
@@ -62,7 +72,6 @@ def build_pooled_sensor_page(
     Parameters
     ----------
     flight_folders : `results/analyze/<flight>` with `sensor_noise.json` and `health.json`, oldest flight first
-    figure_folder : takes the figures
     output : `results/report/all_sensors.html`
     pages : words → other pages that it leads to
     """
@@ -72,23 +81,22 @@ def build_pooled_sensor_page(
         told = read_document(folder / SENSOR_NOISE_FILE)
         if told["sensors"]:
             by_vehicle.setdefault(read_document(folder / HEALTH_FILE)["vehicle"], []).append(told)
-    parts = [page_links(pages or {}, output)]
-    for number, (vehicle, documents) in enumerate(by_vehicle.items()):
-        parts += _of_vehicle(vehicle or "Unknown vehicle", documents, Path(figure_folder) / str(number))
-    if not by_vehicle:
-        parts.append(paragraph("No log's sensors could be read."))
+    parts = [_of_vehicle(vehicle or "Unknown vehicle", documents) for vehicle, documents in by_vehicle.items()]
+    html = "".join(parts) or paragraph("No log's sensors could be read.")
+    names = short_names(one["flight"] for documents in by_vehicle.values() for one in documents)
+    head = PageHead(
+        "All sensors", "All sensors, over all flights", "each device by itself", page_links(pages or {}, output)
+    )
     Path(output).parent.mkdir(parents=True, exist_ok=True)
-    write_page(output, PageHead("All sensors", "All sensors, over all flights", "each device by itself"), parts)
+    write_page(output, head, [Tab("sensors", "Sensors", html)], names=names)
 
 
-def _of_vehicle(vehicle: str, documents: Sequence[Mapping[str, Any]], figures: Path) -> list[str]:
+def _of_vehicle(vehicle: str, documents: Sequence[Mapping[str, Any]]) -> str:
     pooled = pooled_sensors(documents)
-    drawn = plot_pooled_sensors(pooled, figures)
     parts = []
-    for one, picture in zip(pooled, drawn, strict=False):
+    for one in pooled:
         device = f", device {one.device_id}" if one.device_id else ""
-        count = f"{len(one.flights)} flight{'s' if len(one.flights) != 1 else ''}"
-        parts.append(section(f"{vehicle}: {one.sensor.label}{device}, {count}", figure(picture, _POOLED)))
-    # of all sensors together, behind theirs
-    parts += [section(f"{vehicle}: Allan deviation", figure(one, _POOLED_ALLAN)) for one in drawn[len(pooled) :]]
-    return parts
+        title = f"{one.sensor.label}{device}, {count_words(len(one.flights), 'flight')}"
+        parts.append(details(title, pooled_sensor_chart(one)))
+    parts.append(details("Allan deviation", pooled_allan_chart(pooled)))
+    return section(vehicle, *parts)

@@ -6,14 +6,15 @@ from collections.abc import Hashable, Iterable, Mapping
 from typing import Any
 
 from fusetune.finding import from_documents
-from fusetune.report.markup import number, table
+from fusetune.report.counted import count_words, listed
+from fusetune.report.markup import details, number, section, table
 
 NAMED_FLIGHTS = 3
 """Of more flights the number is told, and the first names."""
 
 
-def advice_table(verdicts: Iterable[Mapping[Hashable, Any]]) -> str:
-    """Remedies of warnings and refusals, each with its reason on one flight and the flights it is for.
+def advice_section(verdicts: Iterable[Mapping[Hashable, Any]]) -> str:
+    """Remedies of warnings and refusals, each with its reason on one flight and the flights it is for; empty of none.
 
     Parameters
     ----------
@@ -31,14 +32,11 @@ def advice_table(verdicts: Iterable[Mapping[Hashable, Any]]) -> str:
         (
             remedy,
             reasons[remedy] if len(names) == 1 else f"for one: {reasons[remedy]}",
-            _names(names),
+            listed(names, NAMED_FLIGHTS),
             number(len(names)),
         )
         for remedy, names in sorted(flights.items(), key=lambda item: (-len(item[1]), item[0]))
     ]
-    return table(("what to do", "because", "flights", "how many"), rows, "For the next flights") if rows else ""
-
-
-def _names(names: list[str]) -> str:
-    more = len(names) - NAMED_FLIGHTS
-    return ", ".join(names[:NAMED_FLIGHTS]) + (f" and {more} more" if more > 0 else "")
+    head = ("what to do", "because", "flights", "how many")
+    title = f"{count_words(len(rows), 'thing')} to do, the most frequent first"
+    return section("What would make the next logs better", details(title, table(head, rows, kind="cards")), id="advice")

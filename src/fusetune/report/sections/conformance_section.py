@@ -25,7 +25,7 @@ def conformance_section(results: Results, missions: Sequence[Document]) -> str:
     missions : of `results/analyze/missions.json`
     """
     rows = results.decision.get("by_manoeuvre", ())
-    parts = [paragraph(_flown_words(one)) for one in missions]
+    parts = [paragraph(_flown_words(one)) for one in missions if _flew(one)]
     by_class = [one for one in rows if one["manoeuvre"]]
     if by_class:
         text = (
@@ -44,7 +44,16 @@ def conformance_section(results: Results, missions: Sequence[Document]) -> str:
             names = [leg_name(legs[one]) for one in numbers]
             summary = f"The sets on each leg of {mission['mission']}"
             parts.append(details(summary, _table(results, of_mission, "leg", numbers, names)))
-    return section("Missions and manoeuvres", *parts) if parts else ""
+    return section("Missions and manoeuvres", *parts, id="manoeuvres")
+
+
+def not_flown(missions: Sequence[Document]) -> list[str]:
+    """A line for each mission that no flight flew."""
+    return [f"No flight flew the mission {one['mission']}." for one in missions if not _flew(one)]
+
+
+def _flew(mission: Document) -> bool:
+    return any(mission["flights"][how] for how in ("flew", "flew in part", "flew otherwise"))
 
 
 def _flown_words(mission: Document) -> str:

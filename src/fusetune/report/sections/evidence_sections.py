@@ -1,14 +1,16 @@
 """The parts of the page about the evidence: comparison, drift, whether the choice holds, weights, the paper's rule."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
 from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
 from fusetune.px4.aid_sources import AID_SOURCES
+from fusetune.report.charts.differences import differences_chart
+from fusetune.report.charts.drift import drift_chart
+from fusetune.report.charts.flights_by_sets import flights_by_sets_chart
+from fusetune.report.charts.pareto import pareto_chart
 from fusetune.report.comparison import percent_change
-from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, signed, table
+from fusetune.report.markup import Cell, CellLike, bullets, details, number, paragraph, section, signed, table
 from fusetune.report.results import Results
 from fusetune.report.sections.ranking_tables import (
     NOT_KNOWN,
@@ -30,49 +32,42 @@ from fusetune.report.withheld import (
     gap_lengths,
     usual_gap_length,
 )
-from fusetune.storage.files import AnyPath
 
 
-def evidence_section(results: Results, figures: AnyPath) -> str:
-    """Forest plot, heat map, signs per flight, ranking and objections."""
-    figures = Path(figures)
-    rule = results.decision["rule"]
-    title = "What the flights say"
+def evidence_section(results: Results) -> str:
+    """Every set against the present one: ranking, intervals, objections; empty where no flight has a say."""
     if not results.flights:
-        return section(title, paragraph("No flight has a say, so there is nothing to compare the sets by."))
+        return ""
     return section(
-        title,
+        "What the flights say of the sets",
         paragraph(
-            "Every set was replayed on every flight, so the sets saw the same samples. They are judged in three ways. "
-            "Aided: predictions of each measurement, one step ahead, before it was used. Unaided: of velocity and "
-            "position, after seconds without GNSS. Smoothed: its velocity against the one that the whole flight, "
-            "before and after, makes likely. A set is better when its errors are smaller; how large it sets the "
-            "uncertainty that it claims does not count."
+            "Every set was replayed on every flight, so the sets saw the same samples. They are judged by how far off "
+            "they predicted: aided, one step ahead; unaided, after seconds without GNSS; smoothed, against the "
+            "velocity that the whole flight makes likely. How large a set says its uncertainty is does not count."
         ),
-        figure(
-            figures / "differences.svg",
-            f"Dot: mean over the flights; bar: {rule['confidence']:.0%} interval from what differs between flights (of "
-            "a single one, between its blocks of about 10 s). A set replaces the present one only if its bar in the "
-            "first column, or in that of the smoothed velocity, lies clearly left of the line, and none of its other "
-            "bars wholly right of it. A dot without a bar: how far chance could do that is not known. The columns "
-            "have scales of their own; arrows point at what lies outside.",
-        ),
+        differences_chart(results),
+        details("The ranking in figures", ranking_table(results)),
         objections_table(results),
-        figure(
-            figures / "flights_by_sets.svg",
-            "Does it hold on each flight? A set that is good should be so on most. The colours fit the usual sets; "
-            "what is beyond them has the colour of the end.",
-        ),
-        sign_table(results),
-        ranking_table(results),
         details("All other criteria", criteria_table(results)),
+        id="ranking",
     )
 
 
-def withheld_section(results: Results, figures: AnyPath) -> str:
-    """Drift while sensors are withheld, and the two aims against each other; empty where no flight has a say."""
-    figures = Path(figures)
+def flight_by_flight_section(results: Results) -> str:
+    """Does it hold on each flight? Empty where no flight has a say."""
     if not results.flights:
+        return ""
+    figures = details("The figures", sign_table(results))
+    return section("On each flight", flights_by_sets_chart(results), figures, id="each-flight")
+
+
+def withheld_section(results: Results) -> str:
+    """Drift while sensors are withheld, and the two aims against each other; empty where no flight has a say."""
+    if not results.flights:
+        return ""
+    told = [_drift_table(results, (POSITION, VELOCITY), "Without GNSS, horizontal")]
+    told.append(_drift_table(results, (BAROMETER, MAGNETOMETER), "Without barometer, without magnetometer"))
+    if not any(told):
         return ""
     parts = [
         paragraph(
@@ -80,24 +75,11 @@ def withheld_section(results: Results, figures: AnyPath) -> str:
             "the estimator for some seconds while it flew on. What the sensor measured in the end shows how far the "
             "prediction had drifted: the better the estimator knew its velocity, attitude and biases, the less."
         ),
-        figure(
-            figures / "drift.svg",
-            "Above: drift (RMS over the gaps of a flight, mean over the flights); the shade holds the middle half of "
-            "the flights. Below: change against the present set on the same gaps, mean over the flights ± one "
-            "standard error.",
-        ),
-        figure(
-            figures / "pareto.svg",
-            f"Dot: mean; cross: {results.decision['rule']['confidence']:.0%} intervals. No set on the dotted line can "
-            "be bettered in one of the two without loss in the other.",
-        ),
+        details("How far it drifted", drift_chart(results)),
+        details("Two aims against each other", pareto_chart(results)),
+        details("Figures of the drift", *told, _drift_note(results) if told[1] else "", *_shorter_gaps(results)),
     ]
-    others = _drift_table(results, (BAROMETER, MAGNETOMETER), "Without barometer, without magnetometer")
-    parts += [others, _drift_note(results)] if others else []
-    parts += _shorter_gaps(results)
-    gnss = _drift_table(results, (POSITION, VELOCITY), "Without GNSS, horizontal")
-    parts += [details("Figures of the drift without GNSS", gnss)] if gnss else []
-    return section("Without a sensor", *parts)
+    return section("Without a sensor", *parts, id="withheld")
 
 
 def _drift_table(results: Results, withheld: tuple[Withheld, ...], caption: str) -> str:
@@ -110,7 +92,7 @@ def _drift_table(results: Results, withheld: tuple[Withheld, ...], caption: str)
         head += ["change %"]
     rows = []
     for name in results.shown:
-        row: list[Cell | str] = [set_name(name, results)]
+        row: list[CellLike] = [set_name(name, results)]
         for _, summary in summaries:
             last = _horizons(summary)[-1]
             row += [number(_figure(summary, name, seconds, "mean")) for seconds in _horizons(summary)]
@@ -160,20 +142,23 @@ def holds_section(results: Results) -> str:
     validated = results.decision["leave_one_out"]
     title = "Does the choice hold?"
     if validated is None:
-        if not results.flights:
-            return ""
-        return section(title, paragraph("With fewer than three flights that count none can be left out to see."))
+        return ""
     chosen, worth = validated["chosen"], validated["differences"]
-    rows = [(flight, set_name(name, results), _worth(worth[flight])) for flight, name in sorted(chosen.items())]
+    ordered = sorted(chosen, key=lambda flight: results.flights.index(flight) if flight in results.flights else -1)
+    rows: list[tuple[CellLike, ...]] = [
+        (flight, set_name(chosen[flight], results), _worth(worth[flight])) for flight in ordered
+    ]
     rows.append((Cell("mean", "quiet"), Cell(""), signed(float(percent_change(validated["difference"])))))
     return section(
         title,
         paragraph(_holds(results)),
-        table(("flight left out", "best set of the others", "change of the error there %"), rows),
+        details(
+            "Each flight", table(("flight left out", "best set of the others", "change of the error there %"), rows)
+        ),
         paragraph(
             "Each flight was left out in turn, the best eligible set chosen from the others and judged on the flight "
             "that had no part in choosing it. Below 0 is better than the present set. This shows how much hangs on "
-            "single flights; whether a set is proved better is told by its interval and by p, all sets.",
+            "single flights; whether a set is proved better is told by its interval and by p.",
             "note",
         ),
     )
@@ -236,7 +221,9 @@ def weights_section(results: Results) -> str:
     )
     unknown = not sources or any(cell.text == NOT_KNOWN for row in rows for cell in row if isinstance(cell, Cell))
     note = paragraph("A flight too short to show the whiteness of a source takes the mean of the others.", "note")
-    return section("What counts how much", paragraph(text), table(head, rows), note if unknown else "")
+    return section(
+        "What counts how much", paragraph(text), details("On each flight", table(head, rows), note if unknown else "")
+    )
 
 
 def _white_shares(results: Results) -> pd.DataFrame:
@@ -275,4 +262,8 @@ def paper_section(results: Results) -> str:
         for one in mode["ranking"]
     ]
     head = ("set", "aggregate RMS", "NIS inside the χ² bounds", "break rate %")
-    return section("Paper mode", paragraph(text), bullets(mode["why"]), table(head, rows))
+    return section(
+        "The paper's own rule",
+        paragraph(text),
+        details("Why, and its ranking", bullets(mode["why"]), table(head, rows)),
+    )

@@ -6,8 +6,12 @@ from typing import Any
 
 from fusetune.finding import from_documents
 from fusetune.px4.aid_sources import AID_SOURCES
-from fusetune.report.markup import Cell, details, number, paragraph, section, table
+from fusetune.report.markup import Cell, Html, details, number, paragraph, section, severity_mark, table
 from fusetune.report.results import Results
+from fusetune.report.severity_words import SEVERITY_WORDS
+
+_OF_HEALTH = "diagnosis."
+"""What is wrong with the vehicle stands in its health."""
 
 _INTRODUCTION = (
     "Told by the flights themselves, whichever set is chosen. A value to compare is no advice to fly: noises act "
@@ -23,21 +27,28 @@ _NOISES = (
 
 def findings_section(results: Results) -> str:
     """What was found about sensors, the noises behind a click; empty where nothing is known."""
-    findings = from_documents(results.decision["findings"])
+    told = [one for one in results.decision["findings"] if not one["id"].startswith(_OF_HEALTH)]
+    findings = from_documents(told)
     noises = results.decision["noises"]
     if not findings and not noises:
         return ""
     parts = []
     if findings:
-        rows = [(one.found, one.remedy) for one in findings]
-        parts += [paragraph(_INTRODUCTION), table(("what PX4 is told, and what the flights say", "what to do"), rows)]
-    else:
-        parts.append(paragraph("Nothing shows that PX4 is told anything wrong of the sensors."))
+        rows = [
+            (
+                Html(severity_mark(one.severity, SEVERITY_WORDS[one.severity]), "short"),
+                Cell(one.found, "said"),
+                one.remedy,
+            )
+            for one in findings
+        ]
+        head = ("", "what PX4 is told, and what the flights say", "what to do")
+        parts += [paragraph(_INTRODUCTION, "note"), table(head, rows, kind="cards findings")]
     if noises:
-        head = ("source", "unit", "flights", "told", "size of the error", "interval", "a filter may want")
+        columns = ("source", "unit", "flights", "told", "size of the error", "interval", "a filter may want")
         text = paragraph(_NOISES)
-        parts.append(details("Every source", text, table(head, [_noise_row(one) for one in noises])))
-    return section("What PX4 is told, and what the data say", *parts)
+        parts.append(details("Noise of every source", text, table(columns, [_noise_row(one) for one in noises])))
+    return section("What PX4 is told, and what the data say", *parts, id="told-and-shown")
 
 
 def _noise_row(noise: dict[str, Any]) -> tuple[str | Cell, ...]:

@@ -3,36 +3,32 @@
 from __future__ import annotations
 
 from html import escape
-from pathlib import Path
 from typing import Any
 
-from fusetune.apply.missing_motion import THINNED
-from fusetune.report.markup import Cell, bullets, figure, paragraph, section, table
+from fusetune.apply.missing_motion_kinds import THINNED
+from fusetune.report.charts.power import power_chart
+from fusetune.report.markup import Cell, bullets, details, paragraph, section, table
 from fusetune.report.results import Results
-from fusetune.storage.files import AnyPath
 
 ROUGH = 5
 """With fewer flights their spread is hardly known."""
 
 
-def next_steps_section(results: Results, figures: AnyPath) -> str:
+def next_steps_section(results: Results) -> str:
     """Steps first, then what they rest on."""
     decision = results.decision
     parts = [steps_list(decision["next_steps"])]
     if decision["missing_motion"]:
-        parts.append(paragraph("What these flights cannot tell, and what would:"))
-        parts.append(bullets([_missing(one) for one in decision["missing_motion"]]))
+        told = bullets([_missing(one) for one in decision["missing_motion"]])
+        parts.append(details("What these flights cannot tell, and what would", told))
     power = decision["power"]
     if power:
-        parts += [paragraph(_power_text(power)), _power_table(power)]
         parts.append(
-            figure(
-                Path(figures) / "power.svg",
-                "Chance that a set which truly gains so much would be found by this decision, beside the sets that "
-                "were tried and varying from flight to flight as they do. Dotted: the flights that decide now.",
+            details(
+                "How many flights it takes", paragraph(_power_text(power)), power_chart(results), _power_table(power)
             )
         )
-    return section("What to do next", *parts)
+    return section("What to do next", *parts, id="next-steps")
 
 
 def steps_list(steps: list[dict[str, Any]]) -> str:
@@ -53,10 +49,10 @@ def _power_text(power: dict[str, Any]) -> str:
     now = f"{power['flights']} flights of {power['minutes']:.1f} scored minutes decide now"
     share = power["within_share"]
     if share is None:
-        return f"How many flights it takes: {now}; they are too short to show what longer ones would bring.{rough}"
+        return f"{now}; they are too short to show what longer ones would bring.{rough}"
     longer = "longer flights help" if share > 0.5 else "more flights help more than longer ones"
     return (
-        f"How many flights it takes: {now}. Of what varies between them, what varies within them accounts for "
+        f"{now}. Of what varies between them, what varies within them accounts for "
         f"{100 * share:.0f} %: {longer}.{rough}"
     )
 

@@ -4,87 +4,80 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
-from pathlib import Path
 from typing import Any
 
 from fusetune.apply.search.answer import headline, unit_of, why_kept
 from fusetune.apply.search.words import worth_sentences
 from fusetune.apply.sensitivity.result import FLAT, MATTERS, NOT_TOLD, UNSURE
-from fusetune.report.figures.search_figures import (
-    FOUND_VALUES,
-    KEPT_ASIDE,
-    SEARCH_PARETO,
-    SEARCH_SENSITIVITY,
-    SHRINKAGE,
+from fusetune.report.charts.search import found_chart, found_pareto_chart, kept_aside_chart, shrinkage_chart
+from fusetune.report.charts.sensitivity import sensitivity_chart
+from fusetune.report.counted import count_words
+from fusetune.report.markup import (
+    Cell,
+    bullets,
+    details,
+    drawn,
+    number,
+    paragraph,
+    prose,
+    section,
+    severity_mark,
+    signed,
+    table,
 )
-from fusetune.report.markup import Cell, bullets, details, figure, number, paragraph, section, table
 from fusetune.report.search_results import SearchResults
+from fusetune.report.sections.loading import NOTHING_TO_LOAD, file_to_load, how_to_load
 from fusetune.report.sections.next_steps_section import steps_list
-from fusetune.storage.files import AnyPath
 
 _MATTERS_WORDS = {MATTERS: "yes", FLAT: "hardly", UNSURE: "not sure", NOT_TOLD: "not told"}
 _DIGITS = 4
 
 
-def search_section(results: SearchResults, figures: AnyPath) -> str:
-    """Answer, table and evidence of a search.
-
-    Parameters
-    ----------
-    results : of the search's folder (`fusetune.report.search_results.read_search`)
-    figures : folder that holds `fusetune.report.figures.search_figures.SEARCH_FIGURES`
-    """
-    return "\n".join(
-        (
-            search_answer(results),
-            section("What the search found", *_found(results, Path(figures))),
-            search_evidence(results, figures),
-        )
-    )
-
-
 def search_answer(results: SearchResults) -> str:
     """What to set and what it is worth, in a box."""
     search, decision = results.search, results.decision
-    tag = '<span class="tag">exploratory</span>' if search["exploratory"] else ""
-    parts = [paragraph(one) for one in worth_sentences(search)]
+    mark = severity_mark("warning", "exploratory") if search["exploratory"] else ""
+    vehicle = decision["vehicle"]["in_words"] if decision["vehicle"] else "unknown vehicle"
+    told = prose(f"{vehicle} · {count_words(len(search['flights']), 'flight')}")
+    parts = [f'<p class="eyebrow">{told} {mark}</p><h2>{prose(headline(search, decision))}</h2>']
+    parts += [paragraph(one, "lead" if place == 0 else "") for place, one in enumerate(worth_sentences(search))]
     if results.is_change:
         parts.append(bullets(decision["cautions"]))
     parts += [paragraph(one) for one in why_kept(search, decision)]
-    parts.append(
+    parts.append(_load(results))
+    steps = decision["next_steps"]
+    if steps:
+        first = f"<p>{prose(steps[0]['text'])}</p>" + (
+            f"<p><code>{escape(steps[0]['command'])}</code></p>" if steps[0]["command"] else ""
+        )
+        parts.append(f'<div class="answer-cards"><div class="card"><h3>Next</h3>{first}</div></div>')
+    return f'<section class="answer is-{escape(decision["status"])}" id="answer"><div>{"".join(parts)}</div></section>'
+
+
+def _load(results: SearchResults) -> str:
+    if not (results.is_change and results.decision["on_vehicle"]["parameters"]):
+        return paragraph(NOTHING_TO_LOAD, "note")
+    return file_to_load() + how_to_load()
+
+
+def search_found(results: SearchResults) -> str:
+    """The parameters that were searched, and where they went."""
+    caption = (
+        "Where each parameter is and where the search on all flights took it, inside the bounds that it may move in. "
+        "Small: what the same search found with a part of the flights kept aside. Where they lie together the flights "
+        "determine the value; where they scatter, it could be another as well."
+    )
+    return section(
+        "What the search found",
+        _parameters(results),
+        drawn(found_chart(results), caption),
         paragraph(
             "Prediction errors: how far off the estimator was when it predicted a measurement before it saw it, and "
             "how far velocity and position had drifted after seconds without GNSS. Kept aside: flights that the search "
             "which found the values had not seen, as it will not have seen the next ones.",
             "note",
-        )
+        ),
     )
-    return (
-        f'<section class="decision {escape(decision["status"])}"><h2>{escape(headline(search, decision))}{tag}</h2>'
-        + "".join(parts)
-        + "</section>"
-    )
-
-
-def _found(results: SearchResults, figures: Path) -> list[str]:
-    parts = [_parameters(results)]
-    if results.is_change and results.decision["on_vehicle"]["parameters"]:
-        parts.append(
-            paragraph(
-                "best_params.params holds what changes. Load it in QGroundControl (Parameters → Tools → Load from "
-                "file), reboot, and fly a short, safe flight first; rollback.params brings the old values back.",
-                "note",
-            )
-        )
-    else:
-        parts.append(paragraph("There is nothing to load: best_params.params holds no parameter and says so.", "note"))
-    caption = (
-        "Where each parameter is (square) and where the search on all flights took it (diamond), inside the bounds "
-        "that it may move in (grey). Small dots: what the same search found with a part of the flights kept aside. "
-        "Where they lie together the flights determine the value; where they scatter, it could be another as well."
-    )
-    parts.append(figure(figures / FOUND_VALUES, caption))
-    return parts
 
 
 def _parameters(results: SearchResults) -> str:
@@ -118,11 +111,6 @@ def _parameters(results: SearchResults) -> str:
     )
 
 
-def _order(one: Mapping[str, Any]) -> tuple[bool, float]:
-    """What changes first, what brings most before."""
-    return not one["is_changed"], -(one["alone_percent"] or 0.0)
-
-
 def _remark(one: Mapping[str, Any]) -> tuple[str, str]:
     """What there is to say of a parameter, and its class."""
     if one["at_bound"]:
@@ -148,23 +136,20 @@ def _goes_along(name: str, value: float) -> tuple[Cell | str, ...]:
     )
 
 
-def search_evidence(results: SearchResults, figures: AnyPath) -> str:
+def search_evidence(results: SearchResults) -> str:
     """What shows that: gains on flights kept aside, luck, what matters, the two aims."""
-    folder = Path(figures)
-    worth: list[str] = []
     if results.parts:
         worth = [
-            figure(
-                folder / KEPT_ASIDE,
-                "One bar for each flight, in order of time: what was found without this flight, flown on it, against "
-                "what flies now. To the right is better. Line and shade: the gain to expect on as many flights again, "
-                "and its 95 % interval.",
+            drawn(
+                kept_aside_chart(results),
+                "One bar for each flight: what was found without this flight, flown on it, against what flies now. "
+                "Line and shade: the change to expect on as many flights again, and its 95 % interval.",
             ),
-            figure(
-                folder / SHRINKAGE,
-                "What a search promises (open circle, on the flights it saw) and what is left of it on flights that it "
-                "did not see (full circle). A search always fits some chance of its own flights; the distance is that "
-                "luck. A single part may do better than promised when its flights happen to be easier.",
+            drawn(
+                shrinkage_chart(results),
+                "What a search promises on the flights it saw, and what is left of it on flights that it did not see. "
+                "A search always fits some chance of its own flights; the distance is that luck. A single part may do "
+                "better than promised when its flights happen to be easier.",
             ),
         ]
     else:
@@ -172,21 +157,11 @@ def search_evidence(results: SearchResults, figures: AnyPath) -> str:
             paragraph("A single flight leaves none to keep aside: what is luck in the gain cannot be seen. Add logs.")
         ]
     told = results.sensitivity.sentences
-    matters = [paragraph(told[0]), bullets(told[1:])]
-    if results.sensitivity.found is not None:
-        matters.append(
-            figure(
-                folder / SEARCH_SENSITIVITY,
-                "Each curve moves one parameter and holds the others as the search found them (diamond, “chosen”); "
-                "above the line is better than now (dotted). The shade is the 95 % interval of the change. Green: "
-                "values between which the errors hardly change. Dots: the sets that were tried.",
-            )
-        )
-    aims = figure(
-        folder / SEARCH_PARETO,
-        "Every set that the search on all flights tried: to the right it is better with all sensors, upwards it drifts "
-        "less without GNSS. On the green line (the Pareto front) nothing gains in one without losing in the other. The "
-        "search takes no set that pays for one with the other.",
+    matters = [paragraph(told[0]), bullets(told[1:]), sensitivity_chart(results.sensitivity.found)]
+    aims = drawn(
+        found_pareto_chart(results),
+        "Every set that the search on all flights tried. On the line (the Pareto front) nothing gains in one without "
+        "losing in the other. The search takes no set that pays for one with the other.",
     )
     return "\n".join(
         (
@@ -196,6 +171,11 @@ def search_evidence(results: SearchResults, figures: AnyPath) -> str:
             section("How it was searched", *_how(results)),
         )
     )
+
+
+def _change(gain: float | None) -> Cell:
+    """A gain as the change of the errors that it is."""
+    return signed(None if gain is None else -gain if gain else 0.0)
 
 
 def _how(results: SearchResults) -> list[str]:
@@ -221,13 +201,13 @@ def _how(results: SearchResults) -> list[str]:
         (
             one["search"],
             ", ".join(one["kept_aside"]) or "none",
-            number(one["gain_in_search_percent"], 3),
-            number(one["gain_kept_aside_percent"], 3),
+            _change(one["gain_in_search_percent"]),
+            _change(one["gain_kept_aside_percent"]),
             ", ".join(f"{name} {one['values'][name]:.3g}" for name in one["changed"]) or "nothing",
         )
         for one in search["searches"]
     ]
-    head = ("search", "kept aside", "gain on what it saw %", "gain kept aside %", "found")
+    head = ("search", "kept aside", "change on what it saw %", "change kept aside %", "found")
     parts.append(details("What each search found", table(head, rows)))
     return parts
 

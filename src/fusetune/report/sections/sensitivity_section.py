@@ -2,37 +2,30 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from fusetune.apply.sensitivity.result import FLAT, MATTERS, NOT_TOLD, UNSURE, ParameterSensitivity, Sensitivity
 from fusetune.apply.sensitivity.wording import best_value
+from fusetune.report.charts.sensitivity import sensitivity_chart
 from fusetune.report.comparison import percent_change
-from fusetune.report.markup import Cell, bullets, figure, number, paragraph, section, table
+from fusetune.report.markup import Cell, bullets, details, number, paragraph, section, table
 from fusetune.report.results import Results
-from fusetune.storage.files import AnyPath
 
 _DIGITS = 3
 _VERDICTS = {MATTERS: "matters", UNSURE: "not sure", FLAT: "flat", NOT_TOLD: "not told by these sets"}
 
 
-def sensitivity_section(results: Results, figures: AnyPath) -> str:
+def sensitivity_section(results: Results) -> str:
     """In words, as a curve for each parameter, and as a table; empty where no flight has a say."""
     told = results.sensitivity
     if not results.flights:
         return ""
     title = "What matters"
     if told.found is None:
-        return section(title, paragraph(told.sentences[0]))
+        return section(title, paragraph(told.sentences[0]), id="sensitivity")
     parts = [paragraph(told.sentences[0]), bullets(told.sentences[1:])]
     if any(one.curve is not None for one in told.found.parameters):
-        caption = (
-            "Each curve moves one parameter and holds the others; above the line is better. The shade says how sure "
-            "the change from the chosen (or present) value is: what the flights differ by, and what the sets leave "
-            "open. Green: values between which the errors hardly change. Circles: sets that change this parameter "
-            "alone; dots: sets that change others, too."
-        )
-        parts += [figure(Path(figures) / "sensitivity.svg", caption), _table(told.found)]
-    return section(title, *parts)
+        parts.append(sensitivity_chart(told.found))
+        parts.append(details("Figures of each parameter", _table(told.found)))
+    return section(title, *parts, id="sensitivity")
 
 
 def _table(found: Sensitivity) -> str:

@@ -30,16 +30,32 @@ INTRODUCTION = (
 )
 
 
-def trust_section(analyze_folders: Sequence[AnyPath]) -> str:
-    """Table of all flights, and the figures of each behind a click; empty where no flight was compared."""
-    found = [file for folder in analyze_folders if (file := Path(folder) / "fidelity.json").exists()]
-    flights = [read_document(file) for file in found]
+def read_trust(analyze_folders: Sequence[AnyPath]) -> list[dict[str, Any]]:
+    """Documents `fidelity.json` of the flights that were compared."""
+    files = [Path(folder) / "fidelity.json" for folder in analyze_folders]
+    return [read_document(file) for file in files if file.exists()]
+
+
+def trust_section(flights: Sequence[dict[str, Any]]) -> str:
+    """Table of all flights, and the figures of each behind a click; empty where no flight was compared.
+
+    Parameters
+    ----------
+    flights : documents `fidelity.json`
+    """
     if not flights:
         return ""
     head = ("flight", "grade", "as logged", "in words", "repaired", "what remains")
     parts = [details(f"{flight['flight']}: figures", _details(flight)) for flight in flights]
     rows = [_row(flight) for flight in flights]
-    return section("How far the replay can be trusted", paragraph(INTRODUCTION), table(head, rows), *parts)
+    told = details("Grade of each flight", table(head, rows))
+    return section(
+        "How far the replay can be trusted",
+        paragraph(INTRODUCTION),
+        told,
+        details("Figures of each flight", *parts),
+        id="trust",
+    )
 
 
 def _row(flight: dict[str, Any]) -> tuple[str | Cell, ...]:

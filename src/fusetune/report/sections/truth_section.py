@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from fusetune.report.markup import Cell, number, paragraph, section, table
+from fusetune.report.markup import Cell, details, number, paragraph, section, table
 from fusetune.report.results import Results, figure_values
 
 _TRUE_ERRORS = (
@@ -27,14 +27,28 @@ _CONFIRMING = (
 """The four by which a choice is judged: source, axis, words, unit (docs/decision.md, The study)."""
 
 
-def truth_sentence(results: Results) -> str:
-    """Whether the truth confirms a change, with figures; empty where nothing changes or no truth is known.
+def truth_verdict(results: Results) -> str:
+    """Whether the truth confirms a change; empty where nothing changes or no truth is known."""
+    return _compared(results)[0]
 
-    Each figure is the RMSE of the chosen set beside that of the present one, both means over the flights with a truth.
-    """
+
+def truth_sentence(results: Results) -> str:
+    """Whether the truth confirms a change, with figures; empty where nothing changes or no truth is known."""
+    verdict, known = _compared(results)
+    if not known:
+        return ""
+    flights = len(_true_errors(results, "flight"))
+    whose = f"of {flights} of the flights" if flights < len(results.flights) else "of these flights"
+    said = f"The truth {whose} is known; the decision never looks at it."
+    return f"{said} It {verdict}: true error of {', '.join(known)}."
+
+
+def _compared(results: Results) -> tuple[str, list[str]]:
+    """What the truth says of a change, and each figure: the RMSE of the chosen set beside that of the present one, both
+    means over the flights with a truth."""
     decision = results.decision
     if decision["status"] != "change":
-        return ""
+        return "", []
     smaller: list[str] = []
     larger: list[str] = []
     known: list[str] = []
@@ -53,19 +67,14 @@ def truth_sentence(results: Results) -> str:
         change = f"{100.0 * (new / now - 1.0):+.0f}".replace("-", "−")
         known.append(f"{words} {change} % ({_plain(now)} to {_plain(new)} {unit})".replace(" °)", "°)"))
     if not known:
-        return ""
+        return "", []
     if not smaller and not larger:
-        verdict = "shows no difference"
-    elif not larger:
-        verdict = "confirms the change"
-    elif smaller:
-        verdict = f"confirms the change in {_listed(smaller)}, not in {_listed(larger)}"
-    else:
-        verdict = "speaks against the change"
-    flights = len(_true_errors(results, "flight"))
-    whose = f"of {flights} of the flights" if flights < len(results.flights) else "of these flights"
-    said = f"The truth {whose} is known; the decision never looks at it."
-    return f"{said} It {verdict}: true error of {', '.join(known)}."
+        return "shows no difference", known
+    if not larger:
+        return "confirms the change", known
+    if smaller:
+        return f"confirms the change in {_listed(smaller)}, not in {_listed(larger)}", known
+    return "speaks against the change", known
 
 
 def truth_section(results: Results) -> str:
@@ -79,11 +88,16 @@ def truth_section(results: Results) -> str:
         "it shows here whether the decision deserves trust."
     )
     order = [name for name in results.shown if name in by_set.index]
+    sentence = truth_sentence(results)
     return section(
-        "True errors (RMSE)",
-        paragraph(text),
-        _error_table("set", by_set.loc[order], "Mean over the flights"),
-        _error_table("flight", by_flight, f"Of the set “{results.present}” on each flight"),
+        "Against the truth",
+        paragraph(sentence or text),
+        details("True errors of each set", _error_table("set", by_set.loc[order], "RMSE, mean over the flights")),
+        details(
+            "True errors on each flight",
+            _error_table("flight", by_flight, f"RMSE of the set “{results.present}”"),
+        ),
+        id="truth",
     )
 
 

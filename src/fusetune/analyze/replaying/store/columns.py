@@ -7,7 +7,7 @@ The fields of a row are said where it is recorded: `INNOVATION_ROW`, `STATE_ROW`
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -56,9 +56,13 @@ def local_position_table(rows: np.ndarray) -> pa.Table:
 
 def flags_table(rows: np.ndarray) -> pa.Table:
     """One row per change of a flag, at least one a second."""
-    flags = rows["flags"].astype(bool)
-    columns = {name: np.ascontiguousarray(flags[:, i]) for i, name in enumerate(FLAG_COLUMNS)}
-    return pa.table({"timestamp": np.ascontiguousarray(rows["timestamp"])} | columns)
+    return pa.table(flag_columns(rows))
+
+
+def flag_columns(rows: np.ndarray) -> dict[str, np.ndarray]:
+    """The same as arrays."""
+    flags = np.ascontiguousarray(rows["flags"].T) != 0
+    return {"timestamp": np.ascontiguousarray(rows["timestamp"]), **dict(zip(FLAG_COLUMNS, flags, strict=True))}
 
 
 def prediction_table(results: Sequence[GapResult]) -> pa.Table:
@@ -72,10 +76,24 @@ def prediction_table(results: Sequence[GapResult]) -> pa.Table:
     return pa.table({"sensor": sensors.take(pa.array(table["gap"])), "source": source} | table)
 
 
+def prediction_columns(results: Sequence[GapResult]) -> dict[str, np.ndarray]:
+    """The same as arrays."""
+    table = gap_predictions(results)
+    sensors = np.array([result.gap.sensor for result in results], object)
+    sources = np.array(AID_SOURCE_NAMES, object)[table.pop("source")]
+    return {"sensor": sensors[table["gap"]], "source": sources} | table
+
+
 def gap_table(results: Sequence[GapResult]) -> pa.Table:
     """Published position and velocity (NED, m and m/s) at the beginning and the end of every gap."""
-    columns: dict[str, Any] = {
-        "sensor": pa.array([result.gap.sensor for result in results], pa.string()),
+    columns = gap_columns(results)
+    return pa.table(columns | {"sensor": pa.array(columns["sensor"], pa.string())})
+
+
+def gap_columns(results: Sequence[GapResult]) -> dict[str, np.ndarray]:
+    """The same as arrays."""
+    columns = {
+        "sensor": np.array([result.gap.sensor for result in results], object),
         "start": np.array([result.gap.start for result in results], np.int64),
         "stop": np.array([result.gap.stop for result in results], np.int64),
     }
@@ -83,7 +101,7 @@ def gap_table(results: Sequence[GapResult]) -> pa.Table:
         for name in _ENDS:
             values = [result.local_position[name][row] for result in results]
             columns[f"{name}_{moment}"] = np.array(values, np.int64 if name == "timestamp" else np.float64)
-    return pa.table(columns)
+    return columns
 
 
 def _flattened(rows: np.ndarray, arrays: tuple[str, ...]) -> pa.Table:

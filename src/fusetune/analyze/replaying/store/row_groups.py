@@ -19,9 +19,14 @@ ROWS_PER_GROUP = 1 << 15
 
 def replay_table_options(schema: pa.Schema) -> dict[str, object]:
     """How tables of a replay are written."""
-    # Figures hardly ever repeat: a dictionary of them, and their extremes, would only take time.
-    texts = [field.name for field in schema if pa.types.is_dictionary(field.type)]
+    # the extremes of figures would only take time
+    texts = _texts(schema)
     return {"compression": "zstd", "compression_level": 1, "use_dictionary": texts, "write_statistics": False}
+
+
+def _texts(schema: pa.Schema) -> list[str]:
+    """Columns that are written with a dictionary: figures hardly ever repeat, and one of them would only take time."""
+    return [field.name for field in schema if pa.types.is_dictionary(field.type) or pa.types.is_string(field.type)]
 
 
 @contextmanager
@@ -69,16 +74,21 @@ def tables_in_groups(target: AnyPath, schema: pa.Schema) -> Iterator[Callable[[p
     Takes the next table.
     """
     waiting: list[pa.Table] = []
-    with atomic_path(target) as path, table_writer(path, schema) as writer:
+    rows = 0
+    with atomic_path(target) as path, table_writer(path, schema, use_dictionary=_texts(schema)) as writer:
 
         def write() -> None:
+            nonlocal rows
             if waiting:
                 writer.write_table(pa.concat_tables(waiting).unify_dictionaries())
                 waiting.clear()
+                rows = 0
 
         def take(table: pa.Table) -> None:
+            nonlocal rows
             waiting.append(table)
-            if sum(len(one) for one in waiting) >= ROWS_PER_GROUP:
+            rows += len(table)
+            if rows >= ROWS_PER_GROUP:
                 write()
 
         yield take

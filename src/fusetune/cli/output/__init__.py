@@ -1,0 +1,1 @@
+"""What sub-commands share of telling: tables, documents, the progress of a run, what a shell completes."""

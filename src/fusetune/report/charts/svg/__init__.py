@@ -1,0 +1,1 @@
+"""Drawing of SVG: shapes, scales, axes, legends."""
