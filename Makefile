@@ -5,6 +5,7 @@
 # make browser        … then looks at the pages in Chromium, as a reader does, and judges them by axe-core
 # make lint           … then looks for slips, form, and imports that the house forbids
 # make types          … then checks the types
+# make wheel          builds a wheel into dist/; on Linux with an x86-64 processor it carries the estimator compiled
 # make docs           … then builds the documentation into site/, its notebooks run on the demonstration's flights
 # make with-upload    adds to .venv what requirements-upload.lock holds; likewise with-slurm, with-mlflow, with-browser, with-dev
 # These are the checks of a change; .ci/run and .github/workflows/checks.yml call them.
@@ -32,7 +33,7 @@ unexport UV_COMPILE_BYTECODE
 # What the demonstration is for; with real logs the same files come.
 MADE := results/apply/best_params.params results/apply/rollback.params results/apply/decision.json results/report.html
 
-.PHONY: all setup test browser lint types demonstration demo-loop docs lock clean
+.PHONY: all setup test browser lint types demonstration demo-loop docs wheel lock clean
 
 all: $(READY)
 	$(BIN)/snakemake --cores $(CORES)
@@ -87,6 +88,12 @@ docs: .venv/.with-docs
 demo-loop: $(READY)
 	$(BIN)/python -m benchmarks.closed_loop --cores $(CORES)
 
+# From an empty build/, which might hold what is no more. Kernels are compiled for processors that have AVX2.
+wheel: $(READY)
+	rm -rf build dist
+	FUSETUNE_KERNELS=$$([ "$$(uname -sm)" = "Linux x86_64" ] && grep -q avx2 /proc/cpuinfo && echo 1) \
+		$(BIN)/python -c "from setuptools import build_meta; print('dist/' + build_meta.build_wheel('dist'))"
+
 # The stamp goes first and comes last: a set-up that was interrupted is done again from nothing. Libraries in which Python
 # finds no byte code are as good.
 $(READY): requirements.lock pyproject.toml
@@ -124,5 +131,5 @@ lock:
 
 # Removes what the pipeline has made; logs in flights/, the environment and the history of the decisions stay.
 clean:
-	rm -rf .snakemake .cache demo-loop
+	rm -rf .snakemake .cache demo-loop build dist
 	@[ ! -d results ] || find results -mindepth 1 -maxdepth 1 ! -name history -exec rm -rf {} +

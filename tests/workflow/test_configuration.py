@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import MISSING
+from importlib.metadata import requires
 from pathlib import Path
 from typing import Any
 
@@ -172,9 +173,49 @@ def test_the_lock_files_agree(project_root: Path) -> None:
     assert not alone & {"mypy", "pymavlink", "pytest", "ruff"}, "what the pipeline runs with, no more"
 
 
-def test_the_conda_environment_has_the_locked_versions(project_root: Path) -> None:
+CONDA_PYTHON = "3.11"
+CONDA_ENVIRONMENT = """\
+# For `snakemake --sdm conda`: all that jobs import, in the versions of requirements.lock; the package itself comes from
+# where the workflow found it. Made from requirements.lock, renewed by pytest --update.
+channels:
+  - conda-forge
+  - nodefaults
+dependencies:
+  - python={python}
+  - pip
+  - pip:
+{pins}
+"""
+OF_CONDA = {
+    "python_version": CONDA_PYTHON,
+    "python_full_version": f"{CONDA_PYTHON}.0",
+    "implementation_name": "cpython",
+    "platform_python_implementation": "CPython",
+    "os_name": "posix",
+    "sys_platform": "linux",
+    "platform_system": "Linux",
+    "extra": "",
+}
+
+
+def asked_by_jobs(project_root: Path) -> set[str]:
+    """Names of the packages that jobs import, and of those that these ask for; Snakemake itself stays outside."""
+    project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    asked = [Requirement(text).name for text in project["dependencies"]]
+    found: set[str] = set()
+    while asked:
+        name = asked.pop().lower().replace("_", "-")
+        if name not in found | {"snakemake"}:
+            found.add(name)
+            needed = map(Requirement, requires(name) or ())
+            asked += [one.name for one in needed if one.marker is None or one.marker.evaluate(OF_CONDA)]
+    return found
+
+
+def test_the_conda_environment_has_the_locked_versions_of_all_that_jobs_import(
+    project_root: Path, up_to_date: UpToDate
+) -> None:
     pins = locked(project_root / "requirements.lock")
-    environment = yaml.safe_load((project_root / "workflow" / "envs" / "fusetune.yaml").read_text(encoding="utf-8"))
-    pinned = environment["dependencies"][-1]["pip"]
-    assert pinned
-    assert set(pinned) <= {f"{name}=={version}" for name, (version, _) in pins.items()}
+    lines = [f"      - {name}=={pins[name][0]}" for name in sorted(asked_by_jobs(project_root))]
+    text = CONDA_ENVIRONMENT.format(python=CONDA_PYTHON, pins="\n".join(lines))
+    up_to_date(project_root / "workflow" / "envs" / "fusetune.yaml", None, text)

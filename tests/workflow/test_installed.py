@@ -146,6 +146,8 @@ def test_from_three_logs_in_an_empty_folder_to_the_parameter_file(
         assert (empty / file).stat().st_size > 0
     # logs stay where they are
     assert [one.resolve() for one in sorted((empty / "flights").iterdir())] == given
+    # what jobs in an environment of conda's would import
+    assert (empty / ".snakemake" / "fusetune_package" / "fusetune" / "packaged").samefile(Path(snakefile).parents[1])
     # the configuration that came with it is named as in a checkout
     results = empty / "results"
     assert '"config/config.yaml"' in (results / "apply" / "decision.json").read_text(encoding="utf-8")

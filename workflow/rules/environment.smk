@@ -43,17 +43,23 @@ def prepend_to_path_list(variable, folder):
 
 
 # Jobs inherit the environment: they import the package that lies beside this workflow, installed or not. An installed
-# package has its workflow within it.
+# package has its workflow within it; jobs in an environment of conda's find it by a link in a folder that holds nothing else,
+# for the libraries beside it are of another environment.
+LINKED = Path(os.path.abspath(STATE)) / "fusetune_package"
 if SOURCES.is_dir():
     sys.path.insert(0, str(SOURCES))
     prepend_to_path_list("PYTHONPATH", str(SOURCES))
 from snakemake.exceptions import WorkflowError
+from snakemake.settings.types import DeploymentMethod
 from snakemake.shell import shell
 
 try:
     import fusetune
 except ModuleNotFoundError:
     raise WorkflowError("This workflow needs the package fusetune: install it beside Snakemake, with pip.") from None
+
+if not SOURCES.is_dir() and DeploymentMethod.CONDA in workflow.deployment_settings.deployment_method:
+    prepend_to_path_list("PYTHONPATH", str(LINKED))
 
 from fusetune.running.cluster_jobs import cancel_queued_jobs
 from fusetune.storage.content import ContentDigests
@@ -65,6 +71,7 @@ from fusetune.ekf2.compiled.kernel_cache import use_kernel_cache
 from fusetune.running.recovery import (
     belong_together,
     bind_together,
+    link_to,
     remove,
     remove_stale_locks,
     remove_unfinished,
@@ -153,6 +160,8 @@ def take_the_folder():
         for folder in (STATE, RESULTS):
             demand_room(folder, LEAST_FREE_BYTES)
         claim = claim_run(STATE, RUN)
+        if not SOURCES.is_dir():
+            link_to(Path(fusetune.__file__).parent, LINKED / "fusetune")
         if not claim.locked:
             print("No locks in this file system: after a killed run use snakemake --unlock.", file=sys.stderr)
         elif not workflow.touch:

@@ -14,6 +14,7 @@ import os
 import shutil
 import uuid
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,6 +89,17 @@ def bind_together(state: AnyPath, results: AnyPath) -> None:
     for file in (Path(state) / MADE_UNDER, Path(results) / f".{MADE_UNDER}"):
         with atomic_path(file) as temporary:
             temporary.write_text(name, encoding="ascii")
+
+
+def link_to(target: AnyPath, link: AnyPath) -> None:
+    """Let a link lead to a folder, whatever stood in its place; where links cannot be made there is none."""
+    link = Path(link)
+    if link.is_symlink() and os.readlink(link) == os.fspath(target):
+        return
+    with suppress(OSError):
+        link.parent.mkdir(parents=True, exist_ok=True)
+        remove(link)
+        link.symlink_to(target, target_is_directory=True)
 
 
 def remove(path: AnyPath) -> None:

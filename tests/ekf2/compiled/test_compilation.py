@@ -55,9 +55,10 @@ def compilations(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     """The commands by which the estimator would have been compiled; each leaves something that may be loaded."""
     commands: list[list[str]] = []
 
-    def compiled(command: list[str], **_: object) -> None:
+    def compiled(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
         commands.append(command)
         monkeypatch.setattr(compilation, "_may_be_loaded", lambda _: True)
+        return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.setattr(compilation.subprocess, "run", compiled)
     ensure_compiled.cache_clear()
@@ -176,7 +177,12 @@ def test_what_cannot_be_compiled_in_one_piece_is_compiled_the_usual_way(
     cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     commands: list[list[str]] = []
-    monkeypatch.setattr(compilation.subprocess, "run", lambda command, **_: commands.append(command[3:]))
+
+    def started(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
+        commands.append(command[3:])
+        return subprocess.CompletedProcess(command, 1)
+
+    monkeypatch.setattr(compilation.subprocess, "run", started)
     (cache / compilation.RECORD_NAME).unlink()
     ensure_compiled.cache_clear()
     ensure_compiled()

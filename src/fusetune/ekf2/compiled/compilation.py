@@ -43,17 +43,21 @@ from numba.core import (
 )
 from numba.core import ir as numba_ir
 
-from fusetune.ekf2.compiled.kernel_cache import LOCATOR, keep_others_out, others_may_write_kernels
-from fusetune.ekf2.compiled.kernel_locator import KernelLocator
+from fusetune.ekf2.compiled.carried_kernels import carried_folder, may_be_taken, take_over
+from fusetune.ekf2.compiled.kernel_cache import (
+    COMPILES,
+    LOCATOR,
+    RECORD_NAME,
+    keep_others_out,
+    others_may_write_kernels,
+)
+from fusetune.ekf2.compiled.kernel_locator import KernelLocator, processor
 from fusetune.errors import UserError
 from fusetune.storage.file_lock import LocksUnavailableError, lock
 from fusetune.storage.files import atomic_path
 
 LOCK_NAME = "compile.lock"
-RECORD_NAME = "compiled.json"
 ENTRY_SOURCE = Path(__file__).parents[1] / "replay" / "loop.py"
-COMPILES = "fusetune.ekf2.replay.warm_up"
-"""The module that, when it is run, calls the entry once and so compiles all."""
 CHILD_MARK = "FUSETUNE_COMPILING"
 LINKED_TOGETHER = 25
 """As many modules are linked before the result is linked to the entry: LLVM looks through all of that each time."""
@@ -76,6 +80,7 @@ PASSES_FOR_OTHERS = (
 What these would simplify besides, branches that a constant decides, LLVM simplifies as well.
 """
 PLAIN = "--plain"
+ONLY_LOADS = "--only-loads"
 NOT_IN_ONE_PIECE = (
     f"Numba {numba.__version__} does not compile the estimator in one piece: it is done function by function, "
     "which takes some minutes longer and gives the same results."
@@ -110,8 +115,9 @@ def ensure_compiled() -> None:
             lock(queue, exclusive=True, wait=True)
         if not _may_be_loaded(folder):
             keep_others_out(folder)
-            for file in folder.iterdir():
-                file.unlink()  # Numba would stumble over a damaged one
+            _empty(folder)
+            if _take_carried(caches, folder):
+                return
             print("Compiling the estimator for this processor ...", file=sys.stderr)
             _compile(caches)
             if not _may_be_loaded(folder):
@@ -124,9 +130,30 @@ def is_compiled() -> bool:
     return not _setting("DISABLE_JIT") and _may_be_loaded(kernel_folder())
 
 
-def _compile(caches: Path, *options: str) -> None:
+def _empty(folder: Path) -> None:
+    for file in folder.iterdir():
+        file.unlink()  # Numba would stumble over a damaged one
+
+
+def _take_carried(caches: Path, folder: Path) -> bool:
+    """Take over what an installed package carries for processors like this one, if another process can run it."""
+    carried = carried_folder()
+    if not may_be_taken(carried) or not _is_whole(carried):
+        return False
+    take_over(carried, folder, processor())
+    if _compile(caches, ONLY_LOADS) == 0:
+        _record(folder)
+        return True
+    _empty(folder)
+    return False
+
+
+def _compile(caches: Path, *options: str) -> int:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(caches), "NUMBA_CACHE_LOCATOR_CLASSES": LOCATOR}
-    subprocess.run([sys.executable, "-m", COMPILES, *options], env=environment, umask=0o022, check=False)
+    command, quiet = [sys.executable, "-m", COMPILES, *options], None
+    if ONLY_LOADS in options:
+        environment[CHILD_MARK], quiet = "1", subprocess.DEVNULL
+    return subprocess.run(command, env=environment, umask=0o022, stderr=quiet, check=False).returncode
 
 
 def _setting(name: str) -> Any:
@@ -147,8 +174,11 @@ def _kernel_files(folder: Path) -> dict[str, str]:
 
 def _may_be_loaded(folder: Path) -> bool:
     """Whether a folder holds the kernels as they were compiled, byte for byte, and others cannot have written them."""
-    if others_may_write_kernels(folder):
-        return False
+    return not others_may_write_kernels(folder) and _is_whole(folder)
+
+
+def _is_whole(folder: Path) -> bool:
+    """Whether a folder holds the kernels as they were compiled, byte for byte."""
     try:
         recorded = json.loads((folder / RECORD_NAME).read_text(encoding="utf-8"))
         return bool(recorded) and recorded == _kernel_files(folder)
@@ -391,6 +421,15 @@ def _short_repr(record: types.Record) -> str:
     return f"Record({len(record.fields)} fields, {record.size} bytes)"
 
 
+def refuse_to_compile() -> None:
+    """Let this process fail where it would compile, rather than load from the cache."""
+
+    def refuse(*_: object, **__: object) -> Any:
+        raise RuntimeError("the cache does not hold these kernels")
+
+    compiler.compile_extra = refuse
+
+
 def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = ()) -> None:
     """Compile by a first call of the entry, and record what is now in the cache; the work of the child process.
 
@@ -402,6 +441,9 @@ def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = 
     gc.disable()  # hardly anything of what compiling makes is ever let go
     with nullcontext() if PLAIN in options else joined_without_optimising():
         call_entry()
-    folder = kernel_folder()
+    _record(kernel_folder())
+
+
+def _record(folder: Path) -> None:
     with atomic_path(folder / RECORD_NAME) as temporary:
         temporary.write_text(json.dumps(_kernel_files(folder), indent=1) + "\n", encoding="utf-8")

@@ -21,6 +21,10 @@ from fusetune.storage.files import AnyPath
 
 LOCATOR = "fusetune.ekf2.compiled.kernel_locator.KernelLocator"
 PACKAGE = Path(__file__).resolve().parents[2]
+COMPILES = "fusetune.ekf2.replay.warm_up"
+"""The module that, when it is run, calls the entry once and so compiles all."""
+RECORD_NAME = "compiled.json"
+"""Digests of the files that were compiled, in their folder."""
 KERNEL_SOURCES = ("ekf2", "px4/aid_sources.py")
 """What the machine code follows from."""
 
@@ -91,5 +95,10 @@ def _top() -> Path:
     return caches.parents[1] if caches.parts[-2:] == _below().parts else caches
 
 
+def digest_of_sources() -> str:
+    """By which the folder of kernels is named."""
+    return source_digest(*KERNEL_SOURCES)[:16]
+
+
 def _below() -> Path:
-    return Path("numba") / source_digest(*KERNEL_SOURCES)[:16]
+    return Path("numba") / digest_of_sources()

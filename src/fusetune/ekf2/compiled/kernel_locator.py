@@ -21,11 +21,16 @@ from numba.core.registry import cpu_target
 PACKAGE = Path(__file__).resolve().parents[2]
 
 
+def processor() -> tuple[str, ...]:
+    """This processor, as Numba names what it compiles for."""
+    target: tuple[str, ...] = cpu_target.target_context.codegen().magic_tuple()
+    return target
+
+
 @cache
 def target_name() -> str:
     """Name of what kernels are compiled for: this processor, by these versions of Numba, LLVM and Python."""
-    target = cpu_target.target_context.codegen().magic_tuple()
-    made_by = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag, *target)
+    made_by = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag, *processor())
     return hashlib.sha256(repr(made_by).encode()).hexdigest()[:16]
 
 

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from fusetune.ekf2.compiled.compilation import compile_and_record, is_compiled
+from fusetune.ekf2.compiled.compilation import ONLY_LOADS, compile_and_record, is_compiled, refuse_to_compile
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.numerics.constants import ONE_G
@@ -51,4 +51,8 @@ def _imu_at_rest() -> TopicTable:
 
 
 if __name__ == "__main__":
-    compile_and_record(compile_kernels, sys.argv[1:])
+    if ONLY_LOADS in sys.argv:
+        refuse_to_compile()
+        compile_kernels()
+    else:
+        compile_and_record(compile_kernels, sys.argv[1:])
