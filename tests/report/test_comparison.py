@@ -1,7 +1,6 @@
 """Figures of the comparison by hand."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

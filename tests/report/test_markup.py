@@ -4,7 +4,19 @@ import math
 
 import pytest
 
-from fusetune.report.markup import Cell, Html, details, drawn, grouped_table, link, number, paragraph, section, signed, table
+from fusetune.report.markup import (
+    Cell,
+    Html,
+    details,
+    drawn,
+    grouped_table,
+    link,
+    number,
+    paragraph,
+    section,
+    signed,
+    table,
+)
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,9 @@ def test_the_ranking_on_the_page_is_that_of_the_file(made: tuple[Path, str], res
 
 
 def test_the_change_on_each_flight_is_that_of_the_file(made: tuple[Path, str]) -> None:
-    scores = pd.read_parquet(made[0] / "apply" / "per_flight.parquet").pivot(index="flight", columns="set", values="score")
+    scores = pd.read_parquet(made[0] / "apply" / "per_flight.parquet").pivot(
+        index="flight", columns="set", values="score"
+    )
     change = 100.0 * (scores["better"] - scores["present"]).map(math.expm1)
     by_flight = {row[0]: row for row in rows_of(made[1], "each-flight") if row}
     assert by_flight["better"][1:] == [signed(change[f"flight_{i}"]) for i in range(5)]

@@ -22,7 +22,7 @@ rule flight_page:
     conda:
         "../envs/fusetune.yaml"
     resources:
-        mem_mb=of_its_logs(LIBRARIES_MB, 3.0),
+        mem_mb=of_its_logs(LIBRARIES_MB + 50, 3.0),
         runtime=of_its_logs(5, 0.05),
     params:
         code=DIGEST["report"],
@@ -47,7 +47,7 @@ rule sensor_page:
     conda:
         "../envs/fusetune.yaml"
     resources:
-        mem_mb=of_its_logs(LIBRARIES_MB, 3.0),
+        mem_mb=of_its_logs(LIBRARIES_MB + 50, 3.0),
         runtime=of_its_logs(5, 0.05),
     params:
         code=DIGEST["report"],

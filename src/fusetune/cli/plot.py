@@ -76,7 +76,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _flight(options: argparse.Namespace) -> PlottedFlight:
-    from fusetune.report.figures.plotted_flight import flight_of_log, flight_of_results
+    from fusetune.plotted_log import flight_of_log
+    from fusetune.report.figures.plotted_flight import flight_of_results
 
     if not options.what.is_dir():
         if options.flight is not None:

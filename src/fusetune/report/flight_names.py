@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from itertools import takewhile
 from typing import Any
 
 LONGEST = 20
@@ -19,8 +19,8 @@ _DIGITS = re.compile(r"(\d+)")
 def short_names(flights: Iterable[str]) -> dict[str, str]:
     """Short name of each flight; no two are alike.
 
-    Of `SkyRats__log_8_2021-8-12-15-53-14` it is `log_8`. Where two would be alike without owner or date they keep it, but
-    for a flight of the owner who has most; what is still long loses what all begin with, then its middle.
+    Of `SkyRats__log_8_2021-8-12-15-53-14` it is `log_8`. Where two would be alike without owner or date they keep it,
+    but for a flight of the owner who has most; what is still long loses what all begin with, then its middle.
     """
     names = list(dict.fromkeys(flights))
     short = {name: name for name in names}
@@ -60,7 +60,8 @@ def _without_owner(name: str) -> str:
 
 def _common_start(names: list[str]) -> int:
     """How many characters all of several names begin with, up to the beginning of a word."""
-    shared = len(os.path.commonprefix(names)) if len(names) > 1 else 0
+    columns = zip(*names, strict=False) if len(names) > 1 else ()
+    shared = sum(1 for _ in takewhile(lambda letters: len(set(letters)) == 1, columns))
     return (
         max((match.start() for match in _WORD_BEGINS.finditer(names[0]) if match.start() <= shared), default=0)
         if (shared)

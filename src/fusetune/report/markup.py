@@ -99,10 +99,8 @@ def grouped_table(
         title = f'<tr class="group"><th scope="rowgroup" colspan="{len(head)}">{_prose(name)}</th></tr>' if name else ""
         bodies.append(f"<tbody>{title}{''.join(_row(row, head) for row in group)}</tbody>")
     below = f'<p class="note">{_prose(footer)}</p>' if footer else ""
-    return (
-        f'<div class="scroll"><table{_class(kind)}>{told}<thead><tr>{titles}</tr></thead>{"".join(bodies)}</table></div>'
-        + below
-    )
+    inside = f"{told}<thead><tr>{titles}</tr></thead>{''.join(bodies)}"
+    return f'<div class="scroll"><table{_class(kind)}>{inside}</table></div>{below}'
 
 
 def _class(kind: str) -> str:

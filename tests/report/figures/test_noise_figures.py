@@ -99,7 +99,7 @@ def test_a_log_without_standing_still_says_what_to_do() -> None:
 
 
 def test_spectra_say_what_vibration_limits(noise: SensorNoise) -> None:
-    titles = [title(axes) for axes in draw_spectra(noise).axes]
+    titles = [title(axes).replace("\n", " ") for axes in draw_spectra(noise).axes]
     assert re.search(r"[45]\.\d × in flight, vibration-limited", titles[0])
     assert "vibration-limited" not in titles[2]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -66,7 +65,9 @@ def test_an_experiment_is_no_evidence_and_told_apart(shaken: str) -> None:
     words = told(shaken)
     showed, tried = words.index("What the replay shows"), words.index("What was tried")
     assert "ACC_NOISE" not in words[showed:tried]
-    assert words[tried:].startswith("What was tried and measured What was tried The replay with EKF2_ACC_NOISE 0.8 is no better")
+    assert words[tried:].startswith(
+        "What was tried and measured What was tried The replay with EKF2_ACC_NOISE 0.8 is no better"
+    )
 
 
 def test_a_cause_of_the_whole_flight_says_so(shaken: str) -> None:

@@ -56,7 +56,12 @@ def test_a_term_is_marked_where_it_first_stands_in_a_tab_and_listed_once(tmp_pat
     words = "<p>An innovation, Innovations, the innovation variance; the NIS, nis.</p><p><code>gate</code> gate</p>"
     page = written(tmp_path, Tab("one", "One", words), Tab("two", "Two", words))
     marked = [(one.attributes["data-term"], one.text) for one in page.all("dfn")]
-    once = [("innovation", "innovation"), ("innovation-variance", "innovation variance"), ("nis", "NIS"), ("gate", "gate")]
+    once = [
+        ("innovation", "innovation"),
+        ("innovation-variance", "innovation variance"),
+        ("nis", "NIS"),
+        ("gate", "gate"),
+    ]
     assert marked == [*once, *once]
     assert [one.text for one in page.all("dt")] == ["gate", "innovation", "innovation variance", "NIS"]
 

@@ -20,7 +20,7 @@ def test_the_most_frequent_remedy_comes_first_with_its_flights():
 def test_a_flight_with_two_reasons_for_one_remedy_counts_once():
     again = PROFILE | {"id": "barometer", "found": "5 Hz"}
     html = advice_section([{"flight": "log", "advice": [PROFILE, again]}])
-    assert html.count('>log</td>') == 1
+    assert html.count(">log</td>") == 1
     assert "5 Hz" not in html
 
 

@@ -58,7 +58,7 @@ def test_the_page_of_the_decision_has_the_sets_by_manoeuvre_and_the_legs(documen
 
 def test_of_a_mission_that_nobody_flew_there_is_a_line_and_no_section(document: dict[str, Any]) -> None:
     (mission,) = mission_totals([document])
-    flown = dict.fromkeys(mission["flights"], []) | {"not this mission": ["boxed"]}
+    flown = {how: [] for how in mission["flights"]} | {"not this mission": ["boxed"]}
     unflown = [mission | {"flights": flown, "legs": []}]
     assert not_flown(unflown) == ["No flight flew the mission box."]
     assert conformance_section(cast(Results, SimpleNamespace(decision={}, shown=())), unflown) == ""

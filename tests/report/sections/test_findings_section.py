@@ -24,7 +24,7 @@ def test_findings_are_told_with_what_to_do() -> None:
     assert "PX4 is told &lt;too much&gt;" in page
     assert "Compare another" in page
     assert "no advice to fly" in page
-    assert '>0.08 to 0.12</td>' in page
+    assert ">0.08 to 0.12</td>" in page
 
 
 def test_of_a_bound_no_size_is_shown() -> None:

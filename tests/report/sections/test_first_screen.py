@@ -41,7 +41,10 @@ def test_a_change_tells_what_to_load_what_it_brings_and_how_sure(results: Result
     ends = f"{change_of(chosen['lower'])} to {change_of(chosen['upper'])} %"
     assert words.startswith("unknown vehicle · 5 flights") or "· 5 flights" in words
     assert "Change 1 parameter " in words
-    assert f"{change_of(chosen['difference'])} % prediction errors (95 % interval {ends}), smaller on 5 of 5 flights" in words
+    assert (
+        f"{change_of(chosen['difference'])} % prediction errors (95 % interval {ends}), smaller on 5 of 5 flights"
+        in words
+    )
     assert "Load results/apply/best_params.params" in words
     (change,) = results.decision["changes"]
     assert f"{change['name']} {change['previous']:g} → {change['value']:g} {change['unit']}".replace("^2", "²") in words
@@ -95,7 +98,10 @@ def test_what_to_mend_leads_to_its_place_and_what_is_loaded_is_not_told_again(re
 def test_what_the_vehicle_cannot_be_given_is_told_and_names_of_its_release(results: Results) -> None:
     refused = {"parameters": [], "refused": [{"name": "EKF2_X", "reason": "no such <thing>", "remedy": "Update"}]}
     words = told(first_screen(with_decision(results, on_vehicle=refused)))
-    assert "There is nothing to load, as this vehicle cannot be given all of it. EKF2_X: no such &lt;thing&gt;. Update." in words
+    assert (
+        "There is nothing to load, as this vehicle cannot be given all of it. EKF2_X: no such &lt;thing&gt;. Update."
+        in words
+    )
     named = {"parameters": [{"name": "EKF2_OLD", "stands_for": ["EKF2_ACC_NOISE"]}], "refused": []}
     assert "in the file EKF2_OLD" in told(first_screen(with_decision(results, on_vehicle=named)))
 

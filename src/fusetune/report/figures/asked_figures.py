@@ -70,15 +70,13 @@ def flight_drawings(flight: PlottedFlight, sets: Sequence[str], column: str) -> 
         "allan": lambda: draw_allan(flight.noise, columns),
         "spectra": lambda: draw_spectra(flight.noise),
     }
-    if flight.analyzed is not None:
-        others |= _of_analyzed(flight, flight.analyzed)
+    if flight.folders is not None:
+        others |= _of_folders(*flight.folders)
     return drawings | _fitted(others, column)
 
 
-def _of_analyzed(flight: PlottedFlight, folder: Path) -> dict[str, Callable[[], Figure]]:
+def _of_folders(saved: Path, folder: Path) -> dict[str, Callable[[], Figure]]:
     """What is drawn of a flight that the pipeline analysed."""
-    saved = flight.source
-    assert isinstance(saved, Path)
     found: dict[str, Callable[[], Figure]] = {
         "timeline": lambda: draw_timeline(
             load_flight(saved, topics=TIMELINE_TOPICS), tuple(finding_bars(read_flight_results(folder)))

@@ -1,39 +1,28 @@
-"""A flight as its figures show it: of the results of the pipeline, or of a log that is replayed for them."""
+"""A flight as its figures show it."""
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
-from fusetune.analyze.conformance.flown_track import flown_track
-from fusetune.analyze.observed.observed_flight import ObservedFlight
-from fusetune.analyze.replaying.replay_flight import write_replay
-from fusetune.analyze.replaying.settings import WITHOUT_GAPS
-from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise, sensor_noise, sensor_noise_of
-from fusetune.design.parameter_check import typed_values
+from fusetune.analyze.sensor_noise.sensor_noise import SensorNoise, sensor_noise_of
 from fusetune.errors import UserError
-from fusetune.px4.parameters.ekf2_parameters import ParameterError, check_value
-from fusetune.px4.ulog.reader import read_ulog
-from fusetune.report.flight_data.bands import bands
 from fusetune.report.flight_data.content import Band, Panel, ShownSet, TrackView
-from fusetune.report.flight_data.flight_content import LABELS, flight_content, flight_panels, logged_innovations
-from fusetune.report.flight_data.innovation_panels import SetInnovations
-from fusetune.report.flight_data.logged import Logged
-from fusetune.report.flight_data.position_frame import position_frame
-from fusetune.report.flight_data.replays import Replay
-from fusetune.report.flight_data.shown_sets import Choice, shown_sets
-from fusetune.report.flight_data.state_panels import tellers
-from fusetune.report.flight_data.track_view import track_view
-from fusetune.set_names import AS_FLOWN, ONBOARD
+from fusetune.report.flight_data.flight_content import LABELS, flight_content
+from fusetune.report.flight_data.shown_sets import Choice
 from fusetune.storage.files import AnyPath
 
-ASKED = "asked"
-"""The set whose values the command line gives."""
-_ASKED_WORDS = 40
 _USUAL_ROLES = ("present", "chosen", "onboard", "as_flown")
+
+
+class FlightFolders(NamedTuple):
+    """Of a flight as the rooms left it: `results/save/<flight>` and `results/analyze/<flight>`."""
+
+    saved: Path
+    analyzed: Path
 
 
 @dataclass(frozen=True)
@@ -44,8 +33,8 @@ class PlottedFlight:
     ----------
     start_us : when its log begins, µs since boot
     why_not_replayed : of a log that is not; empty of others
-    analyzed : folder of its analysis; None of a log
-    source : the log, or the saved flight
+    folders : of results; None of a log
+    characterise : asked once, when its sensors are drawn
     labels : of sets whose names say too little
     """
 
@@ -56,10 +45,10 @@ class PlottedFlight:
     panels: tuple[Panel, ...]
     bands: tuple[Band, ...]
     track: TrackView | None
-    source: ObservedFlight | Path
+    characterise: Callable[[], SensorNoise]
     labels: Mapping[str, str]
     why_not_replayed: str = ""
-    analyzed: Path | None = None
+    folders: FlightFolders | None = None
 
     @property
     def usual_sets(self) -> tuple[str, ...]:
@@ -69,9 +58,7 @@ class PlottedFlight:
     @cached_property
     def noise(self) -> SensorNoise:
         """Its sensors."""
-        if isinstance(self.source, ObservedFlight):
-            return sensor_noise(self.source.flight, self.source.airborne)
-        return sensor_noise_of(self.source)
+        return self.characterise()
 
 
 def flight_of_results(results: AnyPath, flight: str, sets: Sequence[str], choice: Choice) -> PlottedFlight:
@@ -91,67 +78,5 @@ def flight_of_results(results: AnyPath, flight: str, sets: Sequence[str], choice
         raise UserError(analyze, "there is no such flight", "Name one of the folders beside it")
     content = flight_content(save, analyze, sets, choice)
     return PlottedFlight(flight, content.start_us, content.duration_s, content.sets, content.panels, content.bands,
-                         content.track, save, LABELS, analyzed=analyze)  # fmt: skip
-
-
-def flight_of_log(log: AnyPath, overrides: Mapping[str, float]) -> PlottedFlight:
-    """Of a log: as it was flown, replayed with its own parameters, and with others where any are asked for.
-
-    Parameters
-    ----------
-    overrides : parameters that differ from the log's own, by PX4's names
-
-    Raises
-    ------
-    UserError
-        The log cannot be read; parameters are asked for that PX4 does not have, or for a flight that cannot be
-        replayed.
-    """
-    asked = _checked(overrides)
-    observed = ObservedFlight(read_ulog(log), WITHOUT_GAPS)
-    logged = Logged(observed.logged, observed.flight)
-    failures = observed.verdict.failures
-    if failures and asked:
-        remedy = ". ".join(dict.fromkeys(one.remedy for one in failures if one.remedy)) or "Log the flight again"
-        raise UserError(log, f"cannot be replayed: {'; '.join(observed.verdict.reasons)}", remedy)
-    label = ", ".join(f"{name} {value:g}" for name, value in asked.items())
-    labels = LABELS | {ASKED: label if len(label) <= _ASKED_WORDS else f"{len(asked)} parameters as asked"}
-    with tempfile.TemporaryDirectory(prefix="fusetune-plot-") as folder:
-        replays = [] if failures else [Replay(Path(folder), AS_FLOWN)]
-        replays += [Replay(Path(folder), ASKED)] if asked else []
-        for one in replays:
-            write_replay(observed.prepared, one.name, asked if one.name == ASKED else {}, folder)
-        return _told(Path(log).stem, observed, logged, replays, labels)
-
-
-def _told(
-    name: str, observed: ObservedFlight, logged: Logged, replays: Sequence[Replay], labels: Mapping[str, str]
-) -> PlottedFlight:
-    innovations = [SetInnovations(one.name, labels[one.name], one.innovations, one.parameters) for one in replays]
-    own = logged_innovations(logged)
-    if own:
-        innovations.append(SetInnovations(ONBOARD, labels[ONBOARD], own, observed.parameters))
-    frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
-    told = tellers(logged, replays, labels, frame)
-    flight = observed.flight
-    return PlottedFlight(
-        name=name,
-        start_us=flight.start_timestamp,
-        duration_s=flight.duration_s,
-        sets=shown_sets([*(one.name for one in replays), ONBOARD], None, AS_FLOWN, Choice(chosen=ASKED)),
-        panels=tuple(flight_panels(logged, replays, innovations, told, frame, ())),
-        bands=tuple(bands(logged, replays[0].status_flags if replays else None, None)),
-        track=track_view(flown_track(observed.logged), None, flight, told, frame),
-        source=observed,
-        labels=labels,
-        why_not_replayed="; ".join(observed.verdict.reasons),
-    )
-
-
-def _checked(overrides: Mapping[str, float]) -> dict[str, float]:
-    for name, value in overrides.items():
-        try:
-            check_value(name, value)
-        except ParameterError as error:
-            raise UserError(f"--set {error.name}", error.reason, error.remedy) from error
-    return typed_values(overrides)
+                         content.track, lambda: sensor_noise_of(save), LABELS,
+                         folders=FlightFolders(save, analyze))  # fmt: skip

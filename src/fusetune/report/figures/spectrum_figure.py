@@ -64,5 +64,5 @@ def _spectrum(axes: Axes, character: SensorCharacter) -> None:
     axes.margins(y=0.15)
     axes.set_xlabel("frequency [Hz] (grey: motion)")
     axes.set_ylabel(f"density, axes together [{unit}/√Hz]")
-    axes.set_title(textwrap.fill(vibration_title(character), _TITLE_WIDTH))
+    axes.set_title(textwrap.fill(vibration_title(character), _TITLE_WIDTH, break_on_hyphens=False))
     axes.legend(loc="lower left", fontsize=7)

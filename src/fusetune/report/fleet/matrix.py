@@ -19,9 +19,9 @@ def matrix_section(results: FleetResults) -> str:
     clean = [one for one in flights if not results.has_trouble(one)]
     shown = [one for one in flights if one not in clean] if len(clean) > _MOST_CLEAN_SHOWN else list(flights)
     text = (
-        "Red: the flight must not be repeated like this. Orange: something is to be mended. Blue: worth knowing. Where the "
-        "pointer rests it says how sure. Beside: how many figures of health lie beyond their limits, far (fail) and "
-        "near (warn). Of a refused log little or nothing can be told; its page says why."
+        "Red: the flight must not be repeated like this. Orange: something is to be mended. Blue: worth knowing. Where "
+        "the pointer rests it says how sure. Beside: how many figures of health lie beyond their limits, far (fail) "
+        "and near (warn). Of a refused log little or nothing can be told; its page says why."
     )
     parts = [paragraph(text, "note")]
     if shown:

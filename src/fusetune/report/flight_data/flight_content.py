@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from fusetune.analyze.conformance.track_file import read_track
-from fusetune.analyze.flight_files import CONFORMANCE_FILE, ONBOARD_FILE, SAMPLES_FILE, SCORING_FILE, TRACK_FILE
+from fusetune.analyze.flight_files import (
+    CONFORMANCE_FILE,
+    ONBOARD_FILE,
+    SAMPLES_FILE,
+    SCORE_TABLES,
+    SCORING_FILE,
+    TRACK_FILE,
+)
 from fusetune.analyze.replaying.onboard import onboard_samples
 from fusetune.report.flight_data.bands import bands
 from fusetune.report.flight_data.content import FlightContent, Panel
@@ -35,7 +42,7 @@ from fusetune.report.flight_data.sensor_panels import (
     status_ratio_panel,
     vibration_panels,
 )
-from fusetune.report.flight_data.shown_sets import Choice, replayed_sets, shown_sets
+from fusetune.report.flight_data.shown_sets import UNDECIDED, Choice, replayed_sets, shown_sets
 from fusetune.report.flight_data.state_panels import (
     Teller,
     earth_field,
@@ -56,7 +63,7 @@ LABELS = {ONBOARD: "the vehicle's own filter", AS_FLOWN: "replay as flown"}
 
 
 def flight_content(
-    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice | None = None
+    flight_folder: AnyPath, analyze_folder: AnyPath, sets: Sequence[str] = (), choice: Choice = UNDECIDED
 ) -> FlightContent:
     """Gather it.
 
@@ -64,21 +71,23 @@ def flight_content(
     ----------
     flight_folder : `results/save/<flight>` of a log of which something could be read
     analyze_folder : `results/analyze/<flight>`; of a flight that is not replayed without replays and scores
-    sets : that are shown beside the present one, in this order; without any those that were scored
-    choice : what was decided
+    sets : that are told first behind the present one, in this order
+    choice : what was decided, where it is known
 
     Raises
     ------
     UserError
         A file is missing or damaged.
     """
-    folder, choice = Path(analyze_folder), choice or Choice()
+    folder = Path(analyze_folder)
     results = read_flight_results(folder)
     scoring = _document(folder / SCORING_FILE)
     logged = read_logged(flight_folder, innovations=not (folder / ONBOARD_FILE).exists())
     replays = replays_of(folder, scoring)
     present = PRESENT if scoring is None else scoring["present"]
-    innovations = list(_innovations(folder, logged, scoring, replays, replayed_sets(scoring, sets, choice)))
+    innovations = list(
+        _innovations(folder, logged, scoring, replays, replayed_sets(scoring, folder / SCORE_TABLES["blocks"], sets))
+    )
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
     told = tellers(logged, replays, LABELS, frame)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fusetune.report.flight_data.content import Role, ShownSet
 from fusetune.report.set_styles import set_style, set_styles
 from fusetune.set_names import AS_FLOWN, ONBOARD
+from fusetune.storage.files import AnyPath
+from fusetune.storage.parquet import read_table
 
-MOST_SETS = 12
-"""Beside the present one: more curves than that nobody tells apart."""
+MOST_SETS = 24
+"""Beside the present one: of more, those that predict the flight best."""
 _DRAWN = ("scored", "excluded", "not_scored")
 """States of a set whose replay ran to the end."""
 
@@ -40,25 +45,63 @@ class Choice:
         return "ruled_out" if name in self.ruled_out else "candidate"
 
 
+UNDECIDED = Choice()
+
+
 def replayed_sets(
-    scoring: Mapping[str, Any] | None, asked: Sequence[str] = (), choice: Choice | None = None
+    scoring: Mapping[str, Any] | None, scores: AnyPath, first: Sequence[str] = (), most: int = MOST_SETS
 ) -> list[str]:
-    """Names of the sets that are shown: the present one, the chosen one, then in the order asked for, or of the file.
+    """Names of the sets that are shown: the present one, then those that are to be first, then the others.
 
     Parameters
     ----------
     scoring : `scoring.json`; None of a flight that was not replayed
+    scores : `scores.parquet`, which says which sets predict best where there are too many
+
+    Raises
+    ------
+    UserError
+        There are too many, and the scores are missing or damaged.
     """
     if scoring is None:
         return []
     told, present = scoring["sets"], scoring["present"]
-    wanted = [present, *([choice.chosen] if choice and choice.chosen else ()), *asked, *(() if asked else told)]
-    names = [name for name in dict.fromkeys(wanted) if told.get(name, {}).get("status") in _DRAWN]
-    return names[: MOST_SETS + 1]
+    names = [name for name in dict.fromkeys([present, *first, *told]) if told.get(name, {}).get("status") in _DRAWN]
+    if len(names) <= most + 1:
+        return names
+    errors = relative_errors(scores, present)
+    best = sorted(names, key=lambda name: (name != present, errors.get(name, math.inf)))[: most + 1]
+    return [name for name in names if name in set(best)]
+
+
+def relative_errors(scores: AnyPath, present: str) -> dict[str, float]:
+    """How large the innovations of each set are: mean over sources of the logarithm of their RMS against the present's.
+
+    Raises
+    ------
+    UserError
+        The scores are missing or damaged.
+    """
+    table = read_table(scores, ["set", "source", "n", "sum_squared_innovation"])
+    sets, sources = (table[name].combine_chunks().dictionary_encode() for name in ("set", "source"))
+    names = sets.dictionary.to_pylist()
+    if present not in names:
+        return {}
+    shape = len(names), len(sources.dictionary)
+    place = sets.indices.to_numpy() * shape[1] + sources.indices.to_numpy()
+    counted, squares = (
+        np.bincount(place, table[name].to_numpy(), shape[0] * shape[1]).reshape(shape)
+        for name in ("n", "sum_squared_innovation")
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = 0.5 * np.log(squares / counted)
+    against = logs - logs[names.index(present)]
+    known = np.isfinite(against)
+    return {name: float(against[row, known[row]].mean()) for row, name in enumerate(names) if known[row].any()}
 
 
 def shown_sets(
-    names: Sequence[str], scoring: Mapping[str, Any] | None, present: str, choice: Choice
+    names: Sequence[str], scoring: Mapping[str, Any] | None, present: str, choice: Choice = UNDECIDED
 ) -> tuple[ShownSet, ...]:
     """The sets as the views show them.
 

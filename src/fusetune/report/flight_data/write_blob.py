@@ -4,8 +4,9 @@
 
 * `results/save/<flight>/`: the topics that `logged` names, and `metadata.json`;
 * `results/analyze/<flight>/`: `health.json`, `diagnosis.json`, `effects.json` (of every log), `track.parquet` and
-  `conformance.json`; of a flight that was replayed `scoring.json`, `samples.parquet`, `onboard.innovations.parquet` and
-  the tables of `present.*` and `as_flown.*`. What is not there is not shown, and no error.
+  `conformance.json`; of a flight that was replayed `scoring.json`, `scores.parquet`, `samples.parquet`,
+  `onboard.innovations.parquet` and the tables of `present.*` and `as_flown.*`. What is not there is not shown, and no
+  error.
 
 It writes two blobs (`blob`): `small`, for the report of all flights, and `large`, for the page of the flight. Nothing
 of a decision is read; a page that knows it puts it into a blob with `with_choice`, which leaves the arrays as they are.
@@ -39,7 +40,8 @@ def pack_flight(
     ----------
     flight_folder : `results/save/<flight>`
     analyze_folder : `results/analyze/<flight>`
-    sets : that are shown beside the present one, in this order; without any those that were scored
+    sets : that are told first behind the present one, in this order; the others that were scored follow, of too many
+        those that predict the flight best
 
     Raises
     ------

@@ -125,7 +125,9 @@ def _cause(diagnosis: Document, times: FlightTimes, is_told: bool, is_shown: boo
         ),
     ]
     kind = f"cause is-{diagnosis['severity']}"
-    return f'<div class="{kind}" id="cause-{escape(diagnosis["id"])}"><h3>{_heading(diagnosis)}</h3>{"".join(parts)}</div>'
+    return (
+        f'<div class="{kind}" id="cause-{escape(diagnosis["id"])}"><h3>{_heading(diagnosis)}</h3>{"".join(parts)}</div>'
+    )
 
 
 def _headed(title: str, inside: str) -> str:

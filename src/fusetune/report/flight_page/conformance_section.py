@@ -27,7 +27,8 @@ def conformance_section(document: Document, track: FlownTrack | None) -> str:
     parts.append(details("How long it did what", _manoeuvre_table(document)))
     flown = next((one for one in missions if one["mission"] == document["flown"]), None)
     if flown is not None:
-        text = f"Places are those of {TRACK_WORDS[document['track']]}, and off by what the GNSS receiver is off by for minutes."
+        words = TRACK_WORDS[document["track"]]
+        text = f"Places are those of {words}, and off by what the GNSS receiver is off by for minutes."
         parts.append(paragraph(text, "note"))
         parts.append(details("Its legs", _leg_table(flown)))
         parts.append(details("Its waypoints", _waypoint_table(flown, document["start_us"])))

@@ -10,7 +10,8 @@ from html import escape
 from fusetune.report.page_shell.text_pass import map_text
 
 _SKIPPED = frozenset(
-    ("a", "abbr", "button", "code", "dfn", "dt", "h1", "h2", "summary", "option", "label", "figcaption", ".whole", ".glossary")
+    ("a", "abbr", "button", "code", "dfn", "dt", "h1", "h2", "summary", "option", "label", "figcaption", ".whole",
+     ".glossary")
 )  # fmt: skip
 
 

@@ -42,8 +42,8 @@ def evidence_section(results: Results) -> str:
         "What the flights say of the sets",
         paragraph(
             "Every set was replayed on every flight, so the sets saw the same samples. They are judged by how far off "
-            "they predicted: aided, one step ahead; unaided, after seconds without GNSS; smoothed, against the velocity "
-            "that the whole flight makes likely. How large a set says its uncertainty is does not count."
+            "they predicted: aided, one step ahead; unaided, after seconds without GNSS; smoothed, against the "
+            "velocity that the whole flight makes likely. How large a set says its uncertainty is does not count."
         ),
         differences_chart(results),
         details("The ranking in figures", ranking_table(results)),

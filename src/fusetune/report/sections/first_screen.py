@@ -9,14 +9,26 @@ from typing import Any
 from fusetune.apply.ranking import SAME
 from fusetune.report.comparison import percent_change
 from fusetune.report.counted import count_words
-from fusetune.report.markup import Cell, CellLike, Html, anchor, number, prose, severity_mark, signed, table, unit_cell
+from fusetune.report.markup import (
+    Cell,
+    CellLike,
+    Html,
+    anchor,
+    number,
+    paragraph,
+    prose,
+    severity_mark,
+    signed,
+    table,
+    unit_cell,
+)
 from fusetune.report.results import Results
+from fusetune.report.sections.loading import NOTHING_TO_LOAD, file_to_load, how_to_load
 from fusetune.report.sections.ranking_tables import NOT_KNOWN, confidence_of, interval_text
 from fusetune.report.sections.truth_section import truth_verdict
 from fusetune.report.severity_words import SEVERITY_WORDS
 
-BEST_PARAMS = "results/apply/best_params.params"
-ROLLBACK = "results/apply/rollback.params"
+APPLY_FOLDER = "results/apply/"
 
 _MOST_PROBLEMS = 3
 _DIAGNOSED = "diagnosis."
@@ -116,18 +128,13 @@ def _load(results: Results) -> str:
     """What to load: the file, and what it changes."""
     on_vehicle = results.decision["on_vehicle"]
     if not results.decision["changes"]:
-        return '<p class="note">There is nothing to load: best_params.params holds no parameter and says so.</p>'
+        return paragraph(NOTHING_TO_LOAD, "note")
     changes = table(("parameter", "now", "", "new", "unit", ""), _change_rows(results.decision), kind="changes")
     if not on_vehicle["parameters"]:
         refused = " ".join(f"{one['name']}: {one['reason']}. {one['remedy']}." for one in on_vehicle["refused"])
-        return f"{changes}<p>{prose('There is nothing to load, as this vehicle cannot be given all of it. ' + refused)}</p>"
-    file = f'<p class="load">Load <code>{BEST_PARAMS}</code></p>'
-    return (
-        f'{file}{changes}<details class="how"><summary>How to load it, and how to go back</summary>'
-        "<p>In QGroundControl: Parameters → Tools → Load from file; reboot, and fly a short, safe flight first. "
-        f"<code>{ROLLBACK}</code> brings the old values back. The same for other tools lies beside them: .parm for "
-        "MAVProxy, .sh for PX4’s shell, replay_params.txt for PX4’s own replay.</p></details>"
-    )
+        nothing = "There is nothing to load, as this vehicle cannot be given all of it."
+        return f"{changes}<p>{prose(f'{nothing} {refused}')}</p>"
+    return f"{file_to_load(APPLY_FOLDER)}{changes}{how_to_load(APPLY_FOLDER)}"
 
 
 def _change_rows(decision: Mapping[str, Any]) -> list[tuple[CellLike, ...]]:

@@ -60,10 +60,8 @@ def _bar(counts: Mapping[str, int], total: int) -> str:
     legend = "".join(
         f'<li><span class="dot is-{kind}"></span>{escape(words)} <b>{count}</b></li>' for kind, words, count in told
     )
-    return (
-        f'<svg class="share-bar" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">{"".join(marks)}</svg>'
-        f'<ul class="legend">{legend}</ul>'
-    )
+    shape = 'viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true"'
+    return f'<svg class="share-bar" {shape}>{"".join(marks)}</svg><ul class="legend">{legend}</ul>'
 
 
 def health_section(logs: Logs) -> str:
@@ -121,7 +119,10 @@ def _how_sure(confidences: Sequence[float]) -> str:
 
 def _links(cause: str, names: Sequence[str], logs: Logs) -> str:
     count = f"<b>{count_words(len(names), 'flight')}</b>: "
-    told = [link(name, logs.pages[name], f"cause-{cause}") if name in logs.pages else escape(name) for name in names[:_MOST_LINKS]]
+    told = [
+        link(name, logs.pages[name], f"cause-{cause}") if name in logs.pages else escape(name)
+        for name in names[:_MOST_LINKS]
+    ]
     more = len(names) - _MOST_LINKS
     return count + ", ".join(told) + (f" and {more} more" if more > 0 else "")
 

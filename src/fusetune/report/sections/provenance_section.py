@@ -4,7 +4,7 @@ from fusetune.report.markup import Cell, details, paragraph, section, table
 from fusetune.report.results import Results
 
 FILES = {
-    "apply/best_params.params": "what to load; rollback.params brings it back; .parm and .sh say the same to other tools",
+    "apply/best_params.params": "what to load; rollback.params takes it back; .parm, .sh: for other tools",
     "apply/all_params.params": "every EKF2 parameter as it is to be; all_rollback.params as it is",
     "apply/decision.json": "the decision with all that it rests on",
     "apply/ranking.csv": "the sets with their figures, for a spreadsheet; ranking.parquet holds the same",

@@ -26,6 +26,7 @@ from fusetune.report.markup import (
     table,
 )
 from fusetune.report.search_results import SearchResults
+from fusetune.report.sections.loading import NOTHING_TO_LOAD, file_to_load, how_to_load
 from fusetune.report.sections.next_steps_section import steps_list
 
 _MATTERS_WORDS = {MATTERS: "yes", FLAT: "hardly", UNSURE: "not sure", NOT_TOLD: "not told"}
@@ -55,11 +56,8 @@ def search_answer(results: SearchResults) -> str:
 
 def _load(results: SearchResults) -> str:
     if not (results.is_change and results.decision["on_vehicle"]["parameters"]):
-        return paragraph("There is nothing to load: best_params.params holds no parameter and says so.", "note")
-    return (
-        '<p class="load">Load <code>best_params.params</code></p><p class="note">In QGroundControl: Parameters → Tools → '
-        "Load from file; reboot, and fly a short, safe flight first. rollback.params brings the old values back.</p>"
-    )
+        return paragraph(NOTHING_TO_LOAD, "note")
+    return file_to_load() + how_to_load()
 
 
 def search_found(results: SearchResults) -> str:
@@ -144,13 +142,13 @@ def search_evidence(results: SearchResults) -> str:
         worth = [
             drawn(
                 kept_aside_chart(results),
-                "One bar for each flight: what was found without this flight, flown on it, against what flies now. Line "
-                "and shade: the change to expect on as many flights again, and its 95 % interval.",
+                "One bar for each flight: what was found without this flight, flown on it, against what flies now. "
+                "Line and shade: the change to expect on as many flights again, and its 95 % interval.",
             ),
             drawn(
                 shrinkage_chart(results),
-                "What a search promises on the flights it saw, and what is left of it on flights that it did not see. A "
-                "search always fits some chance of its own flights; the distance is that luck. A single part may do "
+                "What a search promises on the flights it saw, and what is left of it on flights that it did not see. "
+                "A search always fits some chance of its own flights; the distance is that luck. A single part may do "
                 "better than promised when its flights happen to be easier.",
             ),
         ]
