@@ -50,6 +50,9 @@ def test_nobody_is_kept_out(address: str, open_page: OpenPage, axe: str, scheme:
         if page.get_by_role("tab").nth(index).inner_text() == "Flights":
             page.locator(".flight-viewer").scroll_into_view_if_needed()
             page.locator(".fv-groups .fv-figures-button").first.click()
+            for group in page.locator(".fv-group").all():
+                told = int(group.locator(".fv-group-button small").inner_text().split()[0])
+                assert group.locator(".fv-panel:visible").count() == told
         found += violations(page, axe)
     assert found == []
 
