@@ -83,8 +83,8 @@ class Stretches:
     @cached_property
     def _rows(self) -> npt.NDArray[np.intp]:
         """(M,) which row is laid out where; before each stretch any."""
-        rows = np.arange(int(self.count.sum()) + self.count.size) + self.each(self.start - 1 - self._places)
-        rows = np.maximum(rows, 0)
+        rows = np.repeat(self.start - 1 - self._places, self.count + 1)
+        rows = np.maximum(rows + np.arange(rows.size), 0)
         return rows if self.order is None else self.order[rows]
 
 

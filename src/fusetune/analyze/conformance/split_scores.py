@@ -99,11 +99,13 @@ class _Part:
     axis: npt.NDArray[np.int64]
     horizon: Array
     piece: npt.NDArray[np.int64]
-    n: npt.NDArray[np.int64]
+    n: npt.NDArray[Any]
     sums: tuple[Array, ...]
 
 
-def _part(aim: str, table: pa.Table, rows: Stretches, piece: npt.NDArray[np.int64], n: Array, *sums: Array) -> _Part:
+def _part(
+    aim: str, table: pa.Table, rows: Stretches, piece: npt.NDArray[np.int64], n: npt.NDArray[Any], *sums: Array
+) -> _Part:
     first = rows.first
     horizon = table["horizon_s"].to_numpy()[first] if aim == UNAIDED else np.zeros(first.size)
     return _Part(
@@ -113,7 +115,7 @@ def _part(aim: str, table: pa.Table, rows: Stretches, piece: npt.NDArray[np.int6
         table["axis"].to_numpy()[first].astype(np.int64),
         horizon,
         piece[first],
-        np.asarray(n).astype(np.int64),
+        n,
         sums,
     )
 
@@ -185,9 +187,7 @@ def _smoothed(table: pa.Table, pieces: FlightPieces) -> _Part:
     """Sums of about a second belong to the piece of their middle."""
     piece = pieces.at((table["start_us"].to_numpy() + table["stop_us"].to_numpy()) // 2)
     rows = _in_pieces(piece, *_key(table))
-    count, squares = (
-        rows.sums(rows.laid_out(table[name].to_numpy(), 0.0)) for name in ("n", "sum_squares_winsorised")
-    )
+    count, squares = (rows.sums(rows.laid_out(table[name].to_numpy(), 0.0)) for name in ("n", "sum_squares_winsorised"))
     nothing = np.full(squares.size, np.nan)
     return _part(SMOOTHED, table, rows, piece, count, squares, nothing, nothing, nothing)
 
@@ -197,17 +197,14 @@ def _together(parts: Sequence[_Part], flight: str, pieces: FlightPieces) -> pa.T
     set_names, of_set = _by_name([one.set for one in parts])
     source_names, source = _by_name([one.source for one in parts])
     aim_names, aim = _by_name([pa.array([one.aim] * one.n.size, pa.string()).dictionary_encode() for one in parts])
-    axis, horizon, piece = (
-        np.concatenate([getattr(one, name) for one in parts]) for name in ("axis", "horizon", "piece")
-    )
+    axis, piece = (np.concatenate(values) for values in ([one.axis for one in parts], [one.piece for one in parts]))
+    horizon = np.concatenate([one.horizon for one in parts])
     if not piece.size:
         return LEGS_SCHEMA.empty_table()
     rows = Stretches.sorted(of_set, aim, source, axis, _ranks(horizon), piece)
     first, row = rows.first, np.repeat(np.arange(rows.count.size), rows.count)
-    n, *sums = (
-        np.bincount(row, np.concatenate(values)[rows.order])
-        for values in ([one.n for one in parts], *([one.sums[place] for one in parts] for place in range(len(_SUMS))))
-    )
+    columns_of_parts = ([one.n for one in parts], *([one.sums[place] for one in parts] for place in range(len(_SUMS))))
+    n, *sums = (np.bincount(row, np.concatenate(values)[rows.order]) for values in columns_of_parts)
     piece, horizon = piece[first], horizon[first]
     is_unaided = np.array([one == UNAIDED for one in aim_names])[aim[first]]
     kinds = tuple(dict.fromkeys(pieces.kind))
