@@ -205,11 +205,7 @@ def decide(
     )
 
     output = Path(output_folder)
-<<<<<<< HEAD
-    _write_ranking(output, ranked, values, settings.main_source)
-=======
-    _write_ranking(output, ranked, figures, values)
->>>>>>> many
+    _write_ranking(output, ranked, figures, values, settings.main_source)
     _write_per_flight(output, flights)
     write_candidates(output / "candidates.yaml", proposed)
     write_sensitivity(output / SENSITIVITY_FILE, _sensitivity(flights, newest, present, choice, ranked, settings))
@@ -424,13 +420,13 @@ def _paper_mode(
     }
 
 
-<<<<<<< HEAD
-def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, Criteria], source: str) -> None:
-=======
 def _write_ranking(
-    folder: Path, ranked: Sequence[RankedSet], figures: Sequence[dict[str, Any]], values: dict[str, Criteria]
+    folder: Path,
+    ranked: Sequence[RankedSet],
+    figures: Sequence[dict[str, Any]],
+    values: dict[str, Criteria],
+    source: str,
 ) -> None:
->>>>>>> many
     rows = []
     for position, (one, own) in enumerate(zip(ranked, figures, strict=True), start=1):
         row: dict[str, Any] = {"rank": position, **own, **_flat_aims(one), **values[one.name]}
