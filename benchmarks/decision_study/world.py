@@ -12,7 +12,7 @@ import numpy as np
 
 from fusetune.analyze.delays.sensor_delays import SensorDelay, read_delays
 from fusetune.apply.criteria import criteria, metrics_of, paper_entries
-from fusetune.apply.evidence import AimEvidence, AnalyzedFlight, FlightEvidence, read_flights
+from fusetune.apply.evidence import AnalyzedFlight, FlightEvidence, read_flights
 from fusetune.apply.paper_mode import paper_ranking
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.vetoes import break_rates, vetoes
@@ -31,30 +31,6 @@ horizontal position error grew in 9 s without GNSS (m)."""
 
 
 PAPER_AGGREGATE = "paper, aggregate RMS"
-
-
-class KeptAim(AimEvidence):
-    """Evidence whose scores are computed once, for thousands of studies ask for them."""
-
-    column_scores = cached_property(AimEvidence.column_scores.fget)  # type: ignore[attr-defined,assignment]
-    scores = cached_property(AimEvidence.scores.fget)  # type: ignore[attr-defined,assignment]
-
-
-class KeptEvidence(FlightEvidence):
-    """The same for a flight."""
-
-    scores = cached_property(FlightEvidence.scores.fget)  # type: ignore[attr-defined,assignment]
-
-
-def kept(evidence: FlightEvidence) -> KeptEvidence:
-    """Evidence that computes its scores once."""
-    aims = tuple(KeptAim(**vars_of(aim)) for aim in evidence.aims)
-    return KeptEvidence(**vars_of(evidence) | {"aims": aims})
-
-
-def vars_of(one: AimEvidence | FlightEvidence) -> dict:  # type: ignore[type-arg]
-    """Values of the fields of a dataclass, without what was computed of them."""
-    return {name: getattr(one, name) for name in one.__dataclass_fields__}
 
 
 @dataclass(frozen=True)
@@ -123,10 +99,7 @@ def read_world(
     """Read what the flights of a world left behind."""
     sets = tuple(overrides)
     present = sets[0]
-    flights = [
-        replace(one, evidence=kept(one.evidence)) if one.evidence is not None else one
-        for one in read_flights(folders, settings, present)
-    ]
+    flights = read_flights(folders, settings, present)
     figures: dict[str, list[list[float]]] = {}
     truth: dict[str, list[list[float]]] = {quantity: [] for quantity in TRUTH}
     for flight in flights:
@@ -151,7 +124,7 @@ def read_world(
             truth[quantity].append([indexed.get((one, *key), np.nan) for one in sets])
     ordered = tuple(sorted(folders, key=lambda folder: folder.name))
     assert [one.name for one in flights] == [one.name for one in ordered], f"{name}: flights named otherwise"
-    old = [None if one is None else kept(one) for one in read_old_evidence(ordered, present)]
+    old = read_old_evidence(ordered, present)
     return World(
         name=name,
         sets=sets,

@@ -48,7 +48,11 @@ def test_nobody_is_kept_out(address: str, open_page: OpenPage, axe: str, scheme:
         page.get_by_role("tab").nth(index).click()
         settle(page)
         if page.get_by_role("tab").nth(index).inner_text() == "Flights":
+            page.locator(".flight-viewer").scroll_into_view_if_needed()
             page.locator(".fv-groups .fv-figures-button").first.click()
+            for group in page.locator(".fv-group").all():
+                told = int(group.locator(".fv-group-button small").inner_text().split()[0])
+                assert group.locator(".fv-panel:visible").count() == told
         found += violations(page, axe)
     assert found == []
 
@@ -60,6 +64,7 @@ def test_it_is_small_and_opens_quickly(address: str, open_page: OpenPage, capsys
     opened = time.perf_counter() - begun
     begun = time.perf_counter()
     page.get_by_role("tab", name="Flights").click()
+    page.locator(".flight-viewer").scroll_into_view_if_needed()
     page.locator(".fv-strip").wait_for()
     shown = time.perf_counter() - begun
     size = page.evaluate("document.documentElement.outerHTML.length")

@@ -54,7 +54,7 @@ def test_an_interrupted_run_ends_itself_its_jobs_and_says_so_in_a_line(tmp_path:
     out, err = run.communicate(timeout=60)
     assert run.returncode == 130
     assert out == ""
-    assert err.splitlines()[-1] == "fusetune: interrupted"
+    assert err.splitlines()[-2:] == ["What is finished stays, and the next run goes on.", "fusetune: interrupted"]
     assert "Traceback" not in err
     # the lock of the run is free, and nothing is at work there any more
     from fusetune.running.run_lock import claim_run, wait_for_jobs
@@ -78,6 +78,7 @@ def test_a_wrong_setting_is_one_sentence(tmp_path: Path) -> None:
         (["--study", "none.yaml"], "none.yaml: is no file"),
         (["--config", "seed=1", "one.ulg"], "'one.ulg' is not KEY=VALUE"),
         (["--snakemake", "'"], "cannot be taken apart"),
+        (["one.ulg", "-n"], "only tells, and links would have to be made"),
         (["--results", "elsewhere"], "is there already"),
         (["one.ulg", "--config", "flights_dir=/tmp"], "no links are put there"),
     ],

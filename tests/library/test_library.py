@@ -121,3 +121,20 @@ def test_processes_do_not_run_the_script_again(tmp_path: Path):
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["once", "3"]
+
+
+def test_the_sets_of_a_decision_are_a_study_that_the_pipeline_takes(
+    log_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    from fusetune.design.study import load_study
+
+    studies = []
+
+    def run(command: list[str], **given: object) -> subprocess.CompletedProcess[str]:
+        studies.append(load_study(Path(str(given["cwd"]), command[command.index("--study") + 1])))
+        return subprocess.CompletedProcess(command, 2, "", "fusetune: it ends here.\n")
+
+    monkeypatch.setattr(subprocess, "run", run)
+    with pytest.raises(ft.UserError, match="the pipeline failed: it ends here"):
+        ft.decide([log_file], {"late": {"EKF2_GPS_DELAY": 160}}, folder=tmp_path)
+    assert [(one.name, dict(one.overrides)) for one in studies[0].sets] == [("late", {"EKF2_GPS_DELAY": 160.0})]

@@ -56,11 +56,10 @@ rule analyze_flight:
     conda:
         "../envs/fusetune.yaml"
     threads: THREADS_OF_A_FLIGHT
-    # around the present values each parameter makes two sets at the most
     resources:
         **replay_resources(
             len(SETS.replayed) + 2 * len(SETS.around),
-            len(SETS.scored) + 2 * len(SETS.around),
+            MOST_SETS,
             THREADS_OF_A_FLIGHT,
         ),
     params:
@@ -91,8 +90,10 @@ rule join_conformance:
     localrule: True
     conda:
         "../envs/fusetune.yaml"
+    # of a thousand sets the samples of a flight are read and summed in some 0.8 s; nearly nothing else runs then
+    threads: JOINED_AT_ONCE
     resources:
-        mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
+        mem_mb=of_its_logs(2 * LIBRARIES_MB + JOINED_MB_PER_SET * JOINED_AT_ONCE * MOST_SETS, 0.1),
         runtime=of_its_logs(10, 0.02),
     params:
         code=DIGEST["conformance"],

@@ -53,7 +53,7 @@ rule decide:
     conda:
         "../envs/fusetune.yaml"
     resources:
-        mem_mb=of_its_logs(2 * LIBRARIES_MB, 0.1),
+        mem_mb=of_its_logs(2 * LIBRARIES_MB + DECIDED_MB_PER_PAIR * MOST_SETS * len(LOGS), 0.1),
         runtime=of_its_logs(10, 0.01),
     params:
         sets=scored_sets,

@@ -12,5 +12,5 @@ if TYPE_CHECKING:
 
 keep_out("pandas")
 with logged_job(snakemake.log[0]):
-    write_legs([Path(scores).parent for scores in snakemake.input.scores], snakemake.output.legs)
+    write_legs([Path(scores).parent for scores in snakemake.input.scores], snakemake.output.legs, snakemake.threads)
     write_mission_totals(list(snakemake.input.conformance), snakemake.output.missions)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from fusetune.analyze.conformance.flown_track import FlownTrack, flown_track
@@ -18,6 +19,7 @@ from fusetune.analyze.diagnosis.diagnose import diagnose
 from fusetune.analyze.diagnosis.diagnosis import Diagnosis
 from fusetune.analyze.effects.all_effects import FlightEffects
 from fusetune.analyze.effects.effect_files import effects_document
+from fusetune.analyze.flight.reference_truth import GROUND_TRUTH_TOPICS
 from fusetune.analyze.flight_files import (
     DELAYS_FILE,
     DIAGNOSIS_FILE,
@@ -41,10 +43,14 @@ from fusetune.px4.ulog.used_topics import is_used
 from fusetune.save.flight_folder import METADATA_FILE, load_flight, read_flight_document
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
+from fusetune.storage.freed_memory import give_back_freed_memory
 
 Told = TypeVar("Told")
 
 REPLAYABLE = "replayable"
+
+SCRATCH_PREFIX = ".replay-"
+"""Of a folder beside the results that holds the replay of a long flight while it is read."""
 
 
 def diagnose_flight(
@@ -74,16 +80,18 @@ def diagnose_flight(
     """
     metadata = read_flight_document(Path(flight_folder) / METADATA_FILE)
     is_replayable = metadata["verdict"]["status"] == REPLAYABLE
-    used = {entry["topic"] for entry in metadata.get("topics", ()) if is_used(entry["topic"])}
+    used = {entry["topic"] for entry in metadata.get("topics", ()) if is_used(entry["topic"])} - {*GROUND_TRUTH_TOPICS}
     # of a log that could not be read nothing was saved
     logged = load_flight(flight_folder, topics=used) if used else Flight(Path(flight_folder).name)
-    observed = _observed(logged, replay)
-    documents, found, track = _told(observed, metadata, health)
-    if present is not None:
-        if is_replayable and not observed.flew_with(present):
-            # two replays at once would be twice the memory
-            observed = observed.without_replay()
-        documents[DELAYS_FILE] = _delays(observed, present if is_replayable else None)
+    Path(output_folder).mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix=SCRATCH_PREFIX, dir=output_folder) as scratch:
+        observed = _observed(logged, replay, scratch)
+        documents, found, track = _told(observed, metadata, health)
+        if present is not None:
+            if is_replayable and not observed.flew_with(present):
+                # two replays at once would be twice the memory
+                observed = observed.without_replay()
+            documents[DELAYS_FILE] = _delays(observed, present if is_replayable else None)
     _write(Path(output_folder), documents)
     write_track(Path(output_folder) / TRACK_FILE, track)
     return found
@@ -110,13 +118,15 @@ def estimate_delays(
     metadata = read_flight_document(Path(flight_folder) / METADATA_FILE)
     is_replayable = metadata["verdict"]["status"] == REPLAYABLE
     logged = load_flight(flight_folder, REPLAY_TOPICS) if is_replayable else Flight(Path(flight_folder).name)
-    document = _delays(_observed(logged, replay), present if is_replayable else None)
+    Path(output_folder).mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix=SCRATCH_PREFIX, dir=output_folder) as scratch:
+        document = _delays(_observed(logged, replay, scratch), present if is_replayable else None)
     _write(Path(output_folder), {DELAYS_FILE: document})
 
 
-def _observed(logged: Flight, replay: ReplaySettings) -> ObservedFlight:
+def _observed(logged: Flight, replay: ReplaySettings, scratch: AnyPath) -> ObservedFlight:
     # nothing here asks what the filter predicts without a sensor, which takes most of a replay's time and memory
-    return ObservedFlight(logged, replace(replay, withholding=None))
+    return ObservedFlight(logged, replace(replay, withholding=None), Path(scratch))
 
 
 def _delays(observed: ObservedFlight, present: Mapping[str, float] | None) -> dict[str, Any]:
@@ -134,10 +144,12 @@ def _told(
     asked = _Asked(is_replayable)
     no_rows: tuple[HealthRow, ...] = ()
     rows = asked.about("health", no_rows, lambda: health_rows(observed, health))
-    tuned = FlightEffects(observed)
-    effects = tuned.all() if is_replayable else ()
+    # before the first replay, which takes much of the memory
     untold = SensorNoise(name, start_us, (), (), {}, (), 0.0)
     noise = asked.about("sensor noise", untold, lambda: sensor_noise(observed.flight, observed.airborne))
+    _forget_what_flew(observed)
+    tuned = FlightEffects(observed)
+    effects = tuned.all() if is_replayable else ()
     nothing: tuple[Diagnosis, ...] = ()
     found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=tuned))
     track = asked.about("track", None, lambda: _track(observed, is_replayable))
@@ -157,6 +169,21 @@ def _told(
         },
     }
     return documents, found, track
+
+
+def _forget_what_flew(observed: ObservedFlight) -> None:
+    """Drop what the health alone asks for, where there is a replay: of an hour a hundred megabytes."""
+    if observed.verdict.status != REPLAYABLE or not observed.airborne:
+        return
+    for flight in (observed.logged, observed.flight):
+        for name, instance in [*flight.topics]:
+            if name.startswith(_OF_THE_FLOWN_FILTER):
+                flight.topics.pop((name, instance), None)
+    give_back_freed_memory()
+
+
+_OF_THE_FLOWN_FILTER = ("estimator_aid_src_", "estimator_innovation")
+"""Topics of its innovations, for which those of the replay stand."""
 
 
 def _track(observed: ObservedFlight, is_replayable: bool) -> FlownTrack | None:
@@ -180,7 +207,9 @@ class _Asked:
 
     def about(self, what: str, nothing: Told, ask: Callable[[], Told]) -> Told:
         try:
-            return ask()
+            told = ask()
+            give_back_freed_memory()
+            return told
         except OF_DAMAGE as error:
             # a flight whose verdict is sound has all that is asked for: then it is a fault of the program
             if self._is_replayable:

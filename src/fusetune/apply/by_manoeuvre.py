@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from fusetune.analyze.flight.manoeuvre_classes import FLOWN_CLASSES
 from fusetune.apply.evidence import FlightEvidence
 from fusetune.apply.pieces_evidence import PiecesOfFlight, evidence_in
@@ -62,8 +60,7 @@ def by_manoeuvre(
         found += _compared(parts, sets, present, settings, manoeuvre=kind)
     for mission in sorted({pieces[one.flight].mission for one in known} - {""}):
         on_it = [one for one in known if pieces[one.flight].mission == mission]
-        legs = np.unique(np.concatenate([pieces[one.flight].leg for one in on_it]))
-        for leg in legs[legs >= 0].tolist():
+        for leg in sorted({leg for one in on_it for leg in pieces[one.flight].legs}):
             parts = [evidence_in(one, pieces[one.flight], pieces[one.flight].of_leg(leg)) for one in on_it]
             found += _compared(parts, sets, present, settings, mission=mission, leg=leg)
     return found
@@ -82,7 +79,7 @@ def _compared(
     flights = [one for one in parts if one is not None and present in one.sets]
     if not flights:
         return []
-    names = [present, *(one for one in sets if one != present and all(one in flight.sets for flight in flights))]
+    names = [present, *(one for one in sets if one != present and all(one in flight.row for flight in flights))]
     if len(names) == 1:
         return []
     differences = mean_differences(flights, names, settings)

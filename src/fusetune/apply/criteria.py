@@ -1,19 +1,21 @@
 """All the other criteria, averaged over the flights, that stand beside the score in the ranking."""
 
 import math
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.apply.evidence import AnalyzedFlight
+from fusetune.apply.mean_figures import MeanFigures, of_known
 from fusetune.apply.paper_mode import PAPER_VARIABLES, PaperEntry, aggregate_rms
-from fusetune.px4.aid_sources import AID_SOURCES, AXES
+from fusetune.px4.aid_sources import AID_SOURCES
 
+Array = npt.NDArray[np.float64]
 Criteria = dict[str, float]
 
 _FIGURES = {
@@ -45,57 +47,41 @@ def criteria(
     sets: Sequence[str], source: str, flights: Sequence[AnalyzedFlight], metrics: pa.Table
 ) -> dict[str, Criteria]:
     """Criteria of every set, each the mean over the scored flights that have it (counts are sums)."""
-    names = {flight.name for flight in flights if flight.evidence is not None}
-    by_metric = _indexed(metrics, names)
-    return {name: _criteria_of(name, source, flights, by_metric) for name in sets}
-
-
-def _indexed(metrics: pa.Table, flights: set[str]) -> dict[tuple[str, str, str, str], list[float]]:
-    counted = pc.is_in(metrics["flight"], value_set=pa.array(sorted(flights), pa.string()))
-    kept = metrics.filter(pc.and_(counted, pc.is_in(metrics["metric"], value_set=pa.array(_METRICS))))
-    index: dict[tuple[str, str, str, str], list[float]] = defaultdict(list)
-    columns = (kept[name].to_pylist() for name in ("set", "source", "axis", "metric", "value"))
-    for set_name, source, axis, metric, value in zip(*columns, strict=True):
-        if math.isfinite(value):
-            index[set_name, source, axis, metric].append(value)
-    return index
-
-
-def _criteria_of(
-    name: str, source: str, flights: Sequence[AnalyzedFlight], index: dict[tuple[str, str, str, str], list[float]]
-) -> Criteria:
-    def mean(figure_source: str, axis: str, metric: str) -> float:
-        values = index.get((name, figure_source, axis, metric))
-        return float(np.mean(values)) if values else math.nan
-
-    result = {
-        label.format(source=source): mean(where.format(source=source), axis, metric)
+    scored = [flight for flight in flights if flight.evidence is not None]
+    figures = MeanFigures(metrics, [flight.name for flight in scored], sets, _METRICS)
+    columns = {
+        label.format(source=source): figures.of(where.format(source=source), axis, metric)
         for label, (where, axis, metric) in _FIGURES.items()
     }
-    axes = [mean(source, axis, "lag1_correlation") for axis in AXES]
-    known = [value for value in axes if math.isfinite(value)]
-    result[f"lag1_{source}"] = float(np.mean(known)) if known else math.nan
-    nlls = [mean(one, axis, "nll") for one in _AIDING for axis in AXES]
-    known = [value for value in nlls if math.isfinite(value)]
-    result["nll_all_sources"] = float(np.sum(known)) if known else math.nan
-    rates = [mean(one, axis, "break_rate_gate") for one in _AIDING for axis in AXES]
-    known = [value for value in rates if math.isfinite(value)]
-    result["break_rate_gate"] = float(np.mean(known)) if known else math.nan
-    rms = rms_by_variable(name, index)
-    result["paper_aggregate_rms"] = aggregate_rms(rms)
-    summaries = [flight.summary["sets"].get(name, {}) for flight in flights if flight.evidence is not None]
-    for kind in ("resets", "timeouts"):
-        result[kind] = float(sum(sum(summary.get(kind, {}).values()) for summary in summaries))
+    columns[f"lag1_{source}"] = of_known(figures.by_axis([source], "lag1_correlation"), np.mean)
+    columns["nll_all_sources"] = of_known(figures.by_axis(_AIDING, "nll"), np.sum)
+    columns["break_rate_gate"] = of_known(figures.by_axis(_AIDING, "break_rate_gate"), np.mean)
+    rms = rms_by_variable(figures)
+    columns["paper_aggregate_rms"] = np.array([aggregate_rms(dict(zip(rms, one, strict=True))) for one in _rows(rms)])
+    found = {name: dict(zip(columns, one, strict=True)) for name, one in zip(sets, _rows(columns), strict=True)}
+    for name, own in found.items():
+        own |= _events([flight.summary["sets"].get(name, {}) for flight in scored])
+    return found
+
+
+def _rows(columns: Mapping[str, Array]) -> Iterator[tuple[float, ...]]:
+    return zip(*(values.tolist() for values in columns.values()), strict=True)
+
+
+def _events(summaries: Sequence[Mapping[str, Any]]) -> Criteria:
+    kinds = ("resets", "timeouts")
+    result = {kind: float(sum(sum(summary.get(kind, {}).values()) for summary in summaries)) for kind in kinds}
     result["faults"] = float(sum(bool(summary.get("fault_flags")) for summary in summaries))
     return result
 
 
-def rms_by_variable(name: str, index: dict[tuple[str, str, str, str], list[float]]) -> dict[str, float]:
-    """RMS innovation of the variables of the paper's table 12, averaged over the flights."""
+def rms_by_variable(figures: MeanFigures) -> dict[str, Array]:
+    """RMS innovation of the variables of the paper's table 12 of all sets, averaged over the flights."""
     rms = {}
-    for variable, places in PAPER_VARIABLES.items():
-        found = [index[name, *place, "rms_innovation"] for place in places if (name, *place, "rms_innovation") in index]
-        rms[variable] = float(np.mean(found[0])) if found else math.nan
+    for variable, (first, *others) in PAPER_VARIABLES.items():
+        rms[variable] = figures.of(*first, "rms_innovation")
+        for place in others:
+            rms[variable] = np.where(np.isfinite(rms[variable]), rms[variable], figures.of(*place, "rms_innovation"))
     return rms
 
 
@@ -116,8 +102,8 @@ def paper_entries(
     names = {flight.name for flight in flights if flight.evidence is not None}
     wanted = pc.and_(pc.equal(metrics["metric"], "mean_nis"), pc.equal(metrics["source"], "gnss_vel"))
     inside: dict[str, list[bool]] = {}
-    for row in metrics.filter(wanted).to_pylist():
-        if row["axis"] == "all" and row["flight"] in names and is_known(row):
+    for row in metrics.filter(pc.and_(wanted, pc.equal(metrics["axis"], "all"))).to_pylist():
+        if row["flight"] in names and is_known(row):
             inside.setdefault(row["set"], []).append(is_inside(row))
     entries = []
     for name in sets:

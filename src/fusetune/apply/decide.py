@@ -184,13 +184,14 @@ def decide(
         steps_sentence(steps),
     )
     text = " ".join(filter(None, sentences))
-    decision = _decision(choice, ranked, flights, newest, changes, text, settings)
+    figures = [_figures_of(one) for one in ranked]
+    decision = _decision(choice, figures, flights, newest, changes, text, settings)
     decision["paragraphs"] = [one for one in sentences if one]
     decision["next_steps"] = [asdict(one) for one in steps]
     decision["missing_motion"] = [asdict(one) for one in missing]
     decision["power"] = None if power is None else power.document()
     decision["cautions"] = list(minded)
-    decision["by_manoeuvre"] = [asdict(one) for one in parts]
+    decision["by_manoeuvre"] = [dict(vars(one)) for one in parts]
     decision["candidates"] = [asdict(one) for one in proposed]
     decision["present"] = present
     decision["findings"] = documents((*problems, *late, *measured, *findings))
@@ -204,7 +205,7 @@ def decide(
     )
 
     output = Path(output_folder)
-    _write_ranking(output, ranked, values, settings.main_source)
+    _write_ranking(output, ranked, figures, values, settings.main_source)
     _write_per_flight(output, flights)
     write_candidates(output / "candidates.yaml", proposed)
     write_sensitivity(output / SENSITIVITY_FILE, _sensitivity(flights, newest, present, choice, ranked, settings))
@@ -341,7 +342,7 @@ def _changes(
 
 def _decision(
     choice: Choice,
-    ranked: Sequence[RankedSet],
+    figures: Sequence[dict[str, Any]],
     flights: Sequence[AnalyzedFlight],
     newest: AnalyzedFlight | None,
     changes: Sequence[ParameterChange],
@@ -360,7 +361,7 @@ def _decision(
         "rule": asdict(settings) | {"main_source": settings.main_source},
         "leave_one_out": asdict(choice.leave_one_out) if choice.leave_one_out else None,
         "weights": _weights(flights),
-        "ranking": [_figures_of(one) for one in ranked],
+        "ranking": list(figures),
     }
 
 
@@ -419,10 +420,16 @@ def _paper_mode(
     }
 
 
-def _write_ranking(folder: Path, ranked: Sequence[RankedSet], values: dict[str, Criteria], source: str) -> None:
+def _write_ranking(
+    folder: Path,
+    ranked: Sequence[RankedSet],
+    figures: Sequence[dict[str, Any]],
+    values: dict[str, Criteria],
+    source: str,
+) -> None:
     rows = []
-    for position, one in enumerate(ranked, start=1):
-        row: dict[str, Any] = {"rank": position, **_figures_of(one), **_flat_aims(one), **values[one.name]}
+    for position, (one, own) in enumerate(zip(ranked, figures, strict=True), start=1):
+        row: dict[str, Any] = {"rank": position, **own, **_flat_aims(one), **values[one.name]}
         del row["aims"], row["is_present"]
         row["reasons"] = "; ".join(one.reasons)
         row["worse_aims"] = " ".join(one.worse_aims)

@@ -5,8 +5,10 @@ ahead, without GNSS. *Smoothed*: the velocity against one that is smoothed from 
 (source, axis and, unaided, horizon), and each column a scale-profiled NLL.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +19,15 @@ import pyarrow.compute as pc
 
 from fusetune.analyze.metrics.likelihood import profile_nll
 from fusetune.analyze.scoring.aims import AIDED, AIMS, SMOOTHED, UNAIDED
+from fusetune.analyze.scoring.metrics_schema import METRICS_SCHEMA
 from fusetune.analyze.trust.settings import reaches
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.aid_sources import AXES
 from fusetune.set_names import DELAY_MENDED
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
-from fusetune.storage.parquet import read_table
+from fusetune.storage.parquet import read_pieces, read_table
+from fusetune.storage.words import places
 
 Array = npt.NDArray[np.float64]
 
@@ -50,14 +54,14 @@ class AimEvidence:
     sum_nis: Array
     sum_log_variance: Array
 
-    @property
+    @cached_property
     def column_scores(self) -> Array:
         """(S, A) scale-profiled NLL of every column, nat."""
         n = self.n.sum(axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
             return profile_nll(self.sum_nis.sum(axis=1) / n, self.sum_log_variance.sum(axis=1) / n)
 
-    @property
+    @cached_property
     def scores(self) -> Array:
         """(S,) weighted mean over the columns."""
         return np.asarray(self.column_scores @ self.column_weights)
@@ -71,7 +75,7 @@ class FlightEvidence:
     sets: tuple[str, ...]
     aims: tuple[AimEvidence, ...]
 
-    @property
+    @cached_property
     def scores(self) -> Array:
         """(S,) score of the flight: the logarithm of a typical prediction error, nat; lower is better."""
         return np.asarray(sum(aim.weight * aim.scores for aim in self.aims))
@@ -80,8 +84,17 @@ class FlightEvidence:
         """(N,) scores of some sets less that of the first of them; in one of its aims, which it then must have."""
         part = self if aim is None else self.aim(aim)
         assert part is not None, "only flights that have the aim are asked for it"
-        scores = part.scores[[self.sets.index(name) for name in names]]
+        scores = part.scores[self.rows_of(names)]
         return np.asarray(scores - scores[0])
+
+    @cached_property
+    def row(self) -> Mapping[str, int]:
+        """Set → its row."""
+        return {name: row for row, name in enumerate(self.sets)}
+
+    def rows_of(self, names: Sequence[str]) -> npt.NDArray[np.int64]:
+        """(N,) rows of some sets."""
+        return np.array([self.row[name] for name in names], np.int64)
 
     def aim(self, name: str) -> AimEvidence | None:
         """One of the aims, None where this flight has no evidence of it or gives it no weight."""
@@ -113,7 +126,8 @@ class NoEvidence:
 class AnalyzedFlight:
     """What the analyze room says about one flight: its summary, and the evidence or why there is none.
 
-    `metrics` are its figures, columns of `METRICS_SCHEMA`.
+    `metrics` are those of its figures that decisions look at (`DECISIVE_METRICS`), columns of `METRICS_SCHEMA` with
+    words as dictionaries; none of a flight that is left out.
     """
 
     name: str
@@ -127,6 +141,13 @@ class AnalyzedFlight:
     def reason(self) -> str:
         """Why there is no evidence, in words; empty where there is."""
         return self.without.reason if self.without else ""
+
+
+DECISIVE_METRICS = (
+    "rmse", "rms_innovation", "mean_nis", "j_nis", "c_nis", "nll", "break_rate_gate", "lag1_correlation",
+    "white_share", "white_noise", "correlated_noise", "error_correlation_s", "equivalent_noise", "told_noise",
+)  # fmt: skip
+"""A small part of the figures of a flight; of a thousand sets all of them would take a gigabyte for ten flights."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +174,7 @@ def read_flights(
     seen_by : the set that says how white the sources are, where a flight has it; the present one elsewhere. A source
         with a wrong delay looks coloured, as its error holds the acceleration.
     """
-    metrics = {folder: read_table(folder / "metrics.parquet") for folder in map(Path, folders)}
+    metrics = {folder: _read_metrics(folder) for folder in map(Path, folders)}
     shares = {one: white_shares(table, seen_by) or white_shares(table, present) for one, table in metrics.items()}
     known: dict[str, list[float]] = {}
     for one in shares.values():
@@ -169,8 +190,15 @@ def read_left_out(folder: AnyPath, without: NoEvidence) -> AnalyzedFlight:
     folder = Path(folder)
     summary = read_document(folder / "scoring.json")
     return AnalyzedFlight(
-        summary["flight"], folder, summary, read_table(folder / "metrics.parquet"), evidence=None, without=without
+        summary["flight"], folder, summary, METRICS_SCHEMA.empty_table(), evidence=None, without=without
     )
+
+
+def _read_metrics(folder: Path) -> pa.Table:
+    words = [field.name for field in METRICS_SCHEMA if pa.types.is_string(field.type)]
+    decisive = pa.array(DECISIVE_METRICS)
+    pieces = read_pieces(folder / "metrics.parquet", words=words)
+    return pa.concat_tables([one.filter(pc.is_in(one["metric"], value_set=decisive)) for one in pieces])
 
 
 def _read_flight(
@@ -198,15 +226,25 @@ def _evidence_of(
             f"its replay has trust grade {grade}{because}, and the decision takes none below {settings.lowest_grade}"
         )
         return NoEvidence(DISTRUSTED, words)
-    aided = _aided(read_table(folder / "scores.parquet"), settings.sources)
-    unaided = _unaided(read_table(folder / "withheld.parquet"), settings.withheld_sources)
-    smoothed = _smoothed(read_table(folder / "smoothed.parquet"))
+    aided = _aided(_read_scores(folder / "scores.parquet", _AIDED_COLUMNS), settings.sources)
+    unaided = _unaided(_read_scores(folder / "withheld.parquet", _UNAIDED_COLUMNS), settings.withheld_sources)
+    smoothed = _smoothed(_read_scores(folder / "smoothed.parquet", _SMOOTHED_COLUMNS))
     evidence = flight_evidence(summary["flight"], aided, unaided, whiteness, settings, smoothed)
     if evidence is None and aided is not None:
         return NoEvidence(MISLEADING, _why_misleading(aided, whiteness, settings))
     if evidence is None or present not in evidence.sets:
         return NoEvidence(WITHOUT_SAMPLES, f"the flight has nothing of {', '.join(settings.sources)} to judge by")
     return evidence
+
+
+_KEY = ("set", "source", "axis", "block")
+_AIDED_COLUMNS = (*_KEY, "n", "sum_nis_winsorised", "sum_log_variance")
+_UNAIDED_COLUMNS = (*_KEY, "horizon_s", "error_winsorised")
+_SMOOTHED_COLUMNS = (*_KEY, "n", "sum_squares_winsorised")
+
+
+def _read_scores(path: Path, columns: Sequence[str]) -> pa.Table:
+    return read_table(path, columns, words=("set", "source"))
 
 
 def _why_misleading(aided: BlockSums, whiteness: Mapping[str, float], settings: DecisionSettings) -> str:
@@ -279,7 +317,8 @@ def flight_evidence(
     if not any(part[2] > 0.0 for part in parts.values()):
         return None
     total = sum(weight for _, _, weight in parts.values())
-    sets = [name for name in next(iter(parts.values()))[0].sets if all(name in part[0].sets for part in parts.values())]
+    everywhere = set.intersection(*(set(part[0].sets) for part in parts.values()))
+    sets = [name for name in next(iter(parts.values()))[0].sets if name in everywhere]
     aims = [_aim(name, *parts[name], sets, total) for name in AIMS if name in parts]
     # An error of exactly 0, or one that is no number, has no logarithm: such a set has no score.
     able = np.all([np.isfinite(aim.scores) for aim in aims], axis=0)
@@ -306,7 +345,8 @@ def _aim(
     name: str, sums: BlockSums, column_weights: Array, weight: float, sets: Sequence[str], total: float
 ) -> AimEvidence:
     used = column_weights > 0.0
-    rows = [sums.sets.index(one) for one in sets]
+    place = {one: row for row, one in enumerate(sums.sets)}
+    rows = [place[one] for one in sets]
     return AimEvidence(
         name=name,
         weight=weight / total,
@@ -327,7 +367,7 @@ def _aided(table: pa.Table, weights: Mapping[str, float]) -> BlockSums | None:
         "sum_nis": table["sum_nis_winsorised"].to_numpy(),
         "sum_log_variance": table["sum_log_variance"].to_numpy(),
     }
-    return _block_sums(table, _axis_names(table), columns)
+    return _block_sums(table, columns)
 
 
 def _unaided(table: pa.Table, weights: Mapping[str, float]) -> BlockSums | None:
@@ -338,9 +378,7 @@ def _unaided(table: pa.Table, weights: Mapping[str, float]) -> BlockSums | None:
         return None
     error = table["error_winsorised"].to_numpy()
     columns = {"n": np.ones(error.size), "sum_nis": np.square(error), "sum_log_variance": np.zeros(error.size)}
-    horizon = table["horizon_s"].to_pylist()
-    labels = [f"{name} after {seconds:g} s" for name, seconds in zip(_axis_names(table), horizon, strict=True)]
-    return _block_sums(table, labels, columns)
+    return _block_sums(table, columns, table["horizon_s"].to_numpy())
 
 
 def _smoothed(table: pa.Table) -> BlockSums | None:
@@ -349,7 +387,7 @@ def _smoothed(table: pa.Table) -> BlockSums | None:
         return None
     squares = table["sum_squares_winsorised"].to_numpy()
     columns = {"n": table["n"].to_numpy(), "sum_nis": squares, "sum_log_variance": np.zeros(squares.size)}
-    return _block_sums(table, _axis_names(table), columns)
+    return _block_sums(table, columns)
 
 
 def _axes_of(sums: BlockSums) -> list[tuple[str, str]]:
@@ -362,26 +400,30 @@ def _weighted(weights: Mapping[str, float]) -> list[str]:
     return sorted({key.partition(".")[0] for key, weight in weights.items() if weight > 0.0})
 
 
-def _axis_names(table: pa.Table) -> list[str]:
-    return [AXES[axis] for axis in table["axis"].to_pylist()]
-
-
-def _block_sums(table: pa.Table, labels: Sequence[str], values: Mapping[str, npt.NDArray[Any]]) -> BlockSums:
-    """Add up rows by set, block and column: a source and what the rows are labelled."""
-    names, set_index = np.unique(np.asarray(table["set"].to_pylist()), return_inverse=True)
+def _block_sums(table: pa.Table, values: Mapping[str, npt.NDArray[Any]], horizon: Array | None = None) -> BlockSums:
+    """Add up rows by set, block and column: a source, its axis and, where there is one, the horizon (N,) in seconds."""
+    names, sources = (sorted(table[name].unique().to_pylist()) for name in ("set", "source"))
+    set_index, source = places(table["set"], names), places(table["source"], sources)
     blocks, block_index = np.unique(table["block"].to_numpy(), return_inverse=True)
-    pairs = list(zip(table["source"].to_pylist(), labels, strict=True))
-    columns = sorted(set(pairs))
-    position = {pair: index for index, pair in enumerate(columns)}
-    column_index = np.array([position[pair] for pair in pairs])
-    sums = {name: np.zeros((names.size, blocks.size, len(columns))) for name in values}
-    for name, value in values.items():
-        np.add.at(sums[name], (set_index, block_index, column_index), value)
+    times = np.zeros(1) if horizon is None else np.unique(horizon)
+    time = 0 if horizon is None else np.searchsorted(times, horizon)
+    number = (source * len(AXES) + table["axis"].to_numpy()) * times.size + time
+    found, column_index = np.unique(number, return_inverse=True)
+    parts = zip(*np.unravel_index(found, (len(sources), len(AXES), times.size)), strict=True)
+    pairs = [
+        (sources[one], AXES[axis] if horizon is None else f"{AXES[axis]} after {times[number]:g} s")
+        for one, axis, number in parts
+    ]
+    columns = sorted(pairs)
+    column_index = np.array([columns.index(pair) for pair in pairs])[column_index]
+    shape = (len(names), blocks.size, len(columns))
+    cell = np.ravel_multi_index((set_index, block_index, column_index), shape)
+    sums = {name: np.bincount(cell, value, minlength=math.prod(shape)).reshape(shape) for name, value in values.items()}
     # A set with another number of samples did not share the source with the others; it has no paired score.
     count = sums["n"].sum(axis=(1, 2))
     complete = count == count.max()
     return BlockSums(
-        sets=tuple(str(name) for name in names[complete]),
+        sets=tuple(name for name, one in zip(names, complete, strict=True) if one),
         columns=tuple((one, f"{one} {text}") for one, text in columns),
         n=sums["n"][complete][0],
         sum_nis=sums["sum_nis"][complete],

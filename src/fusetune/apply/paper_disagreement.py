@@ -179,7 +179,7 @@ def _log_ratios(
     if not both:
         return ratios
     # All sets that were scored on these flights, as in the ranking: its intervals come out again.
-    common = [name for name in both[0].sets if all(name in flight.sets for flight in both)]
+    common = [name for name in both[0].sets if all(name in flight.row for flight in both)]
     names = list(dict.fromkeys((other, one, *common)))
     ratios["score"] = mean_differences(both, names, settings)[1]
     for aim in AIMS:

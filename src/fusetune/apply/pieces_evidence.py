@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +17,7 @@ from fusetune.apply.evidence import WITHOUT_SAMPLES, AimEvidence, AnalyzedFlight
 from fusetune.apply.settings import DecisionSettings
 from fusetune.px4.aid_sources import AXES
 from fusetune.storage.files import AnyPath
-from fusetune.storage.parquet import read_table
+from fusetune.storage.parquet import read_pieces
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -67,14 +69,69 @@ class PiecesOfFlight:
     n: Array
     sum_nis: Array
     sum_log_variance: Array
+    _by_piece: dict[tuple[str, tuple[str, ...], tuple[str, ...]], PieceSums] = field(default_factory=dict, repr=False)
+
+    @property
+    def legs(self) -> list[int]:
+        """Legs that it flew, ascending."""
+        return np.unique(self._leg_of_piece[self._leg_of_piece >= 0]).tolist()
 
     def of_classes(self, classes: Sequence[str]) -> Flags:
-        """Rows of some manoeuvre classes."""
-        return np.asarray(self.kind.places_in(classes) >= 0)
+        """(P,) pieces that are of some manoeuvre classes."""
+        wanted = [number for number, word in enumerate(self.kind.words) if word in classes]
+        return np.isin(self.kind.codes[self._pieces[0]], wanted)
 
     def of_leg(self, leg: int) -> Flags:
-        """Rows of a leg of the mission."""
-        return np.asarray(self.leg == leg)
+        """(P,) pieces that are of a leg of the mission."""
+        return np.asarray(self._leg_of_piece == leg)
+
+    @cached_property
+    def _leg_of_piece(self) -> npt.NDArray[np.int64]:
+        return self.leg[self._pieces[0]]
+
+    @cached_property
+    def _pieces(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+        """(P,) a row of each piece, in their order, and (N,) the place of each row's piece among them."""
+        pieces, place = _few(self.piece)
+        first = np.zeros(pieces.size, np.intp)
+        first[place[::-1]] = np.arange(place.size)[::-1]
+        return first, place
+
+    def sums(self, aim: AimEvidence, sets: tuple[str, ...]) -> PieceSums:
+        """All pieces of an aim of the flight; what single classes and legs say is asked for again and again."""
+        key = (aim.name, sets, aim.columns)
+        if key not in self._by_piece:
+            self._by_piece[key] = self._sums(aim, sets)
+        return self._by_piece[key]
+
+    def _sums(self, aim: AimEvidence, sets: tuple[str, ...]) -> PieceSums:
+        first, piece = self._pieces
+        place, column = self.name.places_in(sets), self.label.places_in(aim.columns)
+        rows = np.flatnonzero((self.aim.places_in([aim.name]) == 0) & (column >= 0) & (place >= 0))
+        shape = (len(sets), first.size, len(aim.columns))
+        cell = np.ravel_multi_index((place[rows], piece[rows], column[rows]), shape)
+
+        def summed(values: Array) -> Array:
+            return np.bincount(cell, values[rows], math.prod(shape)).astype(np.float64, copy=False).reshape(shape)
+
+        known = np.bincount(piece[rows], minlength=first.size) > 0
+        return PieceSums(known, summed(self.n), summed(self.sum_nis), summed(self.sum_log_variance))
+
+
+@dataclass(frozen=True)
+class PieceSums:
+    """Sums of S sets over P pieces of a flight, of the A columns of an aim.
+
+    Attributes
+    ----------
+    known : (P,) pieces of which there is any
+    n, sum_nis, sum_log_variance : (S, P, A) as in `AimEvidence`
+    """
+
+    known: Flags
+    n: Array
+    sum_nis: Array
+    sum_log_variance: Array
 
 
 def read_flight_pieces(path: AnyPath) -> dict[str, PiecesOfFlight]:
@@ -85,9 +142,13 @@ def read_flight_pieces(path: AnyPath) -> dict[str, PiecesOfFlight]:
     UserError
         The file is missing or damaged.
     """
-    table = read_table(path, _COLUMNS)
-    flights = table["flight"].unique().to_pylist()
-    return {name: _of_flight(table.filter(pc.equal(table["flight"], name))) for name in flights}
+    found: dict[str, list[pa.Table]] = {}
+    for table in read_pieces(path, _COLUMNS):
+        flights = table["flight"].unique().to_pylist()
+        for name in flights:
+            own = table if len(flights) == 1 else table.filter(pc.equal(table["flight"], name))
+            found.setdefault(name, []).append(own)
+    return {name: _of_flight(pa.concat_tables(found.pop(name)).unify_dictionaries()) for name in list(found)}
 
 
 def _of_flight(table: pa.Table) -> PiecesOfFlight:
@@ -118,9 +179,9 @@ def _words(column: pa.ChunkedArray) -> Words:
 
 def _labels(source: Words, axis: npt.NDArray[np.integer], horizon: Array) -> Words:
     """What a row is of, 0 s standing for no horizon, as `AimEvidence.columns` has it."""
-    times, time = np.unique(horizon, return_inverse=True)
-    numbers = (source.codes.astype(np.int64) * len(AXES) + axis) * times.size + time
-    kept, codes = np.unique(numbers, return_inverse=True)
+    times = np.unique(horizon)
+    numbers = (source.codes.astype(np.int64) * len(AXES) + axis) * times.size + np.searchsorted(times, horizon)
+    kept, codes = _few(numbers)
     labels = []
     for number in kept.tolist():
         seconds = times[number % times.size]
@@ -129,7 +190,13 @@ def _labels(source: Words, axis: npt.NDArray[np.integer], horizon: Array) -> Wor
     return Words(tuple(labels), codes)
 
 
-def evidence_in(whole: FlightEvidence, pieces: PiecesOfFlight, rows: Flags) -> FlightEvidence | None:
+def _few(numbers: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Different numbers from 0 on, of which the largest is small, and (N,) the place of each row's among them."""
+    is_there = np.bincount(numbers) > 0
+    return np.flatnonzero(is_there), (np.cumsum(is_there) - 1)[numbers]
+
+
+def evidence_in(whole: FlightEvidence, pieces: PiecesOfFlight, wanted: Flags) -> FlightEvidence | None:
     """What a flight says of the sets in some of its pieces.
 
     Aims, columns and weights are those of the whole flight, what is lacking in the pieces left out; the blocks, of
@@ -138,13 +205,13 @@ def evidence_in(whole: FlightEvidence, pieces: PiecesOfFlight, rows: Flags) -> F
     Parameters
     ----------
     whole : evidence of the flight
-    rows : (N,) of `pieces`
+    wanted : (P,) which of them, as `PiecesOfFlight.of_classes` and `of_leg` say
 
     Returns
     -------
     None where the pieces hold too little of every aim
     """
-    aims = [found for aim in whole.aims if (found := _aim_in(aim, whole.sets, pieces, rows)) is not None]
+    aims = [found for aim in whole.aims if (found := _aim_in(aim, pieces.sums(aim, whole.sets), wanted)) is not None]
     total = sum(aim.weight for aim in aims)
     if total <= 0.0:
         return None
@@ -171,17 +238,11 @@ def in_classes(
     return replace(flight, evidence=None, without=NoEvidence(WITHOUT_SAMPLES, reason))
 
 
-def _aim_in(aim: AimEvidence, sets: Sequence[str], pieces: PiecesOfFlight, rows: Flags) -> AimEvidence | None:
-    place, column = pieces.name.places_in(sets), pieces.label.places_in(aim.columns)
-    rows = rows & (pieces.aim.places_in([aim.name]) == 0) & (column >= 0) & (place >= 0)
-    if not rows.any():
+def _aim_in(aim: AimEvidence, sums: PieceSums, wanted: Flags) -> AimEvidence | None:
+    blocks = wanted & sums.known
+    if not blocks.any():
         return None
-    blocks, block = np.unique(pieces.piece[rows], return_inverse=True)
-    index = (place[rows], block, column[rows])
-    shape = (len(sets), blocks.size, len(aim.columns))
-    n, nis, log_variance = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for sums, values in ((n, pieces.n), (nis, pieces.sum_nis), (log_variance, pieces.sum_log_variance)):
-        np.add.at(sums, index, values[rows])
+    n, nis, log_variance = (one[:, blocks] for one in (sums.n, sums.sum_nis, sums.sum_log_variance))
     enough = n[0].sum(axis=0) >= FEWEST.get(aim.name, FEWEST[AIDED])
     weights = aim.column_weights * enough
     if not weights.any():

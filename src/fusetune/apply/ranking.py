@@ -168,7 +168,7 @@ def rank(
     vetoed : reasons against a set, by name
     """
     evidence = [flight.evidence for flight in flights if flight.evidence is not None]
-    by_set = {name: [one for one in evidence if name in one.sets] for name in sets}
+    by_set = {name: [one for one in evidence if name in one.row] for name in sets}
     complete = [name for name in sets if evidence and len(by_set[name]) == len(evidence)]
     partial = [name for name in sets if 0 < len(by_set[name]) < len(evidence)]
     equal = {
@@ -180,7 +180,7 @@ def rank(
     if complete:
         ranked = _compared(complete, present, evidence, vetoed, equal, settings)
         redrawn = bootstrap_scores(evidence, complete, settings.draws, settings.seed)
-        ranked = _with_family(ranked, present, evidence, complete, redrawn.total, settings)
+        ranked = _with_family(ranked, present, evidence, complete, redrawn, settings)
     for name in partial:
         # A set that failed on some flights: its figures come from the others, for information.
         ranked += [one for one in _compared([name], present, by_set[name], vetoed, equal, settings) if one.name == name]
@@ -199,7 +199,7 @@ def _compared(
 ) -> list[RankedSet]:
     """Sets that were all scored on all of these flights, against the present one."""
     names = list(dict.fromkeys((present, *sets)))
-    scores = np.array([one.scores[[one.sets.index(name) for name in names]] for one in evidence])
+    scores = np.array([one.scores[one.rows_of(names)] for one in evidence])
     to_present = mean_differences(evidence, names, settings)
     aims = _aims(names, evidence, settings)
     of_velocity = aims[SMOOTHED] if all(one.aim(SMOOTHED) is not None for one in evidence) else None
@@ -286,7 +286,8 @@ def _with_family(
 
 def _shares_of_best(able: Sequence[str], complete: Sequence[str], scores: Array) -> dict[str, float] | None:
     """Share of draws in which each set is best; None where sets differ and no draw shows by how much that varies."""
-    drawn = scores[:, [complete.index(name) for name in able]]
+    place = {name: column for column, name in enumerate(complete)}
+    drawn = scores[:, [place[name] for name in able]]
     differences = drawn - drawn[:, :1]
     if not (differences.std(axis=0) > EQUAL_WITHIN).any() and without_rounding(differences).any():
         return None

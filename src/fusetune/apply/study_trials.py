@@ -57,7 +57,7 @@ def trials_of_study(
 
 
 def _is_scored(name: str, flights: Sequence[AnalyzedFlight]) -> bool:
-    return any(flight.evidence is not None and name in flight.evidence.sets for flight in flights)
+    return any(flight.evidence is not None and name in flight.evidence.row for flight in flights)
 
 
 def _varied(overrides: Mapping[str, Mapping[str, float]], now: Mapping[str, float]) -> list[str]:
@@ -104,7 +104,6 @@ def _differences(flights: Sequence[AnalyzedFlight], names: Sequence[str], presen
         evidence = flight.evidence
         if evidence is None or (aim is not None and evidence.aim(aim) is None):
             continue
-        scored = [name for name in names if name in evidence.sets]
-        found = evidence.differences([present, *scored], aim)[1:]
-        table[[names.index(name) for name in scored], column] = found
+        rows = [row for row, name in enumerate(names) if name in evidence.row]
+        table[rows, column] = evidence.differences([present, *(names[row] for row in rows)], aim)[1:]
     return table

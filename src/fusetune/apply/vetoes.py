@@ -20,6 +20,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.rates import rate_ratio
 from fusetune.px4.aid_sources import AXES
 from fusetune.px4.parameters.ekf2_parameters import check_value
+from fusetune.storage.words import texts
 
 FEWEST_FLIGHTS = 2
 """On so many flights, or on all where there are fewer, a set must do worse for it to be held against it."""
@@ -83,7 +84,7 @@ def _failures(name: str, flights: Sequence[AnalyzedFlight], settings: DecisionSe
     reasons = []
     for flight in flights:
         assert flight.evidence is not None
-        if name not in flight.evidence.sets:
+        if name not in flight.evidence.row:
             summary = flight.summary["sets"].get(name, {})
             left_out = summary.get("evidence", {}).get("left_out", {})
             lacks = "; ".join(why for source, why in sorted(left_out.items()) if source in counting)
@@ -176,10 +177,11 @@ def break_rates(metrics: pa.Table) -> Mapping[str, BreakRates]:
         pc.equal(metrics["metric"], "break_rate_gate"), pc.is_in(metrics["axis"], value_set=pa.array(AXES))
     )
     rates: dict[str, dict[tuple[str, str, str, str], tuple[float, float]]] = {}
-    for row in metrics.filter(wanted).to_pylist():
-        if math.isfinite(row["value"]) and row["n"] > 0:
-            key = (row["set"], row["source"], row["axis"], row["flight"])
-            rates.setdefault(row["set"], {})[key] = (row["value"], row["n"])
+    kept = metrics.filter(wanted)
+    keys = zip(*(texts(kept[name]) for name in ("set", "source", "axis", "flight")), strict=True)
+    for key, value, samples in zip(keys, kept["value"].to_pylist(), kept["n"].to_pylist(), strict=True):
+        if math.isfinite(value) and samples > 0:
+            rates.setdefault(key[0], {})[key] = (value, samples)
     return rates
 
 

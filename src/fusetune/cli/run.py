@@ -92,6 +92,10 @@ def run(options: argparse.Namespace) -> int:
 
     try:
         status = run_workflow(workflow_file(), folder, arguments, take)
+    except KeyboardInterrupt:
+        display.end()
+        print("What is finished stays, and the next run goes on.", file=sys.stderr)
+        raise
     finally:
         display.end()
     if status:
@@ -140,6 +144,9 @@ def _prepare(options: argparse.Namespace, folder: Path) -> str:
     for file in filter(None, (options.configfile, options.study)):
         if not Path(file).is_file():
             raise UserError(file, "is no file", "Mend the name")
+    if options.dry_run and (options.logs or options.results):
+        reason = "only tells, and links would have to be made for what is named beside it"
+        raise UserError("--dry-run", reason, "Leave out logs and --results, or run")
     from fusetune.running.project_folder import FLIGHTS, link_results
 
     flights_dir = _settings(options, folder).flights_dir

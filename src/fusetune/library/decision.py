@@ -128,6 +128,7 @@ def _run(logs: Sequence[Path], place: Path, sets: Mapping[str, Mapping[str, floa
 def _write_study(place: Path, sets: Mapping[str, Mapping[str, float]]) -> Path:
     document = {
         "name": "asked",
+        "kind": "list",
         "sets": [{"name": name, "parameters": checked_values(values, f"set {name}")} for name, values in sets.items()],
     }
     file = place / "asked_study.yaml"

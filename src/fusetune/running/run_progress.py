@@ -65,6 +65,9 @@ class RunProgress:
         elif isinstance(event, Counted):
             self.done, self.total = event.done, event.total
         elif isinstance(event, JobBegun):
+            if not self._begun:
+                # planning is no part of the pace
+                self._steady_since = self._clock()
             self.now[event.number] = event
             self._begun[event.rule] += 1
             self._expected[event.rule] = max(self._expected[event.rule], self._begun[event.rule])

@@ -57,9 +57,8 @@ def run_workflow(snakefile: AnyPath, folder: AnyPath, arguments: Sequence[str], 
             [*command, *arguments],
             cwd=Path(folder),
             stdin=subprocess.DEVNULL,
-            # what Snakemake says at its end who asked says better
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
             text=True,
             encoding="utf-8",
             errors="backslashreplace",
@@ -74,8 +73,8 @@ def run_workflow(snakefile: AnyPath, folder: AnyPath, arguments: Sequence[str], 
 
 
 def _tell_all(process: subprocess.Popen[str], told: Teller) -> None:
-    assert process.stderr is not None
-    for line in process.stderr:
+    assert process.stdout is not None
+    for line in process.stdout:
         told(event_of(line) or line.rstrip("\n"))
 
 

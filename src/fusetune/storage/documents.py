@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from fusetune.errors import RUN_AGAIN, UserError
+from fusetune.storage.indented_json import indented
 
 Built = TypeVar("Built")
 
@@ -42,15 +43,16 @@ def write_document(
     if not document or _DIGEST in document:
         raise ValueError(f"a document has entries, and none of them is {_DIGEST!r}")
 
-    def text_of(value: Any, lines: int, indent: int | None = None) -> str:
+    def text_of(value: Any, lines: int) -> str:
         if lines and isinstance(value, Mapping) and value:
             entries = sorted(value.items()) if sort_keys else value.items()
             return (
                 "{\n" + ",\n".join(f"{json.dumps(str(key))}: {text_of(one, lines - 1)}" for key, one in entries) + "\n}"
             )
-        return json.dumps(value, indent=indent, sort_keys=sort_keys, ensure_ascii=False, allow_nan=allow_nan)
+        return json.dumps(value, sort_keys=sort_keys, ensure_ascii=False, allow_nan=allow_nan)
 
-    text = text_of(document, lines, None if lines else 1).removesuffix("\n}")
+    text = text_of(document, lines) if lines else indented(document, sort_keys=sort_keys, allow_nan=allow_nan)
+    text = text.removesuffix("\n}")
     # a name that is no text, as of a file of another encoding, becomes the escape that JSON has for it
     content = text.encode("utf-8", errors="backslashreplace")
     Path(path).write_bytes(content + _seal_of(content))

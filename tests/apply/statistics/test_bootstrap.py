@@ -51,7 +51,7 @@ def test_score_is_the_profiled_likelihood_by_hand() -> None:
 def test_one_flight_of_one_block_does_not_vary() -> None:
     one = evidence(1, (1.0, 1.3), blocks=1)
     scores = bootstrap_scores([one], ["set0", "set1"], draws=300, seed=0)
-    np.testing.assert_allclose(scores.total, np.broadcast_to(one.scores, scores.total.shape))
+    np.testing.assert_allclose(scores, np.broadcast_to(one.scores, scores.shape))
 
 
 def test_draws_are_those_of_a_plain_loop_in_distribution() -> None:
@@ -70,29 +70,29 @@ def test_draws_are_those_of_a_plain_loop_in_distribution() -> None:
                 )
             scores.append(total)
         slow.append(np.mean(scores, axis=0))
-    fast = bootstrap_scores(flights, ["set0", "set1"], draws=3000, seed=1).total
+    fast = bootstrap_scores(flights, ["set0", "set1"], draws=3000, seed=1)
     np.testing.assert_allclose(fast.mean(0), np.mean(slow, axis=0), atol=6e-3)
     np.testing.assert_allclose(fast.std(0), np.std(slow, axis=0), rtol=0.06)
 
 
 def test_pairing_takes_out_what_the_sets_have_in_common() -> None:
     flights = [evidence(seed, (1.0, 1.1), unaided=True) for seed in range(5)]
-    redrawn = bootstrap_scores(flights, ["set0", "set1"], draws=1000, seed=0)
     # The second set's errors are 1.1 times the first's on every sample: the difference is exactly ln 1.1.
-    for scores in (redrawn.total, *redrawn.aims.values()):
+    for of in (None, AIDED, UNAIDED):
+        scores = bootstrap_scores(flights, ["set0", "set1"], draws=1000, seed=0, aim=of)
         np.testing.assert_allclose(scores[:, 1] - scores[:, 0], np.log(1.1), atol=1e-12)
         assert scores[:, 0].std() > 1e-3
 
 
 def test_an_aim_is_the_mean_over_the_flights_that_have_it() -> None:
     flights = [evidence(1, (1.0, 1.2), blocks=1, unaided=True), evidence(2, (1.0, 1.2), blocks=1)]
-    redrawn = bootstrap_scores(flights, ["set0", "set1"], draws=500, seed=0)
+    redrawn = bootstrap_scores(flights, ["set0", "set1"], draws=500, seed=0, aim=UNAIDED)
     only = flights[0].aim(UNAIDED)
     assert only is not None
-    drawn = np.isfinite(redrawn.aims[UNAIDED][:, 0])
+    drawn = np.isfinite(redrawn[:, 0])
     # Of two flights the first is missing in a quarter of the draws.
     assert 1.0 - drawn.mean() == pytest.approx(0.25, abs=0.06)
-    np.testing.assert_allclose(redrawn.aims[UNAIDED][drawn], np.broadcast_to(only.scores, (drawn.sum(), 2)))
+    np.testing.assert_allclose(redrawn[drawn], np.broadcast_to(only.scores, (drawn.sum(), 2)))
 
 
 def test_a_column_without_samples_in_the_drawn_blocks_keeps_its_whole_score() -> None:
@@ -101,15 +101,22 @@ def test_a_column_without_samples_in_the_drawn_blocks_keeps_its_whole_score() ->
     n, nis = part.n.copy(), part.sum_nis.copy()
     n[1:, 2], nis[:, 1:, 2] = 0.0, 0.0
     one = dataclasses.replace(one, aims=(dataclasses.replace(part, n=n, sum_nis=nis),))
-    assert np.isfinite(bootstrap_scores([one], ["set0", "set1"], draws=400, seed=0).total).all()
+    assert np.isfinite(bootstrap_scores([one], ["set0", "set1"], draws=400, seed=0)).all()
+
+
+def test_it_does_not_matter_how_many_slots_are_scored_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    flights = [evidence(seed, (1.0, 1.1, 0.9), unaided=True) for seed in range(3)]
+    whole = bootstrap_scores(flights, ["set0", "set1", "set2"], draws=50, seed=7)
+    monkeypatch.setattr("fusetune.apply.statistics.bootstrap._FIGURES_AT_ONCE", 1)
+    assert np.array_equal(whole, bootstrap_scores(flights, ["set0", "set1", "set2"], draws=50, seed=7))
 
 
 def test_same_seed_same_bytes_and_the_order_of_sets_does_not_matter() -> None:
     flights = [evidence(seed, (1.0, 1.1, 0.9)) for seed in range(5)]
-    first = bootstrap_scores(flights, ["set0", "set1", "set2"], draws=500, seed=7).total
-    again = bootstrap_scores(flights, ["set2", "set0", "set1"], draws=500, seed=7).total
+    first = bootstrap_scores(flights, ["set0", "set1", "set2"], draws=500, seed=7)
+    again = bootstrap_scores(flights, ["set2", "set0", "set1"], draws=500, seed=7)
     np.testing.assert_array_equal(first, again[:, [1, 2, 0]])
-    assert not np.array_equal(first, bootstrap_scores(flights, ["set0", "set1", "set2"], draws=500, seed=8).total)
+    assert not np.array_equal(first, bootstrap_scores(flights, ["set0", "set1", "set2"], draws=500, seed=8))
 
 
 def test_expanded_interval_covers_the_truth_with_few_flights() -> None:

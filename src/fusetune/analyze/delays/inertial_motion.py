@@ -64,21 +64,28 @@ def inertial_motion(imu: TopicTable, states: FilterStates) -> InertialMotion | N
     inside = (states.time > stamp[0]) & (states.time <= stamp[-1]) if stamp.size else np.zeros(states.time.size, bool)
     if np.count_nonzero(inside) < _LEAST_UPDATES:
         return None
-    time, q = states.time[inside], states.quaternion[inside]
+    time, q, filtered = states.time[inside], states.quaternion[inside], states.velocity[inside]
+    # of an hour each of these, and each step in between, is tens of megabytes
+    del states
     turned = _over(stamp, stacked(imu, "gyro_rad"), time)
-    pushed = _over(stamp, stacked(imu, "accelerometer_m_s2"), time)
     step_s = np.diff(time)[:, None] * 1e-6
-    # rotations in NED that the filter added to what its gyros said
-    added = rotation_vector(multiply(q[1:], conjugate(multiply(q[:-1], from_rotation_vector(turned)))))
-    corrections = np.vstack([np.zeros(3), np.cumsum(added, axis=0)])
-    fast = corrections - slow_part(time, corrections, ATTITUDE_KNOTS_S)
-    q = multiply(from_rotation_vector(-fast), q)
+    q = multiply(from_rotation_vector(-_fast_corrections(time, q, turned)), q)
     half_way = rotation_matrix(multiply(q[:-1], from_rotation_vector(0.5 * turned)))
+    pushed = _over(stamp, stacked(imu, "accelerometer_m_s2"), time)
     gained = np.einsum("nij,nj->ni", half_way, pushed) + np.array([0.0, 0.0, ONE_G]) * step_s
+    del half_way, pushed
     velocity = np.vstack([np.zeros(3), np.cumsum(gained, axis=0)])
-    bounded = velocity - slow_part(time, velocity - states.velocity[inside], VELOCITY_KNOTS_S)
+    bounded = velocity - slow_part(time, velocity - filtered, VELOCITY_KNOTS_S)
+    del gained, filtered
     rate = np.vstack([turned[:1], turned]) / np.maximum(np.vstack([step_s[:1], step_s]), 1e-3)
     return InertialMotion(time, velocity, bounded, rotation_matrix(q), rate)
+
+
+def _fast_corrections(time: npt.NDArray[np.int64], q: Array, turned: Array) -> Array:
+    """(M, 3) sum of the rotations in NED that the filter added to what its gyros said, without its slow part."""
+    added = rotation_vector(multiply(q[1:], conjugate(multiply(q[:-1], from_rotation_vector(turned)))))
+    corrections = np.vstack([np.zeros(3), np.cumsum(added, axis=0)])
+    return np.asarray(corrections - slow_part(time, corrections, ATTITUDE_KNOTS_S))
 
 
 def _over(stamp: npt.NDArray[np.int64], values: Array, time: npt.NDArray[np.int64]) -> Array:

@@ -111,10 +111,13 @@ def velocity_place(
     # PX4 takes half an update off the time of a sample, so that it is the right one for the mean update that takes it.
     half_update_us = round(0.5 * float(np.median(np.diff(steps.time)))) if steps.time.size > 1 else 0
     later_s = 0.0
+    parts: list[Stretch] = []
     for _ in range(_ROUNDS):
+        # of an hour those of two rounds would be a hundred megabytes more
+        parts.clear()
         at = time + half_update_us - round(later_s * 1e6)
         found = (stretch_of(steps.rows(row), at, values, (), swings=True) for row in rows)
-        parts = [one for one in found if one is not None]
+        parts += [one for one in found if one is not None]
         if not parts:
             return None
         information, moment = _told_by(parts)

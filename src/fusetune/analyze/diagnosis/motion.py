@@ -89,6 +89,10 @@ def _about_down(vectors: Array, angle: Array) -> Array:
     return np.column_stack([cosine * north - sine * east, sine * north + cosine * east, vectors[:, 2]])
 
 
+_AT_ONCE = 1 << 14
+"""Updates that are turned at a time: of an hour the matrices of all would be tens of megabytes."""
+
+
 def motion_of(record: ReplayedSet, flight: Flight, airborne: tuple[Interval, ...]) -> Motion | None:
     """Motion of a replay; None where it has no steps, or none in the air."""
     if record.steps is None or not airborne:
@@ -102,7 +106,10 @@ def motion_of(record: ReplayedSet, flight: Flight, airborne: tuple[Interval, ...
     turned_by = rotation_matrix(steps.quaternion)
     rate = rate - _gyro_bias(steps, airborne)
     off = _heading_off(steps, turned_by, rate)
-    rotation = np.einsum("nij,njk->nik", _turn(-off), turned_by)
+    rotation = turned_by
+    for start in range(0, len(off), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        rotation[some] = np.einsum("nij,njk->nik", _turn(-off[some]), turned_by[some])
     gained = np.einsum("nij,nj->ni", rotation, force) + np.array([0.0, 0.0, ONE_G])
     height = _height(steps, airborne)
     thrust, source = _thrust(flight, steps.time, force, airborne)

@@ -18,6 +18,7 @@ from fusetune.analyze.effects.range_finder import RangeFit, estimate_range_arm, 
 from fusetune.analyze.effects.static_pressure import estimate_static_pressure
 from fusetune.analyze.effects.vision import estimate_vision_arm
 from fusetune.analyze.observed.observed_flight import ObservedFlight
+from fusetune.storage.freed_memory import give_back_freed_memory
 
 
 class FlightEffects:
@@ -46,6 +47,7 @@ class FlightEffects:
         """What one of `TUNERS` tells."""
         if tuner not in self._asked:
             self._asked[tuner] = TUNERS[tuner](self)
+            give_back_freed_memory()
         return self._asked[tuner]
 
     def all(self) -> tuple[Effect, ...]:

@@ -134,15 +134,18 @@ def joined_steps(pieces: Iterable[Columns]) -> ReplayedSteps:
 
 
 def _joined(pieces: Iterable[Columns], blocks: Mapping[str, Block]) -> dict[str, npt.NDArray[Any]]:
-    parts: dict[str, list[npt.NDArray]] = {
-        "time": [np.zeros(0, np.int64)],
-        **{name: [np.zeros((0, block.size) if block.size else 0)] for name, block in blocks.items()},
-    }
+    shapes = {"time": (), **{name: (block.size,) if block.size else () for name, block in blocks.items()}}
+    found = {name: np.zeros((0, *shape), np.int64 if name == "time" else np.float64) for name, shape in shapes.items()}
+    count = 0
     for piece in pieces:
-        for name, values in parts.items():
-            values.append(piece[name].astype(np.int64 if name == "time" else np.float64))
-    # one after the other, so that no two are in memory in both forms
-    return {name: np.concatenate(parts.pop(name)) for name in (*parts,)}
+        rows = slice(count, count := count + piece["time"].size)
+        for name, values in found.items():
+            if count > len(values):
+                # twice what is needed: room that is not used takes no memory, and nothing small is left behind
+                found[name] = np.empty((2 * count, *shapes[name]), values.dtype)
+                found[name][: rows.start] = values[: rows.start]
+            found[name][rows] = piece[name]
+    return {name: values[:count] for name, values in found.items()}
 
 
 @dataclass(frozen=True)

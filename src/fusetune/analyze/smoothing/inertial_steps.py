@@ -24,6 +24,9 @@ from fusetune.quaternions import conjugate, from_rotation_vector, multiply, rota
 
 Array = npt.NDArray[np.float64]
 
+_AT_ONCE = 1 << 14
+"""Updates whose matrices are made at a time: of an hour all of them would be tens of megabytes each."""
+
 
 @dataclass(frozen=True)
 class InertialSteps:
@@ -66,23 +69,27 @@ def inertial_steps(steps: ReplayedSteps) -> InertialSteps:
 
     corrected_rotation = rotation_vector(multiply(steps.quaternion[1:], conjugate(predicted)))
     corrected_velocity = steps.velocity[1:] - (steps.velocity[before] + gained)
-    gyro_change = steps.gyro_bias[before] - steps.gyro_bias[0]
-    accel_change = steps.accel_bias[before] - steps.accel_bias[0]
-
-    turned = np.cumsum(turn * dt[:, :, None], axis=0)
-    by_bias = _turned(turn, gyro_change) * dt
+    # of an hour each of these is tens of megabytes, so none stays longer than it is needed
+    del predicted, rotation
+    by_bias = _turned(turn, steps.gyro_bias[before] - steps.gyro_bias[0]) * dt
     known_rotation = np.cumsum(by_bias - corrected_rotation, axis=0)
     # the correction comes after the velocity was predicted
     known_force = np.cross(known_rotation + corrected_rotation, force)
-    known_velocity = np.cumsum(known_force + _turned(turn, accel_change) * dv_dt - corrected_velocity, axis=0)
-    force_sum, known_velocity = _from_zero(np.cumsum(force, axis=0)), _from_zero(known_velocity)
+    del by_bias, corrected_rotation
+    by_bias = _turned(turn, steps.accel_bias[before] - steps.accel_bias[0]) * dv_dt
+    known_velocity = _summed(known_force + by_bias - corrected_velocity)
+    del by_bias, known_force, corrected_velocity
+    turn *= dt[:, :, None]
+    turned = _summed(turn)
+    del turn
+    force_sum = _summed(force)
     return InertialSteps(
         time=steps.time,
         velocity=steps.velocity,
         acceleration=_from_zero(gained / dv_dt),
         force=force_sum,
-        turned=_from_zero(turned),
-        turned_force=_from_zero(np.cumsum(cross_matrix(force) @ turned, axis=0)),
+        turned=turned,
+        turned_force=_turned_force(force, turned),
         known_rotation=_from_zero(known_rotation),
         known_velocity=known_velocity,
         force_time=_integrated(force_sum, steps.time),
@@ -153,7 +160,25 @@ def _turned(matrices: Array, vectors: Array) -> Array:
 
 def _integrated(values: Array, time: npt.NDArray[np.int64]) -> Array:
     step_s = np.diff(time)[:, None] * 1e-6
-    return _from_zero(np.cumsum(0.5 * (values[1:] + values[:-1]) * step_s, axis=0))
+    return _summed(0.5 * (values[1:] + values[:-1]) * step_s)
+
+
+def _turned_force(force: Array, turned: Array) -> Array:
+    """(K + 1, 3, 3) running sums of [F]× A, some updates at a time."""
+    sums = np.zeros((len(force) + 1, 3, 3))
+    for start in range(0, len(force), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        np.matmul(cross_matrix(force[some]), turned[1:][some], out=sums[1:][some])
+    np.cumsum(sums[1:], axis=0, out=sums[1:])
+    return sums
+
+
+def _summed(values: Array) -> Array:
+    """(K + 1, …) running sums from 0 of values (K, …)."""
+    sums = np.empty((len(values) + 1, *values.shape[1:]))
+    sums[0] = 0.0
+    np.cumsum(values, axis=0, out=sums[1:])
+    return sums
 
 
 def _from_zero(sums: Array) -> Array:

@@ -115,7 +115,7 @@ def within_variances(one: FlightEvidence, names: Sequence[str]) -> Array | None:
 
     The aims are taken for unrelated. None with fewer than two blocks in any of them.
     """
-    rows = [one.sets.index(name) for name in names]
+    rows = one.rows_of(names)
     total = np.zeros(len(rows))
     for aim in one.aims:
         if aim.weight <= 0.0:
@@ -126,7 +126,7 @@ def within_variances(one: FlightEvidence, names: Sequence[str]) -> Array | None:
     return total
 
 
-def _jackknife(aim: AimEvidence, rows: Sequence[int]) -> Array:
+def _jackknife(aim: AimEvidence, rows: npt.NDArray[np.int64]) -> Array:
     n = aim.n.sum(axis=0) - aim.n
     nis, log_variance = (sums[rows].sum(axis=1, keepdims=True) - sums[rows] for sums in _sums(aim))
     with np.errstate(divide="ignore", invalid="ignore"):

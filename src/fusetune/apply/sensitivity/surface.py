@@ -207,14 +207,14 @@ def _fitted(kernel: Kernel, places: Array, mean: Array, tried: npt.NDArray[np.bo
     # (K + n T)⁻¹ = T^-½ Q (Λ + n)⁻¹ Qᵀ T^-½, with T^-½ K T^-½ = Q Λ Qᵀ: decomposed once for all nuggets
     root = 1.0 / np.sqrt(thin)
     decomposed, directions = np.linalg.eigh(root[:, None] * matrix * root)
-    inverses = (_inverse(root[:, None] * directions, np.maximum(decomposed, 0.0) + nugget) for nugget in nuggets)
-    fits = [_left_out_fit(inverse, mean) for inverse in inverses]
+    scaled, sizes_kept = root[:, None] * directions, np.maximum(decomposed, 0.0)
+    fits = [_left_out_fit(scaled, sizes_kept + nugget, mean) for nugget in nuggets]
     index = int(np.argmin([fit[0] for fit in fits]))
     error, amplitude = fits[index]
     variance = float(np.var(mean))
     explained = 1.0 - error**2 / variance if variance > 0.0 else 0.0
     quality = FitQuality(kernel.name, len(mean), error, explained, not tells)
-    inverse = _inverse(root[:, None] * directions, np.maximum(decomposed, 0.0) + nuggets[index])
+    inverse = _inverse(scaled, sizes_kept + nuggets[index])
     roughness = float(np.sqrt(amplitude * nuggets[index] * np.median(thin)))
     return Surface(kernel, places, (inverse @ mean)[:, None], inverse, amplitude, roughness, quality)
 
@@ -223,9 +223,12 @@ def _inverse(directions: Array, sizes: Array) -> Array:
     return np.asarray(directions / sizes @ directions.T)
 
 
-def _left_out_fit(inverse: Array, mean: Array) -> tuple[float, float]:
-    """RMS error of left-out sets, and the amplitude: what it says of its own errors agrees with those that it made."""
-    solved, precision = inverse @ mean, np.diag(inverse)
+def _left_out_fit(directions: Array, sizes: Array, mean: Array) -> tuple[float, float]:
+    """RMS error of left-out sets, and the amplitude: what it says of its own errors agrees with those that it made.
+
+    Of the inverse (`_inverse`) only what it makes of the mean and its diagonal are needed.
+    """
+    solved, precision = directions @ (directions.T @ mean / sizes), np.square(directions) @ (1.0 / sizes)
     left_out = solved / precision
     amplitude = max(float(mean @ solved) / len(mean), float(np.mean(np.square(left_out) * precision)))
     return float(np.sqrt(np.mean(np.square(left_out)))), amplitude

@@ -1,7 +1,7 @@
 """Paired hierarchical bootstrap: flights are redrawn, and in each drawn flight its blocks, alike for all sets."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.special import ndtr, stdtr, stdtrit
 
 from fusetune.analyze.metrics.likelihood import profile_nll
-from fusetune.apply.evidence import AIMS, AimEvidence, FlightEvidence
+from fusetune.apply.evidence import AimEvidence, FlightEvidence
 from fusetune.apply.statistics.rounding import EQUAL_WITHIN
 
 Array = npt.NDArray[np.float64]
@@ -38,15 +38,9 @@ class Interval:
         return self.lower > 0.0 or self.upper < 0.0
 
 
-@dataclass(frozen=True)
-class Redrawn:
-    """Redrawn mean scores, (D, S) each: of the whole score, and of each aim alone where any flight speaks of it."""
-
-    total: Array
-    aims: dict[str, Array]
-
-
-def bootstrap_scores(flights: Sequence[FlightEvidence], sets: Sequence[str], draws: int, seed: int) -> Redrawn:
+def bootstrap_scores(
+    flights: Sequence[FlightEvidence], sets: Sequence[str], draws: int, seed: int, aim: str | None = None
+) -> Array:
     """Redraw the mean score of every set.
 
     Parameters
@@ -55,62 +49,72 @@ def bootstrap_scores(flights: Sequence[FlightEvidence], sets: Sequence[str], dra
     sets : names, S; each must be scored on every flight
     draws : D
     seed : of the generator; the same seed gives the same draws on any number of cores
+    aim : the score in this kind of prediction alone
 
     Returns
     -------
-    Mean scores. In one draw all sets see the same flights and blocks, so differences are paired. An aim's mean is
-    over the drawn flights that have it, and NaN where none has.
+    (D, S) mean scores. In one draw all sets see the same flights and blocks, so differences are paired, and an aim
+    sees what the whole score sees. An aim's mean is over the drawn flights that have it, and NaN where none has.
     """
     generator = np.random.Generator(np.random.PCG64(seed))
     count = len(flights)
     drawn = generator.integers(0, count, size=(draws, count))
-    total = np.zeros((draws, len(sets)))
-    aims = {name: (np.zeros_like(total), np.zeros((draws, 1))) for name in AIMS}
+    total, number = np.zeros((draws, len(sets))), np.zeros((draws, 1))
     for index, flight in enumerate(flights):
         draw_of_slot = np.nonzero(drawn == index)[0]
-        columns = np.array([flight.sets.index(name) for name in sets])
-        for aim in flight.aims:
-            scores = _redrawn_aim(aim, columns, draw_of_slot.size, generator)
-            np.add.at(total, draw_of_slot, aim.weight * scores)
-            np.add.at(aims[aim.name][0], draw_of_slot, scores)
-            np.add.at(aims[aim.name][1], draw_of_slot, 1.0)
+        rows = flight.rows_of(sets)
+        for part in flight.aims:
+            weights = _times_drawn(part.n.shape[0], draw_of_slot.size, generator)
+            factor = part.weight if aim is None else float(part.name == aim)
+            if factor > 0.0:
+                number[:, 0] += np.bincount(draw_of_slot, minlength=draws)
+                for slots, scores in _rescored(part, rows, weights):
+                    for draw, one in zip(draw_of_slot[slots].tolist(), factor * scores, strict=True):
+                        total[draw] += one
     with np.errstate(invalid="ignore"):
-        means = {name: scores / number for name, (scores, number) in aims.items() if number.any()}
-    return Redrawn(total / count, means)
+        return total / (count if aim is None else number)
 
 
-def _redrawn_aim(aim: AimEvidence, columns: npt.NDArray[np.int64], slots: int, generator: np.random.Generator) -> Array:
-    """(slots, S) scores of one aim of a flight whose blocks are drawn anew for each slot."""
-    blocks, axes = aim.n.shape
+def _times_drawn(blocks: int, slots: int, generator: np.random.Generator) -> Array:
+    """(slots, blocks) how often each block is drawn for each slot."""
     picks = generator.integers(0, blocks, size=(slots, blocks))
     cells = (np.arange(slots)[:, None] * blocks + picks).ravel()
-    weights = np.bincount(cells, minlength=slots * blocks).reshape(slots, blocks).astype(np.float64)
-    whole = aim.column_scores
-    # all of a thousand sets at once would take gigabytes
-    at_once = max(1, _FIGURES_AT_ONCE // max(slots * axes, 1))
-    parts = [columns[start : start + at_once] for start in range(0, max(columns.size, 1), at_once)]
-    return np.concatenate([_rescored(aim, part, weights, whole) for part in parts], axis=1)
+    return np.bincount(cells, minlength=slots * blocks).reshape(slots, blocks).astype(np.float64)
 
 
-def _rescored(aim: AimEvidence, columns: npt.NDArray[np.int64], weights: Array, whole: Array) -> Array:
-    """(slots, S) scores of some sets with each block as often as a slot has drawn it."""
-    slots, blocks = weights.shape
-    n = np.zeros((slots, 1, aim.n.shape[1]))
-    nis = np.zeros((slots, columns.size, aim.n.shape[1]))
+def _rescored(aim: AimEvidence, rows: npt.NDArray[np.int64], weights: Array) -> Iterator[tuple[slice, Array]]:
+    """Scores of some sets with each block as often as a slot has drawn it: some of the slots, (N, S) theirs."""
+    slots, columns = weights.shape[0], aim.n.shape[1]
+    # sets stand last: there are a thousand of them, or few, but of columns always few
+    nis = np.ascontiguousarray(aim.sum_nis[rows].transpose(1, 2, 0))
+    log_variance = np.ascontiguousarray(aim.sum_log_variance[rows].transpose(1, 2, 0))
     has_variance = bool(aim.sum_log_variance.any())
-    log_variance = np.zeros_like(nis if has_variance else n)
-    # Summed block by block, not by a matrix product: its order of summation could change with the number of cores.
-    for block in range(blocks):
-        weight = weights[:, block, None, None]
-        n += weight * aim.n[block]
-        nis += weight * aim.sum_nis[columns, block]
-        if has_variance:
-            log_variance += weight * aim.sum_log_variance[columns, block]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scores = profile_nll(nis / n, log_variance / n)
-    # A draw may hold none of the blocks in which a column has samples: then the column says what it says on the whole.
-    scores = np.where(n > 0.0, scores, whole[columns])
-    return np.asarray((scores * aim.column_weights).sum(axis=-1))
+    whole, no_variance = aim.column_scores[rows].T, np.zeros(1)
+    at_once = max(1, _FIGURES_AT_ONCE // max(rows.size * columns, 1))
+    for start in range(0, slots, at_once):
+        some = slice(start, min(start + at_once, slots))
+        weight = weights[some, :, None, None]
+        n = _weighed_sum(weight, aim.n[:, :, None])
+        mean_log_variance = _weighed_sum(weight, log_variance) if has_variance else no_variance
+        with np.errstate(invalid="ignore", divide="ignore"):
+            scores = profile_nll(_weighed_sum(weight, nis) / n, mean_log_variance / n)
+        # Where a draw holds none of the blocks in which a column has samples, it says what it says on the whole.
+        if not n.all():
+            scores = np.where(n > 0.0, scores, whole)
+        scores *= aim.column_weights[:, None]
+        yield some, scores.sum(axis=1)
+
+
+def _weighed_sum(weight: Array, figures: Array) -> Array:
+    """(N, A, S) sums of the figures (B, A, S) of blocks, each so many times (N, B, 1, 1).
+
+    Summed block by block, not by a matrix product: its order of summation could change with the number of cores.
+    """
+    total = weight[:, 0] * figures[0]
+    part = np.empty_like(total)
+    for block in range(1, len(figures)):
+        total += np.multiply(weight[:, block], figures[block], out=part)
+    return np.asarray(total)
 
 
 def spread_of_flights(draws: Array, differences: Array) -> Array:

@@ -51,7 +51,7 @@ def leave_one_out(
     if len(flights) < FEWEST_FLIGHTS:
         return None
     names = [present, *(name for name in eligible if name != present)]
-    scores = np.array([flight.scores[[flight.sets.index(name) for name in names]] for flight in flights])
+    scores = np.array([flight.scores[flight.rows_of(names)] for flight in flights])
     scores = without_rounding(scores - scores[:, :1])
     total = scores.sum(axis=0)
     best = names[int(np.argmin(total))]

@@ -85,8 +85,7 @@ def _of_blocks(
     settings: DecisionSettings,
     aim: str | None,
 ) -> list[MeanDifference]:
-    redrawn = bootstrap_scores(flights, names, settings.draws, settings.seed)
-    scores = redrawn.total if aim is None else redrawn.aims[aim]
+    scores = bootstrap_scores(flights, names, settings.draws, settings.seed, aim)
     units = units_redrawn(flights, aim)
     found = []
     for index, difference in enumerate(differences):

@@ -20,7 +20,8 @@ _OF_NAMES = {
 }
 """Names of arguments that say no suffix themselves → suffixes."""
 _FOLDERS = ("DIR", "RESULTS", "A", "B")
-_PARAMETERS = ("NAME:KEY=VALUE,…", "NAME=VALUE,…", "NAMES")
+_PARAMETERS = {"NAME:KEY=VALUE,…": "=", "NAME=VALUE,…": "=", "NAMES": ""}
+"""Arguments that hold names of parameters → what follows one."""
 _SETTINGS = ("KEY=VALUE",)
 
 
@@ -37,7 +38,7 @@ def complete_argument(prefix: str, action: argparse.Action, **given: object) -> 
 
     name = action.metavar if isinstance(action.metavar, str) else ""
     if name in _PARAMETERS:
-        return _parameters(prefix)
+        return _parameters(prefix, _PARAMETERS[name])
     if name in _SETTINGS:
         return _settings(prefix)
     if name in _FOLDERS or name.endswith("_DIR"):
@@ -48,12 +49,12 @@ def complete_argument(prefix: str, action: argparse.Action, **given: object) -> 
     return []
 
 
-def _parameters(prefix: str) -> list[str]:
+def _parameters(prefix: str, then: str) -> list[str]:
     """Names of parameters, where one may begin: at first, behind `NAME:` or behind a comma."""
     from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
 
     head = prefix[: max(prefix.rfind(":"), prefix.rfind(",")) + 1]
-    return [f"{head}{name}" for name in PARAMETERS if f"{head}{name}".startswith(prefix)]
+    return [f"{head}{name}{then}" for name in PARAMETERS if f"{head}{name}".startswith(prefix)]
 
 
 def _settings(prefix: str) -> list[str]:

@@ -10,7 +10,9 @@ from html import escape
 _TAG = re.compile(r"(<[^>]*>)")
 _NAME = re.compile(r"</?([a-zA-Z][a-zA-Z0-9]*)")
 _VOID = frozenset(("area", "base", "br", "col", "hr", "img", "input", "link", "meta", "source", "wbr"))
-_DRAWN = "svg"
+_CLASSES = re.compile(r' class="([^"]*)"')
+_PICTURE = re.compile(r"(<svg\b.*?</svg>)", re.DOTALL)
+_DRAWN_TEXT = re.compile(r"(<(?:text|tspan)\b[^>]*>)([^<]+)")
 
 _PICTURE_IDS = re.compile(r'aria-labelledby="([\w-]+)-t \1-d">.*?id="\1-t".*?id="\1-d"', re.DOTALL)
 
@@ -24,17 +26,29 @@ def map_text(html: str, change: Change, *, drawn: Change | None = None, skip: fr
     ----------
     html : of our own making, so every `<` in text and attributes is escaped
     change : of the text between tags
-    drawn : of the text in pictures; None leaves it
+    drawn : of the text in pictures, not of what they are called; None leaves it
     skip : elements whose text stays, and classes as `.quiet`
     """
+    # the most of a page's tags are those of pictures
+    parts = _PICTURE.split(html)
+    parts[1::2] = [one if drawn is None else _in_picture(one, drawn) for one in parts[1::2]]
+    open_elements: list[tuple[str, bool]] = []
+    parts[::2] = [_in_words(one, change, skip, open_elements) for one in parts[::2]]
+    return "".join(parts)
+
+
+def _in_picture(picture: str, change: Change) -> str:
+    return _DRAWN_TEXT.sub(lambda match: match[1] + change(match[2]), picture)
+
+
+def _in_words(html: str, change: Change, skip: frozenset[str], open_elements: list[tuple[str, bool]]) -> str:
+    """A piece between pictures; `open_elements` are those that are open where it begins, and after it where it ends,
+    each with whether its text stays."""
     parts = _TAG.split(html)
-    open_elements: list[tuple[str, bool, bool]] = []
     for place, part in enumerate(parts):
-        skipped, in_picture = open_elements[-1][1:] if open_elements else (False, False)
         if place % 2 == 0:
-            if part and not skipped:
-                how = drawn if in_picture else change
-                parts[place] = how(part) if how is not None else part
+            if part and not (open_elements and open_elements[-1][1]):
+                parts[place] = change(part)
             continue
         match = _NAME.match(part)
         name = match[1].lower() if match else ""
@@ -44,14 +58,15 @@ def map_text(html: str, change: Change, *, drawn: Change | None = None, skip: fr
             while open_elements and open_elements.pop()[0] != name:
                 pass
         else:
-            open_elements.append((name, skipped or _is_skipped(name, part, skip), in_picture or name == _DRAWN))
+            stays = bool(open_elements) and open_elements[-1][1]
+            open_elements.append((name, stays or _is_skipped(name, part, skip)))
     return "".join(parts)
 
 
 def _is_skipped(name: str, tag: str, skip: frozenset[str]) -> bool:
     if name in skip or name in ("script", "style"):
         return True
-    match = re.search(r' class="([^"]*)"', tag)
+    match = _CLASSES.search(tag) if "class=" in tag else None
     return match is not None and any(f".{one}" in skip for one in match[1].split())
 
 
@@ -75,7 +90,7 @@ def with_short_names(html: str, names: Mapping[str, str]) -> str:
         html,
         lambda text: found.sub(written, text),
         drawn=lambda text: found.sub(lambda match: short[match[0]], text),
-        skip=frozenset(("code", "pre", ".whole", "desc", "title")),
+        skip=frozenset(("code", "pre", ".whole")),
     )
 
 

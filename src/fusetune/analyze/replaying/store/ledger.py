@@ -11,11 +11,11 @@ from fusetune.save.flight_folder import read_metadata
 from fusetune.storage.files import AnyPath
 from fusetune.storage.ledger import Ledger, key_of
 
+LEDGER_FILE = ".replays.made.json"
+
 
 class ReplayLedger:
-    """The record of the replays of one flight.
-
-    Each set has a file of its own, so that it does not matter which job replays it, and with which other sets.
+    """The record of the replays of one flight, which one job makes.
 
     Parameters
     ----------
@@ -27,22 +27,19 @@ class ReplayLedger:
     def __init__(self, flight_folder: AnyPath, output_folder: AnyPath, made_with: Any) -> None:
         self._folder = Path(output_folder)
         self._source = [read_metadata(flight_folder)["checksum"], made_with]
+        self._ledger = Ledger(self._folder / LEDGER_FILE)
 
     def outdated(self, sets: Mapping[str, Mapping[str, float]]) -> dict[str, Mapping[str, float]]:
         """Those of the sets, name → values, whose files do not stand as they were made from just this."""
         return {
             name: values
             for name, values in sets.items()
-            if not self._ledger(name).is_current(name, self._key(values), self._files(name))
+            if not self._ledger.is_current(name, self._key(values), self._files(name))
         }
 
     def record(self, sets: Mapping[str, Mapping[str, float]]) -> None:
         """Enter sets that have just been replayed."""
-        for name, values in sets.items():
-            self._ledger(name).record(name, self._key(values), self._files(name))
-
-    def _ledger(self, name: str) -> Ledger:
-        return Ledger(self._folder / f".{name}.made.json")
+        self._ledger.record_all({name: (self._key(values), self._files(name)) for name, values in sets.items()})
 
     def _key(self, values: Mapping[str, float]) -> str:
         return key_of([*self._source, dict(values)])
