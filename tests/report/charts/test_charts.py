@@ -15,9 +15,10 @@ import pytest
 from tests.report.made_search import made_search
 
 from fusetune.apply.evidence import AIDED
+from fusetune.report.change_cells import cell_words
 from fusetune.report.charts.differences import answer_chart, differences_chart
 from fusetune.report.charts.drift import drift_chart
-from fusetune.report.charts.flights_by_sets import cell_words, flights_by_sets_chart
+from fusetune.report.charts.flights_by_sets import flights_by_sets_chart
 from fusetune.report.charts.innovations import (
     breaks_chart,
     consistency_chart,

@@ -216,4 +216,6 @@ def test_of_too_many_sets_those_are_shown_that_predict_best(folders: tuple[Path,
     assert errors["better"] == pytest.approx(np.log(0.1 / 0.13), abs=0.03)
     best = min((name for name in errors if name != PRESENT), key=lambda name: errors[name])
     assert replayed_sets(scoring, scores, most=1) == [PRESENT, best]
+    worst = max((name for name in errors if name != PRESENT), key=lambda name: errors[name])
+    assert replayed_sets(scoring, scores, (worst,), most=1) == [PRESENT, worst], "what is asked for is shown"
     assert replayed_sets(None, scores) == []

@@ -23,6 +23,7 @@ from fusetune.report.flight_data.sensor_panels import (
     status_ratio_panel,
     vibration_panels,
 )
+from fusetune.report.flight_data.state_panels import Teller, motion_panels
 
 START = 1_000_000
 TIME = START + np.arange(5, dtype=np.int64) * 1_000_000
@@ -213,3 +214,20 @@ def test_positions_about_another_origin_are_moved() -> None:
     local |= {"ref_lat": np.array([np.nan, 47.001]), "ref_lon": np.array([np.nan, 8.0])}
     local |= {"ref_alt": np.array([np.nan, 480.0])}
     np.testing.assert_allclose(frame.of_vehicle(local), [[0.0, 0.0, 0.0], [111.195, 0.0, 20.0]], atol=1e-3)
+
+
+def test_angles_are_those_of_the_quaternion_and_parted_where_they_turn_over() -> None:
+    """A turn about one axis by an angle a is (cos a/2, sin a/2 along the axis); from 170° on by 20° is −170°."""
+    half = np.radians([30.0, 20.0, 170.0, 190.0]) / 2.0
+    axes = (1, 2, 3, 3)
+    q = np.zeros((4, 4))
+    q[:, 0] = np.cos(half)
+    q[np.arange(4), axes] = np.sin(half)
+    nowhere = np.full((4, 3), np.nan)
+    one = Teller("one", "one", TIME[:4], nowhere, nowhere, TIME[:4], q)
+    np.testing.assert_allclose(one.euler_deg, [[30, 0, 0], [0, 20, 0], [0, 0, 170], [0, 0, -170]], atol=1e-9)
+    panels = by_id(*motion_panels([one], None, 0, PositionFrame(None)))
+    assert set(panels) == {"attitude.0", "attitude.1", "attitude.2"}
+    (heading,) = panels["attitude.2"].series
+    np.testing.assert_allclose(heading.values, [0.0, 0.0, 170.0, np.nan, -170.0], atol=1e-9)
+    assert heading.time.tolist() == [*TIME[:3], TIME[2] + 100, TIME[3]]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from fusetune.report.change_cells import cell_words, colour_reach
 from fusetune.report.charts.blocks import chart_block, in_a_box
 from fusetune.report.charts.set_looks import set_class, set_marker
 from fusetune.report.charts.svg.axes import NARROW
@@ -68,13 +69,6 @@ def _chart(results: Results, values: Array, flights: list[str], sets: list[str])
     return drawn.replace("<svg ", f'<svg width="{width:.0f}" height="{rows.bottom + 4.0:.0f}" ', 1)
 
 
-def colour_reach(values: Array) -> float:
-    """Where the colour is full: a hopeless set takes the end of the scale and leaves the others theirs, percent."""
-    typical = np.nanmedian(np.abs(values), axis=0)
-    shown = np.abs(values)[:, typical <= 3.0 * max(float(np.nanmedian(typical)), 0.3)]
-    return max(float(np.nanquantile(shown, 0.9)), 1.0)
-
-
 def _cells(values: Array, reach: float, rows: Rows, flights: list[str], sets: list[str]) -> str:
     """Cells of one colour as one path, and on each its figure, which tells more where the pointer rests."""
     cells: dict[tuple[str, int], list[str]] = {}
@@ -100,17 +94,6 @@ def _look(value: float, reach: float) -> tuple[str, int]:
         return "cell", 0
     step = min(max(math.ceil(_STEPS * abs(value) / reach), 1), _STEPS)
     return f"cell {'good' if value < 0.0 else 'bad'}", step
-
-
-def cell_words(value: float) -> str:
-    """A change in few signs: "–" where it is not known, "=" where there is none."""
-    if math.isnan(value):
-        return "–"
-    if value == 0.0:
-        return "="
-    if abs(value) >= 999.5:
-        return "≫" if value > 0.0 else "≪"
-    return minus(f"{value:+.0f}" if abs(value) >= 9.5 else f"{value:+.1f}")
 
 
 def _in_words(value: float) -> str:

@@ -161,9 +161,10 @@ def consistency_chart(results: Results) -> str:
     table: list[list[Cell | str]] = []
     for source, axis, rows in found:
         dimension = _dimension(source, axis)
+        by_set = _by_set(rows)
         for name in results.shown:
-            own = rows[rows["set"] == name]
-            if len(own):
+            own = by_set.get(name)
+            if own is not None:
                 ratios = own["value"].to_numpy(np.float64) / dimension
                 inside = int(((own["lower"] <= own["value"]) & (own["value"] <= own["upper"])).sum())
                 spread = (float(np.median(ratios)), float(ratios.min()), float(ratios.max()))
@@ -172,13 +173,18 @@ def consistency_chart(results: Results) -> str:
     return chart_block(title, charts, figures_table(words, table))
 
 
+def _by_set(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    return {str(name): own for name, own in rows.groupby("set", observed=True)}
+
+
 def _dimension(source: str, axis: str) -> float:
     return float(len(dict(AID_SOURCES[source].groups)[axis]))
 
 
 def _consistency_panel(results: Results, source: str, axis: str, found: pd.DataFrame) -> str:
     expected = _dimension(source, axis)
-    names = [name for name in results.shown if (found["set"] == name).any()]
+    by_set = _by_set(found)
+    names = [name for name in results.shown if name in by_set]
     rows = _set_rows(results, names, _ROW)
     ratios = found["value"].to_numpy(np.float64) / expected
     bounds = [float(found[column].median()) / expected for column in ("lower", "upper")]
@@ -199,7 +205,7 @@ def _consistency_panel(results: Results, source: str, axis: str, found: pd.DataF
             parts.append(line(panel.x.at(end), panel.top, panel.x.at(end), panel.bottom, "expected"))
     said = []
     for row, name in enumerate(names):
-        own = found[found["set"] == name]
+        own = by_set[name]
         parts.append(_flight_marks(results, name, own, expected, panel, rows.y(row)))
         if name in _told_of(results):
             said.append(f"{name}: median {figure(float(own['value'].median()) / expected, 3)}")

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from fusetune.apply.search.answer import unit_of
 from fusetune.report.charts.blocks import chart_block
 from fusetune.report.charts.pareto import search_pareto_chart
 from fusetune.report.charts.svg.axes import HEAD, LABEL_ROOM, NARROW, TICK_ROOM, Panel, x_axis
@@ -15,11 +14,12 @@ from fusetune.report.charts.svg.elements import group, hinted, line, rectangle, 
 from fusetune.report.charts.svg.legend import Entry, legend, line_symbol, marker_symbol, patch_symbol
 from fusetune.report.charts.svg.markers import marker
 from fusetune.report.charts.svg.rows import Rows, rows_of
-from fusetune.report.charts.svg.scales import Linear, minus, percent, signed_figure
+from fusetune.report.charts.svg.scales import Linear, percent, signed_figure
 from fusetune.report.charts.svg.text_width import text_width
 from fusetune.report.counted import count_words
 from fusetune.report.flight_names import short_names
 from fusetune.report.search_results import SearchResults
+from fusetune.report.searched_parameters import axis_groups, found_title, from_to_words
 from fusetune.set_names import FOUND
 
 _ROW = 22.0
@@ -178,18 +178,10 @@ def found_chart(results: SearchResults) -> str:
     if not parameters:
         return ""
     charts: list[str] = []
-    for unit, names in _groups(parameters).items():
+    for unit, names in axis_groups(parameters).items():
         folds = {name: [float(one["values"][name]) for one in results.parts] for name in names}
         charts.append(_found_panel(names, parameters, folds, unit, with_legend=not charts))
-    return chart_block(_found_title(parameters), charts)
-
-
-def _groups(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str | None, list[str]]:
-    """Parameters that share an axis: by unit, or all ratios; None stands for ratios. Those that change come first."""
-    found: dict[str | None, list[str]] = {}
-    for name, one in sorted(parameters.items(), key=lambda item: not item[1]["is_changed"]):
-        found.setdefault(None if one["scale"] == "log" else unit_of(name), []).append(name)
-    return found
+    return chart_block(found_title(parameters), charts)
 
 
 def _found_panel(
@@ -220,7 +212,7 @@ def _found_panel(
     for place, name in enumerate(names):
         one, at = parameters[name], placed(name)
         y = top + _FOUND_ROW * place
-        told = _values(name, one)
+        told = from_to_words(name, one)
         said.append(f"{name}: {told}")
         parts.append(text(6.0, y + 12.0, name, "head over" if one["is_changed"] else "over"))
         parts.append(text(NARROW - _RIGHT, y + 12.0, told, "over" if one["is_changed"] else "note over", "end"))
@@ -259,21 +251,6 @@ def _ratio_words(power: float) -> str:
 
 def _shift_words(value: float) -> str:
     return "now" if abs(value) < 1e-9 else signed_figure(value, 3)
-
-
-def _values(name: str, one: Mapping[str, Any]) -> str:
-    now, found = (minus(f"{one[part]:.3g}") for part in ("present", "found"))
-    unit = unit_of(name).replace("^2", "²")
-    return f"{now} → {found} {unit}".rstrip() if one["is_changed"] else f"{now} {unit}".rstrip()
-
-
-def _found_title(parameters: Mapping[str, Mapping[str, Any]]) -> str:
-    changed = [name for name, one in parameters.items() if one["is_changed"]]
-    bound = [name for name in changed if parameters[name]["at_bound"]]
-    if not changed:
-        return "The search found no parameter worth changing"
-    count = f"{len(changed)} of {len(parameters)} parameters would change"
-    return f"{count}; not determined: {', '.join(bound)}" if bound else count
 
 
 def found_pareto_chart(results: SearchResults) -> str:

@@ -4,7 +4,6 @@ import math
 import textwrap
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,6 +11,7 @@ from matplotlib.patches import Rectangle
 
 from fusetune.apply.evidence import AIDED, UNAIDED
 from fusetune.apply.pareto import pareto_front
+from fusetune.report.change_cells import cell_words, colour_reach
 from fusetune.report.comparison import (
     AIM_LABELS,
     SCORE,
@@ -105,7 +105,7 @@ def flights_by_sets(results: Results) -> Figure:
     width = max(label_inches + 1.2 + 0.6 * len(changes.columns), 3.8)
     figure = new_figure(width, max(1.3 + 0.25 * len(numbered), 2.3))
     axes = figure.add_subplot()
-    limit = _colour_limit(values)
+    limit = colour_reach(values)
     image = axes.imshow(values, cmap="PuOr_r", vmin=-limit, vmax=limit, aspect="auto")
     names = [shortened(name) for name in changes.columns]
     axes.set_xticks(range(len(names)), names, rotation=35, ha="right", rotation_mode="anchor")
@@ -114,28 +114,13 @@ def flights_by_sets(results: Results) -> Figure:
     if values.size <= _ANNOTATED_CELLS:
         for (row, column), value in np.ndenumerate(values):
             colour = "white" if abs(value) > 0.7 * limit else "black"
-            axes.text(column, row, _percent_text(value), ha="center", va="center", fontsize=7, color=colour)
+            axes.text(column, row, cell_words(value), ha="center", va="center", fontsize=7, color=colour)
     beyond = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
         (bool(np.nanmin(values) < -limit), bool(np.nanmax(values) > limit)), "neither"
     )
     figure.colorbar(image, ax=axes, label="change [%]", extend=beyond)
     figure.suptitle("Per flight against the present set; below 0 is better", fontsize=9, x=0.01, ha="left")
     return figure
-
-
-def _colour_limit(values: npt.NDArray[np.float64]) -> float:
-    """Reach of the colours: a hopeless set takes the end of the scale and leaves the others theirs."""
-    typical = np.nanmedian(np.abs(values), axis=0)
-    shown = np.abs(values)[:, typical <= 3.0 * max(float(np.nanmedian(typical)), 0.3)]
-    return max(float(np.nanquantile(shown, 0.9)), 1.0)
-
-
-def _percent_text(value: float) -> str:
-    if math.isnan(value):
-        return "–"
-    if value == 0.0:
-        return "="
-    return minus(f"{value:+.0f}" if abs(value) >= 9.5 else f"{value:+.1f}")
 
 
 def pareto(results: Results) -> Figure:

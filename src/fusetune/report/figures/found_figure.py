@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from fusetune.apply.search.answer import unit_of
 from fusetune.report.figures.drawing import (
     CHOSEN_COLOUR,
     PRESENT_COLOUR,
@@ -21,6 +20,7 @@ from fusetune.report.figures.drawing import (
     new_figure,
 )
 from fusetune.report.search_results import SearchResults
+from fusetune.report.searched_parameters import axis_groups, found_title, from_to_words
 
 _FOLD_COLOUR = "#E69F00"
 _ROW = 0.36
@@ -31,7 +31,7 @@ def found_figure(results: SearchResults) -> Figure:
     parameters: Mapping[str, Mapping[str, Any]] = results.search["parameters"]
     if not parameters:
         return empty_figure("No parameter was searched.")
-    groups = _groups(parameters)
+    groups = axis_groups(parameters)
     rows = [len(names) for names in groups.values()]
     figure = new_figure(7.4, 1.05 + _ROW * sum(rows) + 0.55 * len(groups))
     panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=[count + 0.6 for count in rows])[:, 0]
@@ -39,21 +39,13 @@ def found_figure(results: SearchResults) -> Figure:
         for place, name in enumerate(names):
             _row(axes, place, parameters[name], [one["values"][name] for one in results.parts], is_ratio=unit is None)
         _finish(axes, names, parameters, unit)
-    figure.suptitle(_title(parameters), fontsize=9.5, x=0.01, ha="left")
+    figure.suptitle(found_title(parameters), fontsize=9.5, x=0.01, ha="left")
     entries: dict[str, Any] = {}
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
         entries |= dict(zip(labels, handles, strict=True))
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=5, markerscale=0.85)
     return figure
-
-
-def _groups(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str | None, list[str]]:
-    """Parameters that share an axis: by unit, or all ratios; None stands for ratios. Those that change come first."""
-    found: dict[str | None, list[str]] = {}
-    for name, one in sorted(parameters.items(), key=lambda item: not item[1]["is_changed"]):
-        found.setdefault(None if one["scale"] == "log" else unit_of(name), []).append(name)
-    return found
 
 
 def _row(axes: Axes, place: int, one: Mapping[str, Any], folds: Sequence[float], *, is_ratio: bool) -> None:
@@ -86,7 +78,7 @@ def _finish(axes: Axes, names: Sequence[str], parameters: Mapping[str, Mapping[s
     axes.set_ylim(len(names) - 0.5, -0.65)
     axes.grid(visible=False, axis="y")
     right = axes.secondary_yaxis("right")
-    right.set_yticks(range(len(names)), [_values(name, parameters[name]) for name in names])
+    right.set_yticks(range(len(names)), [from_to_words(name, parameters[name]) for name in names])
     right.tick_params(length=0)
     right.spines["right"].set_visible(False)
     if unit is None:
@@ -99,17 +91,3 @@ def _finish(axes: Axes, names: Sequence[str], parameters: Mapping[str, Mapping[s
     else:
         axes.set_xlabel(f"change [{unit}]" if unit else "change")
         axes.xaxis.set_major_formatter(lambda value, _: minus(f"{value:+.3g}") if value else "now")
-
-
-def _values(name: str, one: Mapping[str, Any]) -> str:
-    now, found, unit = minus(f"{one['present']:.3g}"), minus(f"{one['found']:.3g}"), unit_of(name)
-    return f"{now} → {found} {unit}".rstrip() if one["is_changed"] else f"{now} {unit}".rstrip()
-
-
-def _title(parameters: Mapping[str, Mapping[str, Any]]) -> str:
-    changed = [name for name, one in parameters.items() if one["is_changed"]]
-    bound = [name for name in changed if parameters[name]["at_bound"]]
-    if not changed:
-        return "The search found no parameter worth changing"
-    count = f"{len(changed)} of {len(parameters)} parameters would change"
-    return f"{count}; not determined: {', '.join(bound)}" if bound else count

@@ -71,7 +71,7 @@ def flight_content(
     ----------
     flight_folder : `results/save/<flight>` of a log of which something could be read
     analyze_folder : `results/analyze/<flight>`; of a flight that is not replayed without replays and scores
-    sets : that are told first behind the present one, in this order
+    sets : that are told first behind the present one and the chosen one, in this order
     choice : what was decided, where it is known
 
     Raises
@@ -85,9 +85,9 @@ def flight_content(
     logged = read_logged(flight_folder, innovations=not (folder / ONBOARD_FILE).exists())
     replays = replays_of(folder, scoring)
     present = PRESENT if scoring is None else scoring["present"]
-    innovations = list(
-        _innovations(folder, logged, scoring, replays, replayed_sets(scoring, folder / SCORE_TABLES["blocks"], sets))
-    )
+    first = [*([choice.chosen] if choice.chosen else []), *sets]
+    shown = replayed_sets(scoring, folder / SCORE_TABLES["blocks"], first)
+    innovations = list(_innovations(folder, logged, scoring, replays, shown))
     flags, position = (replays[0].status_flags, replays[0].local_position) if replays else (None, None)
     frame = position_frame(replays[0].summary if replays else None, logged.topic("vehicle_local_position"))
     told = tellers(logged, replays, LABELS, frame)

@@ -39,14 +39,16 @@ class Buckets(NamedTuple):
 
 _COARSEST = 4
 _STEP = 0.86
-_OTHER, _SLOW, _FEWEST = 0.5, 0.4, 2
+_SHARES, _FEWEST = (0.5, 0.4), 2
+"""Of the other buckets, of those of the sets that matter most."""
+_MAIN, _OTHER, _SLOW = range(len(Buckets._fields))
 
 
 def _levels() -> tuple[Buckets, ...]:
     """From the finest to the coarsest."""
     found, main = [], float(FINEST)
     while main >= _COARSEST:
-        found.append(Buckets(round(main), *(max(round(share * main), _FEWEST) for share in (_OTHER, _SLOW))))
+        found.append(Buckets(round(main), *(max(round(share * main), _FEWEST) for share in _SHARES)))
         main *= _STEP
     return tuple(found)
 
@@ -73,7 +75,7 @@ def pack_content(content: FlightContent, budget_bytes: int) -> bytes:
     """
     important = {one.name for one in content.sets if one.role in _IMPORTANT}
     most = budget_bytes // 4 * 3
-    guesses = [_guess(content.panels, important, one) for one in _LEVELS]
+    guesses = _guesses(content.panels, important)
     number = _first_below(guesses, most)
     blob = _packed(content, important, _LEVELS[number])
     # what one level took says what the others take
@@ -96,21 +98,23 @@ def _first_below(guesses: Sequence[float], most: float) -> int:
     return next((number for number, one in enumerate(guesses) if one <= most), len(guesses) - 1)
 
 
-def _guess(panels: Iterable[Panel], important: set[str], buckets: Buckets) -> float:
-    return sum(_guess_of(one, _buckets_of(panel, one, important, buckets)) for panel in panels for one in panel.series)
+def _guesses(panels: Iterable[Panel], important: set[str]) -> list[float]:
+    """What the blob takes at each of the levels, about."""
+    series = [(panel, one) for panel in panels for one in panel.series]
+    sizes = np.array([one.time.size for _, one in series], np.int64)
+    kept = np.array([2 if one.peaks is None else 3 for _, one in series], np.int64)
+    costs = np.array([_BYTES_OF_TIME + _BYTES_OF_FIGURE * (1 + (one.sigma is not None)) for _, one in series])
+    which = np.array([_kind_of(*one, important) for one in series], np.int64)
+    points = (np.minimum(sizes, kept * np.array(one)[which]) for one in _LEVELS)
+    return [float(np.sum(_BYTES_OF_SERIES + costs * each)) for each in points]
 
 
-def _guess_of(series: Series, buckets: int) -> float:
-    points = min(series.time.size, (3 if series.peaks is not None else 2) * buckets)
-    figures = 1 + (series.sigma is not None)
-    return _BYTES_OF_SERIES + points * (figures * _BYTES_OF_FIGURE + _BYTES_OF_TIME)
-
-
-def _buckets_of(panel: Panel, series: Series, important: set[str], buckets: Buckets) -> int:
+def _kind_of(panel: Panel, series: Series, important: set[str]) -> int:
+    """Which of the `Buckets` a series has, by number."""
     source = AID_SOURCES.get(panel.source or "")
     if panel.group in _SLOW_GROUPS or (source is not None and source.every_update):
-        return buckets.slow
-    return buckets.main if series.set is None or series.set in important else buckets.other
+        return _SLOW
+    return _MAIN if series.set is None or series.set in important else _OTHER
 
 
 def _packed(content: FlightContent, important: set[str], buckets: Buckets) -> bytes:
@@ -171,7 +175,7 @@ class _Writer:
         return [max(self.seconds(one.start), 0.0), self.seconds(one.stop), one.words]
 
     def panel(self, panel: Panel, important: set[str], buckets: Buckets) -> dict[str, Any]:
-        series = [self._series(one, _buckets_of(panel, one, important, buckets)) for one in panel.series]
+        series = [self._series(one, buckets[_kind_of(panel, one, important)]) for one in panel.series]
         return {
             "id": panel.id,
             "group": panel.group,

@@ -70,8 +70,11 @@ def replayed_sets(
     if len(names) <= most + 1:
         return names
     errors = relative_errors(scores, present)
-    best = sorted(names, key=lambda name: (name != present, errors.get(name, math.inf)))[: most + 1]
-    return [name for name in names if name in set(best)]
+    # so many that are to be first say as little as none does; what is first of all is what was chosen, if anything was
+    wanted = {present, *(first if len(first) <= most else first[:1])}
+    best = sorted(names, key=lambda name: (name != present, name not in wanted, errors.get(name, math.inf)))
+    kept = set(best[: most + 1])
+    return [name for name in names if name in kept]
 
 
 def relative_errors(scores: AnyPath, present: str) -> dict[str, float]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fusetune.analyze.flight.ground_truth import Truth, read_truth
+from fusetune.analyze.metrics.attitude import heading
 from fusetune.analyze.replaying.store.state_columns import STATE_COLUMNS, VARIANCE_COLUMNS
 from fusetune.px4.flight import TopicTable, stacked
 from fusetune.px4.layouts.logged_state_series import LoggedStates, logged_biases, logged_state_series
@@ -55,8 +56,7 @@ class Teller:
         w, x, y, z = self.q.T
         roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
-        heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        return np.degrees(np.column_stack([roll, pitch, heading]))
+        return np.degrees(np.column_stack([roll, pitch, heading(self.q)]))
 
 
 def tellers(logged: Logged, replays: Sequence[Replay], labels: Mapping[str, str], frame: PositionFrame) -> list[Teller]:

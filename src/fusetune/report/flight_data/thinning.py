@@ -40,12 +40,14 @@ def kept_rows(
     count = len(values)
     if count <= 2 * buckets:
         return np.arange(count)
-    found = [np.array([0, count - 1]), *_extremes(values, buckets), *(_largest(one, buckets) for one in peaks)]
-    found.append(_edges(values, buckets))
+    stays = np.zeros(count, np.bool_)
+    stays[[0, -1]] = True
+    for rows in (*_extremes(values, buckets), *(_largest(one, buckets) for one in peaks), _edges(values, buckets)):
+        stays[rows] = True
     if flagged is not None:
         rows = np.flatnonzero(flagged)
-        found.append(rows if rows.size <= _MOST_FLAGGED * buckets else rows[kept_rows(values[rows], buckets)])
-    return np.unique(np.concatenate(found))
+        stays[rows if rows.size <= _MOST_FLAGGED * buckets else rows[kept_rows(values[rows], buckets)]] = True
+    return np.flatnonzero(stays)
 
 
 def _extremes(values: npt.NDArray[np.floating], buckets: int) -> tuple[Rows, Rows]:
