@@ -15,8 +15,11 @@ def colour_reach(values: npt.NDArray[np.float64]) -> float:
     ----------
     values : (flights, sets), percent; NaN where a flight does not tell
     """
-    typical = np.nanmedian(np.abs(values), axis=0)
-    shown = np.abs(values)[:, typical <= 3.0 * max(float(np.nanmedian(typical)), 0.3)]
+    size = np.abs(values[:, np.isfinite(values).any(axis=0)])
+    if not size.size:
+        return 1.0
+    typical = np.nanmedian(size, axis=0)
+    shown = size[:, typical <= 3.0 * max(float(np.median(typical)), 0.3)]
     return max(float(np.nanquantile(shown, 0.9)), 1.0)
 
 

@@ -86,6 +86,14 @@ class Results:
         return set_styles([*map(str, self.ranking["name"]), self.present], self.present, self.decision["chosen"])
 
     @cached_property
+    def figure_rows(self) -> tuple[pd.DataFrame, dict[tuple[str, str, str], Any]]:
+        """Metrics of the shown sets, and where those of each source, axis and metric are: they are asked for hundreds
+        of times."""
+        shown = self.metrics[self.metrics["set"].isin(self.shown)]
+        places: Any = shown.groupby(["source", "axis", "metric"], observed=True).indices
+        return shown, places
+
+    @cached_property
     def _ranked(self) -> dict[str, dict[Hashable, Any]]:
         """Rows of the ranking by set: the figures ask for them hundreds of times."""
         return {row["name"]: row for row in self.ranking.to_dict("records")}
@@ -183,9 +191,8 @@ def pooled_samples(results: Results) -> list[PooledSamples]:
 
 def figure_values(results: Results, source: str, axis: str, metric: str) -> pd.DataFrame:
     """Rows of one figure for the shown sets: flight, set, value, lower, upper, n."""
-    metrics = results.metrics
-    rows = metrics[(metrics["source"] == source) & (metrics["axis"] == axis) & (metrics["metric"] == metric)]
-    return rows[rows["set"].isin(results.shown)]
+    metrics, rows = results.figure_rows
+    return metrics.take(rows.get((source, axis, metric), np.zeros(0, np.intp)))
 
 
 def as_flown(results: Results) -> pd.DataFrame:

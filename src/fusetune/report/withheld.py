@@ -39,16 +39,16 @@ def drift(results: Results, withheld: Withheld) -> pd.DataFrame:
     -------
     Columns flight, set, horizon_s and drift (unit of the source); empty where nothing was withheld
     """
-    metrics = results.metrics
-    rows = metrics[
-        (metrics["source"] == withheld.source)
-        & metrics["axis"].isin(withheld.axes)
-        & metrics["metric"].astype(str).str.startswith("withheld_rms_")
-        & metrics["set"].isin(results.shown)
+    metrics, places = results.figure_rows
+    found = [
+        rows
+        for (source, axis, metric), rows in places.items()
+        if source == withheld.source and axis in withheld.axes and _METRIC.fullmatch(metric)
     ]
-    if rows.empty:
+    if not found:
         return pd.DataFrame({"flight": [], "set": [], "horizon_s": [], "drift": []})
-    found = pd.DataFrame(
+    rows = metrics.take(np.sort(np.concatenate(found)))
+    squares = pd.DataFrame(
         {
             "flight": rows["flight"].astype(str),
             "set": rows["set"].astype(str),
@@ -56,7 +56,7 @@ def drift(results: Results, withheld: Withheld) -> pd.DataFrame:
             "square": np.square(rows["value"].to_numpy(np.float64)),
         }
     )
-    grouped = found.groupby(["flight", "set", "horizon_s"])["square"].agg(["sum", "size"])
+    grouped = squares.groupby(["flight", "set", "horizon_s"])["square"].agg(["sum", "size"])
     complete = grouped[grouped["size"] == len(withheld.axes)].reset_index()
     return pd.DataFrame(
         {

@@ -64,10 +64,10 @@ def test_figures_are_written_as_in_print() -> None:
 
 def test_names_that_are_cut_still_differ() -> None:
     names = [f"paper{number}+delay_mended" for number in range(1, 7)]
-    short = fitted_names(names, 90.0)
+    short = fitted_names(tuple(names), 90.0)
     assert len(set(short)) == 6
     assert all("…" in one and text_width(one) <= 90.0 for one in short)
-    assert fitted_names(["short"], 90.0) == ["short"]
+    assert fitted_names(("short",), 90.0) == ["short"]
     # DejaVu Sans: 0.59 em of a y, at 10 units to the em
     assert text_width("yy", 10.0) == pytest.approx(11.8)
 

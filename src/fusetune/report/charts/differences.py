@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
-from fusetune.apply.evidence import AIDED, SMOOTHED, UNAIDED
+from fusetune.apply.evidence import AIDED, AIMS, SMOOTHED, UNAIDED
 from fusetune.apply.ranking import NOT_ELIGIBLE
 from fusetune.report.charts.blocks import chart_block, figures_table
 from fusetune.report.charts.set_looks import name_classes, set_class, set_group, set_marker
@@ -164,14 +166,15 @@ def differences_chart(results: Results) -> str:
     names = [str(name) for name in aim_changes(results, SCORE).index if name in results.shown]
     if not names:
         return ""
-    charts = [_panel(results, aim, names) for aim in (SCORE, *told_aims(results))]
+    changes = {aim: found.reindex(names) for aim in (SCORE, *AIMS) if len(found := aim_changes(results, aim))}
+    charts = [_panel(results, aim, changes[aim]) for aim in changes]
     confidence = results.decision["rule"]["confidence"]
     title = f"Prediction error against what flies now, mean over the flights with {confidence:.0%} interval"
-    return chart_block(title, charts, _table(results, names))
+    return chart_block(title, charts, _table(results, changes))
 
 
-def _panel(results: Results, aim: str, names: list[str]) -> str:
-    changes = aim_changes(results, aim).reindex(names)
+def _panel(results: Results, aim: str, changes: pd.DataFrame) -> str:
+    names = [str(name) for name in changes.index]
     able = (~changes["status"].isin(OUT)).to_numpy()
     left, right = robust_reach(*known_ends(changes), able)
     rows = rows_of(names, HEAD + 4.0, _ROW, kinds=name_classes(results, names))
@@ -216,17 +219,15 @@ def _row(results: Results, name: str, hint: str, told: tuple[float, float, float
     return group(set_class(results, name), hinted(hint, interval, edge))
 
 
-def _table(results: Results, names: list[str]) -> str:
-    aims = (SCORE, *told_aims(results))
-    changes = {aim: aim_changes(results, aim).reindex(names) for aim in aims}
+def _table(results: Results, changes: Mapping[str, pd.DataFrame]) -> str:
     rows: list[list[Cell | str]] = []
-    for name in names:
+    for name in map(str, changes[SCORE].index):
         row: list[Cell | str] = [f"{name} (not eligible)" if results.status(name) == NOT_ELIGIBLE else name]
-        for aim in aims:
-            change, *ends = changes[aim].loc[name, ["change", "lower", "upper"]].to_numpy(np.float64).tolist()
+        for found in changes.values():
+            change, *ends = found.loc[name, ["change", "lower", "upper"]].to_numpy(np.float64).tolist()
             known = all(map(math.isfinite, ends))
             row.append(signed(change))
             row.append(Cell(f"{signed(ends[0]).text} to {signed(ends[1]).text}" if known else "–", "short"))
         rows.append(row)
-    titles = [words for aim in aims for words in (f"{AIM_LABELS[aim]} %", "interval")]
+    titles = [words for aim in changes for words in (f"{AIM_LABELS[aim]} %", "interval")]
     return figures_table(("set", *titles), rows)

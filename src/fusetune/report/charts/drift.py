@@ -47,9 +47,9 @@ def _horizons(summary: pd.DataFrame) -> list[float]:
 
 def _curves(results: Results, summary: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Of each set that has one, the present one last, so that it lies on top."""
-    names = summary.index.get_level_values("set")
     order = [*(name for name in results.shown if name != results.present), results.present]
-    return {name: summary[names == name].droplevel("set").sort_index() for name in order if (names == name).any()}
+    found = {str(name): rows.droplevel("set").sort_index() for name, rows in summary.groupby(level="set")}
+    return {name: found[name] for name in order if name in found}
 
 
 def _absolute(results: Results, withheld: Withheld, summary: pd.DataFrame, *, with_legend: bool) -> str:

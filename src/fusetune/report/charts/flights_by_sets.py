@@ -46,7 +46,7 @@ def flights_by_sets_chart(results: Results) -> str:
 
 
 def _chart(results: Results, values: Array, flights: list[str], sets: list[str]) -> str:
-    short, names = fitted_names(sets, _WIDEST_NAME), short_names(results.scoring)
+    short, names = fitted_names(tuple(sets), _WIDEST_NAME), short_names(results.scoring)
     lean = math.sin(math.radians(_SLANT))
     head_room = 26.0 + lean * max(text_width(name) for name in short)
     rows = rows_of([names[one] for one in flights], head_room, _ROW, 1.2 * NARROW)

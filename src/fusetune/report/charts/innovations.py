@@ -214,8 +214,8 @@ def _consistency_panel(results: Results, source: str, axis: str, found: pd.DataF
 
 def _flight_marks(results: Results, name: str, own: pd.DataFrame, expected: float, panel: Panel, y: float) -> str:
     """A mark for each flight, full within its bounds; of many flights small ones that say nothing by themselves."""
-    values = own["value"].to_numpy(np.float64)
-    inside = ((own["lower"] <= own["value"]) & (own["value"] <= own["upper"])).to_numpy()
+    values, lower, upper = (own[name].to_numpy(np.float64) for name in ("value", "lower", "upper"))
+    inside = (lower <= values) & (values <= upper)
     places = panel.x(values / expected)
     shape = results.styles[name].marker
     if len(own) <= _MOST_MARKS:

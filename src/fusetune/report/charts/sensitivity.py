@@ -47,7 +47,8 @@ def sensitivity_chart(found: Sensitivity | None) -> str:
     if not told:
         return ""
     limits = _limits(told)
-    charts = [_panel(one, found, limits, with_legend=one is told[0]) for one in told]
+    entries = _entries(found, told)
+    charts = [_panel(one, found, limits, entries if one is told[0] else ()) for one in told]
     return chart_block(_title(found), charts)
 
 
@@ -68,7 +69,7 @@ def _limits(told: Sequence[ParameterSensitivity]) -> tuple[float, float]:
     return best - margin, worst + margin
 
 
-def _panel(one: ParameterSensitivity, found: Sensitivity, limits: tuple[float, float], *, with_legend: bool) -> str:
+def _panel(one: ParameterSensitivity, found: Sensitivity, limits: tuple[float, float], entries: Sequence[Entry]) -> str:
     curve = one.curve
     assert curve is not None, "what is told of has a curve"
     y = Linear(*limits, HEAD + 20.0 + _HEIGHT, HEAD + 20.0)
@@ -93,29 +94,37 @@ def _panel(one: ParameterSensitivity, found: Sensitivity, limits: tuple[float, f
         parts.append(
             hinted(f"flies now: {figure(one.present)} {unit}", line(place, panel.top, place, panel.bottom, "now"))
         )
-    has_choice = not math.isclose(one.incumbent, one.present, rel_tol=1e-5) and panel.x.holds(one.incumbent)
-    if has_choice:
+    if _is_moved(one) and panel.x.holds(one.incumbent):
         change = float(np.interp(one.incumbent, curve.values, percent_change(curve.differences)))
         where = (panel.x.at(one.incumbent), panel.y.at(min(max(change, limits[0]), limits[1])))
         hint = f"chosen: {figure(one.incumbent)} {unit}, {percent(change)}"
         parts.append(group("set-1", hinted(hint, marker("diamond", *where, 4.5))))
     below = panel.bottom + TICK_ROOM + (LABEL_ROOM if unit else 0.0) + 4.0
-    drawn, height = legend(_entries(found, has_choice=True) if with_legend else (), below)
+    drawn, height = legend(entries, below)
     most = percent(float(percent_change(one.change)))
     said = f"{_WORDS[one.verdict]}; now {figure(one.present)} {unit}; errors change by up to {most}"
     return svg("sensitivity", one.parameter, said, NARROW, below + height, [*parts, drawn], "")
 
 
-def _entries(found: Sensitivity, *, has_choice: bool) -> list[Entry]:
-    return [
-        Entry(line_symbol("set-1"), "others as chosen"),
-        Entry(patch_symbol("set-1"), f"{found.confidence:.0%} interval"),
-        Entry(line_symbol("quiet", "dashed"), "others at their best"),
-        Entry(patch_symbol("good"), "hardly changes"),
-        Entry(line_symbol("ink", "now"), "flies now"),
-        Entry(marker_symbol("set-1", "diamond"), "chosen"),
-        Entry(marker_symbol("ink", "circle", hollow=True), "a set that changes this alone"),
+def _entries(found: Sensitivity, told: Sequence[ParameterSensitivity]) -> list[Entry]:
+    """Of what is drawn in any panel, in the colour of the first one."""
+    look = _LOOKS[told[0].verdict]
+    curves = [one.curve for one in told if one.curve is not None]
+    entries = [(True, Entry(line_symbol(look), "others as chosen"))]
+    entries += [
+        (any(one.lower for one in curves), Entry(patch_symbol(look), f"{found.confidence:.0%} interval")),
+        (any(one.others_at_best for one in curves), Entry(line_symbol("quiet", "dashed"), "others at their best")),
+        (any(one.same_within for one in told), Entry(patch_symbol("good"), "hardly changes")),
+        (True, Entry(line_symbol("ink", "now"), "flies now")),
+        (any(map(_is_moved, told)), Entry(marker_symbol("set-1", "diamond"), "chosen")),
+        (True, Entry(marker_symbol("ink", "circle", hollow=True), "a set that changes this alone")),
     ]
+    return [entry for is_drawn, entry in entries if is_drawn]
+
+
+def _is_moved(one: ParameterSensitivity) -> bool:
+    """Whether the choice has another value than flies now."""
+    return not math.isclose(one.incumbent, one.present, rel_tol=1e-5)
 
 
 def _curves(panel: Panel, curve: Curve, look: str) -> str:

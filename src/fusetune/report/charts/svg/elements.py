@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from html import escape
 from zlib import crc32
@@ -66,25 +67,25 @@ def boxed(low: float, q1: float, median: float, q3: float, high: float, y: float
 
 def dots(x: npt.ArrayLike, y: npt.ArrayLike, radius: float, kind: str) -> str:
     """Many circles as one path, those that would lie on each other once; empty where there are none."""
-    places = np.round(np.column_stack(np.broadcast_arrays(np.ravel(x), np.ravel(y))).astype(np.float64), 1)
-    places = np.unique(places[np.isfinite(places).all(axis=1)], axis=0)
     arc = f"a{px(radius)} {px(radius)} 0 1 0"
-    steps = "".join(
-        f"M{px(across - radius)} {px(down)}{arc} {px(2.0 * radius)} 0{arc} {px(-2.0 * radius)} 0"
-        for across, down in places.tolist()
-    )
+    once = f"{arc} {px(2.0 * radius)} 0{arc} {px(-2.0 * radius)} 0"
+    steps = "".join(f"M{px(across - radius)} {px(down)}{once}" for across, down in _places(x, y))
     return f'<path class="{kind}" d="{steps}"/>' if steps else ""
 
 
 def crosses(x: npt.ArrayLike, y: npt.ArrayLike, radius: float, kind: str) -> str:
     """Many crosses as one path."""
-    places = np.round(np.column_stack(np.broadcast_arrays(np.ravel(x), np.ravel(y))).astype(np.float64), 1)
-    places = np.unique(places[np.isfinite(places).all(axis=1)], axis=0)
     d = px(2.0 * radius)
     steps = "".join(
-        f"M{px(across - radius)} {px(down - radius)}l{d} {d}m0-{d}l-{d} {d}" for across, down in places.tolist()
+        f"M{px(across - radius)} {px(down - radius)}l{d} {d}m0-{d}l-{d} {d}" for across, down in _places(x, y)
     )
     return f'<path class="{kind}" d="{steps}"/>' if steps else ""
+
+
+def _places(x: npt.ArrayLike, y: npt.ArrayLike) -> list[tuple[float, float]]:
+    """Known places to a tenth of a pixel, each once."""
+    pairs = np.round(np.column_stack(np.broadcast_arrays(np.ravel(x), np.ravel(y))).astype(np.float64), 1)
+    return sorted({(a, b) for a, b in pairs.tolist() if math.isfinite(a + b)})
 
 
 def area(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike, kind: str) -> str:

@@ -45,7 +45,7 @@ class Rows:
     def labels(self) -> str:
         """The names, those that had to be shortened with all of them where the pointer rests."""
         parts = []
-        short = fitted_names(self.names, (self.room - _GAP) / BOLDER)
+        short = fitted_names(tuple(self.names), (self.room - _GAP) / BOLDER)
         for place, (name, shown) in enumerate(zip(self.names, short, strict=True)):
             kind = self.kinds[place] if self.kinds else ""
             words = text(self.room - _GAP, self.y(place) + 0.35 * FONT_SIZE, shown, kind, "end")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import lru_cache
 
 FONT_SIZE = 11.5
 """Of all words in a chart, in units of its view box, which are pixels at its natural width."""
@@ -19,7 +19,7 @@ _WIDTHS = (
     *(64, 34, 64, 84),
 )
 """Hundredths of the size, from the space to the tilde, of DejaVu Sans, which is wider than most fonts."""
-_FIRST = 32
+_BY_LETTER = {chr(32 + place): width for place, width in enumerate(_WIDTHS)}
 _OTHERS = 70
 _ELLIPSIS = "…"
 _HEADS = (1 / 3, 1 / 2, 2 / 3, 5 / 6, 1 / 6, 1.0, 0.0)
@@ -28,8 +28,7 @@ _HEADS = (1 / 3, 1 / 2, 2 / 3, 5 / 6, 1 / 6, 1.0, 0.0)
 
 def text_width(words: str, size: float = FONT_SIZE) -> float:
     """Width of words at a size."""
-    places = (ord(letter) - _FIRST for letter in words)
-    return size * 0.01 * sum(_WIDTHS[place] if 0 <= place < len(_WIDTHS) else _OTHERS for place in places)
+    return size * 0.01 * sum(_BY_LETTER.get(letter, _OTHERS) for letter in words)
 
 
 def fitted(words: str, width: float, size: float = FONT_SIZE, head: float = 1 / 3) -> str:
@@ -44,11 +43,14 @@ def fitted(words: str, width: float, size: float = FONT_SIZE, head: float = 1 / 
     return _ELLIPSIS
 
 
-def fitted_names(names: Sequence[str], width: float, size: float = FONT_SIZE) -> list[str]:
+@lru_cache(maxsize=64)
+def fitted_names(names: tuple[str, ...], width: float, size: float = FONT_SIZE) -> list[str]:
     """Names that are no wider than a width and, where any way of shortening does that, still differ.
 
     Flights often differ at the end of their names, sets at the beginning or in the middle.
     """
+    if all(text_width(name, size) <= width for name in names):
+        return list(names)
     tried = [[fitted(name, width, size, head) for name in names] for head in _HEADS]
     return max(tried, key=lambda shown: len(set(shown)))
 
