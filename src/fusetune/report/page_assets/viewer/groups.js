@@ -160,7 +160,7 @@
     function select(group) {
       const source = fusetune.state.get("source") || null;
       const axis = fusetune.state.get("axis");
-      const has = group.own.some((panel) => panel.source === source);
+      const has = source !== null && group.own.some((panel) => panel.source === source);
       for (const { panel, element: at } of group.panels) {
         if (!panel || !BY_SOURCE.includes(group.name)) continue;
         const other = has && (panel.source !== source || (axis !== undefined && String(panel.axis) !== axis));
