@@ -36,7 +36,6 @@ SURE_ARM_M = 0.05
 _AXES = "XYZ"
 
 
-
 @dataclass(frozen=True)
 class MissingMotion:
     """Something that the flights so far cannot tell.
