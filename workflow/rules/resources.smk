@@ -5,7 +5,7 @@ import os
 
 KERNELS_MB = 350  # Python, its libraries and the compiled estimator
 LIBRARIES_MB = 200
-DIAGNOSED_MB_PER_MB = 11.0  # of a flight that is diagnosed, for each MB of its log
+DIAGNOSED_MB_PER_MB = 7.0  # of a flight that is diagnosed, for each MB of its log
 THREAD_MB_PER_MB = 1.0  # of a set that is replayed and scored beside others
 MOST_THREADS_OF_A_FLIGHT = 8
 SEARCHED_MB_PER_MB = 8.0  # of a flight on which sets are tried in memory, for each MB of its log
