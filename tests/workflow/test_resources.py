@@ -36,6 +36,14 @@ def test_an_hour_gets_the_memory_that_was_measured_and_not_thrice_it(
     assert measured_mb < asked < 3 * measured_mb
 
 
+@pytest.mark.parametrize(("flight", "measured_mb"), [("hour", 960), ("thinned", 935)])
+def test_the_diagnosis_of_an_hour_gets_the_memory_that_was_measured(
+    resources: dict[str, Any], flight: str, measured_mb: int
+) -> None:
+    needed = resources["of_its_logs"](resources["KERNELS_MB"], resources["DIAGNOSED_MB_PER_MB"])
+    assert measured_mb < needed(of(flight), attempt=1) < 3 * measured_mb
+
+
 def test_each_attempt_asks_for_as_much_again(resources: dict[str, Any]) -> None:
     needed = resources["of_its_logs"](300, 2.0)
     assert [needed(of("thinned"), attempt=n) for n in (1, 2, 3)] == [522, 1044, 1566]

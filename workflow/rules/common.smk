@@ -197,6 +197,10 @@ def of_flights_after(pattern):
     return lambda wildcards: expand(pattern, flight=changes_flown())
 
 
+# around the present values each parameter makes two sets at the most
+MOST_SETS = len(SETS.scored) + 2 * len(SETS.around)
+
+
 def closing_words():
     if not os.path.exists("results/save/flights.csv"):
         return "Done."

@@ -15,9 +15,6 @@ JOINED_MB_PER_SET = 0.2  # of each of them
 DECIDED_MB_PER_PAIR = 0.1  # of a flight and a set that it was scored with
 SIMULATED_LOG_MB = 10.0  # of a flight that is not simulated yet
 
-# around the present values each parameter makes two sets at the most
-MOST_SETS = len(SETS.scored) + 2 * len(SETS.around)
-
 
 def log_mb(flight):
     """Size of a flight's log, MB; of one that is not there it is that of the demonstration's."""
