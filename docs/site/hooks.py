@@ -63,6 +63,7 @@ def with_links(text: str, source: str, page: str) -> str:
     source : place of the file in the project, from which its links lead
     page : its place in the site
     """
+
     def replaced(found: re.Match[str]) -> str:
         head, target, anchor = found[1], found[2], found[3] or ""
         if "://" in target or target.startswith("mailto:"):
