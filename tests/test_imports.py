@@ -65,7 +65,7 @@ def imported_by(file: Path) -> Iterator[str]:
 UPLOAD = ("src/fusetune/apply/upload", "benchmarks/upload_trials")
 OF_AN_EXTRA = {
     "mlflow": ("src/fusetune/apply/history/mlflow_export.py", "tests/apply/history/test_keep.py"),
-    "playwright": ("tests/browser/conftest.py",),
+    "playwright": ("tests/browser/conftest.py", "tests/browser/looking.py", "tests/browser/test_viewer.py"),
 }
 """Libraries that a plain installation lacks, and who does without them where they are not there."""
 
