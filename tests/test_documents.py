@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 DOCUMENTS = (
-    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "flights/README.md", "docs/*.md", "docs/howto/*.md",
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "flights/README.md", "docs/*.md",
+    "docs/howto/*.md",
 )  # fmt: skip
 
 MADE = (
