@@ -24,6 +24,9 @@ from fusetune.storage.files import AnyPath
 WRITTEN_BACK = "EKF2_MAG_DECL"
 """The estimator writes this one back once it knows its place, so a recorded set holds the value at the end."""
 
+OF_DRIVERS = "SENS_"
+"""So parameters of the sensors' drivers begin, some of which took over from EKF2's; no estimator reads them."""
+
 FORM = 'Expected {"params": {NAME: number, …}, "overrides": {NAME: number, …}}'
 
 SetValues = tuple[dict[str, float], dict[str, float]]
@@ -56,7 +59,7 @@ def read_set_files(folder: AnyPath, release: str = BASELINE) -> dict[str, SetVal
 def read_set_file(file: AnyPath, release: str = BASELINE) -> SetValues:
     """Read one set; a summary that a replay wrote is one, too.
 
-    What a release has beside the parameters of the baseline release, and its estimator does not read, is left out.
+    What the release lacks, or has beside the baseline's and its estimator does not read, is left out.
 
     Raises
     ------
@@ -89,7 +92,11 @@ def _numbers(file: AnyPath, values: object, release: str) -> dict[str, float]:
 
 
 def _metadata(name: str, release: str) -> ParameterMetadata | None:
-    """Metadata of a parameter that a release has; None where only that release has it and does not read it."""
+    """Metadata of a parameter; None where the release lacks it, or has it alone and does not read it."""
+    if release != BASELINE and name.startswith(OF_DRIVERS):
+        return None
+    if name in PARAMETERS and not PARAMETERS[name].exists_in(number_of_name(release)):
+        return None
     if name in PARAMETERS or name not in ALL_PARAMETERS or not ALL_PARAMETERS[name].exists_in(number_of_name(release)):
         return metadata_of(name)
     return ALL_PARAMETERS[name] if name in parameters_beside(release) else None
