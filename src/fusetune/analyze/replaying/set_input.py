@@ -59,7 +59,7 @@ def read_set_files(folder: AnyPath, release: str = BASELINE) -> dict[str, SetVal
 def read_set_file(file: AnyPath, release: str = BASELINE) -> SetValues:
     """Read one set; a summary that a replay wrote is one, too.
 
-    What the release lacks, or has beside the baseline's and its estimator does not read, is left out.
+    What the release has beside the baseline's, and its estimator does not read, is left out.
 
     Raises
     ------
@@ -92,10 +92,8 @@ def _numbers(file: AnyPath, values: object, release: str) -> dict[str, float]:
 
 
 def _metadata(name: str, release: str) -> ParameterMetadata | None:
-    """Metadata of a parameter; None where the release lacks it, or has it alone and does not read it."""
+    """Metadata of a parameter; None where the release has it beside the baseline, and does not read it."""
     if release != BASELINE and name.startswith(OF_DRIVERS):
-        return None
-    if name in PARAMETERS and not PARAMETERS[name].exists_in(number_of_name(release)):
         return None
     if name in PARAMETERS or name not in ALL_PARAMETERS or not ALL_PARAMETERS[name].exists_in(number_of_name(release)):
         return metadata_of(name)

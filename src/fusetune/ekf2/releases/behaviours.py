@@ -117,8 +117,8 @@ class Behaviours:
     )
 
     holds_unobservable_heading: bool = _behaviour(
-        "While nothing makes the heading observable, no fusion changes it, and its variance is uncorrelated and at most "
-        "EKF2_HEAD_NOISE squared. v1.17 and before fuse a heading innovation of zero.",
+        "While nothing makes the heading observable, no fusion changes it, and its variance is uncorrelated and at "
+        "most EKF2_HEAD_NOISE squared. v1.17 and before fuse a heading innovation of zero.",
         since="main",
         source="ekf_helper.cpp, covariance.cpp, control.cpp",
     )
@@ -128,8 +128,8 @@ class Behaviours:
         source="aid_sources/gnss/gnss_checks.cpp",
     )
     starts_gnss_within_gates: bool = _behaviour(
-        "GNSS starts without a reset where north and east each pass the gate. v1.17 asks for a sum of test ratios below "
-        "0.25.",
+        "GNSS starts without a reset where north and east each pass the gate. v1.17 asks for a sum of test ratios "
+        "below 0.25.",
         since="main",
         source="aid_sources/gnss/gps_control.cpp",
     )
@@ -145,8 +145,8 @@ class Behaviours:
         source="aid_sources/gnss/gps_control.cpp",
     )
     stamps_gnss_by_message: bool = _behaviour(
-        "The time of a GNSS measurement is the one that its message tells, not that of the message less EKF2_GPS_DELAY; "
-        "where the message tells none, that remains.",
+        "The time of a GNSS measurement is the one that its message tells, not that of the message less "
+        "EKF2_GPS_DELAY; where the message tells none, that remains.",
         since="main",
         source="../EKF2.cpp",
     )
@@ -157,8 +157,8 @@ class Behaviours:
         source="aid_sources/magnetometer/mag_control.cpp",
     )
     aligns_field_on_climb: bool = _behaviour(
-        "The reset at 1.5 m above ground takes the heading along only without north-east aiding, and aligns the field "
-        "either way.",
+        "The field is aligned in flight by the reset at 1.5 m above ground alone, which takes the heading along only "
+        "without north-east aiding.",
         since="main",
         source="aid_sources/magnetometer/mag_control.cpp",
     )
@@ -166,6 +166,16 @@ class Behaviours:
         "The magnetic heading is consistent only while both the low-passed and the present innovation are small.",
         since="main",
         source="aid_sources/magnetometer/mag_control.cpp",
+    )
+    counts_vision_to_north_east: bool = _behaviour(
+        "Position of vision is north-east aiding, too, once the yaw is aligned.",
+        since="main",
+        source="estimator_interface.cpp",
+    )
+    stamps_vision_velocity: bool = _behaviour(
+        "Vision velocity in a local frame carries the time of its sample, so it is published. Before, it carries none.",
+        since="main",
+        source="aid_sources/external_vision/ev_vel.h",
     )
     turns_velocity_with_yaw: bool = _behaviour(
         "A yaw reset by more than 0.3 rad turns the horizontal velocity along, without north-east aiding.",

@@ -18,8 +18,8 @@ def _update_nothing(ekf):
 @kernel
 def _find_heading_observability(ekf):
     cs = ekf.cs
-    by_position = is_north_east_aiding_active(ekf) or (cs.ev_pos and cs.yaw_align)
-    ekf.heading.observable = by_position or cs.mag_hdg or cs.mag_3d or cs.ev_yaw or cs.gnss_yaw
+    by_yaw = cs.mag_hdg or cs.mag_3d or cs.ev_yaw or cs.gnss_yaw
+    ekf.heading.observable = by_yaw or is_north_east_aiding_active(ekf)
 
 
 update_heading_observability = by_release(_update_nothing, "holds_unobservable_heading", _find_heading_observability)
