@@ -31,6 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="cold",
         help="from the vehicle's own logged state (warm), from nothing (cold, the default), or what suits the log",
     )
+    parser.add_argument(
+        "--release",
+        default="v1.16",
+        metavar="RELEASE",
+        help="release of PX4 whose estimator replays it: v1.16 (the default), v1.17",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -41,5 +47,5 @@ def run(options: argparse.Namespace) -> int:
 
     reconstruction = ReconstructionSettings() if options.reconstruct else None
     settings = ReplaySettings(reconstruction=reconstruction, start=StartSettings(mode=options.start))
-    print("replayed:", *replay_log(options.log, options.sets, options.out, settings))
+    print("replayed:", *replay_log(options.log, options.sets, options.out, settings, options.release))
     return DONE

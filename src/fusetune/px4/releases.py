@@ -59,6 +59,14 @@ def name_of(release: Release) -> str:
     return "v" + ".".join(map(str, release))
 
 
+def number_of_name(name: str) -> tuple[int, int]:
+    """The number of a release that `name_of` names, or of ``"main"``."""
+    if name == "main":
+        return DEVELOPMENT
+    major, minor = name.removeprefix("v").split(".")
+    return int(major), int(minor)
+
+
 def name_of_version(version: int) -> str:
     """A release with its stage, of PX4's number for it: a byte each for major, minor, patch and stage.
 

@@ -22,7 +22,8 @@ from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings, StartSet
 from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, Start, choose_start
 from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
-from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.filter.common.parameters import complete, parameters_beside
+from fusetune.ekf2.releases.behaviours import BASELINE
 from fusetune.ekf2.replay.recording import FULL, RecordArrays, Recording
 from fusetune.ekf2.replay.replay import replay, replay_into
 from fusetune.ekf2.replay.results import Gap, ReplayResult, ReplaySummary
@@ -51,10 +52,15 @@ class PreparedFlight:
     start: Start
     gaps: tuple[Gap, ...] = ()
     handovers: tuple[Handover, ...] = ()
+    release: str = BASELINE
+    """Whose estimator replays it."""
 
     def parameters(self, overrides: Mapping[str, float]) -> dict[str, float]:
         """A complete set: the log's own parameters, but for some."""
-        return complete(self.flight.parameters.initial, overrides, self.flight.release)
+        beside, logged = parameters_beside(self.release), self.flight.parameters.initial
+        common = {name: value for name, value in overrides.items() if name not in beside}
+        own = {name: float({**logged, **overrides}[name]) for name in beside if name in logged or name in overrides}
+        return complete(logged, common, self.flight.release) | own
 
     def course_of(self, overrides: Mapping[str, float]) -> tuple[Any, ...]:
         """What the replay of a set follows from beside the flight: sets that have it in common have one replay.
@@ -96,7 +102,9 @@ class PreparedFlight:
         return measured_rows(innovations, self.reconstructed, params, of.update_interval_us)
 
     def _shared(self) -> dict[str, Any]:
-        return {"start": self.start.state, "gaps": self.gaps, "handovers": self.handovers}
+        return {
+            "start": self.start.state, "gaps": self.gaps, "handovers": self.handovers, "release": self.release,
+        }  # fmt: skip
 
     def _with_measured_gaps(self, summary: Summary, params: Mapping[str, float]) -> Summary:
         if not summary.gaps or not self.reconstructed.changed:
@@ -146,7 +154,8 @@ class PreparedFlight:
     def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the summary of a replay: how it started and what was reconstructed."""
         warm = result.warm_start_us is not None
-        return {
+        release = {} if self.release == BASELINE else {"release": self.release}
+        return release | {
             "start": {"mode": WARM if warm else COLD, "why": self.start.why, "time_us": result.warm_start_us},
             "reconstruction": [asdict(step) for step in self.reconstructed.steps],
             "handover_timestamps": [one.time_us for one in self.handovers],

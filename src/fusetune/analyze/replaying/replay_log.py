@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from fusetune.analyze.replaying.prepared_flight import prepare
 from fusetune.analyze.replaying.replay_flight import write_replay
 from fusetune.analyze.replaying.set_input import read_set_files
 from fusetune.analyze.replaying.settings import ReplaySettings
+from fusetune.ekf2.releases.behaviours import BASELINE
+from fusetune.ekf2.releases.modelled import demand_modelled
 from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.px4.layouts.estimator_instances import of_one_instance
 from fusetune.px4.layouts.release_layouts import canonical
@@ -20,6 +23,7 @@ def replay_log(
     sets_folder: AnyPath,
     output_folder: AnyPath,
     settings: ReplaySettings | None = None,
+    release: str = BASELINE,
 ) -> list[str]:
     """Replay every set that a folder holds as `SET.json` on one ULog file.
 
@@ -29,6 +33,8 @@ def replay_log(
     ----------
     settings : ReplaySettings, optional
         By default the samples are used as they were logged, and the filter starts from nothing. No gaps are made.
+    release : str
+        Whose estimator replays it; the sets may name parameters of that release.
 
     Returns
     -------
@@ -38,16 +44,17 @@ def replay_log(
     Raises
     ------
     UserError
-        The log cannot be read, or a set file is not usable.
+        The log cannot be read, a set file is not usable, or the release is not modelled.
     """
-    sets = read_set_files(sets_folder)
+    demand_modelled(release)
+    sets = read_set_files(sets_folder, release)
     Path(output_folder).mkdir(parents=True, exist_ok=True)
     settings = settings or ReplaySettings()
     flight = read_ulog(log)
     # as PX4's own replay does where nothing is asked for: one estimator instance, from its sensors
     flown = flight if settings.reconstruction is not None else of_one_instance(flight)
     try:
-        prepared = prepare(canonical(flown), settings.reconstruction, settings.start)
+        prepared = replace(prepare(canonical(flown), settings.reconstruction, settings.start), release=release)
     except OF_DAMAGE as error:
         reason = f"cannot be replayed ({type(error).__name__}: {error})"
         raise UserError(log, reason, "See what the command `fusetune save` says of it") from error
