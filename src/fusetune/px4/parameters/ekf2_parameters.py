@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from fusetune.px4.parameters.parameter_migration import SENSOR_PARAMETERS, migrate_names
-from fusetune.px4.releases import BASELINE, DEVELOPMENT, Release, name_of
+from fusetune.px4.releases import BASELINE, Release, estimator_release, name_of
 
 _FLOAT = struct.Struct("<f")
 
@@ -218,13 +218,6 @@ def _range_text(metadata: ParameterMetadata) -> str:
     return f"the default is {metadata.default:g}{unit}"
 
 
-def _release_of(text: str) -> tuple[int, int]:
-    if text == "main":
-        return DEVELOPMENT
-    major, minor = text.removeprefix("v").split(".")
-    return int(major), int(minor)
-
-
 def _metadata_from(row: dict[str, str]) -> ParameterMetadata:
     changes = [change.split("=") for change in row["defaults"].split()]
     labels = [entry.split("=", 1) for entry in row["values"].split(";") if entry]
@@ -232,9 +225,9 @@ def _metadata_from(row: dict[str, str]) -> ParameterMetadata:
         name=row["name"],
         type="INT32" if row["type"] == "INT32" else "FLOAT",
         kind=row["kind"],  # type: ignore[arg-type]
-        default_history=tuple((_release_of(since), as_float32(float(value))) for since, value in changes),
-        first_release=_release_of(row["first_release"]),
-        last_release=_release_of(row["last_release"]),
+        default_history=tuple((estimator_release(since), as_float32(float(value))) for since, value in changes),
+        first_release=estimator_release(row["first_release"]),
+        last_release=estimator_release(row["last_release"]),
         minimum=float(row["minimum"]) if row["minimum"] else None,
         maximum=float(row["maximum"]) if row["maximum"] else None,
         unit=row["unit"],
