@@ -12,6 +12,7 @@ from fusetune import __version__
 from fusetune.cli import (
     cards,
     compare,
+    compare_releases,
     completion,
     confirm,
     conformance,
@@ -55,6 +56,7 @@ GROUPS: Mapping[str, Mapping[str, Command]] = {
         "save": save,
         "replay": replay,
         "fidelity": fidelity,
+        "compare-releases": compare_releases,
         "confirm": confirm,
     },
     "before a flight": {

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from fusetune.cli.command import DONE
+from fusetune.px4.releases import AUTO, BASELINE, ESTIMATORS, name_of
 
 HELP = "replay parameter sets on a log"
 EXAMPLES = (("fusetune replay log.ulg --sets sets --out replays --start auto", "every set of the folder sets"),)
@@ -31,6 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="cold",
         help="from the vehicle's own logged state (warm), from nothing (cold, the default), or what suits the log",
     )
+    parser.add_argument(
+        "--release",
+        choices=(AUTO, *ESTIMATORS),
+        default=name_of(BASELINE),
+        help="of PX4, whose EKF2 it is (%(default)s); auto: the one that flew, or the nearest that is modelled",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -38,8 +45,12 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.analyze.reconstruction import ReconstructionSettings
     from fusetune.analyze.replaying.replay_log import replay_log
     from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
+    from fusetune.ekf2.releases.modelled import demand_modelled
 
+    if options.release != AUTO:
+        demand_modelled(options.release)
     reconstruction = ReconstructionSettings() if options.reconstruct else None
-    settings = ReplaySettings(reconstruction=reconstruction, start=StartSettings(mode=options.start))
+    start = StartSettings(mode=options.start)
+    settings = ReplaySettings(reconstruction=reconstruction, start=start, release=options.release)
     print("replayed:", *replay_log(options.log, options.sets, options.out, settings))
     return DONE

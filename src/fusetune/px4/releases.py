@@ -53,6 +53,9 @@ ALL_HEIGHT_SOURCES = (1, 14)
 NO_MAG_HEADING = (1, 15)
 """Since then no heading of the magnetometer is fused: `heading` then holds its largest field innovation."""
 
+MAG_TYPES_GIVEN_UP = (1, 15)
+"""Since then EKF2_MAG_TYPE is automatic, heading, none or initial; before, 3D and indoor as well."""
+
 VERBOSE_LOG = (1, 16)
 """Since then EKF2_LOG_VERBOSE asks for what replays are compared with."""
 
@@ -77,7 +80,7 @@ def estimator_name(release: Release) -> str:
     return MAIN if release[:2] >= DEVELOPMENT else name_of(release[:2])
 
 
-def estimator_release(name: str) -> Release:
+def number_of_name(name: str) -> Release:
     """The other way round: the major and minor number of ``"v1.16"``, or what `main` counts as."""
     if name == MAIN:
         return DEVELOPMENT

@@ -16,7 +16,7 @@ from fusetune.px4.releases import (
     Release,
     deviation_of,
     estimator_name,
-    estimator_release,
+    number_of_name,
 )
 
 
@@ -40,7 +40,7 @@ class ReplayedRelease:
     @property
     def release(self) -> Release:
         """Its number, for what depends on the release beside the estimator."""
-        return estimator_release(self.name)
+        return number_of_name(self.name)
 
     @property
     def flew(self) -> bool:
@@ -68,24 +68,24 @@ def replayed_release(flight: Flight, asked: str = AUTO, modelled: Sequence[str] 
         ones the newer
     """
     flown = flown_release(flight)
-    wanted = flown.release if asked == AUTO else estimator_release(asked)
+    wanted = flown.release if asked == AUTO else number_of_name(asked)
     if wanted is None:
         name = estimator_name(BASELINE)
         return ReplayedRelease(name, flown, flown.evidence, asked)
     name = nearest_of(wanted, modelled)
     why = [] if asked == AUTO or flown.name == asked else [f"{asked} is asked for"]
     if name != estimator_name(wanted):
-        beyond = estimator_release(ESTIMATORS[0]) > wanted[:2]
+        beyond = number_of_name(ESTIMATORS[0]) > wanted[:2]
         why.append(
             f"{estimator_name(wanted)} is {'older than all releases' if beyond else 'none of the releases'} whose "
-            f"estimator is modelled, and {name} is the nearest of those: {deviation_of(wanted, estimator_release(name))}"
+            f"estimator is modelled, and {name} is the nearest of those: {deviation_of(wanted, number_of_name(name))}"
         )
     return ReplayedRelease(name, flown, "; ".join(why), asked)
 
 
 def nearest_of(release: Release, modelled: Sequence[str] = MODELLED) -> str:
     """The name of the modelled release that is nearest to a release; of two equally near ones the newer."""
-    numbers = {name: estimator_release(name) for name in modelled}
+    numbers = {name: number_of_name(name) for name in modelled}
     last = max(numbers.values())
     wanted = min(release[:2], last)
     return min(modelled, key=lambda name: (abs(numbers[name][1] - wanted[1]), -numbers[name][1]))

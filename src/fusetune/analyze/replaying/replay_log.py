@@ -12,6 +12,7 @@ from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.px4.layouts.estimator_instances import of_one_instance
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
+from fusetune.save.replayed_release import replayed_release
 from fusetune.storage.files import AnyPath
 
 
@@ -28,7 +29,8 @@ def replay_log(
     Parameters
     ----------
     settings : ReplaySettings, optional
-        By default the samples are used as they were logged, and the filter starts from nothing. No gaps are made.
+        By default the samples are used as they were logged, and the filter, that of v1.16, starts from nothing. No
+        gaps are made.
 
     Returns
     -------
@@ -40,14 +42,14 @@ def replay_log(
     UserError
         The log cannot be read, or a set file is not usable.
     """
-    sets = read_set_files(sets_folder)
-    Path(output_folder).mkdir(parents=True, exist_ok=True)
     settings = settings or ReplaySettings()
     flight = read_ulog(log)
+    sets = read_set_files(sets_folder, replayed_release(flight, settings.release).release)
+    Path(output_folder).mkdir(parents=True, exist_ok=True)
     # as PX4's own replay does where nothing is asked for: one estimator instance, from its sensors
     flown = flight if settings.reconstruction is not None else of_one_instance(flight)
     try:
-        prepared = prepare(canonical(flown), settings.reconstruction, settings.start)
+        prepared = prepare(canonical(flown), settings.reconstruction, settings.start, release=settings.release)
     except OF_DAMAGE as error:
         reason = f"cannot be replayed ({type(error).__name__}: {error})"
         raise UserError(log, reason, "See what the command `fusetune save` says of it") from error
