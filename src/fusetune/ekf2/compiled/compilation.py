@@ -53,10 +53,14 @@ from fusetune.ekf2.compiled.kernel_cache import (
 )
 from fusetune.ekf2.compiled.kernel_locator import KernelLocator, processor
 from fusetune.errors import UserError
+from fusetune.px4.releases import BASELINE, name_of
 from fusetune.storage.file_lock import LocksUnavailableError, lock
 from fusetune.storage.files import atomic_path
 
+PLAIN_TEXT = name_of(BASELINE)
+"""The release of PX4 whose behaviour the kernels have that are compiled for no other."""
 LOCK_NAME = "compile.lock"
+RELEASES_NAME = "releases.json"
 ENTRY_SOURCE = Path(__file__).parents[1] / "replay" / "loop.py"
 CHILD_MARK = "FUSETUNE_COMPILING"
 LINKED_TOGETHER = 25
@@ -81,6 +85,8 @@ What these would simplify besides, branches that a constant decides, LLVM simpli
 """
 PLAIN = "--plain"
 ONLY_LOADS = "--only-loads"
+OF_RELEASE = "--release"
+"""Followed by the release of PX4 whose kernels are compiled; without it, those of the plain text."""
 NOT_IN_ONE_PIECE = (
     f"Numba {numba.__version__} does not compile the estimator in one piece: it is done function by function, "
     "which takes some minutes longer and gives the same results."
@@ -88,8 +94,10 @@ NOT_IN_ONE_PIECE = (
 
 
 @cache
-def ensure_compiled() -> None:
+def ensure_compiled(release: str = PLAIN_TEXT) -> None:
     """Make sure the kernel cache holds the estimator for this processor; one process compiles and others wait.
+
+    That of another release of PX4 is compiled when it is first asked for, and kept beside what is there.
 
     Kernels that have lost or changed a byte, or that others could have written, are made again. Does nothing where
     Numba is switched off. What cannot be compiled in one piece is compiled the usual, slower way, after a warning.
@@ -102,7 +110,7 @@ def ensure_compiled() -> None:
     if _setting("DISABLE_JIT") or CHILD_MARK in os.environ:
         return
     caches, folder = Path(_setting("CACHE_DIR")), kernel_folder()
-    if _may_be_loaded(folder):
+    if _may_be_loaded(folder) and release in _compiled_releases(folder):
         return
     try:
         caches.mkdir(parents=True, exist_ok=True)
@@ -113,16 +121,18 @@ def ensure_compiled() -> None:
     with queue:
         with suppress(LocksUnavailableError):  # then each process compiles for itself
             lock(queue, exclusive=True, wait=True)
-        if not _may_be_loaded(folder):
+        intact = _may_be_loaded(folder)
+        if not intact:
             keep_others_out(folder)
             _empty(folder)
-            if _take_carried(caches, folder):
-                return
-            print("Compiling the estimator for this processor ...", file=sys.stderr)
-            _compile(caches)
+            intact = _take_carried(caches, folder)
+        if not (intact and release in _compiled_releases(folder)):
+            told, options = ("", ()) if release == PLAIN_TEXT else (f" of {release}", (OF_RELEASE, release))
+            print(f"Compiling the estimator{told} for this processor ...", file=sys.stderr)
+            _compile(caches, *options)
             if not _may_be_loaded(folder):
                 print(NOT_IN_ONE_PIECE, file=sys.stderr)
-                _compile(caches, PLAIN)
+                _compile(caches, *options, PLAIN)
 
 
 def is_compiled() -> bool:
@@ -146,6 +156,14 @@ def _take_carried(caches: Path, folder: Path) -> bool:
         return True
     _empty(folder)
     return False
+
+
+def _compiled_releases(folder: Path) -> list[str]:
+    """Releases of PX4 whose kernels are in a folder."""
+    try:
+        return list(json.loads((folder / RELEASES_NAME).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return [PLAIN_TEXT]
 
 
 def _compile(caches: Path, *options: str) -> int:
@@ -441,9 +459,13 @@ def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = 
     gc.disable()  # hardly anything of what compiling makes is ever let go
     with nullcontext() if PLAIN in options else joined_without_optimising():
         call_entry()
-    _record(kernel_folder())
+    release = options[options.index(OF_RELEASE) + 1] if OF_RELEASE in options else PLAIN_TEXT
+    folder = kernel_folder()
+    _record(folder, {*_compiled_releases(folder), release} if (folder / RECORD_NAME).exists() else {release})
 
 
-def _record(folder: Path) -> None:
-    with atomic_path(folder / RECORD_NAME) as temporary:
-        temporary.write_text(json.dumps(_kernel_files(folder), indent=1) + "\n", encoding="utf-8")
+def _record(folder: Path, releases: Iterable[str] = (PLAIN_TEXT,)) -> None:
+    """Record what is in the cache, and for which releases."""
+    for name, content in ((RELEASES_NAME, sorted(releases)), (RECORD_NAME, _kernel_files(folder))):
+        with atomic_path(folder / name) as temporary:
+            temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

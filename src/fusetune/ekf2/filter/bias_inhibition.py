@@ -8,6 +8,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_ACCEL_BIAS, IMU_CTRL_GYRO_BIAS
 from fusetune.ekf2.filter.common.imu_rates import body_rate, specific_force
+from fusetune.ekf2.releases.by_release import by_release
 
 COSINE_OF_15_DEGREES = 0.966
 
@@ -44,11 +45,24 @@ def update_imu_bias_inhibit(ekf, params):
 
 
 @kernel
+def _by_fake_position(ekf):
+    return ekf.cs.fake_pos
+
+
+@kernel
+def _by_fake_position_or_gravity(ekf):
+    return ekf.cs.fake_pos or ekf.cs.gravity_vector
+
+
+_is_only_tilt_held = by_release(_by_fake_position, "yields_to_gravity", _by_fake_position_or_gravity)
+
+
+@kernel
 def _is_accel_bias_observable(ekf, axis):
     if ekf.cs.vehicle_at_rest:
         return True
     if ekf.cs.fake_hgt:
         return False
-    if ekf.cs.fake_pos:
+    if _is_only_tilt_held(ekf):
         return abs(ekf.R_to_earth[2, axis]) > COSINE_OF_15_DEGREES
     return True

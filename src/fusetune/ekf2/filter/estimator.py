@@ -6,6 +6,8 @@ corrects the output predictor.
 Mirrors PX4 v1.16 `EKF/ekf.cpp`, whose `predictState` stands in `prediction.py`.
 """
 
+from functools import cache
+
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
@@ -15,10 +17,10 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_M
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, initialise_gnss_memory
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, GNSS_TRUST, initialise_gnss_memory
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_MEMORY, initialise_mag_memory
-from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, initialise_flow_memory
+from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
@@ -32,6 +34,7 @@ from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import (
 from fusetune.ekf2.filter.bias_inhibition import update_imu_bias_inhibit
 from fusetune.ekf2.filter.common.core_memory import CORE_FIELDS, POSITION_REF_GNSS
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_UNKNOWN
+from fusetune.ekf2.filter.common.levelling import LEVELLING_MEMORY, follow_specific_force
 from fusetune.ekf2.filter.common.local_origin import LOCAL_ORIGIN, initialise_local_origin
 from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
@@ -41,6 +44,8 @@ from fusetune.ekf2.filter.wind import WIND_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL
 from fusetune.ekf2.numerics.rotations import quat_aligning_with_up, quat_to_dcm
+from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS
+from fusetune.ekf2.releases.by_release import by_release, marked
 
 EKF = np.dtype(
     [
@@ -70,6 +75,22 @@ EKF = np.dtype(
     align=True,
 )
 """The record `ekf`."""
+
+
+@cache
+def ekf_record(release: str) -> np.dtype:
+    """The record `ekf` of a release: that of v1.16, followed by what its own behaviours remember."""
+    if release == BASELINE:
+        return EKF
+    does = BEHAVIOURS[release]
+    memories = [(name, EKF[name]) for name in EKF.names or ()]
+    if does.levels_at_the_horizon:
+        memories.append(("levelling", LEVELLING_MEMORY))
+    if does.controls_gnss_sources_apart:
+        memories.append(("gnss_trust", GNSS_TRUST))
+    if does.scales_terrain_to_flow:
+        memories.append(("flow_rates", FLOW_RATES))
+    return marked(np.dtype(memories, align=True), release)
 
 
 @kernel
@@ -104,7 +125,7 @@ def initialise_estimator(ekf, params):
 
 
 @kernel
-def level_filter(ekf, params, specific_force):
+def _level_filter(ekf, params, specific_force):
     """Start the filter: level it by the specific force (m/s², body), the attitude that it measures at rest."""
     quat_aligning_with_up(specific_force[0], specific_force[1], specific_force[2], ekf.q)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
@@ -114,7 +135,18 @@ def level_filter(ekf, params, specific_force):
 
 
 @kernel
-def update(ekf, params):
+def _level_filter_and_remember(ekf, params, specific_force):
+    """As v1.16, with the low-passed specific force kept."""
+    for axis in range(3):
+        ekf.levelling.specific_force[axis] = specific_force[axis]
+    _level_filter(ekf, params, specific_force)
+
+
+level_filter = by_release(_level_filter, "levels_at_the_horizon", _level_filter_and_remember)
+
+
+@kernel
+def _update(ekf, params):
     """Run the filter over `ekf.imu_delayed`, with the samples that are due in `ekf.sensors`.
 
     Parameters
@@ -127,3 +159,13 @@ def update(ekf, params):
     predict_state(ekf, params)
     control_fusion_modes(ekf, params)
     correct_output(ekf, params)
+
+
+@kernel
+def _update_and_follow_force(ekf, params):
+    """As v1.16, after the specific force at the horizon has been low-passed."""
+    follow_specific_force(ekf)
+    _update(ekf, params)
+
+
+update = by_release(_update, "levels_at_the_horizon", _update_and_follow_force)

@@ -18,6 +18,7 @@ from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, single_precision
 from fusetune.ekf2.filter.observation_gain import scale_kalman_gain
 from fusetune.ekf2.numerics.rotations import quat_to_dcm, rotate_by_earth_increment
+from fusetune.ekf2.releases.by_release import by_release
 
 MAG_BIAS_LIMIT = 0.5
 MAG_EARTH_LIMIT = 1.0
@@ -36,6 +37,19 @@ MAX_VARIANCE_REDUCTIONS = 1000
 
 
 @kernel
+def _is_wind_not_estimated(ekf):
+    return not ekf.cs.wind
+
+
+@kernel
+def _never(ekf):
+    return False
+
+
+_is_wind_held = by_release(_is_wind_not_estimated, "correlates_wind_always", _never)
+
+
+@kernel
 def clear_inhibited_state_kalman_gains(ekf):
     """Zero the gains of the states that are not being estimated now."""
     K = ekf.scratch.K
@@ -47,7 +61,7 @@ def clear_inhibited_state_kalman_gains(ekf):
     if not ekf.cs.mag:
         for i in range(state.MAG_EARTH, state.MAG_BODY + 3):
             K[i] = 0.0
-    if not ekf.cs.wind:
+    if _is_wind_held(ekf):
         K[state.WIND] = 0.0
         K[state.WIND + 1] = 0.0
 

@@ -9,11 +9,18 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state as S
 from fusetune.ekf2.filter.common.conditions import is_local_horizontal_position_valid
 from fusetune.ekf2.filter.common.local_origin import is_altitude_plausible, is_lat_lon_plausible
-from fusetune.ekf2.filter.measurement_update import fuse_direct_state
+from fusetune.ekf2.filter.measurement_update import fuse_direct_state, measurement_update
+from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_kalman_gain
+from fusetune.ekf2.filter.output_predictor.output_predictor import apply_position_reset
 from fusetune.ekf2.filter.resets.origin_resets import initialise_altitude_to, reset_lat_lon_to, set_ekf_global_origin
-from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_horizontal_position_to
+from fusetune.ekf2.filter.resets.state_resets import (
+    reset_altitude_to,
+    reset_horizontal_position_to,
+    update_horizontal_position_reset_status,
+)
 from fusetune.ekf2.filter.wind import reset_wind_to_external_observation
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon, lat_lon_difference
+from fusetune.ekf2.releases.by_release import by_release
 
 SET_GPS_GLOBAL_ORIGIN = 100000
 EXTERNAL_POSITION_ESTIMATE = 43003
@@ -83,11 +90,38 @@ def _take_horizontal(ekf, params, lat, lon, accuracy, variance):
         ekf.events.reset_pos_to_ext_obs = True
         reset_horizontal_position_to(ekf, params, lat, lon, variance, variance)
     else:
-        fuse_direct_state(ekf, params, north, variance_n, variance, S.POSITION)
-        fuse_direct_state(ekf, params, east, variance_e, variance, S.POSITION + 1)
+        _fuse_given_position(ekf, params, north, east, variance_n, variance_e, variance)
         ekf.time_last_hor_pos_fuse = ekf.time_delayed_us
     ekf.last_known_lat = lat
     ekf.last_known_lon = lon
+
+
+@kernel
+def _fuse_with_kalman_gain(ekf, params, north, east, variance_n, variance_e, variance):
+    fuse_direct_state(ekf, params, north, variance_n, variance, S.POSITION)
+    fuse_direct_state(ekf, params, east, variance_e, variance, S.POSITION + 1)
+
+
+@kernel
+def _fuse_with_gain_of_one(ekf, params, north, east, variance_n, variance_e, variance):
+    """The position takes over the whole innovation, the other states what it tells of them; a reset is told."""
+    _fuse_with_gain_on(ekf, params, north, variance_n, variance, S.POSITION)
+    _fuse_with_gain_on(ekf, params, east, variance_e, variance, S.POSITION + 1)
+    update_horizontal_position_reset_status(ekf, -north, -east)
+    apply_position_reset(ekf, -north, -east, 0.0)
+
+
+@kernel
+def _fuse_with_gain_on(ekf, params, innovation, innovation_variance, variance, index):
+    H = ekf.scratch.H
+    clear_jacobian(H)
+    H[index] = 1.0
+    compute_kalman_gain(ekf, H, innovation_variance)
+    ekf.scratch.K[index] = 1.0
+    measurement_update(ekf, params, variance, innovation)
+
+
+_fuse_given_position = by_release(_fuse_with_kalman_gain, "forces_given_position", _fuse_with_gain_of_one)
 
 
 @kernel

@@ -16,7 +16,8 @@ import numpy as np
 from fusetune.ekf2.feed.inputs import EstimatorInputs
 from fusetune.ekf2.filter.common.core_memory import zeros_on_cache_lines
 from fusetune.ekf2.filter.common.parameters import taken_value
-from fusetune.ekf2.filter.estimator import EKF
+from fusetune.ekf2.filter.estimator import ekf_record
+from fusetune.ekf2.releases.behaviours import BASELINE
 from fusetune.ekf2.replay.flight_schedule import FlightSchedule, flight_schedule, notes_of
 from fusetune.ekf2.replay.handover import take_sensor_states
 from fusetune.ekf2.replay.loop import GAP_RUN, Estimator, run_estimator
@@ -67,11 +68,12 @@ class Course:
         changes: Sequence[tuple[int, ParameterChange]],
         handovers: Sequence[tuple[int, LoggedState]] = (),
         recording: Recording = FULL,
+        release: str = BASELINE,
     ):
-        self.inputs, self.changes, self.handovers = inputs, changes, handovers
+        self.inputs, self.changes, self.handovers, self.release = inputs, changes, handovers, release
         self.notes = notes_of(params[0], changes)
         self.mode = _MODES[recording]
-        self._main = _estimator(zeros_on_cache_lines(EKF), params, new_recorder(self.mode))
+        self._main = _estimator(zeros_on_cache_lines(ekf_record(release)), params, new_recorder(self.mode))
         self._branch = self._main
 
     @property
@@ -92,7 +94,7 @@ class Course:
     @cached_property
     def schedule(self) -> FlightSchedule:
         """When the filter updates, with which samples."""
-        return flight_schedule(self.inputs, self.params[0], self.changes)
+        return flight_schedule(self.inputs, self.params[0], self.changes, release=self.release)
 
     def start_from(self, state: LoggedState) -> tuple[int, int | None]:
         """Go on to the time of a logged state, so that sensors are known, and take it over.
@@ -101,7 +103,7 @@ class Course:
         -------
         The run to go on with and the horizon; (0, None), as if nothing had happened, where the samples end before.
         """
-        schedule = flight_schedule(self.inputs, self.params[0], self.changes, state.time_us)
+        schedule = flight_schedule(self.inputs, self.params[0], self.changes, state.time_us, self.release)
         run = schedule.started_run
         if run is None:
             return 0, None
@@ -128,7 +130,7 @@ class Course:
     def branch(self) -> Course:
         """Another course that starts where this one is."""
         other = copy(self)
-        ekf = zeros_on_cache_lines(EKF)
+        ekf = zeros_on_cache_lines(self.ekf.dtype)
         ekf.view(np.uint8)[:] = self.ekf.view(np.uint8)
         other._main = other._branch = _estimator(ekf, self.params.copy(), self.recorder.copy())
         return other

@@ -22,6 +22,8 @@ from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_ACCUMULATOR
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
+from fusetune.ekf2.releases.behaviours import BASELINE
+from fusetune.ekf2.releases.by_release import marked
 from fusetune.ekf2.replay.loop import (
     COMMAND,
     EVENT,
@@ -118,7 +120,7 @@ class FlightSchedule:
 
 
 def flight_schedule(
-    inputs: EstimatorInputs, params: np.void, changes: Changes, start_us: int | None = None
+    inputs: EstimatorInputs, params: np.void, changes: Changes, start_us: int | None = None, release: str = BASELINE
 ) -> FlightSchedule:
     """The schedule of a flight for some parameters; built on the first call, shared by the others.
 
@@ -127,6 +129,7 @@ def flight_schedule(
     params : EKF2_PARAMETERS record at the start
     changes : changes in flight that are in effect
     start_us : the filter is given a state once the horizon has come to this time
+    release : whose estimator is replayed
     """
 
     def steps(name: str, meaning: Callable[[float], float] = float) -> Steps:
@@ -134,7 +137,7 @@ def flight_schedule(
         return steps_of(float(params[name]), changed, meaning)
 
     delay_max = [value for run, value in steps("EKF2_DELAY_MAX") if run == 0][-1]
-    clock = (steps("EKF2_PREDICT_US"), delay_max, NEVER if start_us is None else start_us)
+    clock = (steps("EKF2_PREDICT_US"), delay_max, NEVER if start_us is None else start_us, release)
     told = {}
     for sensor in SENSOR_NAMES:
         delay = SENSORS[sensor].delay_parameter if sensor in SENSORS else None
@@ -166,9 +169,9 @@ def _bytes(arrays: Sequence[Rows]) -> int:
 class _Builder:
     """Builds the parts of schedules of one flight that share intervals and updates."""
 
-    def __init__(self, inputs: EstimatorInputs, clock: tuple[Steps, float, int]) -> None:
+    def __init__(self, inputs: EstimatorInputs, clock: tuple[Steps, float, int, str]) -> None:
         self.inputs, self.imu, self.clock = inputs, inputs.arrays.imu, clock
-        predict_us, _, _ = clock
+        predict_us = clock[0]
         self.predict_us = timeline(predict_us)
         self.intervals = inputs.memo.get(("intervals", predict_us), self._intervals, _size)
         self.updates, self.lengths, self.levelling = inputs.memo.get(("updates", clock), self._updates, _bytes)
@@ -178,9 +181,9 @@ class _Builder:
         return _shortened(intervals, find_intervals(self.imu, self.predict_us, sampler, intervals))
 
     def _updates(self) -> tuple[Rows, Rows, Rows]:
-        _, delay_max, start_us = self.clock
+        _, delay_max, start_us, release = self.clock
         updates, lengths = np.zeros(len(self.intervals), UPDATE), np.zeros(1, BUFFER_LENGTHS)
-        levelling = np.zeros(1, LEVELLING)
+        levelling = np.zeros(1, marked(LEVELLING, release))
         count = find_updates(
             self.intervals, self.imu, self.predict_us, delay_max, start_us, lengths, levelling, updates
         )

@@ -14,7 +14,9 @@ import numpy as np
 
 from fusetune.ekf2.compiled.compilation import ensure_compiled
 from fusetune.ekf2.feed.inputs import EstimatorInputs
-from fusetune.ekf2.filter.common.parameters import PARAMETER_NAMES, parameter_record
+from fusetune.ekf2.filter.common.parameters import PARAMETER_NAMES, parameter_record, parameters_beside
+from fusetune.ekf2.releases.behaviours import BASELINE
+from fusetune.ekf2.releases.modelled import demand_modelled
 from fusetune.ekf2.replay.course import Course
 from fusetune.ekf2.replay.gaps_ahead import GapsAhead
 from fusetune.ekf2.replay.handover import handover_runs, without_resets_at
@@ -40,6 +42,7 @@ def replay(
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
     recording: Recording = FULL,
+    release: str = BASELINE,
     keep: Callable[[RecordArrays], RecordArrays] | None = None,
 ) -> ReplayResult:
     """Run the estimator over one flight and keep what it published.
@@ -66,6 +69,7 @@ def replay(
         start=start,
         handovers=handovers,
         recording=recording,
+        release=release,
     )
     return result_of(summary, kept.rows())
 
@@ -86,6 +90,7 @@ def replay_into(
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
     recording: Recording = FULL,
+    release: str = BASELINE,
 ) -> ReplaySummary:
     """Run the estimator over one flight and hand on what it publishes, a stretch of the flight at a time.
 
@@ -109,8 +114,17 @@ def replay_into(
         Another estimator instance became primary: the filter takes over what that knew of its sensors.
     recording : Recording
         How much of the rows is handed on; what is, has the same figures either way.
+    release : str
+        Whose estimator is replayed, one of `fusetune.ekf2.releases.behaviours.MODELLED`.
+
+    Raises
+    ------
+    UserError
+        The release is not modelled.
     """
-    course, first_run, warm_start_us = begin_course(inputs, parameters, overridden, start, handovers, recording)
+    course, first_run, warm_start_us = begin_course(
+        inputs, parameters, overridden, start, handovers, recording, release
+    )
     tally, runs, ahead = _Tally(), len(inputs.arrays.imu), GapsAhead(course, gaps, first_run)
     for begin, end in course.stretches(first_run, runs, ahead.cuts):
         ahead.go_apart(begin)
@@ -129,6 +143,7 @@ def begin_course(
     start: LoggedState | None = None,
     handovers: Sequence[Handover] = (),
     recording: Recording = FULL,
+    release: str = BASELINE,
 ) -> tuple[Course, int, int | None]:
     """Set the estimator on its way; arguments as for `replay`.
 
@@ -136,16 +151,18 @@ def begin_course(
     -------
     The course, the run to go on with, and the horizon at which `start` was taken over (None: it was not).
     """
-    ensure_compiled()
+    demand_modelled(release)
+    ensure_compiled(release)
+    known = {*PARAMETER_NAMES, *parameters_beside(release)}
     changes = [
         (run, change)
         for run, change in inputs.parameter_changes
-        if change.name in PARAMETER_NAMES and change.name not in (overridden or frozenset())
+        if change.name in known and change.name not in (overridden or frozenset())
     ]
     inputs = _without_resets(inputs, start, tuple(handovers))
-    record = parameter_record(parameters)
+    record = parameter_record(parameters, release)
     runs = handover_runs(inputs, float(record["EKF2_DELAY_MAX"][0]), handovers)
-    course = Course(inputs, record, changes, runs, recording)
+    course = Course(inputs, record, changes, runs, recording, release)
     first_run, warm_start_us = course.start_from(start) if start is not None else (0, None)
     return course, first_run, warm_start_us
 

@@ -251,6 +251,8 @@ def _set_gnss(e: np.void) -> None:
         return
     now = int(e["time_delayed_us"])
     e["gnss"]["checks_passed"] = True
+    if "gnss_trust" in (e.dtype.names or ()):
+        e["gnss_trust"]["passed"] = True
     e["gnss"]["intermittent"] = False
     e["gnss"]["last_pass_us"] = now
     e["gnss"]["last_fail_us"] = max(now - CHECKS_PASSED_US, 1)

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 
 import numpy as np
 
-from fusetune.ekf2.compiled.compilation import ONLY_LOADS, compile_and_record, is_compiled, refuse_to_compile
+from fusetune.ekf2.compiled.compilation import (
+    OF_RELEASE,
+    ONLY_LOADS,
+    compile_and_record,
+    is_compiled,
+    refuse_to_compile,
+)
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.ekf2.releases.behaviours import BASELINE
 from fusetune.ekf2.replay.replay import replay
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
@@ -18,13 +26,13 @@ IMU_SAMPLES = 4
 IMU_INTERVAL_US = 4000
 
 
-def compile_kernels() -> None:
+def compile_kernels(release: str = BASELINE) -> None:
     """Replay a moment at rest, which compiles the estimator or loads it from the cache.
 
     The types of all inputs are fixed, so what is compiled for this moment serves every flight and parameter set.
     """
     flight = Flight("warm_up", topics={("sensor_combined", 0): _imu_at_rest()})
-    replay(build_inputs(canonical(flight)), complete({}, {}, None))
+    replay(build_inputs(canonical(flight)), complete({}, {}, None), release=release)
 
 
 def load_kernels() -> bool:
@@ -51,8 +59,10 @@ def _imu_at_rest() -> TopicTable:
 
 
 if __name__ == "__main__":
-    if ONLY_LOADS in sys.argv:
+    options = sys.argv[1:]
+    release = options[options.index(OF_RELEASE) + 1] if OF_RELEASE in options else BASELINE
+    if ONLY_LOADS in options:
         refuse_to_compile()
         compile_kernels()
     else:
-        compile_and_record(compile_kernels, sys.argv[1:])
+        compile_and_record(partial(compile_kernels, release), options)

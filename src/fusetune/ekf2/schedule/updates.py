@@ -12,11 +12,12 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.filter.common.levelling import LPF_ALPHA
 from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.ekf2.releases.by_release import by_release
 from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.timeline import value_at
 
-LPF_ALPHA = 0.1
 MIN_SPECIFIC_FORCE = 0.8 * ONE_G
 MAX_SPECIFIC_FORCE = 1.2 * ONE_G
 MAX_RATE = math.radians(15.0)
@@ -33,7 +34,7 @@ LEVELLING = np.dtype([*fields("f8", "accel", "gyro", shape=(3,)), ("begun", "?")
 
 
 @kernel
-def schedule_updates(intervals, imu, predict_us, imu_length, start_us, levelling, updates):
+def _schedule_updates(intervals, imu, predict_us, imu_length, start_us, levelling, updates):
     """Fill `updates`; return how many there are.
 
     Parameters
@@ -77,12 +78,48 @@ def schedule_updates(intervals, imu, predict_us, imu_length, start_us, levelling
 
 
 @kernel
+def _schedule_updates_by_horizon(intervals, imu, predict_us, imu_length, start_us, levelling, updates):
+    """As v1.16's, but what is low-passed for levelling, and averaged, is at the horizon, once per interval."""
+    levelling.started_run = -1
+    count, levelled, average = 0, False, INITIAL_INTERVAL_S
+    if len(imu) > 0 and imu[0].time_us >= start_us:
+        levelling.started_run = 1
+        levelled = True
+    for newest in range(len(intervals)):
+        run = intervals[newest].run
+        delayed = oldest_buffered(newest, imu_length)
+        if newest == 0:
+            average = float(_limited_interval(intervals[delayed], value_at(predict_us, run)))
+        else:
+            average = averaged_interval(intervals[delayed], average, value_at(predict_us, run))
+        if not levelled:
+            levelled = _is_level(intervals[delayed], levelling)
+        if levelled:
+            updates[count].run = run
+            updates[count].delayed = delayed
+            updates[count].average_dt = average
+            count += 1
+        if levelling.started_run < 0 and intervals[delayed].time_us >= start_us:
+            levelling.started_run = run + 1
+            levelled = True
+    return count
+
+
+schedule_updates = by_release(_schedule_updates, "levels_at_the_horizon", _schedule_updates_by_horizon)
+
+
+@kernel
 def averaged_interval(interval, average, predict_us):
     """Average the estimator interval (s), in single precision since PX4 derives time stamps (µs) from it."""
+    limited = _limited_interval(interval, predict_us)
+    return float(np.float32(0.99) * np.float32(average) + np.float32(0.01) * limited)
+
+
+@kernel
+def _limited_interval(interval, predict_us):
     mean = np.float32(0.5) * (np.float32(interval.delta_vel_dt) + np.float32(interval.delta_ang_dt))
     nominal = np.float32(1e-6) * np.float32(predict_us)
-    limited = min(max(mean, np.float32(0.5) * nominal), np.float32(2.0) * nominal)
-    return float(np.float32(0.99) * np.float32(average) + np.float32(0.01) * limited)
+    return min(max(mean, np.float32(0.5) * nominal), np.float32(2.0) * nominal)
 
 
 @kernel

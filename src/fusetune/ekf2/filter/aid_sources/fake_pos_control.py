@@ -20,6 +20,7 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_horizontal_velocity_to_zero,
 )
 from fusetune.ekf2.numerics.geodesy import lat_lon_difference
+from fusetune.ekf2.releases.by_release import by_release
 
 UPDATE_INTERVAL_US = 200_000
 FAILURE_TIMEOUT_US = 400_000
@@ -44,11 +45,24 @@ def control_fake_pos_fusion(ekf, params):
     enable = (
         not enable_valid
         and tilt_variance(ekf) > TILT_UNCERTAIN_VARIANCE
-        and (int(params.EKF2_IMU_CTRL) & IMU_CTRL_GRAVITY_VECTOR) == 0
+        and not _is_gravity_leading(ekf, params)
         and ekf.horizontal_deadreckon_time_exceeded
     )
     ekf.cs.fake_pos = _run(ekf, params, enable, ekf.cs.fake_pos, aid)
     ekf.cs.valid_fake_pos = _run(ekf, params, enable_valid, ekf.cs.valid_fake_pos, aid)
+
+
+@kernel
+def _is_gravity_enabled(ekf, params):
+    return (int(params.EKF2_IMU_CTRL) & IMU_CTRL_GRAVITY_VECTOR) != 0
+
+
+@kernel
+def _is_gravity_fused(ekf, params):
+    return ekf.cs.gravity_vector
+
+
+_is_gravity_leading = by_release(_is_gravity_enabled, "yields_to_gravity", _is_gravity_fused)
 
 
 @kernel

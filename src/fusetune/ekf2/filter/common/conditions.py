@@ -32,7 +32,7 @@ def get_number_of_active_horizontal_aiding_sources(ekf):
 
 
 @kernel
-def _others(sources, aiding_flag):
+def is_other_source_than(sources, aiding_flag):
     """Whether there is a source besides the one whose flag is given."""
     if aiding_flag:
         return sources > 1
@@ -48,7 +48,7 @@ def is_horizontal_aiding_active(ekf):
 @kernel
 def is_other_source_of_horizontal_aiding_than(ekf, aiding_flag):
     """Whether a source other than the one with this flag bounds the horizontal drift."""
-    return _others(get_number_of_active_horizontal_aiding_sources(ekf), aiding_flag)
+    return is_other_source_than(get_number_of_active_horizontal_aiding_sources(ekf), aiding_flag)
 
 
 @kernel
@@ -72,7 +72,7 @@ def is_vertical_position_aiding_active(ekf):
 @kernel
 def is_other_source_of_vertical_position_aiding_than(ekf, aiding_flag):
     """Whether a height source other than the one with this flag is fused."""
-    return _others(get_number_of_active_vertical_position_aiding_sources(ekf), aiding_flag)
+    return is_other_source_than(get_number_of_active_vertical_position_aiding_sources(ekf), aiding_flag)
 
 
 @kernel

@@ -27,6 +27,7 @@ from fusetune.ekf2.numerics.rotations import (
     quat_to_dcm,
     update_yaw_in_rot_mat,
 )
+from fusetune.ekf2.releases.by_release import by_release
 
 MIN_RESET_VARIANCE = 0.01**2
 HORIZONTAL_VELOCITY_VARIANCE_AFTER_ZEROING = 25.0
@@ -64,12 +65,32 @@ def _reset_variance(ekf, index, variance):
 
 
 @kernel
+def _reset_one_after_the_other(ekf, var_n, var_e):
+    _reset_variance(ekf, VELOCITY, var_n)
+    _reset_variance(ekf, VELOCITY + 1, var_e)
+
+
+@kernel
+def _reset_at_once(ekf, var_n, var_e):
+    """Both axes in one, where one is known: the other then keeps its variance, but no covariance."""
+    if math.isfinite(var_n) or math.isfinite(var_e):
+        north = max(MIN_RESET_VARIANCE, var_n) if math.isfinite(var_n) else ekf.P[VELOCITY, VELOCITY]
+        east = max(MIN_RESET_VARIANCE, var_e) if math.isfinite(var_e) else ekf.P[VELOCITY + 1, VELOCITY + 1]
+        reset_covariance_block(ekf, VELOCITY, 1, north)
+        reset_covariance_block(ekf, VELOCITY + 1, 1, east)
+
+
+_reset_horizontal_velocity_variances = by_release(
+    _reset_one_after_the_other, "resets_horizontal_velocity_at_once", _reset_at_once
+)
+
+
+@kernel
 def reset_horizontal_velocity_to(ekf, params, vn, ve, var_n, var_e):
     """Set north and east velocity (m/s) and their variances; horizontal position is uncorrelated."""
     delta_n, delta_e = vn - ekf.vel[0], ve - ekf.vel[1]
     ekf.vel[0], ekf.vel[1] = vn, ve
-    _reset_variance(ekf, VELOCITY, var_n)
-    _reset_variance(ekf, VELOCITY + 1, var_e)
+    _reset_horizontal_velocity_variances(ekf, var_n, var_e)
     uncorrelate_block(ekf, POSITION, 1)
     uncorrelate_block(ekf, POSITION + 1, 1)
     apply_velocity_reset(ekf, delta_n, delta_e, 0.0)

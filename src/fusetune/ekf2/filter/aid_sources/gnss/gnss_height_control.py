@@ -9,6 +9,7 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VPOS
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_resets import GPS_MODE_DEAD_RECKONING
 from fusetune.ekf2.filter.bias_estimator.bias_estimator import reset_bias, set_bias
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
     predict_height_bias,
@@ -20,6 +21,7 @@ from fusetune.ekf2.filter.common.aid_source_status import reset_aid_source_statu
 from fusetune.ekf2.filter.common.conditions import (
     is_height_reset_required,
     is_only_active_source_of_vertical_position_aiding,
+    is_other_source_of_vertical_position_aiding_than,
 )
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_GNSS
 from fusetune.ekf2.filter.common.timing import (
@@ -32,6 +34,7 @@ from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_
 from fusetune.ekf2.filter.resets.origin_resets import initialise_altitude_to
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to
 from fusetune.ekf2.numerics.rotations import component_in_earth
+from fusetune.ekf2.releases.by_release import by_release
 
 TYPICAL_VACC_PER_HACC = 1.5
 
@@ -66,10 +69,15 @@ def _use_gnss_height(ekf, params, sample):
         variance + bias_est.bias_var,
         max(params.EKF2_GPS_P_GATE, 1.0),
     )
-    if not is_fusion_due(ekf.sensors.gnss):
-        return
+    if is_fusion_due(ekf.sensors.gnss):
+        _control_with_height(ekf, params, measurement, variance, valid)
+
+
+@kernel
+def _control_with_latched_checks(ekf, params, measurement, variance, valid):
+    """Start, continue or stop the height that has been judged, once the checks have passed at some time."""
     if valid:
-        update_height_bias(ekf, bias_est, HEIGHT_REF_GNSS, measurement - ekf.gpos_alt, variance)
+        update_height_bias(ekf, ekf.gps_hgt_b_est, HEIGHT_REF_GNSS, measurement - ekf.gpos_alt, variance)
 
     usable = valid and ekf.origin.lat_lon_valid and ekf.gnss.checks_passed
     continuing = usable and int(params.EKF2_GPS_CTRL) & GPS_CTRL_VPOS != 0
@@ -120,6 +128,97 @@ def _start_gnss_height(ekf, params, measurement, variance, may_start, may_initia
         ekf.events.reset_hgt_to_gps = True
         initialise_altitude_to(ekf, params, measurement, variance)
         reset_bias(bias_est)
+
+
+@kernel
+def _control_faulty_height(ekf, params, measurement, variance, valid):
+    """As v1.16's, but a height that fails beside a source that works can be declared faulty.
+
+    The bias is learnt while the height is fused, and the altitude of the origin is set before that begins.
+    """
+    usable = valid and ekf.origin.lat_lon_valid and ekf.gnss_trust.passed and not ekf.gnss_trust.fault
+    continuing = usable and int(params.EKF2_GPS_CTRL) & GPS_CTRL_VPOS != 0
+    if ekf.cs.gps_hgt:
+        if not continuing:
+            stop_gps_hgt_fusion(ekf)
+            return
+        update_height_bias(ekf, ekf.gps_hgt_b_est, HEIGHT_REF_GNSS, measurement - ekf.gpos_alt, variance)
+        _continue_or_fault_height(ekf, params, measurement, variance)
+    elif is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL):
+        is_reference = int(params.EKF2_HGT_REF) == HEIGHT_REF_GNSS
+        if usable and is_reference and not math.isfinite(ekf.origin.alt):
+            _initialise_altitude(ekf, params, measurement, variance, continuing)
+        elif continuing:
+            _start_sound_height(ekf, params, measurement, variance, is_reference)
+
+
+@kernel
+def _continue_or_fault_height(ekf, params, measurement, variance):
+    aid = ekf.aid.gnss_hgt
+    fuse_vertical_position(ekf, params, aid)
+    reset_allowed = _is_height_reset_allowed(ekf, params)
+    if is_height_reset_required(ekf) and ekf.height_sensor_ref == HEIGHT_REF_GNSS and reset_allowed:
+        ekf.events.reset_hgt_to_gps = True
+        reset_altitude_to(ekf, params, measurement, variance)
+        set_bias(ekf.gps_hgt_b_est, measurement - ekf.gpos_alt)
+        reset_aid_source_status_zero_innovation(ekf, aid, 1)
+    elif is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX):
+        stop_gps_hgt_fusion(ekf)
+        if not _is_height_reset_allowed(ekf, params):
+            ekf.gnss_trust.height_fault = True
+            ekf.gnss_trust.height_rejected_us = ekf.time_delayed_us
+
+
+@kernel
+def _initialise_altitude(ekf, params, measurement, variance, starting):
+    """Give the origin its altitude, whether or not the height is to be fused."""
+    ekf.events.reset_hgt_to_gps = True
+    initialise_altitude_to(ekf, params, measurement, variance)
+    reset_bias(ekf.gps_hgt_b_est)
+    if starting:
+        ekf.height_sensor_ref = HEIGHT_REF_GNSS
+        reset_aid_source_status_zero_innovation(ekf, ekf.aid.gnss_hgt, 1)
+        _set_height_active(ekf)
+
+
+@kernel
+def _start_sound_height(ekf, params, measurement, variance, is_reference):
+    """Start as the reference, with a reset, or beside it; a height that was faulty must have agreed for 5 s."""
+    aid, trust = ekf.aid.gnss_hgt, ekf.gnss_trust
+    if is_reference and _is_height_reset_allowed(ekf, params):
+        ekf.height_sensor_ref = HEIGHT_REF_GNSS
+        ekf.events.reset_hgt_to_gps = True
+        reset_altitude_to(ekf, params, measurement, variance)
+        reset_bias(ekf.gps_hgt_b_est)
+        reset_aid_source_status_zero_innovation(ekf, aid, 1)
+    else:
+        if trust.height_fault:
+            if aid.innovation_rejected:
+                trust.height_rejected_us = ekf.time_delayed_us
+            if not is_timed_out(ekf, trust.height_rejected_us, HGT_FUSION_TIMEOUT_MAX):
+                return
+        if not is_reference:
+            set_bias(ekf.gps_hgt_b_est, measurement - ekf.gpos_alt)
+    _set_height_active(ekf)
+    trust.height_fault = False
+
+
+@kernel
+def _set_height_active(ekf):
+    start_height_source(ekf, ekf.gps_hgt_b_est, ekf.aid.gnss_hgt)
+    ekf.cs.gps_hgt = True
+
+
+@kernel
+def _is_height_reset_allowed(ekf, params):
+    """Whether the height may be reset to GNSS: EKF2_GPS_MODE can have it yield to another source."""
+    yields = int(params.EKF2_GPS_MODE) == GPS_MODE_DEAD_RECKONING and is_other_source_of_vertical_position_aiding_than(
+        ekf, ekf.cs.gps_hgt
+    )
+    return not yields or not math.isfinite(ekf.origin.alt)
+
+
+_control_with_height = by_release(_control_with_latched_checks, "faults_gnss_height", _control_faulty_height)
 
 
 @kernel

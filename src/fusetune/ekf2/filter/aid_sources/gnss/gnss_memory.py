@@ -4,6 +4,7 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.releases.by_release import by_release
 
 GNSS_CHECK_NAMES = (
     "fix",
@@ -40,6 +41,10 @@ drift figures (m/s; NaN while not at rest on the ground) are low-passed with 10 
 checks have passed for EKF2_REQ_GPS_H.
 """
 
+GNSS_TRUST = np.dtype([*fields("?", "passed", "fault", "height_fault"), ("height_rejected_us", "i8")], align=True)
+"""Sub-record `ekf.gnss_trust`, since v1.17: whether the latest sample passed the checks, whether position and velocity,
+or the height, count as faulty, and when the height was last rejected (µs)."""
+
 GPS_CTRL_HPOS, GPS_CTRL_VPOS, GPS_CTRL_VEL, GPS_CTRL_YAW = 1, 2, 4, 8
 """Bits of EKF2_GPS_CTRL."""
 
@@ -64,7 +69,32 @@ def forget_drift(gnss):
 
 
 @kernel
-def forget_checks(gnss):
+def _forget_checks(ekf):
     """Let the quality checks start anew."""
-    gnss.last_fail_us = 0
-    gnss.last_pass_us = 0
+    ekf.gnss.last_fail_us = 0
+    ekf.gnss.last_pass_us = 0
+
+
+@kernel
+def _forget_checks_and_result(ekf):
+    _forget_checks(ekf)
+    ekf.gnss_trust.passed = False
+
+
+forget_checks = by_release(_forget_checks, "simplifies_gnss_checks", _forget_checks_and_result)
+
+
+@kernel
+def _latched_result(ekf):
+    """Whether the checks have passed at some time."""
+    return ekf.gnss.checks_passed
+
+
+@kernel
+def _latest_result(ekf):
+    """Whether the latest sample passed the checks."""
+    return ekf.gnss_trust.passed
+
+
+have_checks_passed = by_release(_latched_result, "simplifies_gnss_checks", _latest_result)
+"""Whether GNSS may be started."""

@@ -7,18 +7,25 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, forget_checks
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, forget_checks, have_checks_passed
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
     update_aid_source_status,
 )
-from fusetune.ekf2.filter.common.conditions import is_other_source_of_horizontal_aiding_than
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_resets import is_gnss_reset_allowed, may_start_without_reset
+from fusetune.ekf2.filter.common.conditions import (
+    get_number_of_active_horizontal_position_aiding_sources,
+    is_other_source_of_horizontal_aiding_than,
+    is_other_source_than,
+)
 from fusetune.ekf2.filter.common.state import POSITION
+from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.filter.resets.origin_resets import reset_lat_lon_to
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon, lat_lon_difference
 from fusetune.ekf2.numerics.rotations import rotate_to_earth
+from fusetune.ekf2.releases.by_release import by_release
 
 MIN_NOISE = 0.01
 
@@ -45,7 +52,7 @@ def update_gnss_position(ekf, params, sample):
 
 
 @kernel
-def control_gnss_pos_fusion(ekf, params, force_reset):
+def _control_gnss_pos_fusion(ekf, params, force_reset):
     """Start, continue or stop fusing GNSS position with the sample just judged; the first good one sets the origin."""
     enabled = int(params.EKF2_GPS_CTRL) & GPS_CTRL_HPOS != 0
     continuing = enabled and ekf.cs.tilt_align and ekf.cs.yaw_align
@@ -55,12 +62,57 @@ def control_gnss_pos_fusion(ekf, params, force_reset):
         reset_horizontal_position_to_gnss(ekf, params)
     elif ekf.cs.gnss_pos:
         fuse_horizontal_position(ekf, params, ekf.aid.gnss_pos)
-    elif continuing and ekf.gnss.checks_passed:
+    elif continuing and have_checks_passed(ekf):
         ekf.events.starting_gps_fusion = True
         reset_horizontal_position_to_gnss(ekf, params)
         ekf.cs.gnss_pos = True
-    elif enabled and ekf.gnss.checks_passed and not ekf.origin.lat_lon_valid:
+    elif enabled and have_checks_passed(ekf) and not ekf.origin.lat_lon_valid:
         reset_horizontal_position_to_gnss(ekf, params)
+
+
+@kernel
+def _control_gnss_pos_fusion_apart(ekf, params, force_reset):
+    """As v1.16's, but position starts without a reset where it agrees, and minds when it was fused itself."""
+    aid, trust = ekf.aid.gnss_pos, ekf.gnss_trust
+    enabled = int(params.EKF2_GPS_CTRL) & GPS_CTRL_HPOS != 0
+    continuing = enabled and ekf.cs.tilt_align and ekf.cs.yaw_align and not trust.height_fault
+    places_origin = enabled and trust.passed and not ekf.origin.lat_lon_valid
+    if ekf.cs.gnss_pos:
+        if not continuing:
+            stop_gnss_pos_fusion(ekf)
+            return
+        fuse_horizontal_position(ekf, params, aid)
+        if force_reset or is_timed_out(ekf, aid.time_last_fuse, RESET_TIMEOUT_MAX):
+            if is_gnss_reset_allowed(ekf, params, _is_position_aided_otherwise(ekf), ekf.cs.gnss_pos):
+                reset_horizontal_position_to_gnss(ekf, params)
+            else:
+                stop_gnss_pos_fusion(ekf)
+                trust.fault = True
+    elif continuing and trust.passed:
+        fused = False
+        if ekf.origin.lat_lon_valid and may_start_without_reset(ekf, aid, force_reset):
+            fused = fuse_horizontal_position(ekf, params, aid)
+        reset = places_origin or (
+            not fused and is_gnss_reset_allowed(ekf, params, _is_position_aided_otherwise(ekf), ekf.cs.gnss_pos)
+        )
+        if reset:
+            reset_horizontal_position_to_gnss(ekf, params)
+        if fused or reset:
+            ekf.events.starting_gps_fusion = True
+            ekf.cs.gnss_pos = True
+            trust.fault = False
+    elif places_origin:
+        reset_horizontal_position_to_gnss(ekf, params)
+
+
+@kernel
+def _is_position_aided_otherwise(ekf):
+    return is_other_source_than(get_number_of_active_horizontal_position_aiding_sources(ekf), ekf.cs.gnss_pos)
+
+
+control_gnss_pos_fusion = by_release(
+    _control_gnss_pos_fusion, "controls_gnss_sources_apart", _control_gnss_pos_fusion_apart
+)
 
 
 @kernel
@@ -84,4 +136,4 @@ def stop_gnss_pos_fusion(ekf):
     if ekf.cs.gnss_pos:
         ekf.cs.gnss_pos = False
         if not ekf.cs.gnss_vel:
-            forget_checks(ekf.gnss)
+            forget_checks(ekf)

@@ -7,13 +7,19 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL, forget_checks
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL, forget_checks, have_checks_passed
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_resets import is_gnss_reset_allowed, may_start_without_reset
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
     update_aid_source_status,
 )
-from fusetune.ekf2.filter.common.conditions import is_height_reset_required, is_horizontal_aiding_active
+from fusetune.ekf2.filter.common.conditions import (
+    get_number_of_active_horizontal_velocity_aiding_sources,
+    is_height_reset_required,
+    is_horizontal_aiding_active,
+    is_other_source_than,
+)
 from fusetune.ekf2.filter.common.imu_rates import body_rate
 from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_timed_out
@@ -21,6 +27,7 @@ from fusetune.ekf2.filter.resets.state_resets import reset_velocity_to, reset_ve
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
 from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
 from fusetune.ekf2.numerics.rotations import rotate_to_earth
+from fusetune.ekf2.releases.by_release import by_release
 
 MIN_NOISE = 0.01
 VERTICAL_NOISE_RATIO = 1.5
@@ -65,7 +72,7 @@ def _set_velocity_axis(ekf, aid, axis, velocity, variance):
 
 
 @kernel
-def control_gnss_vel_fusion(ekf, params, force_reset):
+def _control_gnss_vel_fusion(ekf, params, force_reset):
     """Start, continue or stop fusing GNSS velocity with the sample that has just been judged."""
     aid = ekf.aid.gnss_vel
     enabled = int(params.EKF2_GPS_CTRL) & GPS_CTRL_VEL != 0
@@ -80,7 +87,7 @@ def control_gnss_vel_fusion(ekf, params, force_reset):
         fuse_velocity(ekf, params, aid)
         if is_height_reset_required(ekf):
             reset_vertical_velocity_to(ekf, params, aid.observation[2], aid.observation_variance[2])
-    elif continuing and ekf.gnss.checks_passed:
+    elif continuing and have_checks_passed(ekf):
         ekf.events.starting_gps_fusion = True
         # another source of horizontal aiding makes a reset unnecessary, unless the yaw has only now become known
         if (
@@ -90,6 +97,44 @@ def control_gnss_vel_fusion(ekf, params, force_reset):
         ):
             reset_velocity_to_gnss(ekf, params)
         ekf.cs.gnss_vel = True
+
+
+@kernel
+def _control_gnss_vel_fusion_apart(ekf, params, force_reset):
+    """As v1.16's, but velocity starts without a reset where it agrees, and minds when it was fused itself."""
+    aid, trust = ekf.aid.gnss_vel, ekf.gnss_trust
+    enabled = int(params.EKF2_GPS_CTRL) & GPS_CTRL_VEL != 0
+    continuing = enabled and ekf.cs.tilt_align and ekf.cs.yaw_align and not trust.fault and not trust.height_fault
+    if ekf.cs.gnss_vel:
+        if not continuing:
+            stop_gnss_vel_fusion(ekf)
+            return
+        fuse_velocity(ekf, params, aid)
+        if force_reset or is_timed_out(ekf, aid.time_last_fuse, RESET_TIMEOUT_MAX):
+            if force_reset or _is_velocity_reset_allowed(ekf, params):
+                reset_velocity_to_gnss(ekf, params)
+            else:
+                stop_gnss_vel_fusion(ekf)
+    elif continuing and trust.passed:
+        fused = may_start_without_reset(ekf, aid, force_reset) and fuse_velocity(ekf, params, aid)
+        reset = not fused and (force_reset or _is_velocity_reset_allowed(ekf, params))
+        if reset:
+            reset_velocity_to_gnss(ekf, params)
+        if fused or reset:
+            ekf.events.starting_gps_fusion = True
+            ekf.cs.gnss_vel = True
+
+
+@kernel
+def _is_velocity_reset_allowed(ekf, params):
+    sources = get_number_of_active_horizontal_velocity_aiding_sources(ekf)
+    aided = is_other_source_than(sources, ekf.cs.gnss_vel) and not ekf.cs.wind_dead_reckoning
+    return is_gnss_reset_allowed(ekf, params, aided, ekf.cs.gnss_vel)
+
+
+control_gnss_vel_fusion = by_release(
+    _control_gnss_vel_fusion, "controls_gnss_sources_apart", _control_gnss_vel_fusion_apart
+)
 
 
 @kernel
@@ -107,4 +152,4 @@ def stop_gnss_vel_fusion(ekf):
     if ekf.cs.gnss_vel:
         ekf.cs.gnss_vel = False
         if not ekf.cs.gnss_pos:
-            forget_checks(ekf.gnss)
+            forget_checks(ekf)

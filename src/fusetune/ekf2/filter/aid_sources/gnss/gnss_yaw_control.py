@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW, have_checks_passed
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -85,7 +85,7 @@ def control_gnss_yaw_fusion(ekf, params, sample):
         return
     if (
         continuing
-        and ekf.gnss.checks_passed
+        and have_checks_passed(ekf)
         and not ekf.gnss.intermittent
         and is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_yaw_time_us, 2 * GNSS_YAW_MAX_INTERVAL)
     ):

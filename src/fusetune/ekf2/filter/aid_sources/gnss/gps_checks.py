@@ -9,11 +9,15 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import forget_drift
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.numerics.geodesy import project
+from fusetune.ekf2.releases.by_release import by_release
 
 DRIFT_TIME_CONSTANT_S = 10.0
 MIN_DT_S = 0.001
 DRIFT_LIMIT_FACTOR = 10.0
 MIN_FIX_TYPE = 3
+WORST_POSITION_ACCURACY, WORST_SPEED_ACCURACY = 50.0, 10.0
+"""Limits (m, m/s) of the simplified checks."""
+
 MIN_PASSING_TIME_US = 1_000_000
 
 (
@@ -27,11 +31,12 @@ MIN_PASSING_TIME_US = 1_000_000
     CHECK_HSPEED,
     CHECK_VSPEED,
     CHECK_SPOOFED,
-) = (1 << bit for bit in range(10))
+    CHECK_FIX,
+) = (1 << bit for bit in range(11))
 
 
 @kernel
-def check_gnss_sample(ekf, params, sample):
+def _check_gnss_sample(ekf, params, sample):
     """Run the checks on a new sample; return whether it may be used.
 
     A sample is used once the checks have passed for a tenth of EKF2_REQ_GPS_H, and for 1 s at least. When they have
@@ -51,16 +56,74 @@ def check_gnss_sample(ekf, params, sample):
 
 
 @kernel
+def _check_gnss_sample_simply(ekf, params, sample):
+    """Run the checks on a new sample; return whether it may be used.
+
+    Those of the start until they have passed for EKF2_REQ_GPS_H, then simplified ones for good; a sample is used while
+    these have passed for a tenth of that, and for 1 s at least. Starting asks for the result of the latest sample.
+    """
+    gnss, passed = ekf.gnss, False
+    required_us = int(params.EKF2_REQ_GPS_H * 1e6)
+    if gnss.last_fail_us == 0:
+        gnss.last_fail_us = ekf.time_delayed_us
+    if gnss.checks_passed:
+        sound = not _is_unusable(gnss.fail, params, sample)
+        passed = sound and is_timed_out(ekf, gnss.last_fail_us, max(MIN_PASSING_TIME_US, required_us // 10))
+    else:
+        sound = not _is_unfit_to_start(ekf, params, sample)
+        passed = sound and is_timed_out(ekf, gnss.last_fail_us, required_us)
+        if passed:
+            gnss.checks_passed = True
+            ekf.events.gps_checks_passed = True
+    if sound:
+        gnss.last_pass_us = ekf.time_delayed_us
+    else:
+        gnss.last_fail_us = ekf.time_delayed_us
+    _remember_fix(gnss, sample)
+    ekf.gnss_trust.passed = passed
+    return passed
+
+
+@kernel
+def _is_unusable(fail, params, sample):
+    """Whether an enabled one of the simplified checks fails."""
+    mask = int(params.EKF2_GPS_CHECK)
+    fail.fix = sample.fix_type < MIN_FIX_TYPE
+    fail.hacc = sample.hacc > WORST_POSITION_ACCURACY
+    fail.vacc = sample.vacc > WORST_POSITION_ACCURACY
+    fail.sacc = sample.sacc > WORST_SPEED_ACCURACY
+    fail.spoofed = sample.spoofed
+    return (
+        (fail.fix and mask & CHECK_FIX != 0)
+        or (fail.hacc and mask & CHECK_HACC != 0)
+        or (fail.vacc and mask & CHECK_VACC != 0)
+        or (fail.sacc and mask & CHECK_SACC != 0)
+        or (fail.spoofed and mask & CHECK_SPOOFED != 0)
+    )
+
+
+@kernel
+def _is_unfit_to_start(ekf, params, sample):
+    """Whether an enabled one of the checks of the start fails; the fix is compared with EKF2_REQ_FIX."""
+    fail, mask = ekf.gnss.fail, int(params.EKF2_GPS_CHECK)
+    _check_reported_quality(fail, params, sample)
+    fail.fix = sample.fix_type < int(params.EKF2_REQ_FIX) and mask & CHECK_FIX != 0
+    _check_drift(ekf, params, sample)
+    _check_speed_limit(fail, params, sample)
+    return _any_enabled_check_fails(fail, mask)
+
+
+check_gnss_sample = by_release(_check_gnss_sample, "simplifies_gnss_checks", _check_gnss_sample_simply)
+
+
+@kernel
 def run_gnss_checks(ekf, params, sample):
     """Judge one sample by the enabled checks and note the time of success or failure."""
     gnss = ekf.gnss
     _check_reported_quality(gnss.fail, params, sample)
     _check_drift(ekf, params, sample)
     _check_speed_limit(gnss.fail, params, sample)
-    gnss.prev_lat = math.radians(sample.lat_deg)
-    gnss.prev_lon = math.radians(sample.lon_deg)
-    gnss.prev_alt = sample.alt
-    gnss.prev_time_us = sample.time_us
+    _remember_fix(gnss, sample)
     if gnss.last_fail_us == 0:
         gnss.last_fail_us = ekf.time_delayed_us
     if _any_enabled_check_fails(gnss.fail, int(params.EKF2_GPS_CHECK)):
@@ -68,6 +131,14 @@ def run_gnss_checks(ekf, params, sample):
         return False
     gnss.last_pass_us = ekf.time_delayed_us
     return True
+
+
+@kernel
+def _remember_fix(gnss, sample):
+    gnss.prev_lat = math.radians(sample.lat_deg)
+    gnss.prev_lon = math.radians(sample.lon_deg)
+    gnss.prev_alt = sample.alt
+    gnss.prev_time_us = sample.time_us
 
 
 @kernel
@@ -108,9 +179,9 @@ def _filter_drift(gnss, params, sample):
         north, east = project(gnss.prev_lat, gnss.prev_lon, math.radians(sample.lat_deg), math.radians(sample.lon_deg))
         down = gnss.prev_alt - sample.alt
     position = gnss.pos_deriv_filt
-    position[0] = _low_pass(position[0], _limited(north / dt, h_limit), coefficient)
-    position[1] = _low_pass(position[1], _limited(east / dt, h_limit), coefficient)
-    position[2] = _low_pass(position[2], _limited(down / dt, v_limit), coefficient)
+    position[0] = _filtered_drift(params, position[0], north / dt, h_limit, coefficient)
+    position[1] = _filtered_drift(params, position[1], east / dt, h_limit, coefficient)
+    position[2] = _filtered_drift(params, position[2], down / dt, v_limit, coefficient)
     gnss.horizontal_position_drift_rate = math.hypot(position[0], position[1])
     gnss.vertical_position_drift_rate = abs(position[2])
 
@@ -150,6 +221,20 @@ def _any_enabled_check_fails(fail, mask):
         or (fail.vspeed and mask & CHECK_VSPEED != 0)
         or (fail.spoofed and mask & CHECK_SPOOFED != 0)
     )
+
+
+@kernel
+def _filtered_limited_drift(params, state, drift, limit, coefficient):
+    return _low_pass(state, _limited(drift, limit), coefficient)
+
+
+@kernel
+def _limited_filtered_drift(params, state, drift, limit, coefficient):
+    """Limiting what is filtered, not what goes in, leaves no bias where jumps go one way at once and back slowly."""
+    return _limited(_low_pass(state, drift, coefficient), limit)
+
+
+_filtered_drift = by_release(_filtered_limited_drift, "simplifies_gnss_checks", _limited_filtered_drift)
 
 
 @kernel

@@ -34,6 +34,7 @@ from fusetune.ekf2.filter.common.timing import (
 )
 from fusetune.ekf2.filter.yaw_estimator.gaussian_sum import predict_gsf
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import reset_gsf, set_gyro_bias
+from fusetune.ekf2.releases.by_release import by_release
 
 YAW_EMERGENCY_DELAY = 1_000_000
 """How long (µs) horizontal velocity must have been rejected before the yaw is blamed."""
@@ -84,7 +85,7 @@ def _run_yaw_estimator(ekf):
 
 
 @kernel
-def _is_reset_due(ekf, params):
+def _is_joint_reset_due(ekf, params):
     """Whether velocity and position are to be reset; decided once for both, since resetting one would hide the need.
 
     A yaw found wrong in flight is put right here, and calls for a reset of both.
@@ -92,14 +93,31 @@ def _is_reset_due(ekf, params):
     if not _uses_gnss(ekf):
         return False
     due = should_reset_gnss_fusion(ekf, params)
-    if (
+    if _has_yaw_failed(ekf):
+        due = try_yaw_emergency_reset(ekf, params)
+    return due
+
+
+@kernel
+def _is_yaw_put_right(ekf, params):
+    """Whether the yaw was found wrong in flight and has been put right; the sources see to their own time-outs."""
+    if ekf.gnss_trust.fault or not _uses_gnss(ekf):
+        return False
+    return _has_yaw_failed(ekf) and try_yaw_emergency_reset(ekf, params)
+
+
+@kernel
+def _has_yaw_failed(ekf):
+    """Whether horizontal velocity has been rejected for too long in flight, and the yaw is off."""
+    return (
         ekf.cs.in_air
         and is_yaw_failure(ekf)
         and is_timed_out(ekf, ekf.time_last_hor_vel_fuse, YAW_EMERGENCY_DELAY)
         and ekf.time_last_hor_vel_fuse > ekf.time_last_on_ground
-    ):
-        due = try_yaw_emergency_reset(ekf, params)
-    return due
+    )
+
+
+_is_reset_due = by_release(_is_joint_reset_due, "controls_gnss_sources_apart", _is_yaw_put_right)
 
 
 @kernel
@@ -129,7 +147,7 @@ def should_reset_gnss_fusion(ekf, params):
 def stop_gnss_fusion(ekf):
     """Stop everything that GNSS gives."""
     if _uses_gnss(ekf):
-        forget_checks(ekf.gnss)
+        forget_checks(ekf)
     stop_gnss_vel_fusion(ekf)
     stop_gnss_pos_fusion(ekf)
     stop_gps_hgt_fusion(ekf)

@@ -12,6 +12,7 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, GPS
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.filter.yaw_estimator.gaussian_sum import fuse_gsf_velocity
 from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
+from fusetune.ekf2.releases.by_release import by_release
 
 CONVERGED_YAW_DEVIATION = 0.262
 """Standard deviation (rad) below which the composite yaw counts as converged."""
@@ -35,11 +36,26 @@ def is_yaw_failure(ekf):
 
 
 @kernel
+def _is_yaw_reset_new(ekf):
+    return (
+        ekf.cs_prev.yaw_align != ekf.cs.yaw_align or ekf.state_reset.quat_counter != ekf.state_reset_prev.quat_counter
+    )
+
+
+@kernel
+def _never(ekf):
+    return False
+
+
+_has_yaw_been_reset = by_release(_is_yaw_reset_new, "repeats_yaw_emergency_resets", _never)
+
+
+@kernel
 def reset_yaw_to_ekf_gsf(ekf, params):
     """Set the yaw to the yaw estimator's, if that has converged and the yaw was not reset in this update already."""
     if not is_yaw_emergency_estimate_available(ekf):
         return False
-    if ekf.cs_prev.yaw_align != ekf.cs.yaw_align or ekf.state_reset.quat_counter != ekf.state_reset_prev.quat_counter:
+    if _has_yaw_been_reset(ekf):
         return False
     reset_quat_state_yaw(ekf, params, ekf.gsf.yaw, ekf.gsf.yaw_variance)
     ekf.cs.yaw_align = True

@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.common.state import ATTITUDE
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_kalman_gain
 from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.ekf2.releases.by_release import by_release
 
 GRAVITY_MEMORY = np.dtype([("jacobian", "f8", (3, 2))], align=True)
 """Sub-record `ekf.gravity`: of each body axis, the derivative by the attitude errors about north and east."""
@@ -75,7 +76,7 @@ def _fuse_gravity(ekf, params):
 
 
 @kernel
-def control_gravity_fusion(ekf, params):
+def _control_gravity_fusion(ekf, params):
     """Hold the tilt to the vertical while the vehicle hardly accelerates and no other source aids horizontally."""
     imu, aid = ekf.imu_delayed, ekf.aid.gravity
     accel_norm_good = ACCEL_LIMIT_LOW < ekf.accel_magnitude_filt < ACCEL_LIMIT_HIGH
@@ -85,8 +86,36 @@ def control_gravity_fusion(ekf, params):
         and not is_horizontal_aiding_active(ekf)
     )
     _update_gravity(ekf, params)
-    clipping = imu.delta_vel_clipping[0] != 0 or imu.delta_vel_clipping[1] != 0 or imu.delta_vel_clipping[2] != 0
-    if ekf.cs.gravity_vector and not aid.innovation_rejected and not clipping:
+    if _may_be_fused(ekf):
         _fuse_gravity(ekf, params)
     aid.fused = True
     aid.time_last_fuse = imu.time_us
+
+
+@kernel
+def _may_be_fused(ekf):
+    imu = ekf.imu_delayed
+    clipping = imu.delta_vel_clipping[0] != 0 or imu.delta_vel_clipping[1] != 0 or imu.delta_vel_clipping[2] != 0
+    return ekf.cs.gravity_vector and not ekf.aid.gravity.innovation_rejected and not clipping
+
+
+@kernel
+def _control_steady_gravity(ekf, params):
+    """As v1.16's, but with the mean specific force, after alignment, and fused only where it says so."""
+    aid, force = ekf.aid.gravity, ekf.levelling.specific_force
+    squared = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
+    accel_norm_good = ACCEL_LIMIT_LOW * ACCEL_LIMIT_LOW < squared < ACCEL_LIMIT_HIGH * ACCEL_LIMIT_HIGH
+    ekf.cs.gravity_vector = (
+        (int(params.EKF2_IMU_CTRL) & IMU_CTRL_GRAVITY_VECTOR) != 0
+        and (accel_norm_good or ekf.cs.vehicle_at_rest)
+        and not is_horizontal_aiding_active(ekf)
+        and ekf.cs.tilt_align
+    )
+    _update_gravity(ekf, params)
+    if _may_be_fused(ekf):
+        _fuse_gravity(ekf, params)
+        aid.fused = True
+        aid.time_last_fuse = ekf.imu_delayed.time_us
+
+
+control_gravity_fusion = by_release(_control_gravity_fusion, "levels_by_steady_gravity", _control_steady_gravity)

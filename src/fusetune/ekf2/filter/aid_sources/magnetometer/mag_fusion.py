@@ -10,12 +10,13 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
-from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH
+from fusetune.ekf2.filter.common.state import ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov, reset_quat_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, scale_kalman_gain
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import component_in_body, wrap_pi
+from fusetune.ekf2.releases.by_release import by_release
 
 R_MAG_MIN = 0.01**2
 
@@ -47,6 +48,24 @@ def keep_only_mag_gains(K):
     """Let the update move nothing but the field states."""
     K[:MAG_EARTH] = 0.0
     K[MAG_BODY + 3 :] = 0.0
+
+
+@kernel
+def _hold_attitude(ekf, K):
+    """Let the update leave roll and pitch alone."""
+    K[ATTITUDE] = 0.0
+    K[ATTITUDE + 1] = 0.0
+
+
+@kernel
+def _hold_attitude_and_bias(ekf, K):
+    """Let the update leave roll, pitch and the gyro bias about x and y alone."""
+    _hold_attitude(ekf, K)
+    K[GYRO_BIAS] = 0.0
+    K[GYRO_BIAS + 1] = 0.0
+
+
+_hold_tilt = by_release(_hold_attitude, "keeps_level_gyro_bias", _hold_attitude_and_bias)
 
 
 @kernel
@@ -90,8 +109,7 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
         if not update_all_states:
             keep_only_mag_gains(K)
         elif not update_tilt:
-            K[ATTITUDE] = 0.0
-            K[ATTITUDE + 1] = 0.0
+            _hold_tilt(ekf, K)
         measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis])
 
     clear_mag_faults(ekf)
@@ -119,6 +137,21 @@ def compute_declination_h(mag_I, H):
 
 
 @kernel
+def _hold_nothing(ekf, K):
+    """v1.16 lets the declination correct every state."""
+
+
+@kernel
+def _hold_tilt_unless_fused(ekf, K):
+    """The declination leaves alone what the field does."""
+    if not ekf.cs.mag_3d:
+        _hold_tilt(ekf, K)
+
+
+_hold_tilt_by_declination = by_release(_hold_nothing, "keeps_level_gyro_bias", _hold_tilt_unless_fused)
+
+
+@kernel
 def fuse_declination(ekf, params, declination, R, update_all_states):
     """Fuse a declination (rad) of variance R (rad²) into the earth field states; return whether it was fused."""
     H = ekf.scratch.H
@@ -133,6 +166,8 @@ def fuse_declination(ekf, params, declination, R, update_all_states):
     scale_kalman_gain(ekf, innovation_variance)
     if not update_all_states:
         keep_only_mag_gains(ekf.scratch.K)
+    else:
+        _hold_tilt_by_declination(ekf, ekf.scratch.K)
     measurement_update(ekf, params, R, innovation)
     ekf.fs.bad_mag_decl = False
     return True

@@ -12,6 +12,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_fie
 from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
 from fusetune.ekf2.numerics.rotations import component_in_body, rotate_to_earth
+from fusetune.ekf2.releases.by_release import by_release
 
 EARTH_FIELD_MIN_CHANGE = 0.01
 MAG_ANOMALIES_MAX_HAGL = 1.5
@@ -71,17 +72,46 @@ def reset_mag_states(ekf, params, mag, reset_heading):
         reset_mag_states_to_wmm(ekf, params, mag, reset_heading)
     else:
         reset_mag_states_to_measurement(ekf, params, mag, reset_heading)
-    if ekf.cs.in_air:
+    if ekf.cs.in_air and _aligns_field(ekf, reset_heading):
         ekf.cs.mag_aligned_in_flight = True
         ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
 
 
 @kernel
+def _by_any_reset(ekf, reset_heading):
+    return True
+
+
+@kernel
+def _by_heading_reset(ekf, reset_heading):
+    return reset_heading
+
+
+_aligns_field = by_release(_by_any_reset, "aligns_field_with_heading", _by_heading_reset)
+"""Whether a reset in flight aligns the field."""
+
+
+@kernel
 def check_hagl_yaw_reset_req(ekf):
     """Whether the vehicle has just climbed clear (1.5 m) of what disturbs the field near the ground."""
+    if not _may_ask_for_yaw_reset(ekf):
+        return False
     if not (ekf.cs.in_air and ekf.cs.yaw_align) or ekf.cs.mag_aligned_in_flight:
         return False
     return get_terrain_vpos(ekf) + ekf.gpos_alt > MAG_ANOMALIES_MAX_HAGL
+
+
+@kernel
+def _always(ekf):
+    return True
+
+
+@kernel
+def _is_heading_fused(ekf):
+    return ekf.cs.mag_hdg or ekf.cs.mag_3d
+
+
+_may_ask_for_yaw_reset = by_release(_always, "aligns_field_with_heading", _is_heading_fused)
 
 
 @kernel

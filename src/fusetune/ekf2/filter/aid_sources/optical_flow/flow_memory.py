@@ -22,6 +22,9 @@ Limits that the sensor reported (rad/s, m), bias of its gyro against the IMU (ra
 velocities from flow (m/s, FRD), compensated rates (rad/s), samples seen since the start, and work space.
 """
 
+FLOW_RATES = np.dtype([("compensated_lpf", "f8", (2,))], align=True)
+"""Sub-record `ekf.flow_rates`, since v1.17: the compensated rates (rad/s), low-passed as the velocities from flow are."""
+
 
 @kernel
 def initialise_flow_memory(flow):

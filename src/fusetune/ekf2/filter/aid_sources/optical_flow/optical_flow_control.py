@@ -24,6 +24,7 @@ from fusetune.ekf2.filter.common.conditions import (
     get_hagl,
     is_horizontal_aiding_active,
     is_only_active_source_of_horizontal_aiding,
+    is_other_source_of_horizontal_aiding_than,
     is_terrain_estimate_valid,
 )
 from fusetune.ekf2.filter.common.global_position import single_precision
@@ -34,6 +35,7 @@ from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, RESET_TIMEOUT
 from fusetune.ekf2.filter.covariance import reset_covariance_block
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance
 from fusetune.ekf2.filter.resets.state_resets import reset_horizontal_velocity_to, update_terrain_reset_status
+from fusetune.ekf2.releases.by_release import by_release
 
 GYRO_SOURCE_INTERNAL = 1
 GYRO_BIAS_FORGETTING = 0.01
@@ -43,6 +45,7 @@ COS_MAX_TILT = 0.7071
 MIN_SAMPLES_BEFORE_START = 10
 RESTART_INTERVAL_US = 2_000_000
 TERRAIN_VARIANCE_AFTER_RESET = 100.0
+LEAST_RATE = 1e-6
 
 
 @kernel
@@ -98,7 +101,26 @@ def _filter_flow_velocity(ekf, params):
             flow.vel_body_lpf[i] = flow.vel_body[i]
         else:
             flow.vel_body_lpf[i] += VELOCITY_FILTER_ALPHA * (flow.vel_body[i] - flow.vel_body_lpf[i])
+    _filter_flow_rates(ekf)
     flow.counter += 1
+
+
+@kernel
+def _filter_nothing(ekf):
+    """v1.16 asks for the velocities alone."""
+
+
+@kernel
+def _filter_compensated_rates(ekf):
+    flow, filtered = ekf.flow, ekf.flow_rates.compensated_lpf
+    for i in range(2):
+        if flow.counter == 0:
+            filtered[i] = flow.rate_compensated[i]
+        else:
+            filtered[i] += VELOCITY_FILTER_ALPHA * (flow.rate_compensated[i] - filtered[i])
+
+
+_filter_flow_rates = by_release(_filter_nothing, "scales_terrain_to_flow", _filter_compensated_rates)
 
 
 @kernel
@@ -228,9 +250,32 @@ def reset_flow_fusion(ekf, params):
 
 
 @kernel
+def _height_on_ground(ekf, params):
+    """Take the vehicle to stand on the ground."""
+    return params.EKF2_MIN_RNG
+
+
+@kernel
+def _height_of_aided_velocity(ekf, params):
+    """The distance at which the velocity, where something else aids it, causes this flow; else as on the ground."""
+    if not is_other_source_of_horizontal_aiding_than(ekf, ekf.cs.opt_flow):
+        return params.EKF2_MIN_RNG
+    rates, R = ekf.flow_rates.compensated_lpf, ekf.R_to_earth
+    north = -R[0, 0] * rates[1] + R[0, 1] * rates[0]
+    east = -R[1, 0] * rates[1] + R[1, 1] * rates[0]
+    rate = math.hypot(north, east)
+    if rate <= LEAST_RATE:
+        return params.EKF2_MIN_RNG
+    return max(math.hypot(ekf.vel[0], ekf.vel[1]) / rate, params.EKF2_MIN_RNG)
+
+
+_height_by_flow = by_release(_height_on_ground, "scales_terrain_to_flow", _height_of_aided_velocity)
+
+
+@kernel
 def reset_terrain_to_flow(ekf, params):
-    """Take the vehicle to stand on the ground: flow will find the true height as it moves."""
-    terrain = single_precision(params.EKF2_MIN_RNG - ekf.gpos_alt)
+    """Start the terrain anew; flow will find the true height as the vehicle moves."""
+    terrain = single_precision(_height_by_flow(ekf, params) - ekf.gpos_alt)
     change = terrain - ekf.terrain
     ekf.terrain = terrain
     reset_covariance_block(ekf, TERRAIN, 1, TERRAIN_VARIANCE_AFTER_RESET)

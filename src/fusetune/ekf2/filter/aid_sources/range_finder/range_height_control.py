@@ -36,6 +36,7 @@ from fusetune.ekf2.filter.common.timing import (
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_vertical_velocity_to_zero
 from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu
 from fusetune.ekf2.numerics.rotations import component_in_earth
+from fusetune.ekf2.releases.by_release import by_release
 
 RNG_CTRL_CONDITIONAL, RNG_CTRL_ENABLED = 1, 2
 RANGE_VARIANCE_MIN = 0.001
@@ -77,11 +78,24 @@ def _check_sensor(ekf, params):
         rng.sample.range += component_in_earth(R, 2, x, y, z) / rng.cos_tilt
         if ekf.cs.in_air:
             _check_consistency(ekf, params)
-    elif not ekf.cs.in_air and rng.is_regularly_sending_data and rng.is_sample_ready:
+    elif _may_stand(ekf) and rng.is_regularly_sending_data and rng.is_sample_ready:
         # standing on the ground the distance is known, whatever the sensor says
         rng.sample.range = params.EKF2_MIN_RNG
         rng.is_sample_valid = True
     ekf.cs.rng_kin_consistent = rng.is_kinematically_consistent
+
+
+@kernel
+def _is_on_ground(ekf):
+    return not ekf.cs.in_air
+
+
+@kernel
+def _is_at_rest_on_ground(ekf):
+    return not ekf.cs.in_air and ekf.cs.vehicle_at_rest
+
+
+_may_stand = by_release(_is_on_ground, "skips_unhealthy_range", _is_at_rest_on_ground)
 
 
 @kernel
@@ -104,7 +118,7 @@ def _check_consistency(ekf, params):
 
 
 @kernel
-def _control_with_sample(ekf, params):
+def _control_with_every_sample(ekf, params):
     """Choose between height and terrain, then fuse, reset, start or stop."""
     aid, cs, rng = ekf.aid.rng_hgt, ekf.cs, ekf.range
     ctrl = int(params.EKF2_RNG_CTRL)
@@ -138,6 +152,66 @@ def _control_with_sample(ekf, params):
 
 
 @kernel
+def _control_with_healthy_samples(ekf, params):
+    """As v1.16's, but a sample that is not healthy, or not consistent, is left out, and stops nothing."""
+    aid, cs, rng = ekf.aid.rng_hgt, ekf.cs, ekf.range
+    ctrl = int(params.EKF2_RNG_CTRL)
+    continuing = (
+        ctrl in (RNG_CTRL_ENABLED, RNG_CTRL_CONDITIONAL)
+        and cs.tilt_align
+        and math.isfinite(aid.observation[0])
+        and math.isfinite(aid.observation_variance[0])
+    )
+    starting = continuing and _has_recent_sample(ekf) and rng.is_regularly_sending_data and is_data_healthy(rng)
+    aiding = cs.rng_terrain or cs.rng_hgt
+    conditional_aid = aiding and ctrl == RNG_CTRL_CONDITIONAL and is_conditional_range_aid_suitable(ekf, params)
+    full_aid = aiding and ctrl == RNG_CTRL_ENABLED
+    if cs.rng_hgt:
+        if not (conditional_aid or full_aid):
+            stop_rng_hgt_fusion(ekf)
+    elif starting and (conditional_aid or full_aid):
+        _start_height_aiding(ekf, params, conditional_aid)
+
+    if cs.rng_hgt or cs.rng_terrain:
+        if continuing:
+            _follow_conditional_reference(ekf, params, conditional_aid)
+            _fuse_healthy_or_recover(ekf, params, starting)
+        else:
+            stop_rng_hgt_fusion(ekf)
+            stop_rng_terr_fusion(ekf)
+    elif starting:
+        _start_terrain_aiding(ekf, params)
+
+
+@kernel
+def _follow_conditional_reference(ekf, params, conditional_aid):
+    """While range aids low and slow it is the height reference; afterwards another source is chosen."""
+    if conditional_aid:
+        ekf.height_sensor_ref = HEIGHT_REF_RANGE
+    elif int(params.EKF2_RNG_CTRL) == RNG_CTRL_CONDITIONAL:
+        give_up_height_reference(ekf, HEIGHT_REF_RANGE)
+
+
+@kernel
+def _fuse_healthy_or_recover(ekf, params, starting):
+    aid = ekf.aid.rng_hgt
+    if is_data_healthy(ekf.range) and ekf.cs.rng_kin_consistent:
+        fuse_hagl_rng(ekf, params, ekf.cs.rng_hgt, ekf.cs.rng_terrain)
+    leading = ekf.cs.rng_hgt and ekf.height_sensor_ref == HEIGHT_REF_RANGE
+    if is_height_reset_required(ekf) and leading and starting:
+        _reset_height(ekf, params)
+    elif is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX):
+        if ekf.cs.opt_flow_terrain and is_terrain_estimate_valid(ekf):
+            stop_rng_hgt_fusion(ekf)
+            stop_rng_terr_fusion(ekf)
+        elif starting:
+            reset_terrain_to_rng(ekf, params)
+
+
+_control_with_sample = by_release(_control_with_every_sample, "skips_unhealthy_range", _control_with_healthy_samples)
+
+
+@kernel
 def _start_height_aiding(ekf, params, conditional_aid):
     """Let the distance correct the height; as unconditional height reference it also becomes the altitude."""
     aid = ekf.aid.rng_hgt
@@ -163,17 +237,23 @@ def _fuse_or_recover(ekf, params):
     is_fusion_failing = is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX)
 
     if is_height_reset_required(ekf) and ekf.cs.rng_hgt and ekf.height_sensor_ref == HEIGHT_REF_RANGE:
-        ekf.events.reset_hgt_to_rng = True
-        reset_altitude_to(ekf, params, aid.observation[0] - ekf.terrain, math.nan)
-        reset_aid_source_status_zero_innovation(ekf, aid, 1)
-        if not is_vertical_velocity_aiding_active(ekf):
-            reset_vertical_velocity_to_zero(ekf, params)
+        _reset_height(ekf, params)
     elif is_fusion_failing:
         if ekf.cs.opt_flow_terrain and is_terrain_estimate_valid(ekf):
             stop_rng_hgt_fusion(ekf)
             stop_rng_terr_fusion(ekf)
         else:
             reset_terrain_to_rng(ekf, params)
+
+
+@kernel
+def _reset_height(ekf, params):
+    """All height sources fail: take that above the terrain for the height, and no vertical motion."""
+    ekf.events.reset_hgt_to_rng = True
+    reset_altitude_to(ekf, params, ekf.aid.rng_hgt.observation[0] - ekf.terrain, math.nan)
+    reset_aid_source_status_zero_innovation(ekf, ekf.aid.rng_hgt, 1)
+    if not is_vertical_velocity_aiding_active(ekf):
+        reset_vertical_velocity_to_zero(ekf, params)
 
 
 @kernel

@@ -7,7 +7,7 @@ Mirrors PX4 v1.16 `EKF/aid_sources/range_finder/range_height_fusion.cpp`, and `u
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import dist_bottom
+from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import dist_bottom, is_data_healthy
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.covariance import reset_covariance_block
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_kalman_gain, multiply_covariance
 from fusetune.ekf2.filter.resets.state_resets import update_terrain_reset_status
+from fusetune.ekf2.releases.by_release import by_release
 
 HEIGHT = POSITION + 2
 
@@ -46,6 +47,21 @@ def get_range_variance(ekf, params):
 
 
 @kernel
+def _any_sample(ekf):
+    return True
+
+
+@kernel
+def _healthy_sample(ekf):
+    aid = ekf.aid.rng_hgt
+    finite = math.isfinite(aid.observation[0]) and math.isfinite(aid.observation_variance[0])
+    return finite and is_data_healthy(ekf.range)
+
+
+_may_be_limited = by_release(_any_sample, "skips_unhealthy_range", _healthy_sample)
+
+
+@kernel
 def update_range_hagl(ekf, params):
     """Judge the distance to ground.
 
@@ -58,7 +74,7 @@ def update_range_hagl(ekf, params):
     gate = max(params.EKF2_RNG_GATE, 1.0)
     set_axis(aid, 0, measurement, variance, get_hagl(ekf) - measurement, innovation_variance)
     update_aid_source_status(ekf, aid, 1, ekf.range.sample.time_us, gate)
-    if ekf.fs.bad_acc_vertical and aid.innovation_rejected:
+    if ekf.fs.bad_acc_vertical and aid.innovation_rejected and _may_be_limited(ekf):
         limit = gate * math.sqrt(innovation_variance)
         aid.innovation[0] = min(max(aid.innovation[0], -limit), limit)
         aid.innovation_rejected = False

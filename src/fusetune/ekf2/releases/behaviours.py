@@ -1,0 +1,133 @@
+"""Named behaviours: what the estimators of other releases do otherwise than v1.16's, which the kernels themselves tell.
+
+A behaviour says what is done, by which releases, and where PX4 does it. All of those of a release are fixed when a
+replay is built: kernels are compiled for the release, and hold no others (`by_release.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+
+from fusetune.px4 import releases
+from fusetune.px4.releases import name_of
+
+BASELINE = name_of(releases.BASELINE)
+"""The release whose behaviour is the plain text of the kernels."""
+
+RELEASES = ("v1.13", "v1.14", "v1.15", BASELINE, "v1.17", "main")
+"""From the oldest to the newest; `main` is PX4's development branch of May 2026."""
+
+
+def _behaviour(what: str, *, since: str, source: str, until: str = RELEASES[-1]) -> bool:
+    """Declare a behaviour of the releases `since` … `until`, both included, with its place below PX4's `ekf2/EKF`."""
+    assert RELEASES.index(since) <= RELEASES.index(until)
+    declared: bool = field(default=False, metadata={"what": what, "since": since, "until": until, "source": source})
+    return declared
+
+
+@dataclass(frozen=True)
+class Behaviours:
+    """What a release does otherwise than v1.16; a behaviour that is not named here is that of v1.16."""
+
+    levels_at_the_horizon: bool = _behaviour(
+        "The tilt starts from filters of the IMU samples at the fusion time horizon, which go on running; the mean "
+        "interval starts with the first of them, not with 10 ms, and runs before the filter does. v1.16 filters the "
+        "newest samples.",
+        since="v1.17",
+        source="ekf.cpp",
+    )
+    simplifies_gnss_checks: bool = _behaviour(
+        "Once the GNSS checks have passed for EKF2_REQ_GPS_H, only fix, accuracies with wide limits and spoofing are "
+        "checked; the fix by EKF2_REQ_FIX, and only if its bit of EKF2_GPS_CHECK is set. v1.16 runs all checks all the "
+        "time.",
+        since="v1.17",
+        source="aid_sources/gnss/gnss_checks.cpp",
+    )
+    controls_gnss_sources_apart: bool = _behaviour(
+        "GNSS velocity and position start without a reset where they agree, and are each reset or stopped by the time "
+        "since they were fused themselves, as EKF2_GPS_MODE allows. v1.16 resets both by one rule.",
+        since="v1.17",
+        source="aid_sources/gnss/gps_control.cpp",
+    )
+    repeats_yaw_emergency_resets: bool = _behaviour(
+        "The yaw is reset to the yaw estimator's also in an update in which it was reset already.",
+        since="v1.17",
+        source="aid_sources/gnss/gps_control.cpp",
+    )
+    faults_gnss_height: bool = _behaviour(
+        "GNSS height that fails while another source works counts as faulty where EKF2_GPS_MODE allows no reset; its "
+        "bias is learnt only while it is fused, and the origin's altitude is set before and apart from its start.",
+        since="v1.17",
+        source="aid_sources/gnss/gnss_height_control.cpp",
+    )
+    aligns_field_with_heading: bool = _behaviour(
+        "The field counts as aligned in flight only by a reset that takes the heading along, and only a fused heading "
+        "calls for that at 1.5 m above ground.",
+        since="v1.17",
+        source="aid_sources/magnetometer/mag_control.cpp",
+    )
+    keeps_level_gyro_bias: bool = _behaviour(
+        "A magnetometer that corrects yaw but not tilt leaves the gyro bias about x and y alone, too, and so does the "
+        "declination.",
+        since="v1.17",
+        source="aid_sources/magnetometer/mag_fusion.cpp",
+    )
+    levels_by_steady_gravity: bool = _behaviour(
+        "Gravity is fused only once the tilt is aligned, while the low-passed specific force is near 1 g, and counts "
+        "as fused only if it was. v1.16 takes a decaying maximum.",
+        since="v1.17",
+        source="aid_sources/gravity/gravity_fusion.cpp",
+    )
+    yields_to_gravity: bool = _behaviour(
+        "The fake position makes way for gravity only while that is fused; without aiding the accelerometer bias is "
+        "learnt along the vertical alone, with gravity, too.",
+        since="v1.17",
+        source="aid_sources/fake_pos_control.cpp, ekf_helper.cpp",
+    )
+    skips_unhealthy_range: bool = _behaviour(
+        "A range sample that is unhealthy or inconsistent is left out and does not stop the fusion; a healthy one "
+        "starts it. Conditional aid is the height reference while it lasts.",
+        since="v1.17",
+        source="aid_sources/range_finder/range_height_control.cpp",
+    )
+    scales_terrain_to_flow: bool = _behaviour(
+        "A terrain that is reset to optical flow is put where the aided velocity would cause that flow. v1.16 puts it "
+        "right below.",
+        since="v1.17",
+        source="aid_sources/optical_flow/optical_flow_control.cpp",
+    )
+    correlates_wind_always: bool = _behaviour(
+        "The covariance of the wind states follows every fusion, also while the wind is not estimated; the states "
+        "themselves stay then.",
+        since="v1.17",
+        source="ekf_helper.cpp",
+    )
+    resets_horizontal_velocity_at_once: bool = _behaviour(
+        "A reset of the horizontal velocity uncorrelates north and east together; an axis of unknown variance keeps "
+        "the one it has.",
+        since="v1.17",
+        source="velocity_fusion.cpp",
+    )
+    forces_given_position: bool = _behaviour(
+        "A position given from outside is fused with a gain of one on the position itself.",
+        since="v1.17",
+        source="ekf.cpp",
+    )
+
+
+def _behaviours_of(release: str) -> Behaviours:
+    place = RELEASES.index(release)
+    had = {
+        one.name: RELEASES.index(one.metadata["since"]) <= place <= RELEASES.index(one.metadata["until"])
+        for one in fields(Behaviours)
+    }
+    return Behaviours(**had)
+
+
+BEHAVIOURS: Mapping[str, Behaviours] = MappingProxyType({release: _behaviours_of(release) for release in RELEASES})
+"""What each release does; all of v1.16's are false."""
+
+MODELLED = (BASELINE, "v1.17")
+"""Releases all of whose behaviours are here; the others are not replayed."""
