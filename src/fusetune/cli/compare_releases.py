@@ -51,9 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Replay, and print the table or the document; always `DONE`."""
+    from fusetune.analyze.observed.observed_flight import ObservedFlight
     from fusetune.analyze.releases.compared_releases import compare_releases
     from fusetune.analyze.replaying.settings import WITHOUT_GAPS
-    from fusetune.analyze.observed.observed_flight import ObservedFlight
     from fusetune.ekf2.releases.behaviours import MODELLED
     from fusetune.px4.ulog.reader import read_ulog
 
@@ -141,7 +141,7 @@ def _about(replay: ReleaseReplay, base: str) -> Iterator[str]:
         told = ", ".join(f"{one.flag} {1.0 - one.equal:.1%}" for one in differing[:6])
         yield f"{replay.release} has flags otherwise than {base}, share of the time: {told}"
     changes = [
-        f"{name} {value:g}" if before is None else f"{name} {before:g} → {value:g}"
+        f"{name} {value:g} (new)" if before is None else f"{name} {before:g} → {value:g}"
         for name, (before, value) in sorted(replay.parameters.items())
         if before is not None or value
     ]

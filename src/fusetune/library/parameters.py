@@ -11,9 +11,7 @@ from fusetune.px4.parameters.set_names import in_baseline_names, read_by
 from fusetune.px4.releases import BASELINE, Release
 
 
-def checked_values(
-    parameters: Mapping[str, float], told_of: str, replayed: Release = BASELINE
-) -> dict[str, float]:
+def checked_values(parameters: Mapping[str, float], told_of: str, replayed: Release = BASELINE) -> dict[str, float]:
     """EKF2 parameters with values that PX4 takes, of the type that it has them, in the names of the baseline release.
 
     Parameters

@@ -10,7 +10,7 @@ from fusetune.px4.flight import Flight
 from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 from fusetune.px4.release_signs import Span, spans_of, strangers
 from fusetune.px4.release_tags import DIGITS, TAGS
-from fusetune.px4.releases import DEVELOPMENT, FIRST, READ, Release, estimator_name
+from fusetune.px4.releases import DEVELOPMENT, FIRST, READ, Release, estimator_name, number_of_name
 
 CANDIDATES: tuple[Release, ...] = (*READ, DEVELOPMENT)
 
@@ -76,8 +76,7 @@ def _told(flight: Flight) -> tuple[Release | None, str]:
     """What the log itself names, and in which words."""
     tag = TAGS.get(str(flight.info.get("ver_sw", "")).lower()[:DIGITS])
     if tag is not None:
-        major, minor, *_ = tag.name.removeprefix("v").split(".")
-        return (int(major), int(minor)), f"built from the tag {tag.name} of {tag.date}"
+        return number_of_name(tag.name.rpartition(".")[0]), f"built from the tag {tag.name} of {tag.date}"
     if flight.release is not None:
         major, minor, _ = flight.release
         return (major, minor), f"the log names {flight.release_name}"

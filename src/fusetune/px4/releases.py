@@ -80,7 +80,7 @@ def estimator_name(release: Release) -> str:
     return MAIN if release[:2] >= DEVELOPMENT else name_of(release[:2])
 
 
-def number_of_name(name: str) -> Release:
+def number_of_name(name: str) -> tuple[int, int]:
     """The other way round: the major and minor number of ``"v1.16"``, or what `main` counts as."""
     if name == MAIN:
         return DEVELOPMENT

@@ -141,7 +141,12 @@ def _write_readable(
     _demand_checksum(source, flight.checksum)
     verdict = _judge(flight, thresholds, deadline, source.release)
     release = replayed_release(flight, source.release).document()
-    extra = {"file": source.shown, "release": release, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
+    extra = {
+        "file": source.shown,
+        "release": release,
+        "ekf2_parameters": _present_ekf2(flight),
+        "verdict": verdict.document(),
+    }
     write_flight(folder, flight, extra | log_facts(flight), deadline)
     return verdict
 

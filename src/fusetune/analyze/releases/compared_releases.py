@@ -27,7 +27,7 @@ from fusetune.px4.parameters.updated_parameters import after_update, changed_by_
 from fusetune.px4.releases import AUTO, number_of_name
 
 SAME_SAMPLE_US = 6_000
-"""Releases whose intervals are averaged otherwise take a sample at times that differ by so much, in the first seconds."""
+"""Releases that average their intervals otherwise take a sample at times that differ by so much, in the first seconds."""
 
 _GRID_US = 100_000
 """How finely flags are compared."""
@@ -74,7 +74,7 @@ class ReleaseReplay:
     status, reason : of the replay, "ok" where it ran to its end
     parameters : that the update changes or brings → the value that flew (None: there was none) and the new one
     axes : by source and axis
-    rejected : samples rejected in all
+    rejected : samples rejected in all, of the sources that are not formed at every update
     flags : that are ever set in this release or the one compared with
     events : resets, lost sources, faults
     """
@@ -185,7 +185,7 @@ def _told(
         if samples.innovation.size:
             other = None if first is None or key not in first.samples else _in(first.samples[key], intervals)
             axes.append(_axis(key, samples, other))
-            rejected += int(samples.rejected.sum())
+            rejected += 0 if MEASURED_SOURCES[key[0]].every_update else int(samples.rejected.sum())
     return ReleaseReplay(
         release=name,
         status=record.status,

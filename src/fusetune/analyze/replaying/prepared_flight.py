@@ -69,9 +69,7 @@ class PreparedFlight:
 
     def parameters(self, overrides: Mapping[str, float]) -> dict[str, float]:
         """A complete set: the log's own parameters, but for some."""
-        return complete(
-            self.flight.parameters.initial, overrides, self.flight.release, replayed=self.replayed.release
-        )
+        return complete(self.flight.parameters.initial, overrides, self.flight.release, replayed=self.replayed.release)
 
     def course_of(self, overrides: Mapping[str, float]) -> tuple[Any, ...]:
         """What the replay of a set follows from beside the flight: sets that have it in common have one replay.
@@ -209,7 +207,7 @@ def prepare(
     gaps: Sequence[Gap] = (),
     release: str = BASELINE,
 ) -> PreparedFlight:
-    """Reconstruct the sensor stream of a canonical flight, and choose how its replays start and whose estimator does it.
+    """Reconstruct the sensor stream of a canonical flight; choose how its replays start and whose estimator does them.
 
     `None` leaves the stream as it was logged, and starts cold. `release` as in `ReplaySettings`.
     """

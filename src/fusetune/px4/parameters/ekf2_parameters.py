@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from fusetune.px4.parameters.parameter_migration import SENSOR_PARAMETERS, migrate_names
-from fusetune.px4.releases import BASELINE, MAG_TYPES_GIVEN_UP, Release, number_of_name, name_of
+from fusetune.px4.releases import BASELINE, MAG_TYPES_GIVEN_UP, Release, name_of, number_of_name
 
 _FLOAT = struct.Struct("<f")
 

@@ -62,7 +62,7 @@ def in_baseline_names(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def of_vehicle(values: Mapping[str, float], replayed: Release) -> dict[str, float]:
-    """All parameters of a vehicle of the replayed release, as its estimator reads them; what it does not is left out."""
+    """All parameters of a vehicle of a release as its estimator reads them; what it does not read is left out."""
     read = parameters_of(replayed)
     taken = values if values.keys() <= read.keys() else as_read_by(values, replayed)
     return {name: float(value) for name, value in taken.items() if name in read}

@@ -107,12 +107,16 @@ def flights_section(results: Results, logs: Logs, shown: Collection[str] = ()) -
     named = {f"{name}: {len(rows)}": rows for name, rows in groups.items() if rows}
     told = grouped_table(head, named, kind="cards flights", footer=note)
     columns = ("vehicle", "firmware", "replayed_as")
-    whole = [(Cell(name), *(_words(one, column) for column in columns)) for name, one in logs.verdicts.items()]
+    whole: list[list[CellLike]] = [
+        [Cell(name), *(_words(one, column) for column in columns)] for name, one in logs.verdicts.items()
+    ]
     return section(
         "The flights",
         paragraph(text, "note"),
         told,
-        details("Whole names, vehicles, firmware", table(("log", "vehicle", "firmware", "replayed as"), whole, kind="whole")),
+        details(
+            "Whole names, vehicles, firmware", table(("log", "vehicle", "firmware", "replayed as"), whole, kind="whole")
+        ),
         id="flights",
     )
 

@@ -8,12 +8,12 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, forget_checks, have_checks_passed
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_resets import is_gnss_reset_allowed, may_start_without_reset
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
     set_axis,
     update_aid_source_status,
 )
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_resets import is_gnss_reset_allowed, may_start_without_reset
 from fusetune.ekf2.filter.common.conditions import (
     get_number_of_active_horizontal_position_aiding_sources,
     is_other_source_of_horizontal_aiding_than,
