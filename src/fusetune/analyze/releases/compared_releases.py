@@ -27,7 +27,7 @@ from fusetune.px4.parameters.updated_parameters import after_update, changed_by_
 from fusetune.px4.releases import AUTO, number_of_name
 
 SAME_SAMPLE_US = 6_000
-"""Releases that average their intervals otherwise take a sample at times that differ by so much, in the first seconds."""
+"""By how much the times differ at which releases take one sample; they average their intervals differently at first."""
 
 _GRID_US = 100_000
 """How finely flags are compared."""
@@ -152,7 +152,7 @@ def compare_releases(
     first = records[base.release]
     intervals = _compared(base, first)
     replays = tuple(
-        _told(name, records[name], None if name == base.release else first, changed[name], intervals)
+        release_replay(name, records[name], None if name == base.release else first, changed[name], intervals)
         for name in (releases if base.release in releases else names)
     )
     return ReleaseComparison(
@@ -170,13 +170,22 @@ def _compared(prepared: PreparedFlight, record: ReplayedSet) -> tuple[Interval, 
     return subtract(airborne, [Cut(-(2**62), warm_from(record.samples), "warm-up")])
 
 
-def _told(
+def release_replay(
     name: str,
     record: ReplayedSet,
     first: ReplayedSet | None,
     parameters: Mapping[str, tuple[float | None, float]],
     intervals: tuple[Interval, ...],
 ) -> ReleaseReplay:
+    """What one release did on a flight, against another.
+
+    Parameters
+    ----------
+    name : of the release
+    record, first : its replay, and that of the release that it is compared with; None for that one itself
+    parameters : as in `ReleaseReplay`
+    intervals : parts of the flight that are compared, µs
+    """
     axes, rejected = [], 0
     for key in record.samples:
         if key[0] not in MEASURED_SOURCES:
