@@ -14,7 +14,7 @@ from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.ekf2_parameters import migrate
 from fusetune.px4.parameters.logged_parameters import checked_history
-from fusetune.px4.releases import AUTO
+from fusetune.px4.releases import AUTO, Release
 from fusetune.px4.ulog.reader import file_checksum, read_ulog, takes_too_long
 from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.save.discovery import printable
@@ -140,11 +140,12 @@ def _write_readable(
     flight = replace(read_ulog(source.log, limits, deadline), name=source.flight)
     _demand_checksum(source, flight.checksum)
     verdict = _judge(flight, thresholds, deadline, source.release)
-    release = replayed_release(flight, source.release).document()
+    replayed = replayed_release(flight, source.release)
+    release = replayed.document()
     extra = {
         "file": source.shown,
         "release": release,
-        "ekf2_parameters": _present_ekf2(flight),
+        "ekf2_parameters": _present_ekf2(flight, replayed.release),
         "verdict": verdict.document(),
     }
     write_flight(folder, flight, extra | log_facts(flight), deadline)
@@ -165,9 +166,9 @@ def _judge(flight: Flight, thresholds: VerdictThresholds, deadline: Deadline, re
         return unreadable(flight.name, UserError(flight.name, reason, "Copy the log from the vehicle again"))
 
 
-def _present_ekf2(flight: Flight) -> dict[str, float]:
-    """EKF2 parameters at the end of the log under the names of the baseline release."""
-    return migrate(checked_history(flight.parameters, flight.release)[0].at_end(), flight.release)
+def _present_ekf2(flight: Flight, replayed: Release) -> dict[str, float]:
+    """EKF2 parameters at the end of the log, as the estimator that replays it reads them."""
+    return migrate(checked_history(flight.parameters, flight.release)[0].at_end(), flight.release, replayed)
 
 
 def _metadata_of_unreadable(source: _Source) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 from fusetune.px4.parameters.ekf2_parameters import (
     ALL_PARAMETERS,
@@ -15,6 +16,8 @@ from fusetune.px4.parameters.ekf2_parameters import (
     parameters_of,
 )
 from fusetune.px4.releases import BASELINE, Release, estimator_name
+
+Value = TypeVar("Value")
 
 NEWER_NAMES: Mapping[str, str] = {
     name: told[0]
@@ -46,7 +49,7 @@ def read_by(name: str, replayed: Release = BASELINE) -> ParameterMetadata:
     raise ParameterError(name, reason, "Leave it out, or ask for the replay of a release that has it")
 
 
-def in_baseline_names(values: Mapping[str, float]) -> dict[str, float]:
+def in_baseline_names(values: Mapping[str, Value]) -> dict[str, Value]:
     """The values under the names of the baseline, where newer releases only call them otherwise.
 
     Raises
