@@ -16,6 +16,7 @@ from fusetune.ekf2.feed.arrival_order import RunSchedule, schedule_runs
 from fusetune.ekf2.feed.memo import Memo
 from fusetune.ekf2.feed.sensor_samples import IMU_SAMPLE, SYSTEM_FLAGS_SAMPLE
 from fusetune.ekf2.feed.taken_samples import AIDING, only_usable
+from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import Flight, ParameterChange, TopicTable, select_rows
 
 ARMING_STATE_ARMED = 2
@@ -114,6 +115,8 @@ class EstimatorInputs:
     arrays: SampleArrays
     parameter_changes: tuple[tuple[int, ParameterChange], ...]
     """(run, change): changes that the log records in flight, and the run before which each takes effect."""
+    gnss_measured_us: np.ndarray | None = None
+    """Times of measurement of `arrays.gnss` as their messages tell them, (samples,) int64; None where they do not."""
     memo: Memo = field(default_factory=Memo, init=False, repr=False, compare=False)
     """What replays of these samples have in common; inputs made of others by `dataclasses.replace` have their own."""
 
@@ -155,7 +158,8 @@ def build_inputs(flight: Flight) -> EstimatorInputs:
     changes = tuple(
         (int(np.searchsorted(runs.timestamp, change.timestamp)), change) for change in flight.parameters.changed
     )
-    return EstimatorInputs(flight.name, runs.mode, arrays, changes)
+    measured = convert.gnss_measurement_times(flight.topic(SENSORS["gnss"].topics[0].name))
+    return EstimatorInputs(flight.name, runs.mode, arrays, changes, measured)
 
 
 def _imu_rows(table: TopicTable, chosen: np.ndarray) -> np.ndarray:

@@ -39,6 +39,7 @@ QUATERNION_NORM_TOLERANCE = 1e-5
 DOWNWARD_FACING = 25
 MAX_FLOW_TIMESPAN_US = 1e6
 FLOW_QUALITY_MAX = 255.0
+MOST_GNSS_DELAY_US = 1_000_000
 
 NO_NUMBER, NOT_DOWN, NOT_STATIC = "no number", "not facing down", "target not static"
 
@@ -119,6 +120,19 @@ def gnss_refusals(table: TopicTable, release: Release | None = None) -> list[Ref
     if is_older:
         return []
     return [Refusal("velocity not valid (vel_ned_valid)", ~(column(table, "vel_ned_valid", 1.0) > 0))]
+
+
+def gnss_measurement_times(table: TopicTable | None) -> np.ndarray | None:
+    """Times (µs) at which GNSS measured, where its messages tell them, else None.
+
+    A time that is that of the message, or further from it than `MOST_GNSS_DELAY_US`, is none that was measured.
+    """
+    if table is None or "timestamp_sample" not in table:
+        return None
+    sampled = table["timestamp_sample"].astype(np.int64)
+    delay = table["timestamp"].astype(np.int64) - sampled
+    told = (delay > 0) & (delay <= MOST_GNSS_DELAY_US)
+    return sampled if len(told) and told.all() else None
 
 
 def gnss_samples(table: TopicTable) -> np.ndarray:

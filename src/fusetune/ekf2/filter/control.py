@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.aid_sources.zero_innovation_heading_update import cont
 from fusetune.ekf2.filter.aid_sources.zero_velocity_update import control_zero_velocity_update
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GYRO_BIAS, set_gnd_effect, set_in_air_status
 from fusetune.ekf2.filter.common.dead_reckoning import update_dead_reckoning_status
+from fusetune.ekf2.filter.common.heading_observability import update_heading_observability
 from fusetune.ekf2.filter.covariance import tilt_variance
 from fusetune.ekf2.filter.height_control import control_height_fusion
 from fusetune.ekf2.filter.resets.state_resets import remember_reset_counters
@@ -56,6 +57,7 @@ def control_fusion_modes(ekf, params):
     control_fake_pos_fusion(ekf, params)
     control_fake_hgt_fusion(ekf, params)
     update_dead_reckoning_status(ekf, params)
+    update_heading_observability(ekf)
 
 
 @kernel

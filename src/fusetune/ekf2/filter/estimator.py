@@ -33,6 +33,7 @@ from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import (
 )
 from fusetune.ekf2.filter.bias_inhibition import update_imu_bias_inhibit
 from fusetune.ekf2.filter.common.core_memory import CORE_FIELDS, POSITION_REF_GNSS
+from fusetune.ekf2.filter.common.heading_observability import HEADING_MEMORY
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.filter.common.levelling import LEVELLING_MEMORY, follow_specific_force
 from fusetune.ekf2.filter.common.local_origin import LOCAL_ORIGIN, initialise_local_origin
@@ -90,6 +91,8 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("gnss_trust", GNSS_TRUST))
     if does.scales_terrain_to_flow:
         memories.append(("flow_rates", FLOW_RATES))
+    if does.holds_unobservable_heading:
+        memories.append(("heading", HEADING_MEMORY))
     return marked(np.dtype(memories, align=True), release)
 
 

@@ -16,6 +16,8 @@ of `EKF/covariance.cpp`; in double precision.
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, single_precision
+from fusetune.ekf2.filter.common.heading_observability import is_heading_held
+from fusetune.ekf2.filter.covariance import reset_covariance_block
 from fusetune.ekf2.filter.observation_gain import scale_kalman_gain
 from fusetune.ekf2.numerics.rotations import quat_to_dcm, rotate_by_earth_increment
 from fusetune.ekf2.releases.by_release import by_release
@@ -53,6 +55,8 @@ _is_wind_held = by_release(_is_wind_not_estimated, "correlates_wind_always", _ne
 def clear_inhibited_state_kalman_gains(ekf):
     """Zero the gains of the states that are not being estimated now."""
     K = ekf.scratch.K
+    if is_heading_held(ekf):
+        K[state.ATTITUDE + 2] = 0.0
     for i in range(3):
         if ekf.gyro_bias_inhibit[i]:
             K[state.GYRO_BIAS + i] = 0.0
@@ -149,6 +153,37 @@ def _first_excessive_variance(ekf):
 
 
 @kernel
+def _reduce_until_within(ekf):
+    for _ in range(MAX_VARIANCE_REDUCTIONS):
+        i = _first_excessive_variance(ekf)
+        if i < 0:
+            break
+        reduce_variance(ekf, i)
+
+
+@kernel
+def _reduce_each_once(ekf):
+    _reduce_group_once(ekf, state.ATTITUDE, 3, ATTITUDE_VARIANCE_MAX)
+    _reduce_group_once(ekf, state.VELOCITY, 6, MOTION_VARIANCE_MAX)
+    _reduce_group_once(ekf, state.GYRO_BIAS, 6, BIAS_VARIANCE_MAX)
+    if ekf.cs.mag:
+        _reduce_group_once(ekf, state.MAG_EARTH, 6, MAG_VARIANCE_MAX)
+    if ekf.cs.wind:
+        _reduce_group_once(ekf, state.WIND, 2, MOTION_VARIANCE_MAX)
+    _reduce_group_once(ekf, state.TERRAIN, 1, TERRAIN_VARIANCE_MAX)
+
+
+@kernel
+def _reduce_group_once(ekf, index, dof, high):
+    for i in range(index, index + dof):
+        if ekf.P[i, i] > high:
+            reduce_variance(ekf, i)
+
+
+_reduce_excessive_variances = by_release(_reduce_until_within, "reduces_variances_once", _reduce_each_once)
+
+
+@kernel
 def _raise_variance(P, index, low):
     if P[index, index] < low:
         P[index, index] = low
@@ -194,12 +229,27 @@ def _raise_small_variances(ekf):
 @kernel
 def constrain_state_variances(ekf):
     """Keep every variance within the limits of its group of states; `ekf.scratch.K` and `PH` are not kept."""
-    for _ in range(MAX_VARIANCE_REDUCTIONS):
-        i = _first_excessive_variance(ekf)
-        if i < 0:
-            break
-        reduce_variance(ekf, i)
+    _reduce_excessive_variances(ekf)
     _raise_small_variances(ekf)
+
+
+@kernel
+def _hold_heading_and_constrain(ekf, params):
+    """As v1.16's, after a heading that nothing observes was uncorrelated, with a bounded variance."""
+    if is_heading_held(ekf):
+        heading = state.ATTITUDE + 2
+        bounded = min(ekf.P[heading, heading], params.EKF2_HEAD_NOISE * params.EKF2_HEAD_NOISE)
+        reset_covariance_block(ekf, heading, 1, bounded)
+    constrain_state_variances(ekf)
+
+
+@kernel
+def _constrain(ekf, params):
+    constrain_state_variances(ekf)
+
+
+constrain_covariance = by_release(_constrain, "holds_unobservable_heading", _hold_heading_and_constrain)
+"""Keep the covariance within its limits, with what the parameters say of them."""
 
 
 @kernel
@@ -248,7 +298,7 @@ def measurement_update(ekf, params, R, innovation):
     """
     _update_covariance(ekf, R)
     fuse(ekf, params, innovation)
-    constrain_state_variances(ekf)
+    constrain_covariance(ekf, params)
     return True
 
 

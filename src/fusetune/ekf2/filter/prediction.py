@@ -18,7 +18,7 @@ from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.global_position import add_to_global_position, refresh_ellipsoid
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
-from fusetune.ekf2.filter.measurement_update import constrain_state_variances
+from fusetune.ekf2.filter.measurement_update import constrain_covariance
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import earth_rate_ned
 from fusetune.ekf2.numerics.rotations import (
@@ -66,7 +66,7 @@ def predict_covariance(ekf, params):
     _add_field_noise(ekf, params, dt)
     _add_wind_noise(ekf, params, dt)
     _add_terrain_noise(ekf, params)
-    constrain_state_variances(ekf)
+    constrain_covariance(ekf, params)
 
 
 @kernel

@@ -116,6 +116,106 @@ class Behaviours:
         source="ekf.cpp",
     )
 
+    holds_unobservable_heading: bool = _behaviour(
+        "While nothing makes the heading observable, no fusion changes it, and its variance is uncorrelated and at "
+        "most EKF2_HEAD_NOISE squared. v1.17 and before fuse a heading innovation of zero.",
+        since="main",
+        source="ekf_helper.cpp, covariance.cpp, control.cpp",
+    )
+    checks_gnss_strictly_on_ground: bool = _behaviour(
+        "On the ground all GNSS checks are run, even after they have passed; in the air the simplified ones.",
+        since="main",
+        source="aid_sources/gnss/gnss_checks.cpp",
+    )
+    starts_gnss_within_gates: bool = _behaviour(
+        "GNSS starts without a reset where north and east each pass the gate. v1.17 asks for a sum of test ratios "
+        "below 0.25.",
+        since="main",
+        source="aid_sources/gnss/gps_control.cpp",
+    )
+    blames_yaw_for_rejections: bool = _behaviour(
+        "The emergency reset of the yaw needs a rejected velocity, or position, that has not been fused for 1 s.",
+        since="main",
+        source="aid_sources/gnss/gps_control.cpp",
+    )
+    tells_yaw_estimator_deviation: bool = _behaviour(
+        "The yaw estimator is given the standard deviation of the velocity, and that is compared with EKF2_REQ_SACC. "
+        "v1.15 to v1.17 take the variance for it.",
+        since="main",
+        source="aid_sources/gnss/gps_control.cpp",
+    )
+    stamps_gnss_by_message: bool = _behaviour(
+        "The time of a GNSS measurement is the one that its message tells, not that of the message less "
+        "EKF2_GPS_DELAY; where the message tells none, that remains.",
+        since="main",
+        source="../EKF2.cpp",
+    )
+    trusts_mag_again: bool = _behaviour(
+        "A magnetometer at fault is used again once its heading is consistent and no heading was fused for 7 s; no "
+        "heading is fused while the position is said to be constant.",
+        since="main",
+        source="aid_sources/magnetometer/mag_control.cpp",
+    )
+    aligns_field_on_climb: bool = _behaviour(
+        "The field is aligned in flight by the reset at 1.5 m above ground alone, which takes the heading along only "
+        "without north-east aiding.",
+        since="main",
+        source="aid_sources/magnetometer/mag_control.cpp",
+    )
+    doubts_present_heading: bool = _behaviour(
+        "The magnetic heading is consistent only while both the low-passed and the present innovation are small.",
+        since="main",
+        source="aid_sources/magnetometer/mag_control.cpp",
+    )
+    counts_vision_to_north_east: bool = _behaviour(
+        "Position of vision is north-east aiding, too, once the yaw is aligned.",
+        since="main",
+        source="estimator_interface.cpp",
+    )
+    stamps_vision_velocity: bool = _behaviour(
+        "Vision velocity in a local frame carries the time of its sample, so it is published. Before, it carries none.",
+        since="main",
+        source="aid_sources/external_vision/ev_vel.h",
+    )
+    turns_velocity_with_yaw: bool = _behaviour(
+        "A yaw reset by more than 0.3 rad turns the horizontal velocity along, without north-east aiding.",
+        since="main",
+        source="yaw_fusion.cpp",
+    )
+    shifts_active_biases: bool = _behaviour(
+        "A reset of height or position shifts the biases of active sources alone.",
+        since="main",
+        source="position_fusion.cpp",
+    )
+    holds_range_motion: bool = _behaviour(
+        "Horizontal motion keeps the range finder from being called inconsistent for 2 s. v1.14 to v1.17 compare "
+        "seconds with microseconds.",
+        since="main",
+        source="aid_sources/range_finder/range_finder_consistency_check.cpp",
+    )
+    knows_height_by_range: bool = _behaviour(
+        "With the range finder as height reference the height above ground counts as known, so flow can start.",
+        since="main",
+        source="aid_sources/optical_flow/optical_flow_control.cpp",
+    )
+    levers_vision_attitude: bool = _behaviour(
+        "The uncertain attitude of vision adds to its position variance by the lever of the position. v1.17 takes the "
+        "larger of the two variances. The height is turned only where the frame is FRD.",
+        since="main",
+        source="aid_sources/external_vision/ev_pos_control.cpp, aid_sources/external_vision/ev_height_control.cpp",
+    )
+    keeps_airspeed_to_wings: bool = _behaviour(
+        "Airspeed is fused on a fixed wing alone; it starts by a reset of the velocity when dead reckoning, else of an "
+        "unknown wind, else by being fused.",
+        since="main",
+        source="aid_sources/airspeed/airspeed_fusion.cpp",
+    )
+    reduces_variances_once: bool = _behaviour(
+        "A variance beyond its limit is reduced once per update, not until it is within.",
+        since="main",
+        source="covariance.cpp",
+    )
+
 
 def _behaviours_of(release: str) -> Behaviours:
     place = RELEASES.index(release)
@@ -129,5 +229,5 @@ def _behaviours_of(release: str) -> Behaviours:
 BEHAVIOURS: Mapping[str, Behaviours] = MappingProxyType({release: _behaviours_of(release) for release in RELEASES})
 """What each release does; all of v1.16's are false."""
 
-MODELLED = (BASELINE, "v1.17")
+MODELLED = (BASELINE, "v1.17", "main")
 """Releases all of whose behaviours are here; the others are not replayed."""

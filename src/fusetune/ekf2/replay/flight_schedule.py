@@ -22,7 +22,7 @@ from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_ACCUMULATOR
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
-from fusetune.ekf2.releases.behaviours import BASELINE
+from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS
 from fusetune.ekf2.releases.by_release import marked
 from fusetune.ekf2.replay.loop import (
     COMMAND,
@@ -142,10 +142,17 @@ def flight_schedule(
     for sensor in SENSOR_NAMES:
         delay = SENSORS[sensor].delay_parameter if sensor in SENSORS else None
         wanted = steps(*_WANTED[sensor]) if sensor in _WANTED else ((0, 1.0),)
+        if sensor == "gnss" and _are_gnss_times_told(inputs, release):
+            delay = None
         told[sensor] = (steps(delay) if delay else ((0, 0.0),), wanted)
     memo = inputs.memo
     key = ("schedule", clock, tuple(told.values()))
     return memo.get(key, lambda: _Builder(inputs, clock).schedule(told), lambda made: _bytes(made.tables))
+
+
+def _are_gnss_times_told(inputs: EstimatorInputs, release: str) -> bool:
+    """Whether the filter takes the times of the GNSS measurements from their messages."""
+    return BEHAVIOURS[release].stamps_gnss_by_message and inputs.gnss_measured_us is not None
 
 
 def notes_of(params: np.void, changes: Changes) -> Rows:
@@ -212,6 +219,8 @@ class _Builder:
         name = SENSOR_NAMES[number]
         arrived = _arrived(self.inputs, name)
         times = np.ascontiguousarray(getattr(self.inputs.arrays, name)["time_us"])
+        if name == "gnss" and _are_gnss_times_told(self.inputs, self.clock[3]):
+            times = self.inputs.gnss_measured_us
         places = "imu_length" if number == FLOW else "observation_length"
         actions = np.zeros(2 * len(arrived), ACTION)
         count = find_actions(

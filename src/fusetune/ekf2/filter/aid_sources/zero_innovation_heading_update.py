@@ -10,6 +10,7 @@ from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import multiply_covariance
 from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h
+from fusetune.ekf2.releases.by_release import by_release
 
 UPDATE_INTERVAL_US = 200_000
 VARIANCE_WHILE_LEVELLING = 0.001
@@ -17,7 +18,7 @@ VARIANCE_AFTERWARDS = 0.25
 
 
 @kernel
-def control_zero_innovation_heading_update(ekf, params):
+def _control_zero_innovation_heading_update(ekf, params):
     """Fuse a heading innovation of zero every 0.2 s, always while levelling, later only if the variance is large."""
     yaw_aiding = ekf.cs.mag_hdg or ekf.cs.mag_3d or ekf.cs.ev_yaw or ekf.cs.gnss_yaw
     if yaw_aiding or not is_timed_out(ekf, ekf.time_last_heading_fuse, UPDATE_INTERVAL_US):
@@ -38,3 +39,13 @@ def control_zero_innovation_heading_update(ekf, params):
     ekf.reject.yaw = False
     measurement_update(ekf, params, variance, 0.0)
     ekf.time_last_heading_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _hold_heading_otherwise(ekf, params):
+    """A heading that nothing observes is held where gains and covariance are made."""
+
+
+control_zero_innovation_heading_update = by_release(
+    _control_zero_innovation_heading_update, "holds_unobservable_heading", _hold_heading_otherwise
+)

@@ -5,6 +5,7 @@ Mirrors the questions of PX4 v1.16 `EKF/estimator_interface.cpp` and `EKF/ekf_he
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.timing import BAD_ACC_RESET_DELAY, HGT_FUSION_TIMEOUT_MAX, is_timed_out
+from fusetune.ekf2.releases.by_release import by_release
 
 IMU_CTRL_GYRO_BIAS = 1
 IMU_CTRL_ACCEL_BIAS = 2
@@ -100,9 +101,20 @@ def is_vertical_aiding_active(ekf):
 
 
 @kernel
-def is_north_east_aiding_active(ekf):
+def _is_gnss_aiding_active(ekf):
     """Whether a source tied to true north is fused, so that heading is observable by manoeuvring."""
     return ekf.cs.gnss_pos or ekf.cs.gnss_vel or ekf.cs.aux_gpos
+
+
+@kernel
+def _is_gnss_or_vision_aiding_active(ekf):
+    """As v1.16's, with vision that is aligned to north."""
+    return _is_gnss_aiding_active(ekf) or (ekf.cs.ev_pos and ekf.cs.yaw_align)
+
+
+is_north_east_aiding_active = by_release(
+    _is_gnss_aiding_active, "counts_vision_to_north_east", _is_gnss_or_vision_aiding_active
+)
 
 
 @kernel

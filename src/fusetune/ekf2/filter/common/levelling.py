@@ -1,4 +1,4 @@
-"""The low-passed specific force, by which the filter is levelled, where it is followed afterwards, too (since v1.17)."""
+"""The low-passed specific force: it levels the filter and, since v1.17, is followed afterwards, too."""
 
 import numpy as np
 

@@ -9,6 +9,7 @@ Mirrors the resets of PX4 v1.16 `EKF/position_fusion.cpp`, `EKF/velocity_fusion.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.global_position import single_precision
 from fusetune.ekf2.filter.common.local_origin import project_to_local, reproject_to_global
 from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, VELOCITY
@@ -21,15 +22,18 @@ from fusetune.ekf2.filter.output_predictor.output_predictor import (
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import (
     dcm_to_quat,
+    euler_yaw,
     quat_multiply,
     quat_multiply_inverse,
     quat_normalise,
     quat_to_dcm,
     update_yaw_in_rot_mat,
+    wrap_pi,
 )
 from fusetune.ekf2.releases.by_release import by_release
 
 MIN_RESET_VARIANCE = 0.01**2
+LEAST_TURN_OF_VELOCITY = 0.3
 HORIZONTAL_VELOCITY_VARIANCE_AFTER_ZEROING = 25.0
 VERTICAL_VELOCITY_VARIANCE_AFTER_ZEROING = 10.0
 
@@ -169,9 +173,24 @@ def update_terrain_reset_status(ekf, delta_d):
 @kernel
 def shift_external_vision_position_bias(ekf, delta_n, delta_e):
     """Keep the external vision position where it was relative to the vehicle's new position."""
-    bias = ekf.ev_pos_b_est
-    bias.north.bias -= delta_n
-    bias.east.bias -= delta_e
+    if _is_bias_shifted(ekf, ekf.cs.ev_pos):
+        bias = ekf.ev_pos_b_est
+        bias.north.bias -= delta_n
+        bias.east.bias -= delta_e
+
+
+@kernel
+def _is_always_shifted(ekf, active):
+    return True
+
+
+@kernel
+def _is_active(ekf, active):
+    return active
+
+
+_is_bias_shifted = by_release(_is_always_shifted, "shifts_active_biases", _is_active)
+"""Whether the bias of a source moves along with the state that is reset."""
 
 
 @kernel
@@ -213,9 +232,12 @@ def reset_altitude_to(ekf, params, altitude, var):
     _reset_variance(ekf, POSITION + 2, var)
     apply_position_reset(ekf, 0.0, 0.0, delta_d)
     update_vertical_position_reset_status(ekf, delta_d)
-    ekf.baro_b_est.bias += delta_d
-    ekf.ev_hgt_b_est.bias -= delta_d
-    ekf.gps_hgt_b_est.bias += delta_d
+    if _is_bias_shifted(ekf, ekf.cs.baro_hgt):
+        ekf.baro_b_est.bias += delta_d
+    if _is_bias_shifted(ekf, ekf.cs.ev_hgt):
+        ekf.ev_hgt_b_est.bias -= delta_d
+    if _is_bias_shifted(ekf, ekf.cs.gps_hgt):
+        ekf.gps_hgt_b_est.bias += delta_d
     update_terrain_reset_status(ekf, delta_d)
     ekf.terrain = single_precision(ekf.terrain + delta_d)
     ekf.time_last_hgt_fuse = ekf.time_delayed_us
@@ -233,6 +255,7 @@ def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
     if math.isfinite(yaw_var) and yaw_var > FLT_EPSILON:
         reset_covariance_block(ekf, ATTITUDE + 2, 1, yaw_var)
+    yaw_before = euler_yaw(ekf.R_to_earth)
     before, error = ekf.scratch.quat_before, ekf.scratch.quat_error
     for i in range(4):
         before[i] = ekf.q[i]
@@ -243,6 +266,24 @@ def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     quat_normalise(error)
     _propagate_quat_reset(ekf, error)
     ekf.time_last_heading_fuse = ekf.time_delayed_us
+    _turn_velocity_along(ekf, params, wrap_pi(yaw - yaw_before))
+
+
+@kernel
+def _keep_velocity(ekf, params, turn):
+    """v1.17 leaves the velocity where it is."""
+
+
+@kernel
+def _turn_unaided_velocity(ekf, params, turn):
+    """Without north-east aiding the velocity was known relative to the heading alone."""
+    if not is_north_east_aiding_active(ekf) and abs(turn) > LEAST_TURN_OF_VELOCITY:
+        c, s, north, east = math.cos(turn), math.sin(turn), ekf.vel[0], ekf.vel[1]
+        variance = max(ekf.P[VELOCITY, VELOCITY], ekf.P[VELOCITY + 1, VELOCITY + 1])
+        reset_horizontal_velocity_to(ekf, params, c * north - s * east, s * north + c * east, variance, variance)
+
+
+_turn_velocity_along = by_release(_keep_velocity, "turns_velocity_with_yaw", _turn_unaided_velocity)
 
 
 @kernel

@@ -17,6 +17,7 @@ from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.common.timing import is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import set_true_airspeed
+from fusetune.ekf2.releases.by_release import by_release
 
 WIND_TIMEOUT_US = 10_000_000
 DATA_STOPPED_US = 1_000_000
@@ -53,7 +54,7 @@ def _assume_yaw_estimator_airspeed(ekf, params):
 
 
 @kernel
-def _use_airspeed_sample(ekf, params):
+def _use_airspeed_of_any(ekf, params):
     aid, sample = ekf.aid.airspeed, ekf.sensors.airspeed.sample
     update_airspeed(ekf, params)
     ekf.reject.airspeed = aid.innovation_rejected
@@ -76,6 +77,47 @@ def _use_airspeed_sample(ekf, params):
             stop_airspeed_fusion(ekf)
     elif starting_conditions_passing:
         _start_airspeed(ekf, params, is_consistent)
+
+
+@kernel
+def _use_airspeed_of_wing(ekf, params):
+    """As v1.16's, but of a fixed wing alone, and started by a fusion where nothing calls for a reset."""
+    aid, sample = ekf.aid.airspeed, ekf.sensors.airspeed.sample
+    update_airspeed(ekf, params)
+    continuing = ekf.cs.in_air and ekf.cs.fixed_wing and not ekf.cs.fake_pos
+    is_significant = sample.true_airspeed > params.EKF2_ARSP_THR
+    is_consistent = 0.0 < aid.test_ratio[0] < 1.0
+    if ekf.cs.fuse_aspd:
+        if not continuing:
+            stop_airspeed_fusion(ekf)
+            return
+        if is_significant:
+            fuse_airspeed(ekf, params)
+        set_true_airspeed(ekf.gsf, sample.true_airspeed)
+        if is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US):
+            stop_airspeed_fusion(ekf)
+    elif continuing and is_significant:
+        if is_consistent or not ekf.cs.wind or ekf.cs.inertial_dead_reckoning:
+            _start_wing_airspeed(ekf, params, is_consistent)
+
+
+@kernel
+def _start_wing_airspeed(ekf, params, is_consistent):
+    largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
+    wind_unknown = ekf.P[WIND, WIND] + ekf.P[WIND + 1, WIND + 1] > largest
+    lost = ekf.cs.inertial_dead_reckoning and not is_consistent
+    if ekf.horizontal_deadreckon_time_exceeded or lost:
+        reset_vel_using_airspeed(ekf, params)
+    elif not ekf.wind.external_init and (not ekf.cs.wind or wind_unknown):
+        reset_wind_using_airspeed(ekf, params)
+        ekf.aid.airspeed.time_last_fuse = ekf.time_delayed_us
+    else:
+        fuse_airspeed(ekf, params)
+    ekf.cs.wind = True
+    ekf.cs.fuse_aspd = True
+
+
+_use_airspeed_sample = by_release(_use_airspeed_of_any, "keeps_airspeed_to_wings", _use_airspeed_of_wing)
 
 
 @kernel

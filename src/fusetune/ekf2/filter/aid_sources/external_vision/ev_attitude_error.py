@@ -13,6 +13,7 @@ from fusetune.ekf2.numerics.rotations import (
     quat_to_rotation_vector,
     rotation_vector_to_quat,
 )
+from fusetune.ekf2.releases.by_release import by_release
 
 FILTER_INTERVAL_S = 0.01
 FILTER_TIME_CONSTANT_S = 10.0
@@ -50,6 +51,26 @@ def _step_towards(q, target, work):
     x, y, z = quat_to_rotation_vector(work)
     work[0], work[1], work[2], work[3] = rotation_vector_to_quat(FILTER_ALPHA * x, FILTER_ALPHA * y, FILTER_ALPHA * z)
     quat_multiply(q, work, q)
+
+
+@kernel
+def _larger_variance(ekf, axis, variance, axes):
+    orientation_var = ekf.sensors.ev.sample.orientation_var
+    for i in range(axes):
+        variance = max(variance, orientation_var[i])
+    return variance
+
+
+@kernel
+def _levered_variance(ekf, axis, variance, axes):
+    """An attitude error turns the position about the origin of vision: each axis feels the two others."""
+    sample = ekf.sensors.ev.sample
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    return variance + sample.pos[j] ** 2 * sample.orientation_var[k] + sample.pos[k] ** 2 * sample.orientation_var[j]
+
+
+variance_with_attitude = by_release(_larger_variance, "levers_vision_attitude", _levered_variance)
+"""Variance (m²) of one axis of the position where its uncertain attitude, of the first so many axes, counts, too."""
 
 
 @kernel

@@ -6,8 +6,11 @@ Mirrors PX4 v1.16 `EKF/aid_sources/external_vision/ev_height_control.cpp`. Heigh
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD
-from fusetune.ekf2.filter.aid_sources.external_vision.ev_attitude_error import refresh_ev_rotation
+from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_attitude_error import (
+    refresh_ev_rotation,
+    variance_with_attitude,
+)
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
     EV_CTRL_VEL,
     EV_CTRL_VPOS,
@@ -31,6 +34,21 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_vertical_velocity_to_zero,
 )
 from fusetune.ekf2.numerics.rotations import component_in_earth, variance_in_earth
+from fusetune.ekf2.releases.by_release import by_release
+
+
+@kernel
+def _unless_all_in_vision_frame(ekf):
+    return not (ekf.cs.ev_yaw and ekf.cs.ev_pos)
+
+
+@kernel
+def _where_frame_is_frd(ekf):
+    frd = ekf.sensors.ev.sample.pos_frame == EV_FRAME_FRD
+    return frd and not (ekf.cs.ev_yaw and ekf.cs.ev_pos)
+
+
+_is_height_turned = by_release(_unless_all_in_vision_frame, "levers_vision_attitude", _where_frame_is_frd)
 
 
 @kernel
@@ -38,14 +56,12 @@ def _measured_height(ekf, params):
     """Down position (m) of the IMU by external vision, and its variance."""
     sample = ekf.sensors.ev.sample
     position, variance = sample.pos[2], sample.position_var[2]
-    if not (ekf.cs.ev_yaw and ekf.cs.ev_pos):
+    if _is_height_turned(ekf):
         # not working entirely in the vision frame
         refresh_ev_rotation(ekf)
         R = ekf.ev.R_ev_to_ekf
         position = component_in_earth(R, 2, sample.pos[0], sample.pos[1], sample.pos[2])
-        variance = max(
-            variance_in_earth(R, 2, sample.position_var), sample.orientation_var[0], sample.orientation_var[1]
-        )
+        variance = variance_with_attitude(ekf, 2, variance_in_earth(R, 2, sample.position_var), 2)
     variance = max(variance, params.EKF2_EVP_NOISE * params.EKF2_EVP_NOISE, MIN_NOISE * MIN_NOISE)
     if ekf.cs.gps_hgt:
         variance = max(variance, params.EKF2_GPS_P_NOISE * params.EKF2_GPS_P_NOISE)

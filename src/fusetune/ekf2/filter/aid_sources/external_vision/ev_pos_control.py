@@ -12,7 +12,10 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_FRD, EV_FRAME_NED
-from fusetune.ekf2.filter.aid_sources.external_vision.ev_attitude_error import refresh_ev_rotation
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_attitude_error import (
+    refresh_ev_rotation,
+    variance_with_attitude,
+)
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
     EV_CTRL_HPOS,
     MIN_NOISE,
@@ -54,13 +57,7 @@ def _position_in_ekf_frame(ekf, params, axis):
     elif sample.pos_frame == EV_FRAME_FRD:
         R = ekf.ev.R_ev_to_ekf
         position = component_in_earth(R, axis, sample.pos[0], sample.pos[1], sample.pos[2])
-        # the uncertain attitude of vision counts as position noise
-        variance = max(
-            variance_in_earth(R, axis, sample.position_var),
-            sample.orientation_var[0],
-            sample.orientation_var[1],
-            sample.orientation_var[2],
-        )
+        variance = variance_with_attitude(ekf, axis, variance_in_earth(R, axis, sample.position_var), 3)
     if ekf.cs.gnss_pos:
         variance = max(variance, params.EKF2_GPS_P_NOISE * params.EKF2_GPS_P_NOISE)
     variance = max(variance, params.EKF2_EVP_NOISE * params.EKF2_EVP_NOISE, MIN_NOISE * MIN_NOISE)

@@ -35,6 +35,7 @@ from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.resets.state_resets import reset_velocity_to, reset_vertical_velocity_to
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
 from fusetune.ekf2.numerics.rotations import component_in_earth, variance_in_earth
+from fusetune.ekf2.releases.by_release import by_release
 
 NO_SAMPLE_TIME = 0
 BODY_RESET_VARIANCE_FACTOR = 5.0
@@ -83,6 +84,19 @@ def _is_measurement_valid(ekf, params):
 
 
 @kernel
+def _no_time(ekf):
+    return NO_SAMPLE_TIME
+
+
+@kernel
+def _time_of_sample(ekf):
+    return ekf.sensors.ev.sample.time_us
+
+
+_local_sample_time = by_release(_no_time, "stamps_vision_velocity", _time_of_sample)
+
+
+@kernel
 def _fuse_ev_velocity(ekf, params, gate):
     aid, ev = ekf.aid.ev_vel, ekf.ev
     if ekf.sensors.ev.sample.vel_frame == EV_FRAME_BODY_FRD:
@@ -101,7 +115,7 @@ def _fuse_ev_velocity(ekf, params, gate):
             variance = ev.vel_measurement_var[i]
             innovation = ekf.vel[i] - ev.vel_measurement[i]
             set_axis(aid, i, ev.vel_measurement[i], variance, innovation, ekf.P[VELOCITY + i, VELOCITY + i] + variance)
-        update_aid_source_status(ekf, aid, 3, NO_SAMPLE_TIME, gate)
+        update_aid_source_status(ekf, aid, 3, _local_sample_time(ekf), gate)
         fuse_velocity(ekf, params, aid)
     return aid.fused
 

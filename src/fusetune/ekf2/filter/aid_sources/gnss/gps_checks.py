@@ -66,6 +66,7 @@ def _check_gnss_sample_simply(ekf, params, sample):
     required_us = int(params.EKF2_REQ_GPS_H * 1e6)
     if gnss.last_fail_us == 0:
         gnss.last_fail_us = ekf.time_delayed_us
+    _forget_on_ground(ekf)
     if gnss.checks_passed:
         sound = not _is_unusable(gnss.fail, params, sample)
         passed = sound and is_timed_out(ekf, gnss.last_fail_us, max(MIN_PASSING_TIME_US, required_us // 10))
@@ -82,6 +83,20 @@ def _check_gnss_sample_simply(ekf, params, sample):
     _remember_fix(gnss, sample)
     ekf.gnss_trust.passed = passed
     return passed
+
+
+@kernel
+def _forget_nothing(ekf):
+    """v1.17 keeps to the simplified checks for good."""
+
+
+@kernel
+def _forget_that_checks_passed(ekf):
+    if not ekf.cs.in_air:
+        ekf.gnss.checks_passed = False
+
+
+_forget_on_ground = by_release(_forget_nothing, "checks_gnss_strictly_on_ground", _forget_that_checks_passed)
 
 
 @kernel

@@ -103,7 +103,7 @@ def _is_yaw_put_right(ekf, params):
     """Whether the yaw was found wrong in flight and has been put right; the sources see to their own time-outs."""
     if ekf.gnss_trust.fault or not _uses_gnss(ekf):
         return False
-    return _has_yaw_failed(ekf) and try_yaw_emergency_reset(ekf, params)
+    return _is_yaw_blamed(ekf) and try_yaw_emergency_reset(ekf, params)
 
 
 @kernel
@@ -117,6 +117,22 @@ def _has_yaw_failed(ekf):
     )
 
 
+@kernel
+def _is_rejected_yaw_wrong(ekf):
+    """Whether in flight velocity, or position, is being rejected and has been for too long, and the yaw is off."""
+    if not ekf.cs.in_air or not is_yaw_failure(ekf):
+        return False
+    velocity = ekf.cs.gnss_vel and ekf.aid.gnss_vel.innovation_rejected and _is_failing(ekf, ekf.time_last_hor_vel_fuse)
+    position = ekf.cs.gnss_pos and ekf.aid.gnss_pos.innovation_rejected and _is_failing(ekf, ekf.time_last_hor_pos_fuse)
+    return velocity or position
+
+
+@kernel
+def _is_failing(ekf, time_last_fuse):
+    return is_timed_out(ekf, time_last_fuse, YAW_EMERGENCY_DELAY) and time_last_fuse > ekf.time_last_on_ground
+
+
+_is_yaw_blamed = by_release(_has_yaw_failed, "blames_yaw_for_rejections", _is_rejected_yaw_wrong)
 _is_reset_due = by_release(_is_joint_reset_due, "controls_gnss_sources_apart", _is_yaw_put_right)
 
 

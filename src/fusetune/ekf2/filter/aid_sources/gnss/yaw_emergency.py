@@ -78,16 +78,29 @@ def try_yaw_emergency_reset(ekf, params):
 
 
 @kernel
+def _variance_as_it_is(ekf, variance):
+    """v1.16 passes the variance on as if it were the accuracy, and compares that with the limit of the accuracy."""
+    return variance
+
+
+@kernel
+def _standard_deviation(ekf, variance):
+    return math.sqrt(variance)
+
+
+_told_accuracy = by_release(_variance_as_it_is, "tells_yaw_estimator_deviation", _standard_deviation)
+
+
+@kernel
 def control_gnss_yaw_estimator(ekf, params):
     """Give the last GNSS velocity to the yaw estimator, and align the yaw by it where nothing else has."""
     aid = ekf.aid.gnss_vel
-    variance = aid.observation_variance[0]
-    # v1.16 compares the variance with the limit of the speed accuracy, and passes it on as if it were the accuracy
-    if not 0.0 < variance < params.EKF2_REQ_SACC:
+    accuracy = _told_accuracy(ekf, aid.observation_variance[0])
+    if not 0.0 < accuracy < params.EKF2_REQ_SACC:
         return
     if not (np.isfinite(aid.observation[0]) and np.isfinite(aid.observation[1])):
         return
-    fuse_gsf_velocity(ekf.gsf, aid.observation[0], aid.observation[1], variance, ekf.cs.in_air)
+    fuse_gsf_velocity(ekf.gsf, aid.observation[0], aid.observation[1], accuracy, ekf.cs.in_air)
     uses_gnss = int(params.EKF2_GPS_CTRL) & (GPS_CTRL_VEL | GPS_CTRL_HPOS) != 0
     if uses_gnss and not ekf.cs.yaw_align and ekf.cs.tilt_align:
         reset_yaw_to_ekf_gsf(ekf, params)

@@ -55,6 +55,7 @@ from fusetune.ekf2.filter.common.timing import (
 )
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance
+from fusetune.ekf2.releases.by_release import by_release
 
 MAG_LPF_ALPHA = 0.1
 MIN_SAMPLES_TO_START = 3
@@ -119,6 +120,7 @@ def _control_with_sample(ekf, params, wmm_updated):
     starting = continuing and check_mag_field(ekf, params, sample) and _may_start(ekf)
     check_mag_heading_consistency(ekf, params, sample)
 
+    _forgive_mag_fault(ekf)
     no_ne_aiding_or_not_moving = not is_north_east_aiding_active(ekf) or ekf.cs.vehicle_at_rest
     _choose_mode(ekf, params, no_ne_aiding_or_not_moving)
 
@@ -130,7 +132,9 @@ def _control_with_sample(ekf, params, wmm_updated):
         stop_mag_fusion(ekf, params)
         return
 
-    if check_hagl_yaw_reset_req(ekf) or (wmm_updated and no_ne_aiding_or_not_moving):
+    if check_hagl_yaw_reset_req(ekf):
+        _reset_on_climb(ekf, params)
+    elif wmm_updated and no_ne_aiding_or_not_moving:
         _reset_to_filtered(ekf, params, ekf.cs.mag_hdg or ekf.cs.mag_3d)
     else:
         _fuse_sample(ekf, params, sample, R_mag)
@@ -191,6 +195,32 @@ def _may_start(ekf):
 
 
 @kernel
+def _forgive_nothing(ekf):
+    """v1.17 keeps a magnetometer at fault out for good."""
+
+
+@kernel
+def _forgive_consistent_mag(ekf):
+    cs = ekf.cs
+    if cs.mag_heading_consistent and cs.mag and is_timed_out(ekf, ekf.time_last_heading_fuse, RESET_TIMEOUT_MAX):
+        cs.mag_fault = False
+
+
+@kernel
+def _is_never_kept(ekf):
+    return False
+
+
+@kernel
+def _is_position_constant(ekf):
+    return ekf.cs.constant_pos
+
+
+_forgive_mag_fault = by_release(_forgive_nothing, "trusts_mag_again", _forgive_consistent_mag)
+_is_heading_kept = by_release(_is_never_kept, "trusts_mag_again", _is_position_constant)
+
+
+@kernel
 def _choose_mode(ekf, params, no_ne_aiding_or_not_moving):
     """Set which states the magnetometer may correct."""
     cs = ekf.cs
@@ -200,6 +230,7 @@ def _choose_mode(ekf, params, no_ne_aiding_or_not_moving):
         cs.mag
         and heading_usable
         and not cs.mag_fault
+        and not _is_heading_kept(ekf)
         and not cs.mag_field_disturbed
         and not cs.ev_yaw
         and not cs.gnss_yaw
@@ -215,6 +246,22 @@ def _reset_to_filtered(ekf, params, reset_heading):
     """Reset the field states, and yaw if asked, to the filtered measurement."""
     reset_mag_states(ekf, params, ekf.mag.lpf, reset_heading)
     ekf.aid.mag.time_last_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _reset_with_heading(ekf, params):
+    _reset_to_filtered(ekf, params, ekf.cs.mag_hdg or ekf.cs.mag_3d)
+
+
+@kernel
+def _reset_with_unaided_heading(ekf, params):
+    """North-east aiding knows the heading better; the field is aligned either way."""
+    _reset_to_filtered(ekf, params, (ekf.cs.mag_hdg or ekf.cs.mag_3d) and not is_north_east_aiding_active(ekf))
+    ekf.cs.mag_aligned_in_flight = True
+    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+
+
+_reset_on_climb = by_release(_reset_with_heading, "aligns_field_on_climb", _reset_with_unaided_heading)
 
 
 @kernel

@@ -14,6 +14,7 @@ from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.state import MAG_BODY
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.numerics.rotations import euler_yaw, rotate_to_earth, wrap_pi
+from fusetune.ekf2.releases.by_release import by_release
 
 HEADING_LPF_ALPHA = 0.1
 YAW_VARIANCE_MIN = 0.01**2
@@ -40,15 +41,29 @@ def field_azimuth(ekf, params, mag):
 
 
 @kernel
+def _is_any(ekf, params, innovation):
+    return True
+
+
+@kernel
+def _is_within_noise(ekf, params, innovation):
+    return abs(innovation) < params.EKF2_HEAD_NOISE
+
+
+_is_present_small = by_release(_is_any, "doubts_present_heading", _is_within_noise)
+
+
+@kernel
 def check_mag_heading_consistency(ekf, params, mag):
     """Low-pass the heading innovation; consistent once it is small while the vehicle accelerates enough to tell."""
+    innovation = 0.0
     if ekf.cs.yaw_align:
         innovation = wrap_pi(field_azimuth(ekf, params, mag) - get_mag_declination(ekf, params))
         ekf.mag.heading_innovation_lpf += HEADING_LPF_ALPHA * (innovation - ekf.mag.heading_innovation_lpf)
     else:
         ekf.mag.heading_innovation_lpf = 0.0
 
-    if abs(ekf.mag.heading_innovation_lpf) < params.EKF2_HEAD_NOISE:
+    if abs(ekf.mag.heading_innovation_lpf) < params.EKF2_HEAD_NOISE and _is_present_small(ekf, params, innovation):
         acceleration = math.hypot(ekf.accel_horiz_lpf[0], ekf.accel_horiz_lpf[1])
         if is_north_east_aiding_active(ekf) and acceleration > params.EKF2_MAG_ACCLIM:
             ekf.cs.mag_heading_consistent = True

@@ -87,7 +87,14 @@ def _by_heading_reset(ekf, reset_heading):
     return reset_heading
 
 
-_aligns_field = by_release(_by_any_reset, "aligns_field_with_heading", _by_heading_reset)
+@kernel
+def _by_climb_alone(ekf, reset_heading):
+    return False
+
+
+_aligns_field = by_release(
+    by_release(_by_any_reset, "aligns_field_with_heading", _by_heading_reset), "aligns_field_on_climb", _by_climb_alone
+)
 """Whether a reset in flight aligns the field."""
 
 

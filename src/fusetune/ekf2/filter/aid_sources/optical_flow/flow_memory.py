@@ -23,7 +23,7 @@ velocities from flow (m/s, FRD), compensated rates (rad/s), samples seen since t
 """
 
 FLOW_RATES = np.dtype([("compensated_lpf", "f8", (2,))], align=True)
-"""Sub-record `ekf.flow_rates`, since v1.17: the compensated rates (rad/s), low-passed as the velocities from flow are."""
+"""Sub-record `ekf.flow_rates`, since v1.17: the compensated rates (rad/s), low-passed like the velocities."""
 
 
 @kernel

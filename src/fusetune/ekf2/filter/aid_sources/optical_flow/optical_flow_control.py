@@ -155,6 +155,19 @@ def control_optical_flow_fusion(ekf, params):
 
 
 @kernel
+def _by_terrain(ekf):
+    return is_terrain_estimate_valid(ekf)
+
+
+@kernel
+def _by_terrain_or_reference(ekf):
+    return is_terrain_estimate_valid(ekf) or ekf.height_sensor_ref == HEIGHT_REF_RANGE
+
+
+_is_height_known = by_release(_by_terrain, "knows_height_by_range", _by_terrain_or_reference)
+
+
+@kernel
 def _use_flow_sample(ekf, params):
     _complete_gyro_rate(ekf, params)
     _update_gyro_bias(ekf)
@@ -169,7 +182,7 @@ def _use_flow_sample(ekf, params):
         continuing_conditions_passing
         and sample_good
         and ekf.flow.counter > MIN_SAMPLES_BEFORE_START
-        and (is_terrain_estimate_valid(ekf) or is_horizontal_aiding_active(ekf))
+        and (_is_height_known(ekf) or is_horizontal_aiding_active(ekf))
         and is_timed_out(ekf, ekf.aid.optical_flow.time_last_fuse, RESTART_INTERVAL_US)
     )
     _update_terrain_flag(ekf)

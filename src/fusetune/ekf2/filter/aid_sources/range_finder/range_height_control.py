@@ -9,7 +9,11 @@ Mirrors PX4 v1.16 `EKF/aid_sources/range_finder/range_height_control.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import update_range_consistency
+from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import (
+    MISTAKEN_MOTION_HOLD,
+    MOTION_HOLD,
+    update_range_consistency,
+)
 from fusetune.ekf2.filter.aid_sources.range_finder.range_height_fusion import (
     fuse_hagl_rng,
     reset_terrain_to_rng,
@@ -99,6 +103,19 @@ _may_stand = by_release(_is_on_ground, "skips_unhealthy_range", _is_at_rest_on_g
 
 
 @kernel
+def _mistaken_hold(ekf):
+    return MISTAKEN_MOTION_HOLD
+
+
+@kernel
+def _intended_hold(ekf):
+    return MOTION_HOLD
+
+
+_motion_hold_us = by_release(_mistaken_hold, "holds_range_motion", _intended_hold)
+
+
+@kernel
 def _check_consistency(ekf, params):
     speed_squared = ekf.vel[0] * ekf.vel[0] + ekf.vel[1] * ekf.vel[1]
     speed_variance = ekf.P[VELOCITY, VELOCITY] + ekf.P[VELOCITY + 1, VELOCITY + 1]
@@ -112,6 +129,7 @@ def _check_consistency(ekf, params):
         ekf.vel[2],
         ekf.P[VELOCITY + 2, VELOCITY + 2],
         horizontal_motion,
+        _motion_hold_us(ekf),
         ekf.time_delayed_us,
         params.EKF2_RNG_K_GATE,
     )
