@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -93,13 +94,19 @@ def in_own_process(job: str, log: Path) -> dict[str, Any]:
     return json.loads(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
 
 
+def _keep_out(package: str) -> None:
+    """As jobs of the pipeline do; it stood elsewhere in earlier revisions, whose package may be the one at hand."""
+    try:
+        jobs = import_module("fusetune.running.job")
+    except ModuleNotFoundError:
+        sys.path.insert(0, str(Path(fusetune.__file__).resolve().parents[2] / "workflow" / "scripts"))
+        jobs = import_module("job")
+    jobs.keep_out(package)
+
+
 def _measured(job: str, log: Path) -> dict[str, Any]:
     """CPU time and peak memory of one job; of the analysis also the peak of each step."""
-    # those of the package at hand, which may be another revision's
-    sys.path.insert(0, str(Path(fusetune.__file__).resolve().parents[2] / "workflow" / "scripts"))
-    from job import keep_out
-
-    keep_out("pandas")
+    _keep_out("pandas")
     saved, analysis = log.with_suffix(".saved"), log.with_suffix(".analysis")
     steps: dict[str, int] = {}
     if job == "save":

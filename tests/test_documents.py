@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
-DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "flights/README.md", "docs/*.md")
+DOCUMENTS = (
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "flights/README.md", "docs/*.md",
+    "docs/howto/*.md",
+)  # fmt: skip
 
 MADE = (
     "results", "uploads", ".snakemake", ".cache", ".venv", "flights/*", "flights.csv", "checks.csv", "ranking.csv",
@@ -20,7 +23,7 @@ MADE = (
 OF_PX4 = ("EKF", "src/modules", "Tools")
 """Where PX4 has its files."""
 
-SUFFIXES = {".py", ".smk", ".md", ".yaml", ".yml", ".csv", ".toml", ".lock", ".cff", ".css", ".rst"}
+SUFFIXES = {".fish", ".py", ".smk", ".md", ".yaml", ".yml", ".csv", ".toml", ".lock", ".cff", ".css", ".rst"}
 RESULTS = {".json", ".parquet", ".params", ".plan", ".png", ".svg", ".ulg", ".html"}
 """Suffixes of what runs write; the repository has none of these but where its full path is given."""
 

@@ -63,7 +63,10 @@ def imported_by(file: Path) -> Iterator[str]:
 
 
 UPLOAD = ("src/fusetune/apply/upload", "benchmarks/upload_trials")
-OF_AN_EXTRA = {"mlflow": ("src/fusetune/apply/history/mlflow_export.py", "tests/apply/history/test_keep.py")}
+OF_AN_EXTRA = {
+    "mlflow": ("src/fusetune/apply/history/mlflow_export.py", "tests/apply/history/test_keep.py"),
+    "playwright": ("tests/browser/conftest.py", "tests/browser/looking.py", "tests/browser/test_viewer.py"),
+}
 """Libraries that a plain installation lacks, and who does without them where they are not there."""
 
 

@@ -23,7 +23,7 @@ def told(log: Path, folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def test_a_healthy_flight_has_figures_effects_and_sensors_and_nothing_is_wrong(
-    survey_flight: Flight, tmp_path: Path
+    survey_flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = tmp_path / "survey.ulg"
     write_ulog(log, survey_flight)
@@ -40,6 +40,11 @@ def test_a_healthy_flight_has_figures_effects_and_sensors_and_nothing_is_wrong(
     for one in effects["gnss_antenna"]["estimates"]:
         assert abs(one["value"] - true[one["name"]]) < 3.0 * one["standard_error"] < 0.2
     assert {"gyro", "accel", "mag", "baro"} <= found["sensor_noise"]["sensors"].keys()
+    # of a long flight the replay is read from the disk: the files are the same, and nothing else is left there
+    monkeypatch.setattr("fusetune.analyze.replaying.prepared_flight.MOST_IN_MEMORY", 0)
+    diagnose_flight(tmp_path / "save" / "survey", tmp_path / "long")
+    of_both = [{file.name: file.read_bytes() for file in (tmp_path / one).iterdir()} for one in ("analyze", "long")]
+    assert of_both[0] == of_both[1]
 
 
 @pytest.mark.parametrize("content", [b"", b"no log at all", b"ULog\x01\x12\x35\x01" + bytes(100)])

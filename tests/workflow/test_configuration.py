@@ -198,14 +198,18 @@ OF_CONDA = {
 }
 
 
+OUTSIDE_OF_JOBS = {"argcomplete", "rich", "snakemake", "snakemake-interface-logger-plugins"}
+"""What runs jobs, or tells of them."""
+
+
 def asked_by_jobs(project_root: Path) -> set[str]:
-    """Names of the packages that jobs import, and of those that these ask for; Snakemake itself stays outside."""
+    """Names of the packages that jobs import, and of those that these ask for."""
     project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     asked = [Requirement(text).name for text in project["dependencies"]]
     found: set[str] = set()
     while asked:
         name = asked.pop().lower().replace("_", "-")
-        if name not in found | {"snakemake"}:
+        if name not in found | OUTSIDE_OF_JOBS:
             found.add(name)
             needed = map(Requirement, requires(name) or ())
             asked += [one.name for one in needed if one.marker is None or one.marker.evaluate(OF_CONDA)]

@@ -97,8 +97,11 @@ def installed(distributions: tuple[Path, Path], tmp_path_factory: pytest.TempPat
     place = tmp_path_factory.mktemp("installed")
     venv.create(place / "venv", with_pip=True)
     python = place / "venv" / "bin" / "python"
+    ours = ("PYTHON", "NUMBA_", "FUSETUNE_")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
+    environment |= {"XDG_CACHE_HOME": str(place / "cache"), "HOME": str(place), "OPENBLAS_NUM_THREADS": "1"}
     pip = [str(python), "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-index"]
-    subprocess.run([*pip, "--no-deps", "--no-compile", str(distributions[1])], check=True)
+    subprocess.run([*pip, "--no-deps", "--no-compile", str(distributions[1])], env=environment, check=True)
     ask = [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
     packages = Path(subprocess.run(ask, check=True, capture_output=True, text=True).stdout.strip())
     (packages / "libraries.pth").write_text(f"{LIBRARIES}\n", encoding="utf-8")
@@ -109,9 +112,6 @@ def installed(distributions: tuple[Path, Path], tmp_path_factory: pytest.TempPat
     caches = Path(config.CACHE_DIR)
     kernels = Path("fusetune", "numba", caches.name, kernel_folder().relative_to(caches))
     shutil.copytree(kernel_folder(), place / "cache" / kernels)
-    ours = ("PYTHON", "NUMBA_", "FUSETUNE_")
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
-    environment |= {"XDG_CACHE_HOME": str(place / "cache"), "HOME": str(place), "OPENBLAS_NUM_THREADS": "1"}
 
     def run(*command: str, cwd: Path) -> str:
         done = subprocess.run([str(python), *command], cwd=cwd, env=environment, capture_output=True, text=True)

@@ -5,7 +5,7 @@ import os
 
 KERNELS_MB = 350  # Python, its libraries and the compiled estimator
 LIBRARIES_MB = 200
-DIAGNOSED_MB_PER_MB = 11.0  # of a flight that is diagnosed, for each MB of its log
+DIAGNOSED_MB_PER_MB = 7.0  # of a flight that is diagnosed, for each MB of its log
 THREAD_MB_PER_MB = 1.0  # of a set that is replayed and scored beside others
 MOST_THREADS_OF_A_FLIGHT = 8
 SEARCHED_MB_PER_MB = 8.0  # of a flight on which sets are tried in memory, for each MB of its log
@@ -14,9 +14,6 @@ JOINED_AT_ONCE = 2  # flights whose scores are split by manoeuvre at a time
 JOINED_MB_PER_SET = 0.2  # of each of them
 DECIDED_MB_PER_PAIR = 0.1  # of a flight and a set that it was scored with
 SIMULATED_LOG_MB = 10.0  # of a flight that is not simulated yet
-
-# around the present values each parameter makes two sets at the most
-MOST_SETS = len(SETS.scored) + 2 * len(SETS.around)
 
 
 def log_mb(flight):

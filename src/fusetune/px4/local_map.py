@@ -8,9 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 EARTH_RADIUS_M = 6_371_000.0
 """CONSTANTS_RADIUS_OF_EARTH of PX4."""
 
@@ -33,18 +30,6 @@ class LocalMap:
         cosine = math.sin(ref) * math.sin(lat) + math.cos(ref) * math.cos(lat) * math.cos(difference)
         scale = EARTH_RADIUS_M * (math.atan2(sine, cosine) / sine if sine > 0.0 else 1.0)
         return scale * north, scale * east
-
-    def all_to_local(self, lat_deg: npt.ArrayLike, lon_deg: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """North and east (m), (N, 2), of places (N,): as `to_local`, for tracks of many thousands."""
-        lat, ref = np.radians(np.asarray(lat_deg, np.float64)), math.radians(self.lat_deg)
-        difference = np.radians(np.asarray(lon_deg, np.float64) - self.lon_deg)
-        north = math.cos(ref) * np.sin(lat) - math.sin(ref) * np.cos(lat) * np.cos(difference)
-        east = np.cos(lat) * np.sin(difference)
-        sine = np.hypot(north, east)
-        cosine = math.sin(ref) * np.sin(lat) + math.cos(ref) * np.cos(lat) * np.cos(difference)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            scale = EARTH_RADIUS_M * np.where(sine > 0.0, np.arctan2(sine, cosine) / sine, 1.0)
-        return np.column_stack([scale * north, scale * east])
 
     def to_global(self, north_m: float, east_m: float) -> tuple[float, float]:
         """Latitude and longitude (degrees) of a place north and east (m) of the reference."""

@@ -93,12 +93,12 @@ def grouped_table(
         f'<th scope="col"{_class("number" if is_number else "")}>{escape(text)}</th>'
         for text, is_number in zip(head, numeric, strict=True)
     )
-    told = f"<caption>{_prose(caption)}</caption>" if caption else ""
+    told = f"<caption>{prose(caption)}</caption>" if caption else ""
     bodies = []
     for name, group in groups.items():
-        title = f'<tr class="group"><th scope="rowgroup" colspan="{len(head)}">{_prose(name)}</th></tr>' if name else ""
+        title = f'<tr class="group"><th scope="rowgroup" colspan="{len(head)}">{prose(name)}</th></tr>' if name else ""
         bodies.append(f"<tbody>{title}{''.join(_row(row, head) for row in group)}</tbody>")
-    below = f'<p class="note">{_prose(footer)}</p>' if footer else ""
+    below = f'<p class="note">{prose(footer)}</p>' if footer else ""
     inside = f"{told}<thead><tr>{titles}</tr></thead>{''.join(bodies)}"
     return f'<div class="scroll"><table{_class(kind)}>{inside}</table></div>{below}'
 
@@ -118,11 +118,11 @@ def _is_number(column: Sequence[CellLike]) -> bool:
 def _cell(cell: CellLike, title: str) -> str:
     label = f' data-label="{escape(title)}"' if title else ""
     if isinstance(cell, str):
-        return f"<td{label}>{_prose(cell)}</td>"
+        return f"<td{label}>{prose(cell)}</td>"
     if isinstance(cell, Html):
         return f"<td{_class(cell.kind)}{label}>{cell.html}</td>"
     hint = f' title="{escape(cell.hint)}"' if cell.hint else ""
-    inside = link(cell.text, cell.link) if cell.link else _prose(cell.text)
+    inside = link(cell.text, cell.link) if cell.link else prose(cell.text)
     return f"<td{_class(cell.kind)}{label}{hint}>{inside}</td>"
 
 
@@ -160,31 +160,24 @@ def drawn(picture: str, caption: str = "") -> str:
     """A picture that is HTML already (`fusetune.report.charts`), with words beneath; empty without a picture."""
     if not picture:
         return ""
-    words = f"<figcaption>{_prose(caption)}</figcaption>" if caption else ""
+    words = f"<figcaption>{prose(caption)}</figcaption>" if caption else ""
     return f'<figure class="drawn">{picture}{words}</figure>'
 
 
 def paragraph(text: str, kind: str = "") -> str:
     """A paragraph of plain text."""
     attribute = f' class="{escape(kind)}"' if kind else ""
-    return f"<p{attribute}>{_prose(text)}</p>"
+    return f"<p{attribute}>{prose(text)}</p>"
 
 
-def _prose(text: str) -> str:
+def prose(text: str) -> str:
     """Escaped, names in back quotes as code, no line break between a figure and its percent sign."""
     return _QUOTED.sub(r"<code>\1</code>", escape(text).replace(" %", "&nbsp;%"))
 
 
-def prose(text: str) -> str:
-    """Escaped, for HTML that is put together elsewhere."""
-    return _prose(text)
-
-
 def bullets(sentences: Sequence[str], kind: str = "") -> str:
     """A list of plain sentences."""
-    return (
-        f"<ul{_class(kind)}>" + "".join(f"<li>{_prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
-    )
+    return f"<ul{_class(kind)}>" + "".join(f"<li>{prose(one)}</li>" for one in sentences) + "</ul>" if sentences else ""
 
 
 def details(summary: str, *parts: str, kind: str = "", id: str = "") -> str:

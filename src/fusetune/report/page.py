@@ -19,6 +19,7 @@ from fusetune.report.fleet.statistics_sections import (
 )
 from fusetune.report.flight_data.write_blob import with_choice
 from fusetune.report.flight_names import short_names
+from fusetune.report.flight_page.sensors_section import HOW_TO_DRAW
 from fusetune.report.markup import bullets, details
 from fusetune.report.page_shell.shell import FlightBlob, PageHead, Tab, write_page
 from fusetune.report.results import Results, read_results
@@ -223,6 +224,7 @@ def _sensors_tab(read: _Read) -> str:
     return _joined(
         findings_section(read.results),
         innovations_section(read.results),
+        _nothing_to_say([HOW_TO_DRAW]),
     )
 
 

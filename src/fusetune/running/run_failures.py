@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from fusetune.running.workflow_events import Event, JobFailed, Told
+from fusetune.storage.files import AnyPath
 
 _NAME_OF_EXCEPTION = re.compile(r"^[A-Za-z]*(?:Error|Exception)(?: in (?:rule|file) .*?)?(?:, line \d+)?:\s*")
 """How Snakemake and Python begin what they say of an exception."""
@@ -33,7 +34,7 @@ class RunFailures:
     folder : that it works in; logs are named below it
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: AnyPath) -> None:
         self._folder = Path(folder)
         self._jobs: list[JobFailed] = []
         self._told: list[str] = []

@@ -11,6 +11,7 @@ from fusetune.apply.decision_summary import DecisionSummary, decision_summary
 from fusetune.apply.wording import counted
 from fusetune.cli.lines import Lines
 from fusetune.storage.documents import read_document
+from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
 
 
@@ -67,7 +68,7 @@ class RunOutcome:
             yield f"Next:    {self.decision.next_step}"
 
 
-def run_outcome(results: Path) -> RunOutcome:
+def run_outcome(results: AnyPath) -> RunOutcome:
     """Read what a run left.
 
     Raises
@@ -75,6 +76,7 @@ def run_outcome(results: Path) -> RunOutcome:
     UserError
         A file is damaged.
     """
+    results = Path(results)
     table, decision = results / "save" / "flights.parquet", results / "apply" / "decision.json"
     rows = read_table(table).select(["flight", "status"]).to_pylist() if table.is_file() else []
     return RunOutcome(

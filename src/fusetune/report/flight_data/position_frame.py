@@ -10,6 +10,7 @@ import numpy as np
 
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.local_map import LocalMap
+from fusetune.px4.local_tracks import all_to_local
 from fusetune.report.flight_data.content import Figures, Times
 
 _FIX_3D = 3
@@ -54,7 +55,7 @@ class PositionFrame:
         told = np.isfinite(lat) & np.isfinite(lon) & ((lat != 0.0) | (lon != 0.0))
         if "xy_global" in local:
             told &= local["xy_global"].astype(bool)
-        position[told, :2] += LocalMap(*self.origin[:2]).all_to_local(lat[told], lon[told])
+        position[told, :2] += all_to_local(LocalMap(*self.origin[:2]), lat[told], lon[told])
         high = np.isfinite(altitude) & (local["z_global"].astype(bool) if "z_global" in local else told)
         position[high, 2] += self.origin[2] - altitude[high]
         return position
@@ -71,7 +72,7 @@ class PositionFrame:
         if self.origin is None or not set(_FIX) <= set(gnss):
             return Measured(time, velocity, None)
         lat, lon, altitude = (gnss[name][rows].astype(np.float64) for name in _FIX)
-        places = LocalMap(*self.origin[:2]).all_to_local(lat, lon)
+        places = all_to_local(LocalMap(*self.origin[:2]), lat, lon)
         position = np.column_stack([places, self.origin[2] - altitude])
         return Measured(time, velocity, position)
 

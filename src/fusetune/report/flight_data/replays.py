@@ -16,6 +16,7 @@ from fusetune.px4.flight import TopicTable
 from fusetune.report.flight_data.innovation_panels import Innovations, recorded_innovations
 from fusetune.set_names import AS_FLOWN
 from fusetune.storage.documents import read_document
+from fusetune.storage.files import AnyPath
 
 _INNOVATIONS = "innovations"
 
@@ -57,7 +58,7 @@ class Replay:
         return read_columns(table_file(self.folder, self.name, "states"), columns)
 
 
-def replays_of(folder: Path, scoring: Mapping[str, Any] | None) -> tuple[Replay, ...]:
+def replays_of(folder: AnyPath, scoring: Mapping[str, Any] | None) -> tuple[Replay, ...]:
     """The present set's first; none where nothing was replayed.
 
     Parameters
@@ -67,6 +68,7 @@ def replays_of(folder: Path, scoring: Mapping[str, Any] | None) -> tuple[Replay,
     """
     if scoring is None:
         return ()
+    folder = Path(folder)
     present = scoring["present"]
     if not table_file(folder, present, _INNOVATIONS).exists():
         return ()

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from fusetune.analyze.conformance.flown_track import LONGEST_GAP_US, FlownTrack
 from fusetune.px4.flight import Flight
 from fusetune.px4.local_map import LocalMap
+from fusetune.px4.local_tracks import all_to_local
 from fusetune.report.flight_data.content import PlaneTrack, Span, TrackView
 from fusetune.report.flight_data.position_frame import PositionFrame
 from fusetune.report.flight_data.state_panels import Teller
@@ -43,7 +44,7 @@ def track_view(
     if not track.has_place:
         return TrackView(_local(track, flight), manoeuvres=manoeuvres)
     home = (track.lat[0], track.lon[0]) if mission is None else (mission["home"]["lat"], mission["home"]["lon"])
-    north, east = LocalMap(*home).all_to_local(track.lat, track.lon).T
+    north, east = all_to_local(LocalMap(*home), track.lat, track.lon).T
     flown = _parted(PlaneTrack(track.time, north, east, track.height, track.heading))
     fixes = _fixes(flight, home)
     sets = {} if frame is None or frame.origin is None else dict(_places(told, frame.origin, home))
@@ -88,7 +89,7 @@ def _fixes(flight: Flight, home: tuple[float, float]) -> PlaneTrack | None:
         table[name][rows].astype(np.float64) for name in ("latitude_deg", "longitude_deg", "altitude_msl_m")
     )
     time = table["timestamp"][rows].astype(np.int64)
-    north, east = LocalMap(*home).all_to_local(lat, lon).T
+    north, east = all_to_local(LocalMap(*home), lat, lon).T
     return PlaneTrack(time, north, east, height, np.full(time.size, np.nan))
 
 

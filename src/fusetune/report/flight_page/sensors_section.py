@@ -5,7 +5,7 @@ from __future__ import annotations
 from fusetune.report.flight_results import Document
 from fusetune.report.markup import Cell, details, number, paragraph, section, table, unit_cell
 
-_HOW_TO_DRAW = (
+HOW_TO_DRAW = (
     "Each sensor drawn (samples, boxes, histograms, Allan deviation, spectra): snakemake --cores 2 sensors writes "
     "results/report/sensors/."
 )
@@ -32,7 +32,7 @@ def sensors_section(noise: Document, pictures: str = "") -> str:
         parts.append(details("Why these", table(("parameter", "why"), reasons)))
     parts.append(pictures)
     if any(parts) and not pictures:
-        parts.append(paragraph(_HOW_TO_DRAW, "note"))
+        parts.append(paragraph(HOW_TO_DRAW, "note"))
     return section("The sensors themselves", *parts, id="sensors")
 
 

@@ -24,6 +24,7 @@ from fusetune.report.markup import (
 )
 from fusetune.report.results import Results
 from fusetune.report.sections.loading import NOTHING_TO_LOAD, file_to_load, how_to_load
+from fusetune.report.sections.next_steps_section import answer_cards, next_words
 from fusetune.report.sections.ranking_tables import NOT_KNOWN, confidence_of, interval_text
 from fusetune.report.sections.truth_section import truth_verdict
 from fusetune.report.severity_words import SEVERITY_WORDS
@@ -159,16 +160,10 @@ def _change_row(change: Mapping[str, Any], in_file: str) -> tuple[CellLike, ...]
 
 
 def _cards(results: Results) -> str:
-    cards = [
-        _card("How sure", _how_sure(results)),
-        _card("Mend first", _mend_first(results)),
-        _card("Next", _next_step(results)),
-    ]
-    return f'<div class="answer-cards">{"".join(cards)}</div>'
-
-
-def _card(title: str, inside: str) -> str:
-    return f'<div class="card"><h3>{escape(title)}</h3>{inside}</div>' if inside else ""
+    steps = results.decision["next_steps"]
+    return answer_cards(
+        {"How sure": _how_sure(results), "Mend first": _mend_first(results), "Next": next_words(steps, "next-steps")}
+    )
 
 
 def _how_sure(results: Results) -> str:
@@ -234,17 +229,6 @@ def _problem(finding: Mapping[str, Any]) -> str:
     mark = f'<span class="dot is-{escape(finding["severity"])}"></span>'
     hint = f'<span class="hidden">{escape(SEVERITY_WORDS[finding["severity"]])}: </span>'
     return f"<li>{mark}{hint}{anchor(words, place)}{tail}</li>"
-
-
-def _next_step(results: Results) -> str:
-    steps = results.decision["next_steps"]
-    if not steps:
-        return ""
-    first = steps[0]
-    command = f"<p><code>{escape(first['command'])}</code></p>" if first["command"] else ""
-    more = len(steps) - 1
-    end = f"<p>{anchor(f'and {more} more', 'next-steps')}</p>" if more else ""
-    return f"<p>{prose(first['text'])}</p>{command}{end}"
 
 
 def _is_known(value: object) -> bool:

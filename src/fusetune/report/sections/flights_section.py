@@ -95,17 +95,17 @@ def flights_section(results: Results, logs: Logs, shown: Collection[str] = ()) -
         groups[_group(name, results)].append([*row, _look(name, shown)] if shown else row)
     head = ["flight", "recorded", "in the air s", "trust grade", "what is wrong", "remark"]
     if by_flight:
-        head.append(f"“{compared}” %")
+        head.append("change %")
     if shown:
         head.append("")
     text = f"{count_words(len(logs.verdicts), 'log')}, each group in order of time; a name leads to the flight's page."
     note = (
-        f"“{compared}” %: change of the prediction error on the flight with that set, below 0 is better."
+        f"Change: of the prediction error on the flight with “{compared}” against what flies now; below 0 is better."
         if by_flight
         else ""
     )
     named = {f"{name}: {len(rows)}": rows for name, rows in groups.items() if rows}
-    told = grouped_table(head, named, kind="cards flights", footer=note)
+    told = grouped_table(*_without_empty_columns(head, named), kind="cards flights", footer=note)
     columns = ("vehicle", "firmware", "replayed_as")
     whole: list[list[CellLike]] = [
         [Cell(name), *(_words(one, column) for column in columns)] for name, one in logs.verdicts.items()
@@ -119,6 +119,22 @@ def flights_section(results: Results, logs: Logs, shown: Collection[str] = ()) -
         ),
         id="flights",
     )
+
+
+def _without_empty_columns(
+    head: Sequence[str], groups: Mapping[str, Sequence[Sequence[CellLike]]]
+) -> tuple[list[str], dict[str, list[list[CellLike]]]]:
+    """A table without the columns in which nothing stands."""
+    rows = [row for group in groups.values() for row in group]
+    kept = [place for place in range(len(head)) if any(_says(row[place]) for row in rows)]
+    return [head[place] for place in kept], {
+        name: [[row[place] for place in kept] for row in group] for name, group in groups.items()
+    }
+
+
+def _says(cell: CellLike) -> bool:
+    text = cell if isinstance(cell, str) else cell.html if isinstance(cell, Html) else cell.text
+    return text not in ("", "–")
 
 
 def _words(verdict: Mapping[Hashable, Any], name: str) -> str:

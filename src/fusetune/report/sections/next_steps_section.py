@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
 from fusetune.apply.missing_motion_kinds import THINNED
 from fusetune.report.charts.power import power_chart
-from fusetune.report.markup import Cell, bullets, details, paragraph, section, table
+from fusetune.report.markup import Cell, anchor, bullets, details, paragraph, section, table
 from fusetune.report.results import Results
 
 ROUGH = 5
@@ -29,6 +30,34 @@ def next_steps_section(results: Results) -> str:
             )
         )
     return section("What to do next", *parts, id="next-steps")
+
+
+def answer_cards(cards: Mapping[str, str]) -> str:
+    """Cards beneath an answer: title → HTML; those in which nothing stands are left out."""
+    told = "".join(
+        f'<div class="card"><h3>{escape(title)}</h3>{inside}</div>' for title, inside in cards.items() if inside
+    )
+    return f'<div class="answer-cards">{told}</div>' if told else ""
+
+
+def next_card(steps: Sequence[Mapping[str, Any]]) -> str:
+    """The first step alone in a card."""
+    return answer_cards({"Next": next_words(steps)})
+
+
+def next_words(steps: Sequence[Mapping[str, Any]], place: str = "") -> str:
+    """The first step, and how many more there are; empty without any.
+
+    Parameters
+    ----------
+    place : id of where on the page they all stand
+    """
+    if not steps:
+        return ""
+    first, more = steps[0], len(steps) - 1
+    command = f"<p><code>{escape(first['command'])}</code></p>" if first["command"] else ""
+    rest = f"<p>{anchor(f'and {more} more', place)}</p>" if more and place else ""
+    return paragraph(first["text"]) + command + rest
 
 
 def steps_list(steps: list[dict[str, Any]]) -> str:

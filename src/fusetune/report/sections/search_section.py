@@ -24,13 +24,18 @@ from fusetune.report.markup import (
     severity_mark,
     signed,
     table,
+    unit_cell,
 )
 from fusetune.report.search_results import SearchResults
 from fusetune.report.sections.loading import NOTHING_TO_LOAD, file_to_load, how_to_load
-from fusetune.report.sections.next_steps_section import steps_list
+from fusetune.report.sections.next_steps_section import next_card, steps_list
 
 _MATTERS_WORDS = {MATTERS: "yes", FLAT: "hardly", UNSURE: "not sure", NOT_TOLD: "not told"}
 _DIGITS = 4
+_KEPT_ASIDE = (
+    "One bar for each flight: what was found without this flight, flown on it, against what flies now. Line and shade: "
+    "the change to expect on as many flights again, and its 95 % interval."
+)
 
 
 def search_answer(results: SearchResults) -> str:
@@ -45,13 +50,11 @@ def search_answer(results: SearchResults) -> str:
         parts.append(bullets(decision["cautions"]))
     parts += [paragraph(one) for one in why_kept(search, decision)]
     parts.append(_load(results))
-    steps = decision["next_steps"]
-    if steps:
-        first = f"<p>{prose(steps[0]['text'])}</p>" + (
-            f"<p><code>{escape(steps[0]['command'])}</code></p>" if steps[0]["command"] else ""
-        )
-        parts.append(f'<div class="answer-cards"><div class="card"><h3>Next</h3>{first}</div></div>')
-    return f'<section class="answer is-{escape(decision["status"])}" id="answer"><div>{"".join(parts)}</div></section>'
+    words = f'<div class="answer-words">{"".join(parts)}</div>'
+    picture = kept_aside_chart(results)
+    beside = f'<div class="answer-figure">{drawn(picture, _KEPT_ASIDE)}</div>' if picture else ""
+    kind = f"answer is-{escape(decision['status'])}{' has-figure' if picture else ''}"
+    return f'<section class="{kind}" id="answer">{words}{beside}{next_card(decision["next_steps"])}</section>'
 
 
 def _load(results: SearchResults) -> str:
@@ -95,7 +98,7 @@ def _parameters(results: SearchResults) -> str:
                 Cell(name, "mono"),
                 number(one["present"], _DIGITS),
                 number(one["found"], _DIGITS, "number best") if one["is_changed"] else number(None),
-                Cell(unit_of(name), "quiet"),
+                unit_cell(unit_of(name)),
                 number(one["alone_percent"], 2),
                 _MATTERS_WORDS.get(verdicts.get(name, NOT_TOLD), ""),
                 Cell(*_remark(one)),
@@ -129,7 +132,7 @@ def _goes_along(name: str, value: float) -> tuple[Cell | str, ...]:
         Cell(name, "mono"),
         nothing,
         number(value, _DIGITS, "number best"),
-        Cell(unit_of(name), "quiet"),
+        unit_cell(unit_of(name)),
         nothing,
         "",
         along,
@@ -140,11 +143,6 @@ def search_evidence(results: SearchResults) -> str:
     """What shows that: gains on flights kept aside, luck, what matters, the two aims."""
     if results.parts:
         worth = [
-            drawn(
-                kept_aside_chart(results),
-                "One bar for each flight: what was found without this flight, flown on it, against what flies now. "
-                "Line and shade: the change to expect on as many flights again, and its 95 % interval.",
-            ),
             drawn(
                 shrinkage_chart(results),
                 "What a search promises on the flights it saw, and what is left of it on flights that it did not see. "
