@@ -167,7 +167,7 @@ def parser() -> argparse.ArgumentParser:
 def _listed() -> str:
     lines = ["Which EKF2 parameters a PX4 vehicle should fly with, from its flight logs."]
     for group, commands in GROUPS.items():
-        lines += ["", f"{group}:", *(f"  {name:<12} {command.HELP}" for name, command in commands.items())]
+        lines += ["", f"{group}:", *(f"  {name:<16} {command.HELP}" for name, command in commands.items())]
     return "\n".join(lines)
 
 

@@ -12,7 +12,6 @@ from fusetune.cli.command import DONE
 from fusetune.cli.output.json_document import add_json, print_document
 from fusetune.cli.output.tables import percent, table_lines
 from fusetune.errors import UserError
-from fusetune.px4.releases import ESTIMATORS
 
 if TYPE_CHECKING:
     from fusetune.analyze.releases.compared_releases import ReleaseComparison, ReleaseReplay
@@ -28,6 +27,8 @@ _ALL_BUT_NEVER = 0.9995
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Log, releases, and how to tell."""
+    from fusetune.px4.releases import ESTIMATORS
+
     parser.add_argument("log", type=Path, metavar="LOG.ulg")
     parser.add_argument(
         "--releases",
@@ -86,6 +87,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _names(text: str) -> tuple[str, ...]:
+    from fusetune.px4.releases import ESTIMATORS
+
     names = tuple(one.strip() for one in text.split(",") if one.strip())
     unknown = [one for one in names if one not in ESTIMATORS]
     if unknown or not names:

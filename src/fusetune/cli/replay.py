@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 
 from fusetune.cli.command import DONE
-from fusetune.px4.releases import AUTO, BASELINE, ESTIMATORS, name_of
 
 HELP = "replay parameter sets on a log"
 EXAMPLES = (("fusetune replay log.ulg --sets sets --out replays --start auto", "every set of the folder sets"),)
@@ -14,6 +13,8 @@ EXAMPLES = (("fusetune replay log.ulg --sets sets --out replays --start auto", "
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Log, sets, folder, and how it is replayed."""
+    from fusetune.px4.releases import AUTO, BASELINE, ESTIMATORS, name_of
+
     parser.add_argument("log", type=Path, metavar="LOG.ulg")
     parser.add_argument(
         "--sets",
@@ -46,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.analyze.replaying.replay_log import replay_log
     from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
     from fusetune.ekf2.releases.modelled import demand_modelled
+    from fusetune.px4.releases import AUTO
 
     if options.release != AUTO:
         demand_modelled(options.release)
