@@ -219,8 +219,7 @@ def test_what_newer_releases_call_otherwise_is_translated_and_what_they_alone_ha
     with pytest.raises(UserError, match=r"EKF2_GPS_MODE: v1\.16 has no such parameter, v1\.17 to main have it"):
         load_study(file)
     assert [one.overrides for one in load_study(file, "v1.17").sets] == [{"EKF2_GPS_MODE": 0}, {"EKF2_GPS_MODE": 1}]
-    file.write_text(
-        "name: twice\nkind: one_at_a_time\nfixed: {SENS_GPS0_DELAY: 80, EKF2_GPS_DELAY: 90}\nvary: {EKF2_ACC_NOISE: [1]}\n"
-    )
+    twice = "{SENS_GPS0_DELAY: 80, EKF2_GPS_DELAY: 90}"
+    file.write_text(f"name: twice\nkind: one_at_a_time\nfixed: {twice}\nvary: {{EKF2_ACC_NOISE: [1]}}\n")
     with pytest.raises(UserError, match="SENS_GPS0_DELAY is what newer releases call EKF2_GPS_DELAY"):
         load_study(file)
