@@ -22,6 +22,7 @@ from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings, W
 from fusetune.analyze.scoring.settings import ScoringSettings
 from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.apply.settings import DecisionSettings
+from fusetune.px4.releases import ReleaseChoice
 from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.running.workflow_files import file_or_packaged
 from fusetune.save.thresholds import VerdictThresholds
@@ -115,12 +116,17 @@ class Configuration:
     health: HealthSettings = section(HealthSettings)
     conformance: ConformanceSettings = section(ConformanceSettings)
     decision: DecisionSettings = section(DecisionSettings)
+    release: ReleaseChoice = setting(
+        "auto",
+        "release of PX4 whose estimator replays the flights; `auto`: of each flight the one that flew, or the nearest "
+        "that is modelled ([docs/releases.md](../docs/releases.md))",
+    )
     seed: int = setting(1, "seed of the bootstrap of the decision", low=0)
 
     @property
     def replay(self) -> ReplaySettings:
         """What is done about a flight before it is replayed."""
-        return ReplaySettings(self.withheld, self.reconstruction, self.start)
+        return ReplaySettings(self.withheld, self.reconstruction, self.start, self.release)
 
     @property
     def located(self) -> Configuration:

@@ -60,9 +60,9 @@ def read_inputs(settings: Configuration, file: AnyPath) -> Inputs:
         A file or the folder of flights cannot be used, or the configuration names a flight that does not exist.
     """
     found = _discovered(settings.flights_dir, file)
-    study, study_file = load_study(settings.study), settings.study
+    study, study_file = load_study(settings.study, settings.release), settings.study
     if study.needs_flights and not (found.logs or found.refused):
-        study, study_file = load_study(settings.demonstration.study), settings.demonstration.study
+        study, study_file = load_study(settings.demonstration.study, settings.release), settings.demonstration.study
         if study.needs_flights:
             reason = f"demonstration.study is {study_file!r}, whose sets follow from flights"
             raise UserError(file, reason, "Name a study with sets of its own")

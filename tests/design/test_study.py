@@ -206,3 +206,20 @@ def test_descriptions_of_several_lines_become_one(tmp_path: Path) -> None:
     study = load_study(write(tmp_path, head + a_set("a") + "  description: |\n   x\n   y\n"))
     assert study.description == "first second"
     assert study.sets[0].description == "x y"
+
+
+def test_what_newer_releases_call_otherwise_is_translated_and_what_they_alone_have_needs_one(tmp_path: Path) -> None:
+    file = tmp_path / "newer.yaml"
+    file.write_text(
+        "name: newer\nkind: grid\nvary: {SENS_GPS0_DELAY: [80, 160], EKF2_ASP_DELAY: [100]}\n"
+        'constraints: ["EKF2_ASP_DELAY < SENS_GPS0_DELAY"]\n'
+    )
+    assert [one.overrides for one in load_study(file).sets] == [{"EKF2_GPS_DELAY": 160.0, "EKF2_ASP_DELAY": 100.0}]
+    file.write_text("name: own\nkind: one_at_a_time\nvary: {EKF2_GPS_MODE: [0, 1]}\n")
+    with pytest.raises(UserError, match=r"EKF2_GPS_MODE: v1\.16 has no such parameter, v1\.17 to main have it"):
+        load_study(file)
+    assert [one.overrides for one in load_study(file, "v1.17").sets] == [{"EKF2_GPS_MODE": 0}, {"EKF2_GPS_MODE": 1}]
+    twice = "{SENS_GPS0_DELAY: 80, EKF2_GPS_DELAY: 90}"
+    file.write_text(f"name: twice\nkind: one_at_a_time\nfixed: {twice}\nvary: {{EKF2_ACC_NOISE: [1]}}\n")
+    with pytest.raises(UserError, match="SENS_GPS0_DELAY is what newer releases call EKF2_GPS_DELAY"):
+        load_study(file)

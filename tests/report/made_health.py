@@ -112,6 +112,8 @@ def write_documents(
         "flight": name,
         "vehicle": "board-4001",
         "firmware": "v1.16.0",
+        "replayed_as": "v1.16",
+        "replayed_why": "",
         "date": "2026-03-01T10:00:00Z",
     }
     found = health_rows() if rows is None else rows

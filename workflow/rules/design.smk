@@ -26,6 +26,7 @@ rule design:
     params:
         contents=contents(INPUTS.study_file, SETTINGS.mission),
         around=lambda wildcards: asdict(present_found())["sets"] if SETS.around else (),
+        release=SETTINGS.release,
         code=DIGEST["design"],
     message:
         f"Design: write the mission plan and {INPUTS.study.name}'s parameter sets"

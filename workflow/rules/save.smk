@@ -18,6 +18,7 @@ rule save_flight:
         code=DIGEST["save"],
         thresholds=asdict(SETTINGS.verdict),
         limits=asdict(SETTINGS.reading),
+        release=SETTINGS.release,
     message:
         "Save: read {wildcards.flight}"
     script:

@@ -16,4 +16,5 @@ with logged_job(snakemake.log[0]):
         # also where the flights lead to no set
         Path(snakemake.output.around[0]).mkdir(parents=True, exist_ok=True)
     around = [ParameterSet(**one) for one in snakemake.params.around]
-    write_design(snakemake.input.mission, snakemake.input.study, Path(snakemake.output.plan).parent, around)
+    folder = Path(snakemake.output.plan).parent
+    write_design(snakemake.input.mission, snakemake.input.study, folder, around, snakemake.params.release)

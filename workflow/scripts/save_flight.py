@@ -15,11 +15,12 @@ keep_out("pandas")
 with logged_job(snakemake.log[0]):
     thresholds = VerdictThresholds(**snakemake.params.thresholds)
     limits = ReadingLimits(**snakemake.params.limits)
-    flown, folder = snakemake.params.flown, snakemake.output[0]
+    flown, folder, release = snakemake.params.flown, snakemake.output[0], snakemake.params.release
     if flown is None:
         check_checksum(snakemake.input.log, RUN_AGAIN)
-        verdict = save_log(snakemake.input.log, folder, thresholds, limits)
+        verdict = save_log(snakemake.input.log, folder, thresholds, limits, release=release)
     else:
         checksum = snakemake.params.checksum
-        verdict = save_log(flown["path"], folder, thresholds, limits, shown=flown["shown"], checksum=checksum)
+        shown = flown["shown"]
+        verdict = save_log(flown["path"], folder, thresholds, limits, shown=shown, checksum=checksum, release=release)
     print(f"{snakemake.wildcards.flight}: {verdict.status}", *verdict.reasons, sep="\n")

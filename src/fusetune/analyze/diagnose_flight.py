@@ -154,7 +154,7 @@ def _told(
     found = asked.about("diagnosis", nothing, lambda: diagnose(observed, effects=tuned))
     track = asked.about("track", None, lambda: _track(observed, is_replayable))
     documents = {
-        HEALTH_FILE: health_document(logged, rows),
+        HEALTH_FILE: health_document(logged, rows, replay=observed.settings),
         EFFECTS_FILE: effects_document(name, effects),
         SENSOR_NOISE_FILE: noise.document(),
         DIAGNOSIS_FILE: {

@@ -15,7 +15,7 @@ import yaml
 from fusetune.design.names import one_line
 from fusetune.design.parameter_check import parameter_problem, typed_values
 from fusetune.px4.aid_sources import MEASURED_SOURCES
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 from fusetune.storage.files import AnyPath, atomic_path
 
 _SIGNIFICANT_DIGITS = 3
@@ -121,7 +121,7 @@ def _problems(candidate: Candidate) -> list[str]:
 
 def _between(parameter: str, value: float, present: float) -> float:
     """Geometric mean; the value itself where there is none."""
-    if value > 0.0 and present > 0.0 and value != present and PARAMETERS[parameter].type == "FLOAT":
+    if value > 0.0 and present > 0.0 and value != present and ALL_PARAMETERS[parameter].type == "FLOAT":
         return rounded(math.sqrt(value * present))
     return value
 

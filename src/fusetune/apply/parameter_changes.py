@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def parameter_changes(
     for name, value in sorted(overrides.items()):
         before = previous[name]
         if np.float32(value) != np.float32(before):
-            metadata = PARAMETERS[name]
+            metadata = ALL_PARAMETERS[name]
             told = (alone or {}).get(name, "")
             changes.append(
                 ParameterChange(name, before, value, metadata.type, metadata.unit, metadata.reboot_required, told)

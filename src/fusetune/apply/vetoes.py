@@ -19,7 +19,7 @@ from fusetune.apply.evidence import AnalyzedFlight
 from fusetune.apply.settings import DecisionSettings
 from fusetune.apply.statistics.rates import rate_ratio
 from fusetune.px4.aid_sources import AXES
-from fusetune.px4.parameters.ekf2_parameters import check_value
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, check_by, metadata_of
 from fusetune.storage.words import texts
 
 FEWEST_FLIGHTS = 2
@@ -163,7 +163,7 @@ def _out_of_range(name: str, flights: Sequence[AnalyzedFlight]) -> list[str]:
         overrides = flight.summary["sets"].get(name, {}).get("overrides", {})
         for parameter, value in sorted(overrides.items()):
             try:
-                check_value(parameter, value)
+                check_by(ALL_PARAMETERS.get(parameter) or metadata_of(parameter), value)
             except ValueError as error:
                 reasons.append(str(error))
         if overrides:

@@ -12,6 +12,7 @@ from fusetune import __version__
 from fusetune.cli import (
     cards,
     compare,
+    compare_releases,
     completion,
     confirm,
     conformance,
@@ -55,6 +56,7 @@ GROUPS: Mapping[str, Mapping[str, Command]] = {
         "save": save,
         "replay": replay,
         "fidelity": fidelity,
+        "compare-releases": compare_releases,
         "confirm": confirm,
     },
     "before a flight": {
@@ -165,7 +167,7 @@ def parser() -> argparse.ArgumentParser:
 def _listed() -> str:
     lines = ["Which EKF2 parameters a PX4 vehicle should fly with, from its flight logs."]
     for group, commands in GROUPS.items():
-        lines += ["", f"{group}:", *(f"  {name:<12} {command.HELP}" for name, command in commands.items())]
+        lines += ["", f"{group}:", *(f"  {name:<16} {command.HELP}" for name, command in commands.items())]
     return "\n".join(lines)
 
 

@@ -13,6 +13,8 @@ EXAMPLES = (("fusetune replay log.ulg --sets sets --out replays --start auto", "
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Log, sets, folder, and how it is replayed."""
+    from fusetune.px4.releases import AUTO, BASELINE, ESTIMATORS, name_of
+
     parser.add_argument("log", type=Path, metavar="LOG.ulg")
     parser.add_argument(
         "--sets",
@@ -33,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--release",
-        default="v1.16",
-        metavar="RELEASE",
-        help="release of PX4 whose estimator replays it: v1.16 (the default), v1.17",
+        choices=(AUTO, *ESTIMATORS),
+        default=name_of(BASELINE),
+        help="of PX4, whose EKF2 it is (%(default)s); auto: the one that flew, or the nearest that is modelled",
     )
 
 
@@ -44,8 +46,13 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.analyze.reconstruction import ReconstructionSettings
     from fusetune.analyze.replaying.replay_log import replay_log
     from fusetune.analyze.replaying.settings import ReplaySettings, StartSettings
+    from fusetune.ekf2.releases.modelled import demand_modelled
+    from fusetune.px4.releases import AUTO
 
+    if options.release != AUTO:
+        demand_modelled(options.release)
     reconstruction = ReconstructionSettings() if options.reconstruct else None
-    settings = ReplaySettings(reconstruction=reconstruction, start=StartSettings(mode=options.start))
-    print("replayed:", *replay_log(options.log, options.sets, options.out, settings, options.release))
+    start = StartSettings(mode=options.start)
+    settings = ReplaySettings(reconstruction=reconstruction, start=start, release=options.release)
+    print("replayed:", *replay_log(options.log, options.sets, options.out, settings))
     return DONE

@@ -11,8 +11,9 @@ from fusetune.design.missions.mission import load_mission
 from fusetune.design.missions.plan_writing import write_mission_plan
 from fusetune.design.parameter_sets import ParameterSet
 from fusetune.design.study import Study, load_study
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS
 from fusetune.px4.parameters.params_file import ParamEntry, ParamsHeader, write_params
+from fusetune.px4.releases import AUTO
 from fusetune.storage.files import atomic_path
 
 AROUND_FOLDER = "around_present"
@@ -23,6 +24,7 @@ def write_design(
     study_file: str | os.PathLike[str],
     folder: str | os.PathLike[str],
     around: Sequence[ParameterSet] = (),
+    release: str = AUTO,
 ) -> None:
     """Write all that a mission and a study lead to: ``<mission>.plan``, ``<set>.params`` and ``sets.parquet``.
 
@@ -32,13 +34,14 @@ def write_design(
     Parameters
     ----------
     around : the sets of such a study, which flights have led to
+    release : of PX4, whose parameters the study may name, as in the configuration
 
     Raises
     ------
     UserError
         The mission or the study is broken.
     """
-    mission, study = load_mission(mission_file), load_study(study_file)
+    mission, study = load_mission(mission_file), load_study(study_file, release)
     target = Path(folder)
     write_mission_plan(mission, target / f"{mission.name}.plan")
     write_study(replace(study, sets=(*study.sets, *around)), target, target / AROUND_FOLDER if study.around else target)
@@ -60,7 +63,7 @@ def write_set_params(study: Study, parameter_set: ParameterSet, path: str | os.P
 
 
 def _entry(name: str, value: float) -> ParamEntry:
-    metadata = PARAMETERS[name]
+    metadata = ALL_PARAMETERS[name]
     unit = f" {metadata.unit}" if metadata.unit else ""
     reboot = "; takes effect after a reboot" if metadata.reboot_required else ""
     return ParamEntry(name, value, metadata.type, (f"{name}: default {metadata.default:.9g}{unit}{reboot}",))

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_value
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, ParameterError, check_by
+from fusetune.px4.parameters.set_names import read_by
+from fusetune.px4.releases import BASELINE, Release
 
 PARAMETER_PATTERN = "^[A-Z0-9_]{1,16}$"
 """Of names of PX4 parameters."""
 
 
-def parameter_problem(name: str, value: float) -> str | None:
-    """What is wrong with a parameter and its value and what was expected, in words; `None` where nothing is."""
+def parameter_problem(name: str, value: float, replayed: Release = BASELINE) -> str | None:
+    """What is wrong with a parameter of a release and its value, and what was expected; `None` where nothing is."""
     try:
-        check_value(name, value)
+        check_by(read_by(name, replayed), value)
     except ParameterError as error:
         return f"{error.name}: {error.reason} – {error.remedy[0].lower()}{error.remedy[1:]}"
     return None
@@ -22,5 +24,5 @@ def parameter_problem(name: str, value: float) -> str | None:
 def typed_values(parameters: Mapping[str, float]) -> dict[str, float]:
     """Known parameters with `int` values where the type is INT32 and `float` values elsewhere."""
     return {
-        name: int(value) if PARAMETERS[name].type == "INT32" else float(value) for name, value in parameters.items()
+        name: int(value) if ALL_PARAMETERS[name].type == "INT32" else float(value) for name, value in parameters.items()
     }

@@ -18,13 +18,15 @@ from typing import Any, Literal
 from fusetune.design.constraints import CONSTRAINT_PATTERN, Constraint
 from fusetune.design.factors import Factor
 from fusetune.design.names import NAME_PATTERN, name_problem, one_line
+from fusetune.design.newer_names import in_known_names
 from fusetune.design.parameter_check import PARAMETER_PATTERN, parameter_problem, typed_values
 from fusetune.design.parameter_sets import ParameterSet, short_name
 from fusetune.design.sampling import points
 from fusetune.design.search_settings import SEARCHED, SearchSettings
 from fusetune.design.tunable_parameters import TUNABLE_PARAMETERS, USUALLY_VARIED, Scale
 from fusetune.errors import UserError
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, PARAMETERS, ParameterError
+from fusetune.px4.releases import AUTO, BASELINE, Release, number_of_name
 from fusetune.set_names import RESERVED_SET_NAMES
 from fusetune.settings.checking import raise_problems, validate
 from fusetune.settings.declaration import built, required, section, setting
@@ -156,13 +158,24 @@ class Study:
         raise KeyError(name)
 
 
-def load_study(path: str | os.PathLike[str]) -> Study:
-    """Read and check a study file; `UserError` as of `read_checked`, and for sets that cannot be told apart or set."""
+def load_study(path: str | os.PathLike[str], release: str = AUTO) -> Study:
+    """Read and check a study file; `UserError` as of `read_checked`, and for sets that cannot be told apart or set.
+
+    Parameters
+    ----------
+    release : of PX4, whose parameters the study may name, as in the configuration. What newer releases only call
+        otherwise is translated; what only some have can be compared where one of them is asked for.
+    """
+    replayed = BASELINE if release == AUTO else number_of_name(release)
     document = read_yaml(path)
     validate({key: document[key] for key in document if key == "kind"}, schema_of(_StudyKind), path)
     validate(document, schema_of(_FILE_OF_KIND[document["kind"]]), path)
     raise_problems(path, _size_problems(document), "Vary fewer parameters, or give them fewer values")
-    raise_problems(path, _parameter_problems(document), REMEDY)
+    try:
+        document = in_known_names(document)
+    except ParameterError as error:
+        raise UserError(path, f"{error.name} {error.reason}", error.remedy) from error
+    raise_problems(path, _parameter_problems(document, replayed), REMEDY)
     sets = tuple(_SETS_OF_KIND[document["kind"]](document))
     raise_problems(path, _name_problems(sets), REMEDY)
     if len(sets) < document.get("number", 0):
@@ -281,9 +294,9 @@ def _size_problems(document: Mapping[str, Any]) -> Iterable[str]:
         yield f"it makes {sets} sets; expected at most {MOST_SETS}"
 
 
-def _parameter_problems(document: Mapping[str, Any]) -> Iterable[str]:
+def _parameter_problems(document: Mapping[str, Any], replayed: Release) -> Iterable[str]:
     for place, name, value in _parameters_with_places(document):
-        problem = parameter_problem(name, value)
+        problem = parameter_problem(name, value, replayed)
         if problem:
             yield f"{place}: {problem}"
     for key in ("vary", "factors"):
@@ -293,7 +306,7 @@ def _parameter_problems(document: Mapping[str, Any]) -> Iterable[str]:
         for value in (value for value, count in Counter(values).items() if count > 1):
             yield f"vary.{name}: the value {value:g} stands more than once"
     for name, entry in document.get("factors", {}).items():
-        yield from _factor_problems(name, entry)
+        yield from _factor_problems(name, entry, replayed)
     for name in document.get("parameters", ()):
         yield from _untunable(name, "parameters")
     yield from _search_problems(document.get("search", {}))
@@ -323,18 +336,18 @@ def _search_problems(search: Mapping[str, Any]) -> Iterable[str]:
             yield from (f"{place}: {problem}" for one in values if (problem := parameter_problem(name, one)))
 
 
-def _factor_problems(name: str, entry: Mapping[str, Any]) -> Iterable[str]:
+def _factor_problems(name: str, entry: Mapping[str, Any], replayed: Release) -> Iterable[str]:
     place = f"factors.{name}"
     low, high, scale = _bounds(name, entry)
-    if name in PARAMETERS and PARAMETERS[name].type == "INT32":
+    if name in ALL_PARAMETERS and ALL_PARAMETERS[name].type == "INT32":
         yield f"{place}: it is a whole number or a switch; expected it in a list or a grid"
         return
     if low is None or high is None:
-        unknown = parameter_problem(name, 0.0) if name not in PARAMETERS else None
+        unknown = parameter_problem(name, 0.0, replayed) if name not in PARAMETERS else None
         yield f"{place}: {unknown or 'no sane range is known of it; expected low and high'}"
         return
     for value in (low, high):
-        problem = parameter_problem(name, value)
+        problem = parameter_problem(name, value, replayed)
         if problem:
             yield f"{place}: {problem}"
     if low >= high:

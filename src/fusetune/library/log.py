@@ -16,6 +16,7 @@ from fusetune.library.diagnosis import DiagnosedFlight, of_observed
 from fusetune.library.parameters import checked_values
 from fusetune.library.replay import Replay
 from fusetune.px4.flight import Flight
+from fusetune.px4.releases import AUTO
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.flight_folder import load_flight
 from fusetune.save.verdict import Verdict
@@ -79,20 +80,23 @@ class Log:
         time_s = (table["timestamp"] - self._flight.start_timestamp) * 1e-6
         return pd.DataFrame({"time_s": time_s, **table})
 
-    def replay(self, parameters: Mapping[str, float] | None = None) -> Replay:
+    def replay(self, parameters: Mapping[str, float] | None = None, *, release: str = AUTO) -> Replay:
         """Fly the log's sensor data through EKF2 again.
 
         Parameters
         ----------
         parameters : those that differ from the log's own, by PX4's names; without any the filter flies as it flew
+        release : whose EKF2 it is, such as "v1.17" or "main"; "auto": that which flew, or the nearest that is modelled
 
         Raises
         ------
         UserError
-            The flight cannot be replayed (`verdict` says why), or PX4 has no such parameter or forbids the value.
+            The flight cannot be replayed (`verdict` says why), the release is not modelled, or it has no such
+            parameter or forbids the value.
         """
-        overrides = checked_values(parameters or {}, "replay")
-        return Replay(self._prepared, overrides, self._flight.start_timestamp)
+        prepared = self._prepared.as_replayed_by(release)
+        overrides = checked_values(parameters or {}, "replay", prepared.replayed.release)
+        return Replay(prepared, overrides, self._flight.start_timestamp)
 
     def diagnose(self, experiments: int = 2) -> DiagnosedFlight:
         """What is wrong with the vehicle, what explains most first.

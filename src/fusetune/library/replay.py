@@ -42,6 +42,11 @@ class Replay:
         return f"<Replay of {self._prepared.flight.name} with {changed or 'the parameters that flew'}>"
 
     @property
+    def release(self) -> str:
+        """The release of PX4 whose EKF2 it is, such as "v1.16" or "main"."""
+        return self._prepared.release
+
+    @property
     def parameters(self) -> dict[str, float]:
         """All EKF2 parameters that were used."""
         return dict(self._params)

@@ -110,6 +110,8 @@ class Flight:
     replaced_parameters: tuple[ReplacedParameter, ...] = ()
     beyond_limits: tuple[str, ...] = ()
     """Topics that were logged but are beyond what a log may ask for (`fusetune.px4.ulog.reading_limits`)."""
+    release_signs: tuple[str, ...] = ()
+    """Flags of the estimator, as they were logged, that tell releases apart (`fusetune.px4.release_signs`)."""
 
     def topic(self, name: str, instance: int = 0) -> TopicTable | None:
         """Columns of one topic instance, or `None` where the log has none."""

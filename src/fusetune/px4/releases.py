@@ -1,4 +1,4 @@
-"""Releases of PX4: those that are read, the one that is replayed, and what only the number of a release tells.
+"""Releases of PX4: those that are read, those whose estimators differ, and what only the number of a release tells.
 
 Most of what differs between releases a log tells itself, by the topics and fields that it has (`px4/layouts/`); the
 parameters of each stand in `px4/parameters/ekf2_parameters.csv`. Here stands the rest: from which release on PX4 does
@@ -6,6 +6,8 @@ otherwise without its logs showing it.
 """
 
 from __future__ import annotations
+
+from typing import Literal, get_args
 
 Release = tuple[int, int] | tuple[int, int, int]
 """Major and minor number, and the patch where it is known; without it, before all patches of its minor number."""
@@ -16,10 +18,19 @@ FIRST, NEWEST = (1, 8), (1, 17)
 READ = tuple((FIRST[0], minor) for minor in range(FIRST[1], NEWEST[1] + 1))
 
 BASELINE = (1, 16)
-"""The release whose estimator is replayed; its topics and parameters are the ones that count."""
+"""The release whose topics and parameters are the ones that count; its estimator is the plain text of the kernels."""
 
 DEVELOPMENT = (NEWEST[0], NEWEST[1] + 1)
 """What `main` counts as."""
+
+AUTO = "auto"
+"""The release that flew, or the nearest to it that is modelled."""
+
+ReleaseChoice = Literal["auto", "v1.13", "v1.14", "v1.15", "v1.16", "v1.17", "main"]
+"""How people say which release's estimator replays a flight."""
+
+ESTIMATORS: tuple[str, ...] = tuple(name for name in get_args(ReleaseChoice) if name != AUTO)
+"""Releases whose estimators differ, from the oldest to the newest; `main` is PX4's development branch."""
 
 CLIPPING_COUNTED = (1, 11)
 """Since then the IMU samples count clipped ones."""
@@ -42,8 +53,13 @@ ALL_HEIGHT_SOURCES = (1, 14)
 NO_MAG_HEADING = (1, 15)
 """Since then no heading of the magnetometer is fused: `heading` then holds its largest field innovation."""
 
+MAG_TYPES_GIVEN_UP = (1, 15)
+"""Since then EKF2_MAG_TYPE is automatic, heading, none or initial; before, 3D and indoor as well."""
+
 VERBOSE_LOG = (1, 16)
 """Since then EKF2_LOG_VERBOSE asks for what replays are compared with."""
+
+MAIN = "main"
 
 DEVIATIONS = (
     ((1, 13), "its EKF2 took the height from one source at a time and had its own logic for heading and GNSS"),
@@ -59,9 +75,14 @@ def name_of(release: Release) -> str:
     return "v" + ".".join(map(str, release))
 
 
+def estimator_name(release: Release) -> str:
+    """A release without its patch, as `ESTIMATORS` names it: ``"v1.16"``; ``"main"`` for what is newer than all."""
+    return MAIN if release[:2] >= DEVELOPMENT else name_of(release[:2])
+
+
 def number_of_name(name: str) -> tuple[int, int]:
-    """The number of a release that `name_of` names, or of ``"main"``."""
-    if name == "main":
+    """The other way round: the major and minor number of ``"v1.16"``, or what `main` counts as."""
+    if name == MAIN:
         return DEVELOPMENT
     major, minor = name.removeprefix("v").split(".")
     return int(major), int(minor)
@@ -77,8 +98,13 @@ def name_of_version(version: int) -> str:
     return f"{name_of((major, minor, patch))}{'-dev' if stage < 64 else suffix}"
 
 
-def deviation_of(release: Release) -> str:
-    """How the estimator of a release differs from the baseline's, in words; empty for the baseline itself."""
-    if release[:2] == BASELINE:
+def deviation_of(release: Release, replayed: Release = BASELINE) -> str:
+    """How the estimator of a release differs from that of another one that replays it, in words; empty where it is it.
+
+    Without the other the baseline's is meant.
+    """
+    if release[:2] == replayed[:2]:
         return ""
+    if replayed[:2] != BASELINE:
+        return f"its EKF2 is {'newer' if release[:2] > replayed[:2] else 'older'}"
     return next((words for last, words in DEVIATIONS if release[:2] <= last), DEVIATIONS[-1][1])

@@ -26,6 +26,7 @@ class FlightResults:
     Attributes
     ----------
     vehicle, firmware, date, mission : as the log tells them; empty where it does not
+    replayed_as, replayed_why : the release of PX4 whose estimator replays it, and why it is not the one that flew
     start_us : of its log, since boot
     diagnoses : what explains most first
     health : rows of the health table
@@ -38,6 +39,8 @@ class FlightResults:
     flight: str
     vehicle: str
     firmware: str
+    replayed_as: str
+    replayed_why: str
     date: str
     mission: str
     start_us: int
@@ -96,7 +99,7 @@ def read_flight_results(folder: AnyPath) -> FlightResults:
     effects = read_as(folder / EFFECTS_FILE, lambda one: tuple(one["effects"]), "the effects on a flight")
 
     def with_health(document: Document) -> FlightResults:
-        names = ("flight", "vehicle", "firmware", "date", "mission")
+        names = ("flight", "vehicle", "firmware", "replayed_as", "replayed_why", "date", "mission")
         named: dict[str, Any] = {name: str(document[name] or "") for name in names}
         return FlightResults(
             **named,

@@ -114,6 +114,7 @@ def load_flight(
         undefined_topics=tuple(document["undefined_topics"]),
         left_out=tuple(LeftOut(*entry) for entry in document["left_out"]),
         beyond_limits=tuple(document.get("beyond_limits", ())),
+        release_signs=tuple(document.get("release_signs", ())),
     )
 
 
@@ -177,6 +178,7 @@ def _metadata(flight: Flight) -> dict[str, Any]:
         "undefined_topics": list(flight.undefined_topics),
         "left_out": [list(entry) for entry in flight.left_out],
         "beyond_limits": list(flight.beyond_limits),
+        "release_signs": list(flight.release_signs),
         "info": {key: _storable(value) for key, value in sorted(flight.info.items())},
         "multi_info": flight.multi_info,
         "parameters": {

@@ -16,6 +16,9 @@ FLIGHTS_SHEET = (
     SheetColumn("failed_checks", "number of checks that failed; each is a row of `checks.csv`"),
     SheetColumn("warning_checks", "number of checks that warn"),
     SheetColumn("firmware", "release of PX4; `unknown` where the log does not say"),
+    SheetColumn(
+        "replayed_as", "release of PX4 whose estimator replays it; of a refused log that could be read, would replay it"
+    ),
     SheetColumn("vehicle", "short name of what flew: board, end of its id, airframe"),
     SheetColumn("vehicle_uuid", "id of the board; empty in simulations and old releases"),
     SheetColumn("vehicle_hardware", "kind of the board"),

@@ -30,6 +30,7 @@ SCHEMA = pa.schema(
         ("warnings", pa.string()),
         ("checks", pa.string()),
         ("firmware", pa.string()),
+        ("replayed_as", pa.string()),
         ("hardware", pa.string()),
         *((name, pa.string()) for name in VehicleIdentity().columns()),
         ("recorded", pa.string()),
@@ -123,6 +124,7 @@ def _row(folder: Path) -> dict[str, Any]:
         "file": metadata["file"],
         "status": verdict["status"],
         "firmware": metadata.get("firmware", "unknown"),
+        "replayed_as": metadata.get("release", {}).get("replayed", ""),
         "hardware": str(metadata.get("hardware", {}).get("ver_hw", "")),
         **{name: str(metadata.get(name, "")) for name in VehicleIdentity().columns()},
         "recorded": metadata.get("recorded", ""),
@@ -134,7 +136,7 @@ def _row(folder: Path) -> dict[str, Any]:
 
 
 def _row_of_refused(entry: RefusedEntry) -> dict[str, Any]:
-    row = dict.fromkeys(("hardware", *VehicleIdentity().columns(), "recorded", "checksum"), "") | {
+    row = dict.fromkeys(("hardware", "replayed_as", *VehicleIdentity().columns(), "recorded", "checksum"), "") | {
         "firmware": "unknown",
         "size_bytes": 0,
     }

@@ -14,11 +14,13 @@ from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.ekf2_parameters import migrate
 from fusetune.px4.parameters.logged_parameters import checked_history
+from fusetune.px4.releases import AUTO, Release
 from fusetune.px4.ulog.reader import file_checksum, read_ulog, takes_too_long
 from fusetune.px4.ulog.reading_limits import ReadingLimits
 from fusetune.save.discovery import printable
 from fusetune.save.flight_folder import METADATA_FILE, write_flight
 from fusetune.save.log_facts import log_facts
+from fusetune.save.replayed_release import replayed_release
 from fusetune.save.thresholds import VerdictThresholds
 from fusetune.save.verdict import Verdict, judge, unreadable
 from fusetune.storage.documents import write_document
@@ -35,6 +37,7 @@ def save_log(
     *,
     shown: str | None = None,
     checksum: str | None = None,
+    release: str = AUTO,
 ) -> Verdict:
     """Save a log: tables, `metadata.json` and `verdict.json`, which `metadata.json` repeats.
 
@@ -55,6 +58,8 @@ def save_log(
         The file as it is told of; its name by default.
     checksum
         SHA-256 that the log has to have. With another one it is refused: it changed after it was asked for.
+    release
+        Whose estimator is asked to replay it, as in the configuration.
 
     Raises
     ------
@@ -67,7 +72,7 @@ def save_log(
     try:
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir(parents=True)
-        source = _Source(Path(log), target.name, shown or printable(Path(log).name), checksum)
+        source = _Source(Path(log), target.name, shown or printable(Path(log).name), checksum, release)
         verdict = _write(source, partial, thresholds or VerdictThresholds(), limits)
         shutil.rmtree(target, ignore_errors=True)
         os.replace(partial, target)
@@ -102,6 +107,7 @@ class _Source:
     flight: str
     shown: str
     checksum: str | None
+    release: str
 
 
 def _demand_own(folder: Path) -> None:
@@ -133,8 +139,15 @@ def _write_readable(
 ) -> Verdict:
     flight = replace(read_ulog(source.log, limits, deadline), name=source.flight)
     _demand_checksum(source, flight.checksum)
-    verdict = _judge(flight, thresholds, deadline)
-    extra = {"file": source.shown, "ekf2_parameters": _present_ekf2(flight), "verdict": verdict.document()}
+    verdict = _judge(flight, thresholds, deadline, source.release)
+    replayed = replayed_release(flight, source.release)
+    release = replayed.document()
+    extra = {
+        "file": source.shown,
+        "release": release,
+        "ekf2_parameters": _present_ekf2(flight, replayed.release),
+        "verdict": verdict.document(),
+    }
     write_flight(folder, flight, extra | log_facts(flight), deadline)
     return verdict
 
@@ -145,17 +158,17 @@ def _demand_checksum(source: _Source, read: str) -> None:
         raise UserError(source.log, reason, "Run the pipeline again when nothing writes to the log any more")
 
 
-def _judge(flight: Flight, thresholds: VerdictThresholds, deadline: Deadline) -> Verdict:
+def _judge(flight: Flight, thresholds: VerdictThresholds, deadline: Deadline, release: str) -> Verdict:
     try:
-        return judge(canonical(flight), thresholds, deadline)
+        return judge(canonical(flight), thresholds, deadline, release)
     except OF_DAMAGE as error:
         reason = f"holds topics that lack fields every release has ({type(error).__name__}: {error})"
         return unreadable(flight.name, UserError(flight.name, reason, "Copy the log from the vehicle again"))
 
 
-def _present_ekf2(flight: Flight) -> dict[str, float]:
-    """EKF2 parameters at the end of the log under the names of the baseline release."""
-    return migrate(checked_history(flight.parameters, flight.release)[0].at_end(), flight.release)
+def _present_ekf2(flight: Flight, replayed: Release) -> dict[str, float]:
+    """EKF2 parameters at the end of the log, as the estimator that replays it reads them."""
+    return migrate(checked_history(flight.parameters, flight.release)[0].at_end(), flight.release, replayed)
 
 
 def _metadata_of_unreadable(source: _Source) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from fusetune.check import Check
 from fusetune.errors import UserError
 from fusetune.finding import Finding, documents, of_severity
 from fusetune.px4.flight import Flight
+from fusetune.px4.releases import AUTO
 from fusetune.save.checks import registry
 from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.thresholds import VerdictThresholds
@@ -57,18 +58,28 @@ class Verdict:
         }
 
 
-def judge(flight: Flight, thresholds: VerdictThresholds | None = None, deadline: Deadline | None = None) -> Verdict:
+def judge(
+    flight: Flight,
+    thresholds: VerdictThresholds | None = None,
+    deadline: Deadline | None = None,
+    release: str = AUTO,
+) -> Verdict:
     """Judge a flight that could be read, in the layout of `fusetune.px4.layouts.release_layouts.canonical`.
 
     Of the checks of the IMU those after a failed one are left out, since they would only say the same again; without
     IMU samples nothing but the log itself is judged.
+
+    Parameters
+    ----------
+    release : whose estimator is asked to replay it, as in the configuration
 
     Raises
     ------
     TimeLimitError
         The deadline passed.
     """
-    judged, deadline = JudgedFlight(flight, thresholds or VerdictThresholds()), deadline or Deadline()
+    judged = JudgedFlight(flight, thresholds or VerdictThresholds(), release)
+    deadline = deadline or Deadline()
     findings = _asked((*registry.OF_THE_LOG, registry.NEEDED), judged, deadline)
     if findings[-1].severity != "fail":
         findings += _asked(registry.OF_THE_IMU, judged, deadline, until_failed=True)

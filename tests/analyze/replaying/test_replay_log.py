@@ -50,7 +50,7 @@ def test_a_replay_that_never_began_says_why(tmp_path, levelled, said):
         diverged=False,
         levelled=levelled,
     )
-    finish_replay(tmp_path, ReplayIdentity("base", {}, {}), summary)
+    finish_replay(tmp_path, ReplayIdentity("base", {}, {}, "v1.16"), summary)
     written = json.loads((tmp_path / "base.json").read_text())
     assert written["status"] == "not_started"
     assert said in written["reason"]

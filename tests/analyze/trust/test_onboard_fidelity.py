@@ -6,6 +6,7 @@ import pytest
 from fusetune.analyze.replaying.samples import AxisSamples
 from fusetune.analyze.trust.onboard_fidelity import judge_onboard_fidelity
 from fusetune.px4.flight import Flight, ParameterHistory
+from fusetune.save.replayed_release import replayed_release
 
 START = 10_000_000
 
@@ -23,7 +24,8 @@ def judged(scale, *, flight=None):
     wave = np.sin(np.arange(600) * 0.7)
     replayed = samples(times, scale * wave)
     onboard = samples(times[::5] + 5_000, wave[::5])
-    return judge_onboard_fidelity(flight or Flight("f"), replayed, onboard)
+    flight = flight or Flight("f")
+    return judge_onboard_fidelity(flight, replayed, onboard, replayed_release(flight, modelled=("v1.16",)))
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.05, 1.6, 3.0])
@@ -82,6 +84,6 @@ def test_log_without_innovations_of_its_own_is_not_compared():
     times = START + 100_000 * np.arange(200)
     replayed = samples(times, np.ones(200))
     onboard = samples(times[:0], np.ones(0))
-    result = judge_onboard_fidelity(Flight("f"), replayed, onboard)
+    result = judge_onboard_fidelity(Flight("f"), replayed, onboard, replayed_release(Flight("f")))
     assert result.median_relative_rms is None
     assert result.axes == ()

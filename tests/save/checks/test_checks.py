@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from tests.save.made_flight import SLOW_HZ, check_of, judged, made_flight
 
-from fusetune.px4.flight import Flight, LeftOut, ParameterChange
+from fusetune.px4.flight import Flight, LeftOut, ParameterChange, ParameterHistory
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.times import ANOTHER_CLOCK
+from fusetune.save.checks import judged_flight
 from fusetune.save.log_facts import is_airborne
+from fusetune.save.replayed_release import replayed_release
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
@@ -198,14 +201,19 @@ def test_parameters_that_change_in_flight() -> None:
         (0x011001FF, "pass", "v1.16.1"),
         (0x010F00FF, "warning", "terrain in a filter of its own"),
         (0x010E00FF, "warning", "another error state"),
-        (0x010D03FF, "warning", "one source at a time"),
+        (0x010D03FF, "warning", "v1.16 is the nearest of those: its EKF2 took the height from one source at a time"),
+        (0x010800FF, "warning", "older than all releases whose estimator is modelled"),
         (0x011100FF, "warning", "is newer"),
         (0, "warning", "does not say which release"),
     ],
 )
-def test_firmware_whose_behaviour_is_not_modelled_is_named(version: int, status: str, said: str) -> None:
+def test_firmware_whose_behaviour_is_not_modelled_is_named(
+    version: int, status: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(judged_flight, "replayed_release", partial(replayed_release, modelled=("v1.16",)))
     flight = made_flight()
-    flight.info["ver_sw_release"] = version
+    # without parameters its number alone tells
+    flight = replace(flight, parameters=ParameterHistory(), info={"ver_sw_release": version})
     check = check_of(flight, "firmware")
     assert check.severity == status
     assert said in check.found

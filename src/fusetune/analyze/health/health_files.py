@@ -16,6 +16,7 @@ from fusetune.px4.flight import Flight
 from fusetune.px4.vehicle_identity import vehicle_identity
 from fusetune.save.flight_folder import load_flight
 from fusetune.save.log_facts import recorded_at
+from fusetune.save.replayed_release import replayed_release
 from fusetune.storage.documents import read_as, write_document
 from fusetune.storage.files import AnyPath, atomic_path
 from fusetune.storage.parquet import write_table
@@ -40,12 +41,17 @@ _OF_FLIGHT = ("flight", "vehicle", "firmware", "date", "mission")
 _OF_ROW = ("id", "group", "instance", "origin", "severity", "figure", "threshold", "unit")
 
 
-def health_document(logged: Flight, rows: Iterable[HealthRow], mission: str = "") -> dict[str, Any]:
+def health_document(
+    logged: Flight, rows: Iterable[HealthRow], mission: str = "", replay: ReplaySettings = IN_USE
+) -> dict[str, Any]:
     """The table of a flight as JSON holds it: what the flight is, and its rows as findings, times in µs since boot."""
+    replayed = replayed_release(logged, replay.release)
     return {
         "flight": logged.name,
         "vehicle": vehicle_identity(logged).name,
         "firmware": logged.release_name,
+        "replayed_as": replayed.name,
+        "replayed_why": replayed.reason,
         "date": recorded_at(logged),
         "mission": mission,
         "start_us": int(logged.start_timestamp),
@@ -87,7 +93,7 @@ def write_health(
         The saved flight is missing or damaged.
     """
     logged = load_flight(flight_folder, topics=HEALTH_TOPICS)
-    document = health_document(logged, health_rows(ObservedFlight(logged, replay), settings), mission)
+    document = health_document(logged, health_rows(ObservedFlight(logged, replay), settings), mission, replay)
     with atomic_path(output_file) as temporary:
         write_document(temporary, document)
 

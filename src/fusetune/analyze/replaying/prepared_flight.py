@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,8 +23,9 @@ from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings, StartSet
 from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, Start, choose_start
 from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
-from fusetune.ekf2.filter.common.parameters import complete, parameters_beside
+from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.releases.behaviours import BASELINE
+from fusetune.ekf2.releases.modelled import demand_modelled
 from fusetune.ekf2.replay.recording import FULL, RecordArrays, Recording
 from fusetune.ekf2.replay.replay import replay, replay_into
 from fusetune.ekf2.replay.results import Gap, ReplayResult, ReplaySummary
@@ -31,6 +33,8 @@ from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.logged_state import Handover, logged_handovers
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.releases import AUTO
+from fusetune.save.replayed_release import ReplayedRelease, replayed_release
 
 Summary = TypeVar("Summary", bound=ReplaySummary)
 
@@ -54,24 +58,29 @@ class PreparedFlight:
     handovers: tuple[Handover, ...] = ()
     release: str = BASELINE
     """Whose estimator replays it."""
+    asked_release: str = ""
+    """As in `ReplaySettings`; empty where just this one is meant."""
+
+    @cached_property
+    def replayed(self) -> ReplayedRelease:
+        """Whose estimator replays it, and why."""
+        found = replayed_release(self.flight, self.asked_release or self.release)
+        return found if found.name == self.release else replayed_release(self.flight, self.release)
 
     def parameters(self, overrides: Mapping[str, float]) -> dict[str, float]:
         """A complete set: the log's own parameters, but for some."""
-        beside, logged = parameters_beside(self.release), self.flight.parameters.initial
-        common = {name: value for name, value in overrides.items() if name not in beside}
-        own = {name: float({**logged, **overrides}[name]) for name in beside if name in logged or name in overrides}
-        return complete(logged, common, self.flight.release) | own
+        return complete(self.flight.parameters.initial, overrides, self.flight.release, replayed=self.replayed.release)
 
     def course_of(self, overrides: Mapping[str, float]) -> tuple[Any, ...]:
         """What the replay of a set follows from beside the flight: sets that have it in common have one replay.
 
         Returns
         -------
-        Its parameters, and which of their changes in flight are applied to it
+        The release whose estimator does it, its parameters, and which of their changes in flight are applied to it
         """
         params = self.parameters(overrides)
         changed = {change.name for _, change in self.inputs.parameter_changes}
-        return (*sorted(params.items()), *sorted(changed - {*overrides}))
+        return (self.release, *sorted(params.items()), *sorted(changed - {*overrides}))
 
     def replay(
         self,
@@ -103,8 +112,11 @@ class PreparedFlight:
 
     def _shared(self) -> dict[str, Any]:
         return {
-            "start": self.start.state, "gaps": self.gaps, "handovers": self.handovers, "release": self.release,
-        }  # fmt: skip
+            "start": self.start.state,
+            "gaps": self.gaps,
+            "handovers": self.handovers,
+            "release": self.release,
+        }
 
     def _with_measured_gaps(self, summary: Summary, params: Mapping[str, float]) -> Summary:
         if not summary.gaps or not self.reconstructed.changed:
@@ -121,6 +133,19 @@ class PreparedFlight:
     def with_stream(self, reconstructed: ReconstructedFlight) -> PreparedFlight:
         """The same flight, started alike, with another sensor stream."""
         return dataclasses.replace(self, inputs=build_inputs(reconstructed.flight), reconstructed=reconstructed)
+
+    def as_replayed_by(self, release: str) -> PreparedFlight:
+        """The same flight, to be replayed by another release's estimator; "auto" is the one that flew, or the nearest.
+
+        Raises
+        ------
+        UserError
+            The release is not modelled.
+        """
+        if release != AUTO:
+            demand_modelled(release)
+        chosen = replayed_release(self.flight, release).name
+        return dataclasses.replace(self, release=chosen, asked_release=release)
 
     def with_flight(self, flight: Flight) -> PreparedFlight:
         """The same flight with other topics of its log which no replay reads."""
@@ -154,8 +179,8 @@ class PreparedFlight:
     def description(self, result: ReplaySummary) -> dict[str, Any]:
         """For the summary of a replay: how it started and what was reconstructed."""
         warm = result.warm_start_us is not None
-        release = {} if self.release == BASELINE else {"release": self.release}
-        return release | {
+        return {
+            "release": self.replayed.document(),
             "start": {"mode": WARM if warm else COLD, "why": self.start.why, "time_us": result.warm_start_us},
             "reconstruction": [asdict(step) for step in self.reconstructed.steps],
             "handover_timestamps": [one.time_us for one in self.handovers],
@@ -172,7 +197,7 @@ def prepare_flight(flight: Flight, settings: ReplaySettings = IN_USE) -> Prepare
     """
     flight = canonical(flight)
     gaps = plan_gaps(flight, airborne_intervals(flight, {}), settings.withholding) if settings.withholding else ()
-    return prepare(flight, settings.reconstruction, settings.start, gaps)
+    return prepare(flight, settings.reconstruction, settings.start, gaps, settings.release)
 
 
 def prepare(
@@ -180,12 +205,14 @@ def prepare(
     reconstruction: ReconstructionSettings | None = None,
     start: StartSettings | None = None,
     gaps: Sequence[Gap] = (),
+    release: str = BASELINE,
 ) -> PreparedFlight:
-    """Reconstruct the sensor stream of a canonical flight and choose how its replays start.
+    """Reconstruct the sensor stream of a canonical flight; choose how its replays start and whose estimator does them.
 
-    `None` leaves the stream as it was logged, and starts cold.
+    `None` leaves the stream as it was logged, and starts cold. `release` as in `ReplaySettings`.
     """
     chosen = Start(None, "asked for") if start is None else choose_start(flight, start)
     reconstructed = as_logged(flight) if reconstruction is None else reconstruct(flight, reconstruction, chosen.state)
     handovers = logged_handovers(flight)
-    return PreparedFlight(flight, build_inputs(reconstructed.flight), reconstructed, chosen, tuple(gaps), handovers)
+    inputs, replayed = build_inputs(reconstructed.flight), replayed_release(flight, release).name
+    return PreparedFlight(flight, inputs, reconstructed, chosen, tuple(gaps), handovers, replayed, release)

@@ -56,7 +56,9 @@ def replay_set(
     params = prepared.parameters(overrides)
     kept = _Kept(recording)
     summary = prepared.replay_into(kept.take, params, frozenset(overrides), recording)
-    document = summary_document(ReplayIdentity(name, overrides, params, prepared.description(summary)), summary)
+    document = summary_document(
+        ReplayIdentity(name, overrides, params, prepared.release, prepared.description(summary)), summary
+    )
     parameters = values_of(document, "params")
     changed = prepared.reconstructed.changed
     measured = partial(prepared.measured, params=params, of=summary) if changed else None
@@ -162,7 +164,9 @@ def write_replay(
         summary = prepared.replay_into(take, values, frozenset(overrides))
         if told_apart:
             writer.write_spooled(lambda rows: prepared.measured(rows, values, summary))
-    finish_replay(folder, ReplayIdentity(name, overrides, values, prepared.description(summary)), summary)
+    finish_replay(
+        folder, ReplayIdentity(name, overrides, values, prepared.release, prepared.description(summary)), summary
+    )
     return summary
 
 

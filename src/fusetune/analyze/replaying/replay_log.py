@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from fusetune.analyze.replaying.prepared_flight import prepare
 from fusetune.analyze.replaying.replay_flight import write_replay
 from fusetune.analyze.replaying.set_input import read_set_files
 from fusetune.analyze.replaying.settings import ReplaySettings
-from fusetune.ekf2.releases.behaviours import BASELINE
-from fusetune.ekf2.releases.modelled import demand_modelled
 from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.px4.layouts.estimator_instances import of_one_instance
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.ulog.reader import read_ulog
+from fusetune.save.replayed_release import replayed_release
 from fusetune.storage.files import AnyPath
 
 
@@ -23,7 +21,6 @@ def replay_log(
     sets_folder: AnyPath,
     output_folder: AnyPath,
     settings: ReplaySettings | None = None,
-    release: str = BASELINE,
 ) -> list[str]:
     """Replay every set that a folder holds as `SET.json` on one ULog file.
 
@@ -32,9 +29,8 @@ def replay_log(
     Parameters
     ----------
     settings : ReplaySettings, optional
-        By default the samples are used as they were logged, and the filter starts from nothing. No gaps are made.
-    release : str
-        Whose estimator replays it; the sets may name parameters of that release.
+        By default the samples are used as they were logged, and the filter, that of v1.16, starts from nothing. No
+        gaps are made.
 
     Returns
     -------
@@ -44,17 +40,16 @@ def replay_log(
     Raises
     ------
     UserError
-        The log cannot be read, a set file is not usable, or the release is not modelled.
+        The log cannot be read, or a set file is not usable.
     """
-    demand_modelled(release)
-    sets = read_set_files(sets_folder, release)
-    Path(output_folder).mkdir(parents=True, exist_ok=True)
     settings = settings or ReplaySettings()
     flight = read_ulog(log)
+    sets = read_set_files(sets_folder, replayed_release(flight, settings.release).release)
+    Path(output_folder).mkdir(parents=True, exist_ok=True)
     # as PX4's own replay does where nothing is asked for: one estimator instance, from its sensors
     flown = flight if settings.reconstruction is not None else of_one_instance(flight)
     try:
-        prepared = replace(prepare(canonical(flown), settings.reconstruction, settings.start), release=release)
+        prepared = prepare(canonical(flown), settings.reconstruction, settings.start, release=settings.release)
     except OF_DAMAGE as error:
         reason = f"cannot be replayed ({type(error).__name__}: {error})"
         raise UserError(log, reason, "See what the command `fusetune save` says of it") from error

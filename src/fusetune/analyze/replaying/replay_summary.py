@@ -8,16 +8,15 @@ from typing import Any
 
 from fusetune.ekf2.replay.results import ReplaySummary
 
-BASELINE = "v1.16"
-
 
 @dataclass(frozen=True)
 class ReplayIdentity:
-    """What was replayed."""
+    """What was replayed, and whose estimator did it."""
 
     set: str
     overrides: Mapping[str, float]
     params: Mapping[str, float]
+    version: str
     inputs: Mapping[str, Any] | None = None
     """How the replay started and what was reconstructed for it; stands in the JSON file."""
 
@@ -31,7 +30,7 @@ def summary_document(identity: ReplayIdentity, result: ReplaySummary) -> dict[st
     if result.origin is not None:
         origin = dict(zip(("latitude_deg", "longitude_deg", "altitude_m"), result.origin, strict=True))
     return {
-        "version": BASELINE,
+        "version": identity.version,
         "set": identity.set,
         "overrides": dict(identity.overrides),
         "status": status,

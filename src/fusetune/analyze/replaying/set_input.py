@@ -4,28 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from fusetune.ekf2.filter.common.parameters import parameters_beside
-from fusetune.ekf2.releases.behaviours import BASELINE
 from fusetune.errors import UserError
-from fusetune.px4.parameters.ekf2_parameters import (
-    ALL_PARAMETERS,
-    PARAMETERS,
-    ParameterError,
-    ParameterMetadata,
-    metadata_of,
-    number_of,
-)
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, ParameterError, number_of
 from fusetune.px4.parameters.logged_parameters import flown_limits, typed_value
-from fusetune.px4.releases import number_of_name
+from fusetune.px4.parameters.set_names import of_vehicle, read_by
+from fusetune.px4.releases import BASELINE, Release
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 
 WRITTEN_BACK = "EKF2_MAG_DECL"
 """The estimator writes this one back once it knows its place, so a recorded set holds the value at the end."""
 
-OF_DRIVERS = "SENS_"
-"""So parameters of the sensors' drivers begin, some of which took over from EKF2's; no estimator reads them."""
+_OF_SENSORS = "SENS_"
+"""How parameters begin that a vehicle of another release has beside EKF2's, and some of which took over from them."""
 
 FORM = 'Expected {"params": {NAME: number, …}, "overrides": {NAME: number, …}}'
 
@@ -41,60 +34,61 @@ def existing_folder(folder: AnyPath, remedy: str) -> Path:
     return folder
 
 
-def read_set_files(folder: AnyPath, release: str = BASELINE) -> dict[str, SetValues]:
-    """Read every `SET.json` of a folder, in order of name; they may name parameters that a release has.
+def read_set_files(folder: AnyPath, replayed: Release = BASELINE) -> dict[str, SetValues]:
+    """Read every `SET.json` of a folder, in order of name.
+
+    Parameters
+    ----------
+    replayed : the release whose estimator is to have them
 
     Raises
     ------
     UserError
-        There is no such folder, it holds no set, or a file is no set of parameters that the baseline release has.
+        There is no such folder, it holds no set, or a file is no set of parameters that this release has.
     """
     folder = existing_folder(folder, "Name the folder that holds the parameter sets")
     files = sorted(folder.glob("*.json"))
     if not files:
         raise UserError(folder, "holds no parameter set", "Put one SET.json with a params object per set there")
-    return {file.stem: read_set_file(file, release) for file in files}
+    return {file.stem: read_set_file(file, replayed) for file in files}
 
 
-def read_set_file(file: AnyPath, release: str = BASELINE) -> SetValues:
+def read_set_file(file: AnyPath, replayed: Release = BASELINE) -> SetValues:
     """Read one set; a summary that a replay wrote is one, too.
-
-    What the release has beside the baseline's, and its estimator does not read, is left out.
 
     Raises
     ------
     UserError
-        The file is no set of parameters that the baseline release has.
+        The file is no set of parameters that the release has.
     """
     content = read_document(file, remedy=FORM, sealed=False)
-    params, overrides = (_numbers(file, content.get(part, {}), release) for part in ("params", "overrides"))
+    params, overrides = (_numbers(file, content.get(part, {}), replayed) for part in ("params", "overrides"))
     params.pop(WRITTEN_BACK, None)
     return params, overrides
 
 
-def _numbers(file: AnyPath, values: object, release: str) -> dict[str, float]:
+def _numbers(file: AnyPath, values: object, replayed: Release) -> dict[str, float]:
     if not isinstance(values, Mapping):
         raise UserError(file, "is no parameter set: it holds something else than names and numbers", FORM)
     try:
-        known = {name: _metadata(name, release) for name in values}
-        numbers = {name: number_of(metadata, values[name]) for name, metadata in known.items() if metadata}
+        numbers = {name: _number(name, value, replayed) for name, value in values.items()}
     except (ParameterError, OverflowError) as error:
         reason, remedy = (error.reason, error.remedy) if isinstance(error, ParameterError) else (str(error), FORM)
         name = f"{error.name}: " if isinstance(error, ParameterError) else ""
         raise UserError(file, f"{name}{reason}", remedy) from error
     for name, number in numbers.items():
-        if name in PARAMETERS and typed_value(name, number) is None:
+        if name in ALL_PARAMETERS and typed_value(name, number) is None:
             low, high = flown_limits(name)
             raise UserError(
                 file, f"{name} = {number:g} is nothing that can be flown", f"Give a number from {low:g} to {high:g}"
             )
-    return numbers
+    return of_vehicle(numbers, replayed)
 
 
-def _metadata(name: str, release: str) -> ParameterMetadata | None:
-    """Metadata of a parameter; None where the release has it beside the baseline, and does not read it."""
-    if release != BASELINE and name.startswith(OF_DRIVERS):
-        return None
-    if name in PARAMETERS or name not in ALL_PARAMETERS or not ALL_PARAMETERS[name].exists_in(number_of_name(release)):
-        return metadata_of(name)
-    return ALL_PARAMETERS[name] if name in parameters_beside(release) else None
+def _number(name: str, value: Any, replayed: Release) -> float:
+    known = ALL_PARAMETERS.get(name)
+    if known is not None and replayed != BASELINE and known.exists_in(replayed):
+        return number_of(known, value)
+    if known is None and replayed != BASELINE and name.startswith(_OF_SENSORS) and isinstance(value, int | float):
+        return float(value)  # of the sensors, which a vehicle of that release has beside EKF2's
+    return number_of(read_by(name, replayed), value)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
+from fusetune.px4.releases import ReleaseChoice
 from fusetune.settings.declaration import setting
 
 
@@ -71,15 +72,17 @@ class ReplaySettings:
     withholding : gaps that are made in the sensors; None: no gaps
     reconstruction : what is done about a thinned log; None: the samples are used as they were logged
     start : how the filter starts; None: from nothing
+    release : whose estimator replays the flight; "auto": that of the release that flew, or the nearest modelled one
     """
 
     withholding: WithholdingSettings | None = None
     reconstruction: ReconstructionSettings | None = None
     start: StartSettings | None = None
+    release: ReleaseChoice = "v1.16"
 
 
-IN_USE = ReplaySettings(WithholdingSettings(), ReconstructionSettings(), StartSettings())
+IN_USE = ReplaySettings(WithholdingSettings(), ReconstructionSettings(), StartSettings(), "auto")
 """The default configuration."""
 
-WITHOUT_GAPS = ReplaySettings(None, ReconstructionSettings(), StartSettings())
+WITHOUT_GAPS = ReplaySettings(None, ReconstructionSettings(), StartSettings(), "auto")
 """The log is repaired and started as the pipeline does it; what a filter predicts without a sensor is not asked."""

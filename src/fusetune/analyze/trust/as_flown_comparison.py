@@ -14,7 +14,6 @@ from fusetune.analyze.replaying.prepared_flight import PreparedFlight
 from fusetune.analyze.trust.as_flown_figures import AsFlownFigures, as_flown_figures, compared_rows
 from fusetune.analyze.trust.settings import FALLING, TrustSettings
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 from fusetune.px4.flight import Flight
@@ -50,7 +49,6 @@ class AsFlownComparison:
 
     def __init__(self, flight: Flight, settings: TrustSettings):
         self.flight, self.settings = flight, settings
-        self.params = complete(flight.parameters.initial, {}, flight.release)
         self.onboard = onboard_samples(flight)
         self.intervals: tuple[Interval, ...] | None = None
         self._done: list[tuple[PreparedFlight, AsFlownFigures]] = []
@@ -66,10 +64,11 @@ class AsFlownComparison:
             if _is_same_course(prepared, other):
                 return figures
         give_back_freed_memory()
-        result, measured = done or prepared.replay(self.params, keep=compared_rows(self.onboard))
+        result, measured = done or prepared.replay(prepared.parameters({}), keep=compared_rows(self.onboard))
         if self.intervals is None:
             self.intervals = self._compared(result)
-        figures = as_flown_figures(result, measured, self.flight, self.intervals, self.onboard)
+        replayed = prepared.replayed.release
+        figures = as_flown_figures(result, measured, self.flight, self.intervals, self.onboard, replayed)
         # other samples than those in use are not worth their memory
         if not self._done or prepared.inputs is self._done[0][0].inputs:
             self._done.append((prepared, figures))
@@ -95,4 +94,4 @@ class AsFlownComparison:
 def _is_same_course(one: PreparedFlight, other: PreparedFlight) -> bool:
     """Whether two prepared flights give the same replay, as where the one in use starts from nothing anyway."""
     same = ((one.inputs, other.inputs), (one.start.state, other.start.state), (one.handovers, other.handovers))
-    return all(left is right for left, right in same)
+    return one.release == other.release and all(left is right for left, right in same)

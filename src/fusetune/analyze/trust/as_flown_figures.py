@@ -24,7 +24,7 @@ from fusetune.ekf2.replay.recording import RecordArrays, with_fields
 from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.px4.aid_sources import HORIZONTAL_AIDING
 from fusetune.px4.flight import Flight
-from fusetune.px4.releases import ALL_HEIGHT_SOURCES
+from fusetune.px4.releases import ALL_HEIGHT_SOURCES, BASELINE, Release
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,7 @@ def as_flown_figures(
     flight: Flight,
     intervals: tuple[Interval, ...],
     onboard: Mapping[SourceAxis, AxisSamples] | None = None,
+    replayed: Release = BASELINE,
 ) -> AsFlownFigures:
     """Compare a replay with the log of the vehicle's own estimator.
 
@@ -81,6 +82,7 @@ def as_flown_figures(
     flight : in the layout of `fusetune.px4.layouts.release_layouts.canonical`
     intervals : parts of the flight that are compared, µs
     onboard : the vehicle's innovations; by default those of its primary instance
+    replayed : the release whose estimator did it
     """
     onboard = onboard_samples(flight) if onboard is None else onboard
     local = LocalPositions(result, flight, intervals)
@@ -92,14 +94,15 @@ def as_flown_figures(
         height_m=local.height(),
         vertical_velocity_m_s=local.vertical_velocity(),
         flags_equal=flags.mean_share_equal(COMPARED_FLAGS),
-        height_flags_equal=flags.share_all_equal(HEIGHT_FLAGS, beside=_has_one_height_source(flight)),
+        height_flags_equal=flags.share_all_equal(HEIGHT_FLAGS, beside=_has_fewer_height_sources(flight, replayed)),
         compared_s=sum(stop - start for start, stop in intervals) * 1e-6,
         resets=local.resets(),
     )
 
 
-def _has_one_height_source(flight: Flight) -> bool:
-    return flight.release is not None and flight.release < ALL_HEIGHT_SOURCES
+def _has_fewer_height_sources(flight: Flight, replayed: Release) -> bool:
+    """Whether the vehicle's estimator took its height from one source at a time, and that of the replay does not."""
+    return flight.release is not None and flight.release < ALL_HEIGHT_SOURCES <= replayed
 
 
 def compared_rows(onboard: Mapping[SourceAxis, AxisSamples]) -> Callable[[RecordArrays], RecordArrays]:

@@ -193,7 +193,7 @@ def _reason(limits: Sequence[Finding], causes: Sequence[Finding]) -> str:
 def _as_logged(flight: Flight, prepared: PreparedFlight, replay: ReplaySettings) -> PreparedFlight:
     """The flight as the log is, replayed from nothing; where nothing was missing, with the samples of `prepared`."""
     if replay.reconstruction is None or prepared.reconstructed.changed:
-        return prepare(flight)
+        return prepare(flight, release=prepared.replayed.asked)
     return dataclasses.replace(prepared, start=Start(None, "asked for"), handovers=())
 
 

@@ -91,7 +91,7 @@ def _causes(
         lost_to_gnss = max(halved - reached, 0.0)
         words = f"GNSS logged at {rate:.1f} Hz (cost of halving it once more)"
         yield cause(gnss, words, lost_to_gnss, repaired=False, measured=True)
-    if words := other_release(flight):
+    if words := other_release(flight, prepared.replayed):
         yield cause(firmware, words, max(reached - lost_to_gnss, 0.0), repaired=False, measured=False)
 
 
@@ -99,7 +99,8 @@ def without_repair(prepared: PreparedFlight, replay: ReplaySettings, topic: str)
     """The same flight with one sensor's samples as they were logged."""
     if topic == IMU and replay.reconstruction is not None:
         # what is done about the magnetometer follows from the IMU
-        return prepare(prepared.flight, dataclasses.replace(replay.reconstruction, imu=False), replay.start)
+        reconstruction = dataclasses.replace(replay.reconstruction, imu=False)
+        return prepare(prepared.flight, reconstruction, replay.start, release=prepared.replayed.asked)
     reconstructed = prepared.reconstructed
     measured = {name: mask for name, mask in reconstructed.measured.items() if name != topic}
     return prepared.with_stream(_with_table(reconstructed, topic, prepared.flight.topics[topic, 0], measured))

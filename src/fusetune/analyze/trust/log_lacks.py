@@ -26,21 +26,23 @@ from fusetune.save.checks.imu import imu_coverage
 from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.checks.log import firmware
 from fusetune.save.checks.magnetometer import magnetometer
+from fusetune.save.replayed_release import ReplayedRelease
 
 FULL_MAG_RATE_HZ, FULL_BARO_RATE_HZ, FULL_GNSS_RATE_HZ = 20.0, 10.0, 4.5
 FULL_COVERAGE = 0.995
 MID_AIR_START_S = 10.0
 
 
-def log_lacks(flight: Flight) -> tuple[Finding, ...]:
+def log_lacks(flight: Flight, replayed: ReplayedRelease) -> tuple[Finding, ...]:
     """What keeps a replay of this log from repeating the flight, in the order in which it usually matters.
 
-    The findings have the ids of the verdict's checks that tell of the same things.
+    The findings have the ids of the verdict's checks that tell of the same things. `replayed` says whose estimator
+    replays it.
     """
-    return tuple(_lacks(flight))
+    return tuple(_lacks(flight, replayed))
 
 
-def _lacks(flight: Flight) -> Iterator[Finding]:
+def _lacks(flight: Flight, replayed: ReplayedRelease) -> Iterator[Finding]:
     imu = flight.topic("sensor_combined")
     if imu is not None and len(imu["timestamp"]) > 1:
         span_us = float(imu["timestamp"][-1] - imu["timestamp"][0])
@@ -64,7 +66,7 @@ def _lacks(flight: Flight) -> Iterator[Finding]:
             found = f"the log starts {lead_s:.0f} s before take-off, so the replayed filter has to align in the air"
             remedy = "" if logs_from_boot(flight.parameters.at_end()) else SET_LOG_FROM_BOOT
             yield log_start.warned(found, remedy, lead_s, MID_AIR_START_S)
-    if found := other_release(flight):
+    if found := other_release(flight, replayed):
         yield firmware.warned(found, "")
 
 

@@ -25,6 +25,7 @@ from fusetune.analyze.trust.log_lacks import log_lacks
 from fusetune.finding import Finding
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight
+from fusetune.save.replayed_release import ReplayedRelease
 from fusetune.set_names import AS_FLOWN
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
@@ -80,14 +81,17 @@ def write_flight_fidelity(prepared: PreparedFlight, analyze_folder: AnyPath, gra
         If the file of the replay is missing or damaged.
     """
     replayed = read_innovations(table_file(analyze_folder, AS_FLOWN, "innovations"), {})
-    result = judge_onboard_fidelity(prepared.flight, replayed, onboard_samples(prepared.flight))
+    result = judge_onboard_fidelity(prepared.flight, replayed, onboard_samples(prepared.flight), prepared.replayed)
     document = asdict(result) | {"grade": grade.grade, "trust": asdict(grade)}
     with atomic_path(Path(analyze_folder) / FIDELITY_FILE) as path:
         write_document(path, document)
 
 
 def judge_onboard_fidelity(
-    flight: Flight, ours: Mapping[SourceAxis, AxisSamples], theirs: Mapping[SourceAxis, AxisSamples]
+    flight: Flight,
+    ours: Mapping[SourceAxis, AxisSamples],
+    theirs: Mapping[SourceAxis, AxisSamples],
+    replayed: ReplayedRelease,
 ) -> OnboardFidelity:
     """Compare the as-flown replay with the vehicle's own innovations.
 
@@ -95,6 +99,7 @@ def judge_onboard_fidelity(
     ----------
     flight : canonical, for the reasons
     ours, theirs : innovations of the replay and of the vehicle, by source and axis
+    replayed : whose estimator did it
     """
     since = warm_from(ours)
     axes = tuple(
@@ -106,7 +111,7 @@ def judge_onboard_fidelity(
         and (axis := _compare_axis(source, number, ours[source, number], theirs[source, number], since)) is not None
     )
     median = float(np.median([axis.relative_rms for axis in axes])) if axes else None
-    return OnboardFidelity(flight.name, median, axes, log_lacks(flight))
+    return OnboardFidelity(flight.name, median, axes, log_lacks(flight, replayed))
 
 
 def warm_from(ours: Mapping[SourceAxis, AxisSamples]) -> int:

@@ -8,7 +8,7 @@ from fusetune.analyze.trust.as_flown_figures import AsFlownFigures
 from fusetune.analyze.trust.settings import TrustSettings
 from fusetune.finding import Finding, Severity
 from fusetune.px4.flight import Flight
-from fusetune.px4.releases import BASELINE, name_of
+from fusetune.save.replayed_release import ReplayedRelease
 
 FIGURE_NAMES = {
     "innovation_factor": "the size of the innovations",
@@ -87,8 +87,11 @@ def not_compared(names: Sequence[str]) -> Finding:
     return Finding("not_compared", "warning", f"the log does not let {listed} be compared", figure=float(len(names)))
 
 
-def other_release(flight: Flight) -> str:
+def other_release(flight: Flight, replayed: ReplayedRelease) -> str:
     """That the vehicle flew another release than the one that is replayed; empty where it did not, or is not known."""
-    if flight.release is None or flight.release[:2] == BASELINE:
+    if replayed.flown.release is None or replayed.flew:
         return ""
-    return f"the vehicle flew {flight.release_name}, the replay behaves like {name_of(BASELINE)}"
+    flown = flight.release_name
+    if flown == "unknown" or not flown.startswith(replayed.flown.name):
+        flown = replayed.flown.name
+    return f"the vehicle flew {flown}, the replay behaves like {replayed.name}"

@@ -23,6 +23,7 @@ from fusetune.px4.parameters.logged_parameters import is_read
 from fusetune.px4.releases import BASELINE, Release
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.log_facts import is_airborne
+from fusetune.save.replayed_release import replayed_release
 from fusetune.set_names import AS_FLOWN
 from fusetune.storage.files import AnyPath
 
@@ -142,8 +143,8 @@ def compare_replayed(original: AnyPath, replayed: AnyPath, asked: AnyPath | None
     parameters = tuple(_parameters(flown, again, wanted))
     canonical_flown, canonical_again = canonical(flown), canonical(again)
     _demand_same_flight(canonical_flown, canonical_again, replayed, original)
-    # PX4's replay has what was logged and nothing else, and starts from nothing
-    prepared = prepare(canonical_flown)
+    # PX4's replay has what was logged and nothing else, starts from nothing, and is of the release that made it
+    prepared = prepare(canonical_flown, release=replayed_release(canonical_again).name)
     changed = _changed(flown, again)
     errors = tuple(_errors(prepared, canonical_again, changed))
     if not errors:

@@ -11,12 +11,13 @@ import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from types import MappingProxyType
 from typing import Literal
 
 from fusetune.px4.parameters.parameter_migration import SENSOR_PARAMETERS, migrate_names
-from fusetune.px4.releases import BASELINE, Release, name_of, number_of_name
+from fusetune.px4.releases import BASELINE, MAG_TYPES_GIVEN_UP, Release, name_of, number_of_name
 
 _FLOAT = struct.Struct("<f")
 
@@ -87,15 +88,15 @@ def as_float32(value: float) -> float:
     return float(_FLOAT.unpack(_FLOAT.pack(value))[0])
 
 
-def check_value(name: str, value: object) -> None:
-    """Refuse a parameter of the baseline release that is unknown, of the wrong type or out of range.
+def check_value(name: str, value: object, replayed: Release = BASELINE) -> None:
+    """Refuse a parameter that the estimator of a release does not read, or a value of the wrong type or out of range.
 
     Raises
     ------
     ParameterError
         With the reason and the remedy in words.
     """
-    check_by(metadata_of(name), value)
+    check_by(parameters_of(replayed).get(name) or metadata_of(name), value)
 
 
 def check_by(metadata: ParameterMetadata, value: object) -> None:
@@ -130,7 +131,9 @@ def metadata_of(name: str) -> ParameterMetadata:
     raise ParameterError(str(name), "unknown EKF2 parameter", remedy)
 
 
-def migrate(logged: Mapping[str, float | int], release: Release | None = None) -> dict[str, float]:
+def migrate(
+    logged: Mapping[str, float | int], release: Release | None = None, replayed: Release = BASELINE
+) -> dict[str, float]:
     """Logged parameters under the names, and in the meaning, of the baseline release.
 
     Parameters
@@ -139,42 +142,80 @@ def migrate(logged: Mapping[str, float | int], release: Release | None = None) -
         All parameters of a log.
     release
         Firmware release of the log; `None` where unknown. Decides nothing where the log already holds the new name.
+    replayed
+        Whose estimator reads them: beside the baseline's also those that only this release has, see `parameters_of`.
 
     Returns
     -------
     dict
         Only parameters that the log determines; values rounded to float32. Values that are no numbers count as missing.
     """
-    known = (name for name in logged if name in PARAMETERS or name in BECAME)
+    read = parameters_of(replayed)
+    known = (name for name in logged if name in read or name in BECAME)
     sound = {name: logged[name] for name in known if math.isfinite(logged[name])}
-    migrated = migrate_names(sound, BECAME)
-    return {name: as_float32(float(value)) for name, value in migrated.items() if name in PARAMETERS}
+    migrated = as_read_by(sound, replayed)
+    return {name: as_float32(float(value)) for name, value in migrated.items() if name in read}
 
 
 def complete(
-    logged: Mapping[str, float | int], overrides: Mapping[str, float | int], release: Release | None = None
+    logged: Mapping[str, float | int],
+    overrides: Mapping[str, float | int],
+    release: Release | None = None,
+    replayed: Release = BASELINE,
 ) -> dict[str, float]:
-    """All EKF2 parameters of the baseline release: overrides before logged ones before defaults.
+    """All parameters that the estimator of a release reads: overrides before logged ones before its defaults.
 
     Parameters
     ----------
     logged
         Parameters of the log, in the names of its own release.
     overrides
-        Parameters of a set, in the names of the baseline release.
+        Parameters of a set, in the names of `parameters_of` the replayed release.
     release
         Firmware release of the log.
+    replayed
+        Whose estimator reads them.
 
     Raises
     ------
     ParameterError
-        An override is not a parameter of the baseline release.
+        An override is none of these parameters.
     """
+    read = parameters_of(replayed)
     for name in overrides:
-        metadata_of(name)
-    values = _DEFAULTS | migrate(logged, release)
+        if name not in read:
+            metadata_of(name)
+    values = dict(defaults_of(replayed)) | migrate(logged, release, replayed)
     values.update({name: as_float32(float(value)) for name, value in overrides.items()})
     return values
+
+
+@cache
+def parameters_of(replayed: Release) -> Mapping[str, ParameterMetadata]:
+    """Parameters that the estimator of a release reads, by name: the baseline's, and those that are its alone.
+
+    What a release has under another name than the baseline stands here under the baseline's (`migrate`).
+    """
+    own = {
+        name: metadata
+        for name, metadata in ALL_PARAMETERS.items()
+        if metadata.exists_in(replayed) and not metadata.became
+    }
+    return MappingProxyType(dict(PARAMETERS) | own)
+
+
+@cache
+def defaults_of(replayed: Release) -> Mapping[str, float]:
+    """The defaults of `parameters_of` a release: its own, under whatever name it has them."""
+    own = {name: one.default_in(replayed) for name, one in ALL_PARAMETERS.items() if one.exists_in(replayed)}
+    nearest = {name: one.default_in(replayed) for name, one in parameters_of(replayed).items()}
+    told = {name: value for name, value in as_read_by(own, replayed).items() if name in nearest}
+    return MappingProxyType(nearest | {name: as_float32(value) for name, value in told.items()})
+
+
+def as_read_by(values: Mapping[str, float | int], replayed: Release) -> dict[str, float | int]:
+    """Parameters of a vehicle as the estimator of a release takes them, under the names of the baseline."""
+    return migrate_names(values, BECAME, keep_mag_type=replayed < MAG_TYPES_GIVEN_UP)
 
 
 def number_of(metadata: ParameterMetadata, value: object) -> float:
@@ -257,5 +298,3 @@ BECAME: Mapping[str, tuple[str, ...]] = {
     **SENSOR_PARAMETERS,
 }
 """Parameters of other releases → those of the baseline that they tell."""
-
-_DEFAULTS = {name: metadata.default for name, metadata in PARAMETERS.items()}

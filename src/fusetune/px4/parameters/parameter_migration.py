@@ -35,7 +35,9 @@ _STEPS_TO_DENSITY = 10.0
 _MAG_TYPE_AUTOMATIC, _MAG_TYPES_REMOVED = 0, (2, 3, 4)
 
 
-def migrate_names(logged: Mapping[str, float | int], became: Mapping[str, Sequence[str]]) -> dict[str, float | int]:
+def migrate_names(
+    logged: Mapping[str, float | int], became: Mapping[str, Sequence[str]], *, keep_mag_type: bool = False
+) -> dict[str, float | int]:
     """The logged parameters with those of v1.16 added where the log has only their predecessors.
 
     A parameter that the log holds under its v1.16 name is never overridden by a predecessor.
@@ -43,6 +45,7 @@ def migrate_names(logged: Mapping[str, float | int], became: Mapping[str, Sequen
     Parameters
     ----------
     became : parameter of another release → those of v1.16 that stand for it
+    keep_mag_type : for an estimator of v1.14 or before, which knows the kinds of EKF2_MAG_TYPE that v1.15 gave up
     """
     derived: dict[str, float | int] = {}
     for old, new_names in became.items():
@@ -55,7 +58,7 @@ def migrate_names(logged: Mapping[str, float | int], became: Mapping[str, Sequen
     if "EKF2_AID_MASK" in logged:
         derived.update(_controls_of_aid_mask(int(logged["EKF2_AID_MASK"]), int(logged.get("EKF2_HGT_MODE", 0))))
     migrated = derived | dict(logged)
-    if migrated.get("EKF2_MAG_TYPE") in _MAG_TYPES_REMOVED:
+    if not keep_mag_type and migrated.get("EKF2_MAG_TYPE") in _MAG_TYPES_REMOVED:
         migrated["EKF2_MAG_TYPE"] = _MAG_TYPE_AUTOMATIC
     return migrated
 

@@ -99,7 +99,7 @@ def _name_on_vehicle(name: str, logged: Mapping[str, ParameterValue], release: R
     for one in (name, *others):
         if _exists_in(one, release):
             return one
-    metadata = PARAMETERS[name]
+    metadata = ALL_PARAMETERS[name]
     when = f"came with {name_of(metadata.first_release)}"
     if release[:2] > metadata.last_release:
         when = f"went after {name_of(metadata.last_release)}"
@@ -137,7 +137,7 @@ def _to_set(
         what = f"it would have to be {typed:g} for {told}, which" if old not in values else "it"
         raise ParameterError(old, f"{what} is refused: {error.reason}", error.remedy) from error
     previous = logged.get(old, _typed(old, default, type_name))
-    needs_reboot = metadata.reboot_required or any(PARAMETERS[name].reboot_required for name in values)
+    needs_reboot = metadata.reboot_required or any(ALL_PARAMETERS[name].reboot_required for name in values)
     return VehicleParameter(
         old, tuple(values), previous, typed, type_name, metadata.unit, needs_reboot, is_logged=old in logged
     )

@@ -23,6 +23,7 @@ from fusetune.px4.flight import (
     TopicTable,
 )
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS
+from fusetune.px4.release_signs import flag_signs
 from fusetune.px4.releases import FIRST, NEWEST, name_of
 from fusetune.px4.ulog.definitions import MessageLayout, is_padding
 from fusetune.px4.ulog.reading_limits import RAISE_LIMITS, ReadingLimits
@@ -108,9 +109,10 @@ def _read(file: Path, limits: ReadingLimits, deadline: Deadline) -> Flight:
     times, places = _times(messages), _places(messages)
     start, note = _start(content, times, clock)
     deadline.check()
+    topics = {key: one.table for key, one in messages.items()}
     return Flight(
         name=file.stem,
-        topics={key: one.table for key, one in messages.items()},
+        topics=topics,
         parameters=_parameters(values, times, places, start),
         info=values.info,
         multi_info=_multi_info(values),
@@ -124,6 +126,7 @@ def _read(file: Path, limits: ReadingLimits, deadline: Deadline) -> Flight:
         undefined_topics=tuple(sorted(set(scan.undefined_topics.values()))),
         left_out=left_out,
         beyond_limits=beyond,
+        release_signs=flag_signs(topics),
     )
 
 

@@ -13,7 +13,7 @@ from fusetune.report.flight_page.conformance_section import conformance_section
 from fusetune.report.flight_page.effects_section import effects_section
 from fusetune.report.flight_page.health_table import health_table_section
 from fusetune.report.flight_page.sensors_section import sensors_section
-from fusetune.report.flight_results import read_flight_results
+from fusetune.report.flight_results import FlightResults, read_flight_results
 from fusetune.report.markup import section
 from fusetune.report.page_shell.shell import VIEWER_CLASS, FlightBlob, PageHead, Tab, page_links, write_page
 from fusetune.storage.documents import read_document
@@ -50,7 +50,7 @@ def build_flight_page(
         health_table_section(results),
         sensors_section(read_document(noise)) if noise.exists() else "",
     )
-    told = (_known(results.vehicle, "vehicle"), _known(results.firmware, "firmware"), results.mission,
+    told = (_known(results.vehicle, "vehicle"), _firmware(results), results.mission,
             results.date.replace("T", " ").replace("Z", " UTC"))  # fmt: skip
     head = PageHead(
         results.flight, results.flight, " · ".join(one for one in told if one), page_links(pages or {}, output)
@@ -64,6 +64,14 @@ def _flown(conformance: Path, track: Path) -> str:
     if not conformance.exists():
         return ""
     return conformance_section(read_document(conformance), read_track(track) if track.exists() else None)
+
+
+def _firmware(results: FlightResults) -> str:
+    """What flew, and whose estimator replays it where there is a replay."""
+    flew = _known(results.firmware, "firmware")
+    if results.refusals or not results.is_readable:
+        return flew
+    return f"{flew}, replayed as {results.replayed_as}{f' ({results.replayed_why})' if results.replayed_why else ''}"
 
 
 def _known(name: str, what: str) -> str:

@@ -106,12 +106,17 @@ def flights_section(results: Results, logs: Logs, shown: Collection[str] = ()) -
     )
     named = {f"{name}: {len(rows)}": rows for name, rows in groups.items() if rows}
     told = grouped_table(*_without_empty_columns(head, named), kind="cards flights", footer=note)
-    whole = [(Cell(name), _words(one, "vehicle"), _words(one, "firmware")) for name, one in logs.verdicts.items()]
+    columns = ("vehicle", "firmware", "replayed_as")
+    whole: list[list[CellLike]] = [
+        [Cell(name), *(_words(one, column) for column in columns)] for name, one in logs.verdicts.items()
+    ]
     return section(
         "The flights",
         paragraph(text, "note"),
         told,
-        details("Whole names, vehicles, firmware", table(("log", "vehicle", "firmware"), whole, kind="whole")),
+        details(
+            "Whole names, vehicles, firmware", table(("log", "vehicle", "firmware", "replayed as"), whole, kind="whole")
+        ),
         id="flights",
     )
 

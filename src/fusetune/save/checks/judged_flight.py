@@ -13,8 +13,10 @@ from fusetune.ekf2.feed.message_samples import gnss_refusals, taken
 from fusetune.px4.aid_sources import AID_SOURCES, SENSORS, AidSource
 from fusetune.px4.flight import Flight, LeftOut, TopicTable, row_count
 from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.releases import AUTO
 from fusetune.px4.sensor_limits import LACKS_FIELD
 from fusetune.save.checks.logging_advice import WHOLE_LOG, log_more
+from fusetune.save.replayed_release import ReplayedRelease, replayed_release
 from fusetune.save.thresholds import VerdictThresholds
 
 IMU = "sensor_combined"
@@ -33,10 +35,19 @@ FIX_3D = 3
 
 @dataclass(frozen=True)
 class JudgedFlight:
-    """A flight in the layout of `fusetune.px4.layouts.release_layouts.canonical`, and the thresholds of the verdict."""
+    """A flight in the layout of `fusetune.px4.layouts.release_layouts.canonical`, and the thresholds of the verdict.
+
+    `release` says whose estimator is asked to replay it, as in the configuration.
+    """
 
     flight: Flight
     limits: VerdictThresholds
+    release: str = AUTO
+
+    @cached_property
+    def replayed(self) -> ReplayedRelease:
+        """Whose estimator replays it, and why."""
+        return replayed_release(self.flight, self.release)
 
     @property
     def imu(self) -> TopicTable:

@@ -6,7 +6,6 @@ from fusetune.check import Check, check
 from fusetune.finding import Finding
 from fusetune.px4.estimator_samples import is_complete, logged_share
 from fusetune.px4.logger_settings import ESTIMATOR_REPLAY_BIT, MODES, logging_mode_of, logging_profile_of
-from fusetune.px4.releases import BASELINE, deviation_of, name_of
 from fusetune.px4.sensor_limits import LACKS_FIELD, NO_ADVANCE
 from fusetune.px4.ulog.reading_limits import RAISE_LIMITS
 from fusetune.px4.ulog.times import ANOTHER_CLOCK, IMPOSSIBLE
@@ -91,15 +90,22 @@ def _left_out(asked: Check[JudgedFlight], judged: JudgedFlight, what: str, *, is
 @check()
 def firmware(judged: JudgedFlight) -> Finding:
     """Whether the replay behaves like the firmware that flew."""
-    flight, baseline = judged.flight, name_of(BASELINE)
-    if flight.release is None:
-        found = f"the log does not say which release flew; the replay behaves like {baseline}"
+    replayed, flown = judged.replayed, judged.replayed.flown
+    if flown.release is None:
+        found = f"{flown.evidence}; the replay behaves like {replayed.name}"
         return firmware.warned(found, "Compare replays with each other, not with what the vehicle estimated")
-    how = deviation_of(flight.release)
-    if not how:
-        return firmware.passed(f"{flight.release_name} flew, which is what the replay behaves like")
-    remedy = f"Parameters chosen here hold for {baseline}: update the firmware, or test them with care"
-    return firmware.warned(f"{flight.release_name} flew, the replay behaves like {baseline}: {how}", remedy)
+    known = judged.flight.release_name
+    flew = known if known.startswith(flown.name) else flown.name
+    if flown.own_parameters:
+        flew += f", a build with parameters of its own ({', '.join(flown.own_parameters[:3])}),"
+    if replayed.flew and not flown.own_parameters:
+        return firmware.passed(f"{flew} flew ({flown.evidence}), which is what the replay behaves like")
+    if replayed.flew:
+        found = f"{flew} flew, the replay behaves like {replayed.name} without what these do"
+        return firmware.warned(found, "Compare the replay with what the vehicle estimated: the trust grade does")
+    found = f"{flew} flew ({flown.evidence}), the replay behaves like {replayed.name}: {replayed.reason}"
+    remedy = f"Parameters chosen here hold for {replayed.name}: fly that release, or test them with care"
+    return firmware.warned(found, remedy)
 
 
 @check(
