@@ -88,7 +88,8 @@ class Behaviours:
     )
     skips_unhealthy_range: bool = _behaviour(
         "A range sample that is unhealthy or inconsistent is left out and does not stop the fusion; a healthy one "
-        "starts it. Conditional aid is the height reference while it lasts.",
+        "starts it. Conditional aid is the height reference while it lasts; else the reference is chosen anew, so that "
+        "another source takes it from range.",
         since="v1.17",
         source="aid_sources/range_finder/range_height_control.cpp",
     )

@@ -192,7 +192,7 @@ def _control_with_healthy_samples(ekf, params):
 
     if cs.rng_hgt or cs.rng_terrain:
         if continuing:
-            _follow_conditional_reference(ekf, params, conditional_aid)
+            _follow_conditional_reference(ekf, conditional_aid)
             _fuse_healthy_or_recover(ekf, params, starting)
         else:
             stop_rng_hgt_fusion(ekf)
@@ -202,11 +202,11 @@ def _control_with_healthy_samples(ekf, params):
 
 
 @kernel
-def _follow_conditional_reference(ekf, params, conditional_aid):
-    """While range aids low and slow it is the height reference; afterwards another source is chosen."""
+def _follow_conditional_reference(ekf, conditional_aid):
+    """While range aids low and slow it is the height reference; else the reference is chosen anew at every sample."""
     if conditional_aid:
         ekf.height_sensor_ref = HEIGHT_REF_RANGE
-    elif int(params.EKF2_RNG_CTRL) == RNG_CTRL_CONDITIONAL:
+    else:
         give_up_height_reference(ekf, HEIGHT_REF_RANGE)
 
 
