@@ -15,7 +15,7 @@ from fusetune.apply.settings import DecisionSettings
 from fusetune.set_names import PRESENT
 
 from .rules import OLD, OURS, Rule, decide, rules
-from .world import World, kept, scores
+from .world import World, scores
 
 HARDLY = 0.005
 """True difference of the scores of nearly equal sets: 0.5 % of a prediction error."""
@@ -141,7 +141,7 @@ def of_either_sign(
         )
         for own, its in zip(evidence.aims, turned.aims, strict=True)
     )
-    return kept(replace(evidence, aims=aims))
+    return replace(evidence, aims=aims)
 
 
 def mirrored(flights: Sequence[FlightEvidence | None]) -> list[FlightEvidence | None]:
@@ -199,7 +199,7 @@ def _present_first(
         replace(aim, sum_nis=aim.sum_nis[rows], sum_log_variance=aim.sum_log_variance[rows]) for aim in evidence.aims
     ]
     names = tuple(evidence.sets[index] for index in rows)
-    return kept(replace(evidence, sets=names, aims=tuple(change(aim) for aim in ordered)))
+    return replace(evidence, sets=names, aims=tuple(change(aim) for aim in ordered))
 
 
 def with_means(flights: Sequence[FlightEvidence | None], difference: float) -> list[FlightEvidence | None]:
@@ -219,7 +219,7 @@ def with_means(flights: Sequence[FlightEvidence | None], difference: float) -> l
             replace(aim, sum_nis=aim.sum_nis * np.exp([2.0 * move[name][aim.name] for name in one.sets])[:, None, None])
             for aim in one.aims
         )
-        return kept(replace(one, aims=aims))
+        return replace(one, aims=aims)
 
     return [None if one is None else shifted(one) for one in flights]
 

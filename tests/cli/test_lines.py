@@ -41,7 +41,7 @@ def test_on_a_terminal_progress_takes_the_place_of_what_was_before(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((40, 24)))
+    monkeypatch.setattr("shutil.get_terminal_size", lambda *_, **__: os.terminal_size((40, 24)))
     tell()
     shown: list[str] = []
     for line in capsys.readouterr().out.split("\n"):

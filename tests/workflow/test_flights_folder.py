@@ -55,7 +55,7 @@ def test_no_entry_stops_the_others(workspace: Workspace, flights: Path) -> None:
     assert len(rows) == 12
     assert {row["status"] for row in rows.values()} == {"refused"}
     assert all(row["reason"] and row["remedy"] and row["file"] for row in rows.values())
-    assert rows["sess002_log001"]["checksum"] == hashlib.sha256(b"sess002").hexdigest()
+    assert rows["sess002_log001"]["sha256"] == hashlib.sha256(b"sess002").hexdigest()
     assert rows["new_line"]["file"] == "new\\x0aline.ulg"
 
 
@@ -79,7 +79,7 @@ def test_a_log_that_is_exchanged_is_another_log(workspace: Workspace, flights: P
     os.replace(other, flights / "first.ulg")
     assert workspace.planned_jobs(TABLE) == {"save_flight": 1, "list_flights": 1}
     workspace.run_ok("--cores", "1", TABLE)
-    assert verdicts(workspace)["first"]["checksum"] == hashlib.sha256(b"no log: other").hexdigest()
+    assert verdicts(workspace)["first"]["sha256"] == hashlib.sha256(b"no log: other").hexdigest()
     os.utime(flights / "first.ulg")
     assert workspace.planned_jobs(TABLE) == {}
 
@@ -103,6 +103,6 @@ def test_without_the_memory_of_how_they_were_made_results_are_made_again(workspa
     assert "Nothing is known of how results/ was made" in workspace.run_ok("--dry-run")
     workspace.run_ok("--cores", "1", TABLE)
     rows = verdicts(workspace)
-    assert {name: row["checksum"] for name, row in rows.items()} == {
+    assert {name: row["sha256"] for name, row in rows.items()} == {
         name: sha256(flights / f"{name}.ulg") for name in ("first", "second")
     }
