@@ -235,6 +235,8 @@ def told_in_report():
         "sets": len(document["sets"]),
         "files": sorted(files),
     }
+
+
 # around the present values each parameter makes two sets at the most
 MOST_SETS = len(SETS.scored) + 2 * len(SETS.around)
 

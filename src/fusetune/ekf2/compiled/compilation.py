@@ -122,12 +122,11 @@ def ensure_compiled(release: str = PLAIN_TEXT) -> None:
         with suppress(LocksUnavailableError):  # then each process compiles for itself
             lock(queue, exclusive=True, wait=True)
         intact = _may_be_loaded(folder)
+        if not intact:
+            keep_others_out(folder)
+            _empty(folder)
+            intact = _take_carried(caches, folder)
         if not (intact and release in _compiled_releases(folder)):
-            if not intact:
-                keep_others_out(folder)
-                _empty(folder)
-                if _take_carried(caches, folder) and release in _compiled_releases(folder):
-                    return
             told, options = ("", ()) if release == PLAIN_TEXT else (f" of {release}", (OF_RELEASE, release))
             print(f"Compiling the estimator{told} for this processor ...", file=sys.stderr)
             _compile(caches, *options)
@@ -139,14 +138,6 @@ def ensure_compiled(release: str = PLAIN_TEXT) -> None:
 def is_compiled() -> bool:
     """Whether the kernel cache holds the estimator for this processor, and it may be loaded from there."""
     return not _setting("DISABLE_JIT") and _may_be_loaded(kernel_folder())
-
-
-def _compiled_releases(folder: Path) -> list[str]:
-    """Releases of PX4 whose kernels are in a folder."""
-    try:
-        return list(json.loads((folder / RELEASES_NAME).read_text(encoding="utf-8")))
-    except (OSError, ValueError):
-        return [PLAIN_TEXT]
 
 
 def _empty(folder: Path) -> None:
@@ -165,6 +156,14 @@ def _take_carried(caches: Path, folder: Path) -> bool:
         return True
     _empty(folder)
     return False
+
+
+def _compiled_releases(folder: Path) -> list[str]:
+    """Releases of PX4 whose kernels are in a folder."""
+    try:
+        return list(json.loads((folder / RELEASES_NAME).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return [PLAIN_TEXT]
 
 
 def _compile(caches: Path, *options: str) -> int:
@@ -461,15 +460,12 @@ def compile_and_record(call_entry: Callable[[], None], options: Sequence[str] = 
     with nullcontext() if PLAIN in options else joined_without_optimising():
         call_entry()
     release = options[options.index(OF_RELEASE) + 1] if OF_RELEASE in options else PLAIN_TEXT
-    _record(kernel_folder(), release)
+    folder = kernel_folder()
+    _record(folder, {*_compiled_releases(folder), release} if (folder / RECORD_NAME).exists() else {release})
 
 
-def _record(folder: Path, release: str = PLAIN_TEXT) -> None:
-    """Write down which kernels a folder holds, and of which releases."""
-    before = _compiled_releases(folder) if (folder / RECORD_NAME).exists() else []
-    for name, content in (
-        (RELEASES_NAME, sorted({*before, release})),
-        (RECORD_NAME, _kernel_files(folder)),
-    ):
+def _record(folder: Path, releases: Iterable[str] = (PLAIN_TEXT,)) -> None:
+    """Record what is in the cache, and for which releases."""
+    for name, content in ((RELEASES_NAME, sorted(releases)), (RECORD_NAME, _kernel_files(folder))):
         with atomic_path(folder / name) as temporary:
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

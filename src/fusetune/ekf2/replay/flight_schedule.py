@@ -219,8 +219,9 @@ class _Builder:
         name = SENSOR_NAMES[number]
         arrived = _arrived(self.inputs, name)
         times = np.ascontiguousarray(getattr(self.inputs.arrays, name)["time_us"])
-        if name == "gnss" and _are_gnss_times_told(self.inputs, self.clock[3]):
-            times = self.inputs.gnss_measured_us
+        measured = self.inputs.gnss_measured_us
+        if name == "gnss" and measured is not None and _are_gnss_times_told(self.inputs, self.clock[3]):
+            times = measured
         places = "imu_length" if number == FLOW else "observation_length"
         actions = np.zeros(2 * len(arrived), ACTION)
         count = find_actions(

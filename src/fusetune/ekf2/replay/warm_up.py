@@ -60,9 +60,9 @@ def _imu_at_rest() -> TopicTable:
 
 if __name__ == "__main__":
     options = sys.argv[1:]
+    release = options[options.index(OF_RELEASE) + 1] if OF_RELEASE in options else BASELINE
     if ONLY_LOADS in options:
         refuse_to_compile()
         compile_kernels()
     else:
-        release = options[options.index(OF_RELEASE) + 1] if OF_RELEASE in options else BASELINE
         compile_and_record(partial(compile_kernels, release), options)
