@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--release",
         default="v1.16",
         metavar="RELEASE",
-        help="release of PX4 whose estimator replays it: v1.16 (the default), v1.17",
+        help="release of PX4 whose estimator replays it: v1.16 (the default), v1.17 or main (docs/releases.md)",
     )
 
 
