@@ -21,6 +21,7 @@ from typing import NamedTuple
 from benchmarks.reference_flights import log_of, reference_folders
 
 from fusetune.analyze.replaying.replay_log import replay_log
+from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.analyze.trust.fidelity import ReplayFidelity, compare_folders, order_agreement
 from fusetune.ekf2.releases.behaviours import MODELLED, RELEASES
 from fusetune.errors import UserError
@@ -90,7 +91,8 @@ def compared(
         with tempfile.TemporaryDirectory() as scratch:
             try:
                 replays = Path(scratch) / "replays"
-                replay_log(log_of(reference.name, logs, Path(scratch)), reference, replays, release=release)
+                settings = ReplaySettings(release=release)
+                replay_log(log_of(reference.name, logs, Path(scratch)), reference, replays, settings)
                 yield reference.name, compare_folders(reference, replays)
             except UserError as error:
                 yield reference.name, error

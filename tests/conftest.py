@@ -119,5 +119,6 @@ def golden_reference() -> Path:
 
 shared_logs = _shared_folder("logs", "real flight logs")
 shared_reference = _shared_folder("reference", "PX4's own replays of the real logs")
+shared_reference_releases = _shared_folder("reference_releases", "replays of the logs by other releases of PX4")
 shared_reference_random = _shared_folder("reference_random", "PX4's own replays with random parameter sets")
 shared_data = _shared_folder("data", "fact tables")

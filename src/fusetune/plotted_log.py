@@ -50,9 +50,8 @@ def flight_of_log(log: AnyPath, overrides: Mapping[str, float]) -> PlottedFlight
     observed = ObservedFlight(read_ulog(log), WITHOUT_GAPS)
     logged = Logged(observed.logged, observed.flight)
     failures = observed.verdict.failures
-    if failures and asked:
-        remedy = ". ".join(dict.fromkeys(one.remedy for one in failures if one.remedy)) or "Log the flight again"
-        raise UserError(log, f"cannot be replayed: {'; '.join(observed.verdict.reasons)}", remedy)
+    if asked:
+        observed.verdict.demand_replayable(log)
     label = ", ".join(f"{name} {value:g}" for name, value in asked.items())
     labels = LABELS | {ASKED: label if len(label) <= _ASKED_WORDS else f"{len(asked)} parameters as asked"}
     with tempfile.TemporaryDirectory(prefix="fusetune-plot-") as folder:

@@ -138,3 +138,12 @@ def test_the_sets_of_a_decision_are_a_study_that_the_pipeline_takes(
     with pytest.raises(ft.UserError, match="the pipeline failed: it ends here"):
         ft.decide([log_file], {"late": {"EKF2_GPS_DELAY": 160}}, folder=tmp_path)
     assert [(one.name, dict(one.overrides)) for one in studies[0].sets] == [("late", {"EKF2_GPS_DELAY": 160.0})]
+
+
+def test_a_replay_is_that_of_the_release_that_is_asked_for(log: ft.Log):
+    assert log.replay().release == log.replay(release="v1.16").release == "v1.16"
+    with pytest.raises(ft.UserError, match=r"v1\.9: is no release of PX4 whose estimator can be replayed"):
+        log.replay(release="v1.9")
+    with pytest.raises(ft.UserError, match=r"EKF2_GPS_MODE: v1\.16 has no such parameter"):
+        log.replay({"EKF2_GPS_MODE": 1}, release="v1.16")
+    assert log.replay({"SENS_GPS0_DELAY": 90}).parameters["EKF2_GPS_DELAY"] == 90.0

@@ -46,7 +46,7 @@ MADE_BY = {
 WITHOUT_OUTCOME = ("__init__.py", "analyze/__init__.py", "ekf2/__init__.py", "ekf2/compiled", "running")
 """What jobs import that changes no file they make: settings of the process, and who is at work."""
 
-WITHOUT_KERNELS = (*WITHOUT_OUTCOME, "errors.py", "px4/__init__.py", "storage")
+WITHOUT_KERNELS = (*WITHOUT_OUTCOME, "errors.py", "px4/__init__.py", "px4/releases.py", "storage")
 """What the compiled modules import beside kernels, and the values and types that are compiled into them."""
 
 

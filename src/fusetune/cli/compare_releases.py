@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from fusetune.cli.command import DONE
 from fusetune.cli.output.json_document import add_json, print_document
 from fusetune.cli.output.tables import percent, table_lines
-from fusetune.errors import UserError
 
 if TYPE_CHECKING:
     from fusetune.analyze.releases.compared_releases import ReleaseComparison, ReleaseReplay
@@ -59,10 +58,7 @@ def run(options: argparse.Namespace) -> int:
     from fusetune.px4.ulog.reader import read_ulog
 
     observed = ObservedFlight(read_ulog(options.log), WITHOUT_GAPS)
-    if observed.verdict.failures:
-        remedy = ". ".join(dict.fromkeys(one.remedy for one in observed.verdict.failures if one.remedy))
-        reason = f"cannot be replayed: {'; '.join(observed.verdict.reasons)}"
-        raise UserError(options.log, reason, remedy or "Log the flight again")
+    observed.verdict.demand_replayable(options.log)
     found = compare_releases(
         observed.prepared,
         options.releases or MODELLED,

@@ -11,7 +11,6 @@ import pandas as pd
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare_flight
 from fusetune.analyze.replaying.settings import WITHOUT_GAPS
-from fusetune.errors import UserError
 from fusetune.library.diagnosis import DiagnosedFlight, of_observed
 from fusetune.library.parameters import checked_values
 from fusetune.library.replay import Replay
@@ -113,10 +112,7 @@ class Log:
 
     @cached_property
     def _prepared(self) -> PreparedFlight:
-        if self.verdict.failures:
-            remedies = ". ".join(dict.fromkeys(one.remedy for one in self.verdict.failures if one.remedy))
-            reasons = "; ".join(self.verdict.reasons)
-            raise UserError(self.path, f"cannot be replayed: {reasons}", remedies or "Log the flight again")
+        self.verdict.demand_replayable(self.path)
         return prepare_flight(self._observed.flight)
 
 

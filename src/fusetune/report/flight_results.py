@@ -26,7 +26,8 @@ class FlightResults:
     Attributes
     ----------
     vehicle, firmware, date, mission : as the log tells them; empty where it does not
-    replayed_as, replayed_why : the release of PX4 whose estimator replays it, and why it is not the one that flew
+    replayed_as, replayed_why : the release of PX4 whose estimator replays it, and why it is not the one that flew;
+        empty where that is not known
     start_us : of its log, since boot
     diagnoses : what explains most first
     health : rows of the health table
@@ -99,8 +100,10 @@ def read_flight_results(folder: AnyPath) -> FlightResults:
     effects = read_as(folder / EFFECTS_FILE, lambda one: tuple(one["effects"]), "the effects on a flight")
 
     def with_health(document: Document) -> FlightResults:
-        names = ("flight", "vehicle", "firmware", "replayed_as", "replayed_why", "date", "mission")
+        names = ("flight", "vehicle", "firmware", "date", "mission")
         named: dict[str, Any] = {name: str(document[name] or "") for name in names}
+        # results of before it was chosen lack these
+        named |= {name: str(document.get(name, "")) for name in ("replayed_as", "replayed_why")}
         return FlightResults(
             **named,
             **told,

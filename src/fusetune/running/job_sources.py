@@ -64,7 +64,7 @@ JOB_SOURCES = {
         "save",
     ),
     "execute": (*BASE, "ekf2", "design", "execute"),
-    "save": (*BASE, "design", "ekf2/feed", "save"),
+    "save": (*BASE, "design", "ekf2/compiled", "ekf2/feed", "ekf2/releases", "save"),
     "replay": (
         *BASE,
         "design",

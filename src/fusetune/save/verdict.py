@@ -17,6 +17,7 @@ from fusetune.px4.releases import AUTO
 from fusetune.save.checks import registry
 from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.thresholds import VerdictThresholds
+from fusetune.storage.files import AnyPath
 from fusetune.time_limit import Deadline
 
 
@@ -46,6 +47,13 @@ class Verdict:
     def warnings(self) -> tuple[str, ...]:
         """What lessens the worth of the replay, in words."""
         return tuple(finding.found for finding in of_severity(self.findings, "warning"))
+
+    def demand_replayable(self, file: AnyPath) -> None:
+        """Raise `UserError` about the log, with every reason and remedy, where it cannot be replayed."""
+        if self.failures:
+            remedies = dict.fromkeys(finding.remedy for finding in self.failures if finding.remedy)
+            reason = f"cannot be replayed: {'; '.join(self.reasons)}"
+            raise UserError(file, reason, ". ".join(remedies) or "Log the flight again")
 
     def document(self) -> dict[str, Any]:
         """The verdict as a JSON object, in `verdict.json` and in `metadata.json`."""

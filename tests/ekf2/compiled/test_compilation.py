@@ -101,6 +101,22 @@ def test_damaged_kernels_are_deleted_and_compiled(cache: Path, compilations: lis
     assert list(cache.iterdir()) == []
 
 
+def test_another_release_is_compiled_beside_what_is_there_when_it_is_first_asked_for(
+    cache: Path, compilations: list[list[str]]
+) -> None:
+    (cache / compilation.RELEASES_NAME).write_text('["v1.16"]', encoding="utf-8")
+    before = {file: file.read_bytes() for file in cache.iterdir()}
+    ensure_compiled()
+    assert compilations == []
+    ensure_compiled("v1.17")
+    assert [command[-2:] for command in compilations] == [["--release", "v1.17"]]
+    assert {file: file.read_bytes() for file in cache.iterdir()} == before
+    (cache / compilation.RELEASES_NAME).write_text('["v1.16", "v1.17"]', encoding="utf-8")
+    ensure_compiled.cache_clear()
+    ensure_compiled("v1.17")
+    assert len(compilations) == 1
+
+
 def test_kernels_of_another_processor_are_left_alone(
     cache: Path, compilations: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

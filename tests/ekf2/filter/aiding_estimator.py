@@ -6,8 +6,9 @@ import numpy as np
 
 from fusetune.ekf2.filter.common.parameters import complete, parameter_record
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
-from fusetune.ekf2.filter.estimator import EKF, initialise_estimator
+from fusetune.ekf2.filter.estimator import ekf_record, initialise_estimator
 from fusetune.ekf2.numerics.rotations import quat_to_dcm
+from fusetune.ekf2.releases import behaviours
 from fusetune.px4.releases import BASELINE
 
 START_US = 100_000_000
@@ -20,16 +21,16 @@ def parameters(**overrides: float) -> np.ndarray:
     return parameter_record(complete({}, overrides, BASELINE))
 
 
-def new_estimator(params: np.ndarray | None = None) -> np.ndarray:
-    """A one-element array of `EKF` as at switch-on."""
-    memory = np.zeros(1, EKF)
+def new_estimator(params: np.ndarray | None = None, release: str = behaviours.BASELINE) -> np.ndarray:
+    """A one-element array of the record `ekf` of a release, as at switch-on."""
+    memory = np.zeros(1, ekf_record(release))
     initialise_estimator(memory[0], (parameters() if params is None else params)[0])
     return memory
 
 
-def hovering(params: np.ndarray) -> np.ndarray:
+def hovering(params: np.ndarray, release: str = behaviours.BASELINE) -> np.ndarray:
     """Level, still, aligned, 10 m above flat ground, with the covariance of a settled filter."""
-    memory = new_estimator(params)
+    memory = new_estimator(params, release)
     ekf = memory[0]
     ekf["cs"]["tilt_align"] = True
     ekf["cs"]["in_air"] = True

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 from fusetune.ekf2.releases.behaviours import BEHAVIOURS, RELEASES, Behaviours
 
-HEADER = "| behaviour | releases | what it is | PX4, below `src/modules/ekf2/EKF` |"
+HEADER = "| behaviour | releases | what it is | in PX4's EKF2 |"
 
 
 def test_the_table_of_behaviours_is_that_of_the_declarations(project_root, up_to_date):
@@ -14,8 +14,7 @@ def test_the_table_of_behaviours_is_that_of_the_declarations(project_root, up_to
     for one in fields(Behaviours):
         since, until = one.metadata["since"], one.metadata["until"]
         span = since if since == until else f"{since} … {until}"
-        source = ", ".join(f"`{file}`" for file in one.metadata["source"].split(", "))
-        rows.append(f"| `{one.name}` | {span} | {one.metadata['what']} | {source} |")
+        rows.append(f"| `{one.name}` | {span} | {one.metadata['what']} | {one.metadata['source']} |")
     up_to_date(project_root / "docs/releases.md", "behaviours", "\n".join([HEADER, "|---|---|---|---|", *rows]))
 
 

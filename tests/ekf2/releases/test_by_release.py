@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from numba.core import config
+from numba.np.numpy_support import from_dtype
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.parameters import PARAMETER_NAMES, complete, parameter_record
@@ -54,6 +57,13 @@ def test_the_record_of_the_baseline_has_no_new_field():
     assert parameter_record(complete({}, {}, None)).dtype.names == PARAMETER_NAMES
     for release in RELEASES:
         assert release_of_fields(ekf_record(release).names or ()) == release
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="Numba is switched off")
+def test_no_record_passes_for_that_of_another_release():
+    types = [from_dtype(ekf_record(release)) for release in RELEASES]
+    for one, other in permutations(types, 2):
+        assert one.can_convert_to(None, other) is None
 
 
 def test_python_and_compiled_code_choose_the_kernel_of_the_record():

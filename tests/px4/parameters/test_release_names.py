@@ -130,3 +130,10 @@ def test_every_release_gets_what_was_wanted_or_the_reason(data: st.DataObject) -
             assert before[name] == as_float32(wanted[name])
     for one in found:
         assert isinstance(one.value, int) == (one.type == "INT32")
+
+
+def test_what_only_newer_releases_have_is_set_on_these_and_refused_by_name_on_others() -> None:
+    newer, older = (1, 17), (1, 14)
+    assert only({"EKF2_GPS_MODE": 1.0}, logged_by(newer), newer).value == 1
+    refused = refusal({"EKF2_GPS_MODE": 1.0}, logged_by(older), older)
+    assert (refused.name, "came with v1.17" in refused.reason) == ("EKF2_GPS_MODE", True)

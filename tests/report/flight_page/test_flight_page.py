@@ -15,7 +15,7 @@ from fusetune.errors import UserError
 from fusetune.report.flight_data.blob import unpack
 from fusetune.report.flight_data.write_blob import pack_flight
 from fusetune.report.flight_page.page import build_flight_page
-from fusetune.storage.documents import write_document
+from fusetune.storage.documents import read_document, write_document
 
 
 def page_of(folder: Path, blob: bytes | None = None) -> str:
@@ -52,6 +52,15 @@ def test_the_answer_stands_first(shaken: str) -> None:
     ]
     places = [words.index(one) for one in order]
     assert places == sorted(places)
+
+
+def test_the_head_tells_whose_estimator_replays_the_flight(tmp_path: Path) -> None:
+    folder = write_documents(tmp_path / "analyze" / "newer", (SHAKEN,), health_rows())
+    health = read_document(folder / "health.json")
+    write_document(folder / "health.json", health | {"firmware": "v1.17.0", "replayed_why": "v1.17 is none of them"})
+    assert "v1.17.0, replayed as v1.16 (v1.17 is none of them)" in told(page_of(folder))
+    refused = write_documents(tmp_path / "analyze" / "bad", (), refused=[{"found": "no IMU", "remedy": "log it"}])
+    assert "replayed as" not in told(page_of(refused))
 
 
 def test_a_sign_tells_what_is_usual_unless_its_words_do(shaken: str) -> None:

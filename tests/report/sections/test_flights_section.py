@@ -15,7 +15,14 @@ from fusetune.report.results import Results, read_results
 from fusetune.report.sections.flights_section import Logs, flights_section, single_flights_section
 
 VERDICTS = [
-    {"flight": "new", "recorded": "2026-02-01T10:11:12Z", "airborne_s": 61.3, "vehicle": "one", "firmware": "v1.16.0"},
+    {
+        "flight": "new",
+        "recorded": "2026-02-01T10:11:12Z",
+        "airborne_s": 61.3,
+        "vehicle": "one",
+        "firmware": "v1.15.4",
+        "replayed_as": "v1.16",
+    },
     {"flight": "old", "recorded": "2026-01-01T10:11:12Z", "airborne_s": 30.0, "vehicle": "one", "firmware": "v1.16.0"},
     {"flight": "other", "recorded": "", "airborne_s": None, "vehicle": "<two>", "firmware": None},
     {"flight": "bad", "recorded": "", "airborne_s": None, "reason": "the log is <empty>"},
@@ -65,8 +72,8 @@ def test_whole_names_vehicles_and_firmware_are_behind_a_click() -> None:
     section = flights_section(results(), logs())
     listed = section[section.index("<details") :]
     assert 'class="whole"' in listed
-    assert "new one v1.16.0" in told(listed)
-    assert "other &lt;two&gt; unknown" in told(listed)
+    assert "new one v1.15.4 v1.16" in told(listed)
+    assert "other &lt;two&gt; unknown –" in told(listed)
 
 
 def test_without_another_set_no_change_is_told() -> None:

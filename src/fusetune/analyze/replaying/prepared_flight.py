@@ -177,10 +177,10 @@ class PreparedFlight:
         return max(1, MOST_IN_MEMORY // max(1, len(self.inputs.arrays.imu)))
 
     def description(self, result: ReplaySummary) -> dict[str, Any]:
-        """For the summary of a replay: how it started and what was reconstructed."""
+        """For the summary of a replay: whose it is, unless just v1.16's was asked for, its start, what was repaired."""
         warm = result.warm_start_us is not None
-        return {
-            "release": self.replayed.document(),
+        release = {} if self.replayed.asked == BASELINE else {"release": self.replayed.document()}
+        return release | {
             "start": {"mode": WARM if warm else COLD, "why": self.start.why, "time_us": result.warm_start_us},
             "reconstruction": [asdict(step) for step in self.reconstructed.steps],
             "handover_timestamps": [one.time_us for one in self.handovers],

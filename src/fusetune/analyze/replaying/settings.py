@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
-from fusetune.px4.releases import ReleaseChoice
 from fusetune.settings.declaration import setting
 
 
@@ -78,7 +77,7 @@ class ReplaySettings:
     withholding: WithholdingSettings | None = None
     reconstruction: ReconstructionSettings | None = None
     start: StartSettings | None = None
-    release: ReleaseChoice = "v1.16"
+    release: str = "v1.16"
 
 
 IN_USE = ReplaySettings(WithholdingSettings(), ReconstructionSettings(), StartSettings(), "auto")

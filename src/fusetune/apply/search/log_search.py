@@ -104,7 +104,7 @@ def _saved(logs: Sequence[AnyPath], folder: Path, pool: Executor, told: Callable
     paths = [Path(log) for log in logs]
     demand_own_folders(paths)
     told(f"saving {len(paths)} log{'s' if len(paths) > 1 else ''}")
-    program = source_digest("px4", "ekf2/feed", "save")
+    program = source_digest("px4", "ekf2/feed", "ekf2/releases", "save")
     named = {path.stem: path for path in paths}
     ledger = Ledger(folder / ".made.json")
     # the log of a flight that cannot be read gets a folder that says why

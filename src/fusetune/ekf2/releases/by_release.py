@@ -1,8 +1,9 @@
 """Kernels that differ by release: which one a call means follows from the type of a record, while Numba compiles.
 
-The records of v1.16 are plain. Those of another release have one field more, one byte that is named after the release.
-So their type is another, Numba compiles anew for it, and what `by_release` chooses between is settled by then: nothing
-is asked at run time, and what is not chosen is neither typed nor compiled. v1.16 compiles as if there were no others.
+The records of v1.16 are plain. Those of another release have one field more, a byte named after the release, in second
+place: Numba takes a record that only goes on longer for one of the shorter type. So their type is another, Numba
+compiles anew for it, and what `by_release` chooses between is settled by then: nothing is asked at run time, and what
+is not chosen is neither typed nor compiled. v1.16 compiles as if there were no others.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ def marked(record: np.dtype, release: str) -> np.dtype:
     if release == BASELINE:
         return record
     assert record.fields is not None, "only records are marked"
-    fields = [(name, record.fields[name][0]) for name in record.names or ()]
-    return np.dtype([*fields, (_MARKS[release], "?")], align=True)
+    first, *others = [(name, record.fields[name][0]) for name in record.names or ()]
+    return np.dtype([first, (_MARKS[release], "?"), *others], align=True)
 
 
 def release_of_fields(names: Iterable[str]) -> str:

@@ -142,7 +142,7 @@ def flight_schedule(
     for sensor in SENSOR_NAMES:
         delay = SENSORS[sensor].delay_parameter if sensor in SENSORS else None
         wanted = steps(*_WANTED[sensor]) if sensor in _WANTED else ((0, 1.0),)
-        if sensor == "gnss" and _are_gnss_times_told(inputs, release):
+        if sensor == "gnss" and _told_gnss_times(inputs, release) is not None:
             delay = None
         told[sensor] = (steps(delay) if delay else ((0, 0.0),), wanted)
     memo = inputs.memo
@@ -150,9 +150,9 @@ def flight_schedule(
     return memo.get(key, lambda: _Builder(inputs, clock).schedule(told), lambda made: _bytes(made.tables))
 
 
-def _are_gnss_times_told(inputs: EstimatorInputs, release: str) -> bool:
-    """Whether the filter takes the times of the GNSS measurements from their messages."""
-    return BEHAVIOURS[release].stamps_gnss_by_message and inputs.gnss_measured_us is not None
+def _told_gnss_times(inputs: EstimatorInputs, release: str) -> Rows | None:
+    """When GNSS was measured, where the release takes that from the messages and they tell it."""
+    return inputs.gnss_measured_us if BEHAVIOURS[release].stamps_gnss_by_message else None
 
 
 def notes_of(params: np.void, changes: Changes) -> Rows:
@@ -219,9 +219,9 @@ class _Builder:
         name = SENSOR_NAMES[number]
         arrived = _arrived(self.inputs, name)
         times = np.ascontiguousarray(getattr(self.inputs.arrays, name)["time_us"])
-        measured = self.inputs.gnss_measured_us
-        if name == "gnss" and measured is not None and _are_gnss_times_told(self.inputs, self.clock[3]):
-            times = measured
+        told = _told_gnss_times(self.inputs, self.clock[3]) if name == "gnss" else None
+        if told is not None:
+            times = told
         places = "imu_length" if number == FLOW else "observation_length"
         actions = np.zeros(2 * len(arrived), ACTION)
         count = find_actions(

@@ -43,6 +43,7 @@ def draw_releases(found: ReleaseComparison) -> Figure:
     _label(rejected, names, "rejected [%]")
     rejected.tick_params(labelleft=False)
     _label(counts, list(events), "times, or s")
+    counts.set_xlim(0.0, max(1.0, *(max(counted) for counted in events.values())))
     figure.legend(*sizes.get_legend_handles_labels(), loc="outside upper center", ncols=len(found.replays))
     return figure
 

@@ -69,7 +69,7 @@ def _flown(conformance: Path, track: Path) -> str:
 def _firmware(results: FlightResults) -> str:
     """What flew, and whose estimator replays it where there is a replay."""
     flew = _known(results.firmware, "firmware")
-    if results.refusals or not results.is_readable:
+    if results.refusals or not results.is_readable or not results.replayed_as:
         return flew
     return f"{flew}, replayed as {results.replayed_as}{f' ({results.replayed_why})' if results.replayed_why else ''}"
 

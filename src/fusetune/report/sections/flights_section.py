@@ -106,9 +106,9 @@ def flights_section(results: Results, logs: Logs, shown: Collection[str] = ()) -
     )
     named = {f"{name}: {len(rows)}": rows for name, rows in groups.items() if rows}
     told = grouped_table(*_without_empty_columns(head, named), kind="cards flights", footer=note)
-    columns = ("vehicle", "firmware", "replayed_as")
     whole: list[list[CellLike]] = [
-        [Cell(name), *(_words(one, column) for column in columns)] for name, one in logs.verdicts.items()
+        [Cell(name), _words(one, "vehicle"), _words(one, "firmware"), str(one.get("replayed_as") or "–")]
+        for name, one in logs.verdicts.items()
     ]
     return section(
         "The flights",

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from tests.ekf2.filter.height_and_field_records import make_estimator, rotation_matrix
 
-from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import update_range_consistency
+from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import (
+    MISTAKEN_MOTION_HOLD,
+    MOTION_HOLD,
+    update_range_consistency,
+)
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import dist_bottom, is_data_healthy, update_cos_tilt
 from fusetune.ekf2.filter.aid_sources.range_finder.sensor_range_finder import run_range_sensor_checks
 
@@ -144,17 +148,20 @@ def test_fog_check_switched_off():
 class Consistency:
     """Distances at 20 Hz against a vertical velocity."""
 
-    def __init__(self):
+    def __init__(self, hold_us: int = MISTAKEN_MOTION_HOLD):
         self.rng = make_estimator()["range"]
         self.time_us = 1_000_000
         self.distance = 5.0
+        self.hold_us = hold_us
 
     def fly(self, seconds: float, climb_rate: float, vz: float, horizontal_motion: bool = False) -> list[bool]:
         verdicts = []
         for _ in range(round(seconds / 0.05)):
             self.time_us += PERIOD_US
             self.distance += climb_rate * 0.05
-            update_range_consistency(self.rng, self.distance, 0.01, vz, 0.01, horizontal_motion, self.time_us, 1.0)
+            update_range_consistency(
+                self.rng, self.distance, 0.01, vz, 0.01, horizontal_motion, self.hold_us, self.time_us, 1.0
+            )
             verdicts.append(bool(self.rng["is_kinematically_consistent"]))
         return verdicts
 
@@ -197,6 +204,14 @@ def test_horizontal_motion_suspends_the_verdict():
     check.fly(1.0, 0.0, 0.0)
     assert all(check.fly(5.0, 6.0, 0.0, horizontal_motion=True))
     assert not check.fly(0.05, 6.0, 0.0, horizontal_motion=False)[0]
+
+
+def test_main_suspends_it_for_two_seconds_more():
+    check = Consistency(MOTION_HOLD)
+    check.fly(1.0, 0.0, 0.0)
+    check.fly(5.0, 6.0, 0.0, horizontal_motion=True)
+    verdicts = check.fly(3.0, 6.0, 0.0, horizontal_motion=False)
+    assert verdicts.index(False) * PERIOD_US == pytest.approx(2_000_000, abs=PERIOD_US)
 
 
 def test_a_gap_restarts_the_difference():
