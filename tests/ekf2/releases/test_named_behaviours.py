@@ -356,15 +356,28 @@ def test_main_stamps_vision_velocity(release, stamped):
 @pytest.mark.parametrize(("release", "wings_only"), SINCE_MAIN)
 def test_main_keeps_airspeed_to_fixed_wings(release, wings_only, monkeypatch):
     it = flying(release, EKF2_ARSP_THR=2.0)
-    for part in ("_start_airspeed", "_start_wing_airspeed"):
-        monkeypatch.setattr(airspeed_control, part, lambda ekf, *_: setattr(ekf.cs, "fuse_aspd", True))
-    monkeypatch.setattr(airspeed_control, "update_airspeed", lambda ekf, params: None)
+    for part in ("update_airspeed", "_start_airspeed"):
+        monkeypatch.setattr(airspeed_control, part, lambda *_: None)
     it.ekf["sensors"]["airspeed"]["sample"]["true_airspeed"] = 12.0
-    asked(airspeed_control._use_airspeed_sample, it, it.params)
+    airspeed_control._use_airspeed_sample.py_func(it.ekf, it.params)
     assert it.ekf["cs"]["fuse_aspd"] != wings_only
-    it.ekf["cs"]["fixed_wing"], it.ekf["cs"]["fuse_aspd"] = True, False
-    asked(airspeed_control._use_airspeed_sample, it, it.params)
+    it.ekf["cs"]["fixed_wing"] = True
+    it.ekf["cs"]["fuse_aspd"] = it.ekf["cs"]["wind"] = False
+    airspeed_control._use_airspeed_sample.py_func(it.ekf, it.params)
     assert it.ekf["cs"]["fuse_aspd"]
+
+
+@pytest.mark.parametrize(("release", "fused"), SINCE_MAIN)
+def test_airspeed_of_main_starts_by_being_fused(release, fused, monkeypatch):
+    it, done = flying(release), []
+    for part in ("reset_vel_using_airspeed", "_reset_wind", "fuse_airspeed"):
+        monkeypatch.setattr(airspeed_control, part, lambda *_, part=part: done.append(part))
+    it.ekf["cs"]["wind"], it.ekf["horizontal_deadreckon_time_exceeded"] = True, False
+    asked(airspeed_control._start_airspeed, it, it.params, True)
+    assert done == ["fuse_airspeed"] * fused
+    it.ekf["horizontal_deadreckon_time_exceeded"] = True
+    asked(airspeed_control._start_airspeed, it, it.params, True)
+    assert done == ["fuse_airspeed", "reset_vel_using_airspeed"] * fused
 
 
 @pytest.mark.parametrize(("release", "forced"), SINCE_V117)
@@ -385,8 +398,9 @@ def test_an_unhealthy_range_sample_stops_nothing(release, left_out, monkeypatch)
     it = flying(release, EKF2_RNG_CTRL=2.0)
     for part, value in (("is_data_healthy", False), ("_has_recent_sample", True), ("is_height_reset_required", False)):
         monkeypatch.setattr(range_height_control, part, lambda *_, value=value: value)
-    for part in ("stop_rng_hgt_fusion", "stop_rng_terr_fusion", "_start_height_aiding", "_fuse_or_recover"):
+    for part in ("stop_rng_hgt_fusion", "stop_rng_terr_fusion", "_fuse_or_recover"):
         monkeypatch.setattr(range_height_control, part, lambda ekf, *_: setattr(ekf.cs, "rng_terrain", False))
+    monkeypatch.setattr(range_height_control, "_choose_height_aiding", lambda *_: False)
     for part in ("_follow_conditional_reference", "_fuse_healthy_or_recover"):
         monkeypatch.setattr(range_height_control, part, lambda *_: None)
     it.ekf["cs"]["rng_terrain"] = True

@@ -54,11 +54,11 @@ def _assume_yaw_estimator_airspeed(ekf, params):
 
 
 @kernel
-def _use_airspeed_of_any(ekf, params):
+def _use_airspeed_sample(ekf, params):
     aid, sample = ekf.aid.airspeed, ekf.sensors.airspeed.sample
     update_airspeed(ekf, params)
     ekf.reject.airspeed = aid.innovation_rejected
-    continuing_conditions_passing = ekf.cs.in_air and not ekf.cs.fake_pos
+    continuing_conditions_passing = ekf.cs.in_air and not ekf.cs.fake_pos and _may_have_airspeed(ekf)
     is_significant = sample.true_airspeed > params.EKF2_ARSP_THR
     is_consistent = 0.0 < aid.test_ratio[0] < 1.0
     starting_conditions_passing = (
@@ -77,60 +77,60 @@ def _use_airspeed_of_any(ekf, params):
             stop_airspeed_fusion(ekf)
     elif starting_conditions_passing:
         _start_airspeed(ekf, params, is_consistent)
+        ekf.cs.wind = True
+        ekf.cs.fuse_aspd = True
 
 
 @kernel
-def _use_airspeed_of_wing(ekf, params):
-    """As v1.16's, but of a fixed wing alone, and started by a fusion where nothing calls for a reset."""
-    aid, sample = ekf.aid.airspeed, ekf.sensors.airspeed.sample
-    update_airspeed(ekf, params)
-    continuing = ekf.cs.in_air and ekf.cs.fixed_wing and not ekf.cs.fake_pos
-    is_significant = sample.true_airspeed > params.EKF2_ARSP_THR
-    is_consistent = 0.0 < aid.test_ratio[0] < 1.0
-    if ekf.cs.fuse_aspd:
-        if not continuing:
-            stop_airspeed_fusion(ekf)
-            return
-        if is_significant:
-            fuse_airspeed(ekf, params)
-        set_true_airspeed(ekf.gsf, sample.true_airspeed)
-        if is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US):
-            stop_airspeed_fusion(ekf)
-    elif continuing and is_significant:
-        if is_consistent or not ekf.cs.wind or ekf.cs.inertial_dead_reckoning:
-            _start_wing_airspeed(ekf, params, is_consistent)
+def _is_any_vehicle(ekf):
+    return True
 
 
 @kernel
-def _start_wing_airspeed(ekf, params, is_consistent):
+def _is_fixed_wing(ekf):
+    return ekf.cs.fixed_wing
+
+
+_may_have_airspeed = by_release(_is_any_vehicle, "keeps_airspeed_to_wings", _is_fixed_wing)
+
+
+@kernel
+def _reset_to_airspeed(ekf, params, is_consistent):
+    """Set the velocity when dead reckoning, else an unknown wind."""
+    largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
+    wind_unknown = math.hypot(ekf.P[WIND, WIND], ekf.P[WIND + 1, WIND + 1]) > largest
+    if ekf.cs.inertial_dead_reckoning and not is_consistent:
+        reset_vel_using_airspeed(ekf, params)
+    elif _is_wind_free(ekf, wind_unknown):
+        _reset_wind(ekf, params)
+
+
+@kernel
+def _reset_or_fuse_airspeed(ekf, params, is_consistent):
+    """As v1.16's, but dead reckoning counts once it has lasted too long, and what needs no reset is fused."""
     largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
     wind_unknown = ekf.P[WIND, WIND] + ekf.P[WIND + 1, WIND + 1] > largest
     lost = ekf.cs.inertial_dead_reckoning and not is_consistent
     if ekf.horizontal_deadreckon_time_exceeded or lost:
         reset_vel_using_airspeed(ekf, params)
-    elif not ekf.wind.external_init and (not ekf.cs.wind or wind_unknown):
-        reset_wind_using_airspeed(ekf, params)
-        ekf.aid.airspeed.time_last_fuse = ekf.time_delayed_us
+    elif _is_wind_free(ekf, wind_unknown):
+        _reset_wind(ekf, params)
     else:
         fuse_airspeed(ekf, params)
-    ekf.cs.wind = True
-    ekf.cs.fuse_aspd = True
 
 
-_use_airspeed_sample = by_release(_use_airspeed_of_any, "keeps_airspeed_to_wings", _use_airspeed_of_wing)
+_start_airspeed = by_release(_reset_to_airspeed, "keeps_airspeed_to_wings", _reset_or_fuse_airspeed)
 
 
 @kernel
-def _start_airspeed(ekf, params, is_consistent):
-    largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
-    wind_unknown = math.hypot(ekf.P[WIND, WIND], ekf.P[WIND + 1, WIND + 1]) > largest
-    if ekf.cs.inertial_dead_reckoning and not is_consistent:
-        reset_vel_using_airspeed(ekf, params)
-    elif not ekf.wind.external_init and (not ekf.cs.wind or wind_unknown):
-        reset_wind_using_airspeed(ekf, params)
-        ekf.aid.airspeed.time_last_fuse = ekf.time_delayed_us
-    ekf.cs.wind = True
-    ekf.cs.fuse_aspd = True
+def _is_wind_free(ekf, wind_unknown):
+    return not ekf.wind.external_init and (not ekf.cs.wind or wind_unknown)
+
+
+@kernel
+def _reset_wind(ekf, params):
+    reset_wind_using_airspeed(ekf, params)
+    ekf.aid.airspeed.time_last_fuse = ekf.time_delayed_us
 
 
 @kernel

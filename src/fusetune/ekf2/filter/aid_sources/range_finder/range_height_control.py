@@ -136,30 +136,40 @@ def _check_consistency(ekf, params):
 
 
 @kernel
-def _control_with_every_sample(ekf, params):
-    """Choose between height and terrain, then fuse, reset, start or stop."""
-    aid, cs, rng = ekf.aid.rng_hgt, ekf.cs, ekf.range
-    ctrl = int(params.EKF2_RNG_CTRL)
-    continuing = (
-        ctrl in (RNG_CTRL_ENABLED, RNG_CTRL_CONDITIONAL)
-        and cs.tilt_align
+def _is_range_wanted(ekf, params):
+    """Whether range may aid at all now, whatever the sensor says of the sample."""
+    aid = ekf.aid.rng_hgt
+    return (
+        int(params.EKF2_RNG_CTRL) in (RNG_CTRL_ENABLED, RNG_CTRL_CONDITIONAL)
+        and ekf.cs.tilt_align
         and math.isfinite(aid.observation[0])
         and math.isfinite(aid.observation_variance[0])
-        and is_data_healthy(rng)
-        and rng.is_kinematically_consistent
     )
-    starting = continuing and _has_recent_sample(ekf) and rng.is_regularly_sending_data
 
+
+@kernel
+def _choose_height_aiding(ekf, params, may_start):
+    """Let range aid the height where its parameter and the flight allow; return whether it does so conditionally."""
+    cs, ctrl = ekf.cs, int(params.EKF2_RNG_CTRL)
     aiding = cs.rng_terrain or cs.rng_hgt
     conditional_aid = aiding and ctrl == RNG_CTRL_CONDITIONAL and is_conditional_range_aid_suitable(ekf, params)
     full_aid = aiding and ctrl == RNG_CTRL_ENABLED
     if cs.rng_hgt:
         if not (conditional_aid or full_aid):
             stop_rng_hgt_fusion(ekf)
-    elif conditional_aid or full_aid:
+    elif may_start and (conditional_aid or full_aid):
         _start_height_aiding(ekf, params, conditional_aid)
+    return conditional_aid
 
-    if cs.rng_hgt or cs.rng_terrain:
+
+@kernel
+def _control_with_every_sample(ekf, params):
+    """Choose between height and terrain, then fuse, reset, start or stop."""
+    rng = ekf.range
+    continuing = _is_range_wanted(ekf, params) and is_data_healthy(rng) and rng.is_kinematically_consistent
+    starting = continuing and _has_recent_sample(ekf) and rng.is_regularly_sending_data
+    _choose_height_aiding(ekf, params, True)
+    if ekf.cs.rng_hgt or ekf.cs.rng_terrain:
         if continuing:
             _fuse_or_recover(ekf, params)
         else:
@@ -172,25 +182,11 @@ def _control_with_every_sample(ekf, params):
 @kernel
 def _control_with_healthy_samples(ekf, params):
     """As v1.16's, but a sample that is not healthy, or not consistent, is left out, and stops nothing."""
-    aid, cs, rng = ekf.aid.rng_hgt, ekf.cs, ekf.range
-    ctrl = int(params.EKF2_RNG_CTRL)
-    continuing = (
-        ctrl in (RNG_CTRL_ENABLED, RNG_CTRL_CONDITIONAL)
-        and cs.tilt_align
-        and math.isfinite(aid.observation[0])
-        and math.isfinite(aid.observation_variance[0])
-    )
+    rng = ekf.range
+    continuing = _is_range_wanted(ekf, params)
     starting = continuing and _has_recent_sample(ekf) and rng.is_regularly_sending_data and is_data_healthy(rng)
-    aiding = cs.rng_terrain or cs.rng_hgt
-    conditional_aid = aiding and ctrl == RNG_CTRL_CONDITIONAL and is_conditional_range_aid_suitable(ekf, params)
-    full_aid = aiding and ctrl == RNG_CTRL_ENABLED
-    if cs.rng_hgt:
-        if not (conditional_aid or full_aid):
-            stop_rng_hgt_fusion(ekf)
-    elif starting and (conditional_aid or full_aid):
-        _start_height_aiding(ekf, params, conditional_aid)
-
-    if cs.rng_hgt or cs.rng_terrain:
+    conditional_aid = _choose_height_aiding(ekf, params, starting)
+    if ekf.cs.rng_hgt or ekf.cs.rng_terrain:
         if continuing:
             _follow_conditional_reference(ekf, conditional_aid)
             _fuse_healthy_or_recover(ekf, params, starting)
