@@ -11,9 +11,7 @@ from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.replaying.replay_flight import write_replay
 from fusetune.analyze.replaying.settings import WITHOUT_GAPS
 from fusetune.analyze.sensor_noise.sensor_noise import sensor_noise
-from fusetune.design.parameter_check import typed_values
-from fusetune.errors import UserError
-from fusetune.px4.parameters.ekf2_parameters import ParameterError, check_value
+from fusetune.design.parameter_check import checked_values
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.report.figures.plotted_flight import PlottedFlight
 from fusetune.report.flight_data.bands import bands
@@ -46,7 +44,7 @@ def flight_of_log(log: AnyPath, overrides: Mapping[str, float]) -> PlottedFlight
         The log cannot be read; parameters are asked for that PX4 does not have, or for a flight that cannot be
         replayed.
     """
-    asked = _checked(overrides)
+    asked = checked_values(overrides, "--set")
     observed = ObservedFlight(read_ulog(log), WITHOUT_GAPS)
     logged = Logged(observed.logged, observed.flight)
     failures = observed.verdict.failures
@@ -84,12 +82,3 @@ def _told(
         labels=labels,
         why_not_replayed="; ".join(observed.verdict.reasons),
     )
-
-
-def _checked(overrides: Mapping[str, float]) -> dict[str, float]:
-    for name, value in overrides.items():
-        try:
-            check_value(name, value)
-        except ParameterError as error:
-            raise UserError(f"--set {error.name}", error.reason, error.remedy) from error
-    return typed_values(overrides)

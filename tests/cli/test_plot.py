@@ -69,7 +69,7 @@ def test_figures_are_asked_for_by_name_and_by_number(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--set", "EKF2_GPS_DELAYS=1"], "--set EKF2_GPS_DELAYS: unknown EKF2 parameter"),
+        (["--set", "EKF2_GPS_DELAYS=1"], "--set: EKF2_GPS_DELAYS: unknown EKF2 parameter"),
         (["--set", "EKF2_GPS_DELAY=160"], "cannot be replayed"),
         (["--flight", "a"], "is a log, which is one flight"),
     ],

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from fusetune.errors import UserError
 from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, ParameterError, check_by
-from fusetune.px4.parameters.set_names import read_by
+from fusetune.px4.parameters.set_names import in_baseline_names, read_by
 from fusetune.px4.releases import BASELINE, Release
 
 PARAMETER_PATTERN = "^[A-Z0-9_]{1,16}$"
@@ -26,3 +27,24 @@ def typed_values(parameters: Mapping[str, float]) -> dict[str, float]:
     return {
         name: int(value) if ALL_PARAMETERS[name].type == "INT32" else float(value) for name, value in parameters.items()
     }
+
+
+def checked_values(parameters: Mapping[str, float], told_of: str, replayed: Release = BASELINE) -> dict[str, float]:
+    """EKF2 parameters with values that PX4 takes, of the type that it has them, in the names of the baseline release.
+
+    Parameters
+    ----------
+    told_of : what the values are of, for the error
+    replayed : the release whose estimator reads them
+
+    Raises
+    ------
+    UserError
+        The release has no such parameter, or forbids the value.
+    """
+    try:
+        for name, value in parameters.items():
+            check_by(read_by(name, replayed), value)
+        return typed_values(in_baseline_names(parameters))
+    except ParameterError as error:
+        raise UserError(f"{told_of}: {error.name}", error.reason, error.remedy) from error

@@ -14,9 +14,9 @@ from fusetune.analyze.analyze_flight import analyze_flight
 from fusetune.apply.decide import decide as decide_sets
 from fusetune.apply.evidence import trust_grade
 from fusetune.apply.statistics.rounding import without_rounding
+from fusetune.design.parameter_check import checked_values
 from fusetune.errors import UserError
 from fusetune.library.log import Log
-from fusetune.library.parameters import checked_values
 from fusetune.running.worker_processes import all_cores, worker_processes
 from fusetune.save.flights_table import write_flights_table
 from fusetune.save.log_folder import demand_own_folders, save_log

@@ -13,10 +13,10 @@ from typing import Any
 import pandas as pd
 import yaml
 
+from fusetune.design.parameter_check import checked_values
 from fusetune.errors import UserError
 from fusetune.library.comparison import ranking_table
 from fusetune.library.log import Log
-from fusetune.library.parameters import checked_values
 from fusetune.running.worker_processes import all_cores
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath

@@ -11,8 +11,8 @@ import pandas as pd
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare_flight
 from fusetune.analyze.replaying.settings import WITHOUT_GAPS
+from fusetune.design.parameter_check import checked_values
 from fusetune.library.diagnosis import DiagnosedFlight, of_observed
-from fusetune.library.parameters import checked_values
 from fusetune.library.replay import Replay
 from fusetune.px4.flight import Flight
 from fusetune.px4.releases import AUTO
