@@ -31,7 +31,7 @@ def _plus(record):
 @kernel
 def _minus(record):
     # a field that only the record of the newer release has: the kernel of the older one must not be typed with it
-    return record.value - 1.0 if record.of_v1_17 else record.value - 2.0
+    return record.value - 1.0 if record.of_v1_17[0] else record.value - 2.0
 
 
 _changed = by_release(_plus, BEHAVIOUR, _minus)

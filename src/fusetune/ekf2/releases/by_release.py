@@ -1,7 +1,7 @@
 """Kernels that differ by release: which one a call means follows from the type of a record, while Numba compiles.
 
-The records of v1.16 are plain. Those of another release have one field more, a byte named after the release, in second
-place: Numba takes a record that only goes on longer for one of the shorter type. So their type is another, Numba
+The records of v1.16 are plain. Those of another release have one field more, named after the release, in second place:
+Numba takes a record that only goes on longer for one of the shorter type. So their type is another, Numba
 compiles anew for it, and what `by_release` chooses between is settled by then: nothing is asked at run time, and what
 is not chosen is neither typed nor compiled. v1.16 compiles as if there were no others.
 """
@@ -19,6 +19,8 @@ from numba.extending import models, register_model, typeof_impl
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS, RELEASES, Behaviours
 
+CACHE_LINE_BYTES = 64
+
 Kernel = Any
 """A compiled function, or a choice between some."""
 
@@ -26,12 +28,15 @@ _MARKS = {release: f"of_{release.replace('.', '_')}" for release in RELEASES if 
 
 
 def marked(record: np.dtype, release: str) -> np.dtype:
-    """The dtype of a record in a release: that of v1.16 itself, those of others with one byte that tells them apart."""
+    """The dtype of a record in a release: that of v1.16 itself, those of others with a field that tells them apart.
+
+    That is as long as a line of the cache, so that the fields behind it lie as they do in v1.16's.
+    """
     if release == BASELINE:
         return record
     assert record.fields is not None, "only records are marked"
     first, *others = [(name, record.fields[name][0]) for name in record.names or ()]
-    return np.dtype([first, (_MARKS[release], "?"), *others], align=True)
+    return np.dtype([first, (_MARKS[release], "u1", (CACHE_LINE_BYTES,)), *others], align=True)
 
 
 def release_of_fields(names: Iterable[str]) -> str:
