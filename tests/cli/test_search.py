@@ -124,7 +124,7 @@ def test_what_was_tried_tells_what_matters(made: Made) -> None:
     assert told["sensitivity"]["parameters"][0]["parameter"] == SEARCHED
     page = (made.whole / "search.html").read_text(encoding="utf-8")
     assert told["sentences"][0].split(" (")[0] in page
-    assert page.count("<figure>") == 5
+    assert page.count('class="chart" role="img"') == 5
 
 
 def test_of_a_single_flight_nothing_is_kept_aside_and_it_says_so(made: Made, tmp_path: Path, capsys: Captured) -> None:

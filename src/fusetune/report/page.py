@@ -137,11 +137,20 @@ def _read(given: ReportInput, output: AnyPath) -> _Read:
         results=results,
         logs=logs,
         trust=sorted(trust, key=lambda one: order.get(one["flight"], len(order))),
-        fleet=None if given.health_table is None else read_fleet_results(fleet_file, given.health_table, logs.pages),
+        fleet=None if given.health_table is None else _fleet(fleet_file, given.health_table, logs),
         missions=[] if given.missions is None else read_document(given.missions)["missions"],
         mission=given.mission,
         blobs=_blobs(given.blobs, order, results),
     )
+
+
+def _fleet(fleet_file: Path, health_table: AnyPath, logs: Logs) -> FleetResults | None:
+    """What all flights have in common; None where it was made of others than those that are listed.
+
+    So it is where results were copied without the memory of how they were made, and all their logs are gone.
+    """
+    found = read_fleet_results(fleet_file, health_table, logs.pages)
+    return found if {one["name"] for one in found.flights} <= {*logs.verdicts} else None
 
 
 def _of_single_flight(diagnosis: dict[str, Any]) -> dict[str, Any]:

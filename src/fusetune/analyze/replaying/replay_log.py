@@ -11,6 +11,7 @@ from fusetune.analyze.replaying.settings import ReplaySettings
 from fusetune.errors import OF_DAMAGE, UserError
 from fusetune.px4.layouts.estimator_instances import of_one_instance
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.releases import AUTO, number_of_name
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.save.replayed_release import replayed_release
 from fusetune.storage.files import AnyPath
@@ -43,8 +44,10 @@ def replay_log(
         The log cannot be read, or a set file is not usable.
     """
     settings = settings or ReplaySettings()
+    sets = None if settings.release == AUTO else read_set_files(sets_folder, number_of_name(settings.release))
     flight = read_ulog(log)
-    sets = read_set_files(sets_folder, replayed_release(flight, settings.release).release)
+    if sets is None:
+        sets = read_set_files(sets_folder, replayed_release(flight, settings.release).release)
     Path(output_folder).mkdir(parents=True, exist_ok=True)
     # as PX4's own replay does where nothing is asked for: one estimator instance, from its sensors
     flown = flight if settings.reconstruction is not None else of_one_instance(flight)
