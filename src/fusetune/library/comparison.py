@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from fusetune.analyze.analyze_flight import analyze_flight
@@ -17,6 +16,7 @@ from fusetune.apply.statistics.rounding import without_rounding
 from fusetune.design.parameter_check import checked_values
 from fusetune.errors import UserError
 from fusetune.library.log import Log
+from fusetune.report.comparison import percent_change
 from fusetune.running.worker_processes import all_cores, worker_processes
 from fusetune.save.flights_table import write_flights_table
 from fusetune.save.log_folder import demand_own_folders, save_log
@@ -174,23 +174,18 @@ def _replayable(rows: Sequence[Mapping]) -> list[str]:
     return [row["flight"] for row in rows if row["status"] == "replayable"]
 
 
-def percent(difference: pd.Series | pd.DataFrame | np.ndarray) -> pd.Series | pd.DataFrame | np.ndarray:
-    """A difference of scores, nat, as a change of the prediction error, percent."""
-    return 100.0 * np.expm1(difference)
-
-
 def _changes(per_flight: pd.DataFrame, names: list[str]) -> pd.DataFrame:
     scores = per_flight.pivot(index="flight", columns="set", values="score")
     names = [name for name in names if name in scores]
     differences = without_rounding(scores[names].to_numpy() - scores[[PRESENT]].to_numpy())
-    return pd.DataFrame(percent(differences), index=scores.index, columns=pd.Index(names, name="set"))
+    return pd.DataFrame(percent_change(differences), index=scores.index, columns=pd.Index(names, name="set"))
 
 
 def ranking_table(ranking: pd.DataFrame) -> pd.DataFrame:
     """What people read of `ranking.parquet`."""
     table = ranking[["name", "status"]].rename(columns={"name": "set"})
     for name, column in {"change": "difference", "lower": "lower", "upper": "upper"}.items():
-        table[f"{name}_percent"] = percent(ranking[column].astype(float))
+        table[f"{name}_percent"] = percent_change(ranking[column])
     for column in ("p_value", "flights", "flights_better"):
         table[column] = ranking[column]
     return table
