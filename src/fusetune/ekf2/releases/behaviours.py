@@ -217,6 +217,14 @@ class Behaviours:
         source="covariance.cpp",
     )
 
+    # Older releases: state, covariance, biases, start and buffers.
+
+    # Older releases: GNSS, height, fake aiding and the yaw estimator.
+
+    # Older releases: magnetometer and heading.
+
+    # Older releases: range finder, terrain, optical flow, vision, airspeed, drag and sideslip.
+
 
 def _behaviours_of(release: str) -> Behaviours:
     place = RELEASES.index(release)
@@ -230,5 +238,5 @@ def _behaviours_of(release: str) -> Behaviours:
 BEHAVIOURS: Mapping[str, Behaviours] = MappingProxyType({release: _behaviours_of(release) for release in RELEASES})
 """What each release does; all of v1.16's are false."""
 
-MODELLED = (BASELINE, "v1.17", "main")
+MODELLED = RELEASES
 """Releases all of whose behaviours are here; the others are not replayed."""
