@@ -20,7 +20,7 @@ from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, GNSS_TRUST, initialise_gnss_memory
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_MEMORY, initialise_mag_memory
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import FIELD_HISTORY, MAG_MEMORY, initialise_mag_memory
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
@@ -99,6 +99,8 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("local", LOCAL_POSITION))
     if does.doubts_stuck_accel_bias:
         memories.append(("accel_bias_check", ACCEL_BIAS_CHECK))
+    if does.limits_declination:
+        memories.append(("field_history", FIELD_HISTORY))
     return marked(np.dtype(memories, align=True), release)
 
 

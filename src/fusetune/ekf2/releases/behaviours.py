@@ -302,6 +302,67 @@ class Behaviours:
     # Older releases: GNSS, height, fake aiding and the yaw estimator.
 
     # Older releases: magnetometer and heading.
+    knows_field_of_early_2024: bool = _behaviour(
+        "The magnetic model is that of January 2024, in 10⁻⁴ rad and 10⁻⁴ Gauss. v1.16 has that of May 2024.",
+        since="v1.15",
+        until="v1.15",
+        source="../../../lib/world_magnetic_model/geo_magnetic_tables.hpp",
+    )
+    knows_field_of_2023: bool = _behaviour(
+        "The magnetic model is that of April 2023.",
+        since="v1.14",
+        until="v1.14",
+        source="../../../lib/world_magnetic_model/geo_magnetic_tables.hpp",
+    )
+    knows_field_of_2022: bool = _behaviour(
+        "The magnetic model is that of April 2022.",
+        since="v1.13",
+        until="v1.13",
+        source="../../../lib/world_magnetic_model/geo_magnetic_tables.hpp",
+    )
+    looks_field_up_by_fix: bool = _behaviour(
+        "The magnetic model is looked up at GNSS fixes, a rough one is enough, and at a new origin; the declination is "
+        "saved once there is an origin. v1.16 looks it up at the estimated position when the field is fused.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_checks.cpp, ekf_helper.cpp",
+    )
+    assumes_given_declination: bool = _behaviour(
+        "Where the magnetic model does not tell the declination, the heading takes EKF2_MAG_DECL, whatever "
+        "EKF2_DECL_TYPE says.",
+        since="v1.13",
+        until="v1.15",
+        source="mag_control.cpp",
+    )
+    limits_declination: bool = _behaviour(
+        "After every fusion the declination of the field states is kept within 0.5 rad of the reference, and their "
+        "horizontal strength above half of the model's.",
+        since="v1.13",
+        until="v1.15",
+        source="mag_fusion.cpp",
+    )
+    holds_yaw_observable: bool = _behaviour(
+        "GNSS tells the heading above twice EKF2_MAG_ACCLIM, and then for as long as the acceleration is above it. "
+        "v1.16 asks for EKF2_MAG_ACCLIM.",
+        since="v1.13",
+        until="v1.15",
+        source="mag_control.cpp",
+    )
+    counts_field_resets: bool = _behaviour(
+        "The field starts anew after any other reset of the yaw, and after two resets in flight is stopped; once its "
+        "covariance is new, the declination is fused first. What is not fused is not told; to stop leaves covariance "
+        "and yaw alignment as they are. v1.16 resets where nothing else aids, and else stops.",
+        since="v1.15",
+        until="v1.15",
+        source="mag_control.cpp, mag_3d_control.cpp, mag_fusion.cpp",
+    )
+    puts_body_field_by_yaw_estimator: bool = _behaviour(
+        "A reset of the field takes the covariances of both its states, and where the yaw estimator has converged puts "
+        "the body field as its yaw wants. v1.16 keeps a field that is near the model's.",
+        since="v1.15",
+        until="v1.15",
+        source="mag_control.cpp",
+    )
 
     # Older releases: range finder, terrain, optical flow, vision, airspeed, drag and sideslip.
 
