@@ -10,7 +10,7 @@ from fusetune.ekf2.filter.accel_bias_check import check_vertical_accel_bias
 from fusetune.ekf2.filter.aid_sources.barometer.baro_height_control import control_baro_height_fusion
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import update_ground_effect
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import control_gnss_height_fusion
-from fusetune.ekf2.filter.aid_sources.range_finder.range_height_control import control_range_hagl_fusion
+from fusetune.ekf2.filter.aid_sources.range_finder.range_control import control_range_fusion
 from fusetune.ekf2.filter.common.height_reference import (
     HEIGHT_REF_BARO,
     HEIGHT_REF_EV,
@@ -37,7 +37,7 @@ def control_height_fusion(ekf, params):
     update_ground_effect(ekf, params)
     control_baro_height_fusion(ekf, params)
     control_gnss_height_fusion(ekf, params)
-    control_range_hagl_fusion(ekf, params)
+    control_range_fusion(ekf, params)
     check_height_sensor_ref_fallback(ekf, params)
 
 
