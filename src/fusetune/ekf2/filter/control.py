@@ -12,7 +12,7 @@ from fusetune.ekf2.filter.aid_sources.fake_pos_control import control_fake_pos_f
 from fusetune.ekf2.filter.aid_sources.gnss.gps_control import control_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
-from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_control import control_optical_flow_fusion
+from fusetune.ekf2.filter.aid_sources.optical_flow.flow_control import control_flow_fusion
 from fusetune.ekf2.filter.aid_sources.sideslip.sideslip_fusion import control_beta_fusion
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import control_zero_gyro_update
 from fusetune.ekf2.filter.aid_sources.zero_innovation_heading_update import control_zero_innovation_heading_update
@@ -24,8 +24,11 @@ from fusetune.ekf2.filter.covariance import tilt_variance
 from fusetune.ekf2.filter.height_control import control_height_fusion
 from fusetune.ekf2.filter.resets.state_resets import remember_reset_counters
 from fusetune.ekf2.filter.terrain_control import control_terrain_fake_fusion, update_terrain_validity
+from fusetune.ekf2.releases.by_release import does
 
 TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
+
+_knows_no_constant_position = does("knows_no_constant_position")
 
 
 @kernel
@@ -38,7 +41,7 @@ def control_fusion_modes(ekf, params):
         ekf.cs.tilt_align = tilt_variance(ekf) < TILT_ALIGNED_VARIANCE
 
     control_mag_fusion(ekf, params)
-    control_optical_flow_fusion(ekf, params)
+    control_flow_fusion(ekf, params)
     control_gnss_fusion(ekf, params)
     control_air_data_fusion(ekf, params)
     control_beta_fusion(ekf, params)
@@ -71,4 +74,4 @@ def _follow_system_flags(ekf):
     ekf.cs.fixed_wing = flags.is_fixed_wing
     if flags.gnd_effect:
         set_gnd_effect(ekf)
-    ekf.cs.constant_pos = flags.constant_pos
+    ekf.cs.constant_pos = flags.constant_pos and not _knows_no_constant_position(ekf)

@@ -1,12 +1,21 @@
-"""Direction and strength of the Earth's magnetic field at a place, as PX4 v1.16 looks them up.
+"""Direction and strength of the Earth's magnetic field at a place, as PX4 looks them up.
 
-Bilinear interpolation on a grid of 10°; date and height are not considered.
+Bilinear interpolation on a grid of 10°; date and height are not considered. Releases before v1.16 do the same with
+tables of an earlier date.
 """
 
 import math
 
+import numpy as np
+
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.numerics.world_magnetic_model_table import RESOLUTION_DEG, read_tables
+from fusetune.ekf2.numerics.world_magnetic_model_table import (
+    OLDER_EPOCHS,
+    QUANTITIES,
+    RESOLUTION_DEG,
+    older_table_path,
+    read_tables,
+)
 
 _TABLES = read_tables()
 _DECLINATION_SCALE, _DECLINATION = _TABLES["declination"]
@@ -14,6 +23,12 @@ _INCLINATION_SCALE, _INCLINATION = _TABLES["inclination"]
 _STRENGTH_SCALE, _STRENGTH = _TABLES["strength"]
 _RESOLUTION = float(RESOLUTION_DEG)
 _GAUSS_PER_NANOTESLA = 1e-5
+
+_OLDER_TABLES = [read_tables(older_table_path(release)) for release in OLDER_EPOCHS]
+_OLDER = np.array([[tables[quantity].values for quantity in QUANTITIES] for tables in _OLDER_TABLES])
+_RADIANS_PER_UNIT = 1e-4
+_GAUSS_PER_UNIT = 1e-4
+EDITION_OF_V1_13, EDITION_OF_V1_14, EDITION_OF_V1_15 = range(len(OLDER_EPOCHS))
 
 
 @kernel
@@ -58,6 +73,15 @@ def get_mag_strength_gauss(latitude_deg, longitude_deg):
     if not (math.isfinite(latitude_deg) and math.isfinite(longitude_deg)):
         return math.nan
     return _interpolate(latitude_deg, longitude_deg, _STRENGTH) * _STRENGTH_SCALE * _GAUSS_PER_NANOTESLA
+
+
+@kernel
+def older_field_at(edition, latitude_deg, longitude_deg):
+    """Declination, inclination (rad) and strength (Gauss) at a place, as a release before v1.16 knows them."""
+    declination = _interpolate(latitude_deg, longitude_deg, _OLDER[edition, 0]) * _RADIANS_PER_UNIT
+    inclination = _interpolate(latitude_deg, longitude_deg, _OLDER[edition, 1]) * _RADIANS_PER_UNIT
+    strength = _interpolate(latitude_deg, longitude_deg, _OLDER[edition, 2]) * _GAUSS_PER_UNIT
+    return declination, inclination, strength
 
 
 def field_at(latitude_deg: float, longitude_deg: float) -> tuple[float, float, float]:

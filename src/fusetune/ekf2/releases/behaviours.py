@@ -219,11 +219,251 @@ class Behaviours:
 
     # Older releases: state, covariance, biases, start and buffers.
 
+    keeps_position_local: bool = _behaviour(
+        "Position is metres north, east and down of the origin, a map projection on a sphere, kept in single "
+        "precision. v1.16 keeps latitude, longitude and altitude on the ellipsoid.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.cpp, position_fusion.cpp",
+    )
+    flies_over_flat_earth: bool = _behaviour(
+        "Velocity is integrated without Coriolis and transport rate, within 1000 m/s; the rotation of the Earth is set "
+        "where the magnetic model is looked up, and not by the latitude of the estimate.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.cpp, gps_checks.cpp",
+    )
+    filters_motion_plainly: bool = _behaviour(
+        "The height rate is low-passed after the state is predicted, with the interval over the time constant, and the "
+        "horizontal acceleration is a decaying sum of velocity increments. v1.16 uses first-order filters.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.cpp",
+    )
+    filters_terrain_apart: bool = _behaviour(
+        "The terrain is no state of the filter; a filter of its own estimates it.",
+        since="v1.13",
+        until="v1.15",
+        source="terrain_estimator.cpp",
+    )
+    adds_noise_to_estimated_states: bool = _behaviour(
+        "Biases drift unless their axis is inhibited, field and wind only while they are estimated, whatever their "
+        "variances. v1.16 adds no noise above a limit.",
+        since="v1.15",
+        until="v1.15",
+        source="covariance.cpp",
+    )
+    clips_variances: bool = _behaviour(
+        "A variance beyond its limit is cut to it. v1.16 reduces it by fusing an innovation of zero.",
+        since="v1.15",
+        until="v1.15",
+        source="covariance.cpp",
+    )
+    judges_measured_motion: bool = _behaviour(
+        "Whether the vehicle manoeuvres too hard to learn biases is told by rate and specific force as they are "
+        "measured. v1.16 takes the biases off first.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf_helper.cpp",
+    )
+    doubts_stuck_accel_bias: bool = _behaviour(
+        "An accelerometer bias that is near its limit, in a direction that innovations of height and vertical velocity "
+        "contradict for 7 s, gets the variances of the start.",
+        since="v1.15",
+        until="v1.15",
+        source="height_control.cpp",
+    )
+    counts_clipping_of_any_axis: bool = _behaviour(
+        "Clipping of any axis is counted in one; any count is frequent, more than half of a second's is a fault. v1.16 "
+        "counts every axis.",
+        since="v1.13",
+        until="v1.15",
+        source="height_control.cpp",
+    )
+    tells_fused_gravity: bool = _behaviour(
+        "Gravity is told as fused only where it was. v1.16 tells it at every update.",
+        since="v1.14",
+        until="v1.15",
+        source="gravity_fusion.cpp",
+    )
+    keeps_position_at_velocity_resets: bool = _behaviour(
+        "A reset of the velocity leaves the covariances of the position among themselves and with other states.",
+        since="v1.13",
+        until="v1.15",
+        source="velocity_fusion.cpp",
+    )
+    knows_no_constant_position: bool = _behaviour(
+        "Nothing can tell the filter that the position is constant.",
+        since="v1.13",
+        until="v1.15",
+        source="control.cpp",
+    )
+
     # Older releases: GNSS, height, fake aiding and the yaw estimator.
 
     # Older releases: magnetometer and heading.
+    knows_field_of_early_2024: bool = _behaviour(
+        "The magnetic model is that of January 2024, in 10⁻⁴ rad and 10⁻⁴ Gauss. v1.16 has that of May 2024.",
+        since="v1.15",
+        until="v1.15",
+        source="../../../lib/world_magnetic_model/geo_magnetic_tables.hpp",
+    )
+    knows_field_of_2023: bool = _behaviour(
+        "The magnetic model is that of April 2023.",
+        since="v1.14",
+        until="v1.14",
+        source="../../../lib/world_magnetic_model/geo_magnetic_tables.hpp",
+    )
+    knows_field_of_2022: bool = _behaviour(
+        "The magnetic model is that of April 2022.",
+        since="v1.13",
+        until="v1.13",
+        source="../../../lib/world_magnetic_model/geo_magnetic_tables.hpp",
+    )
+    looks_field_up_by_fix: bool = _behaviour(
+        "The magnetic model is looked up at GNSS fixes, a rough one is enough, and at a new origin; the declination is "
+        "saved once there is an origin. v1.16 looks it up at the estimated position when the field is fused.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_checks.cpp, ekf_helper.cpp",
+    )
+    assumes_given_declination: bool = _behaviour(
+        "Where the magnetic model does not tell the declination, the heading takes EKF2_MAG_DECL, whatever "
+        "EKF2_DECL_TYPE says.",
+        since="v1.13",
+        until="v1.15",
+        source="mag_control.cpp",
+    )
+    limits_declination: bool = _behaviour(
+        "After every fusion the declination of the field states is kept within 0.5 rad of the reference, and their "
+        "horizontal strength above half of the model's.",
+        since="v1.13",
+        until="v1.15",
+        source="mag_fusion.cpp",
+    )
+    holds_yaw_observable: bool = _behaviour(
+        "GNSS tells the heading above twice EKF2_MAG_ACCLIM, and then for as long as the acceleration is above it. "
+        "v1.16 asks for EKF2_MAG_ACCLIM.",
+        since="v1.13",
+        until="v1.15",
+        source="mag_control.cpp",
+    )
+    counts_field_resets: bool = _behaviour(
+        "The field starts anew after any other reset of the yaw, and after two resets in flight is stopped; once its "
+        "covariance is new, the declination is fused first. What is not fused is not told; to stop leaves covariance "
+        "and yaw alignment as they are. v1.16 resets where nothing else aids, and else stops.",
+        since="v1.15",
+        until="v1.15",
+        source="mag_control.cpp, mag_3d_control.cpp, mag_fusion.cpp",
+    )
+    puts_body_field_by_yaw_estimator: bool = _behaviour(
+        "A reset of the field takes the covariances of both its states, and where the yaw estimator has converged puts "
+        "the body field as its yaw wants. v1.16 keeps a field that is near the model's.",
+        since="v1.15",
+        until="v1.15",
+        source="mag_control.cpp",
+    )
 
     # Older releases: range finder, terrain, optical flow, vision, airspeed, drag and sideslip.
+
+    keeps_innovation_at_reset: bool = _behaviour(
+        "A reset of the state to a source leaves that source's innovation as it was, and does not count as fused; only "
+        "its time-out begins anew.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf_helper.cpp",
+    )
+    forgets_stopped_sources: bool = _behaviour(
+        "A stopped source forgets what it last judged, so that the update that stops it publishes nothing of it.",
+        since="v1.14",
+        until="v1.15",
+        source="ekf.h",
+    )
+    takes_range_for_height: bool = _behaviour(
+        "The range finder is a height source like the barometer, with a bias against the reference and, conditionally, "
+        "where the terrain is known. It never corrects the terrain on its way.",
+        since="v1.14",
+        until="v1.15",
+        source="range_height_control.cpp",
+    )
+    judges_range_in_climb: bool = _behaviour(
+        "Whether the range finder agrees with the vertical velocity is concluded only above 0.5 m/s. v1.16 asks for "
+        "that only to trust it again.",
+        since="v1.14",
+        until="v1.15",
+        source="range_finder_consistency_check.cpp",
+    )
+    sees_no_fog: bool = _behaviour(
+        "The range finder is not checked for fog; once found faulty it is not used again.",
+        since="v1.13",
+        until="v1.15",
+        source="sensor_range_finder.cpp",
+    )
+    flies_flow_over_terrain: bool = _behaviour(
+        "Flow of sufficient quality, within the sensor's rate and level enough, is fused over the terrain that the "
+        "filter apart knows, whose distance is taken as given. The sensor's gyro is taken as it is for the flow, its "
+        "bias for the lever arm alone; the velocity is reset to the single sample.",
+        since="v1.13",
+        until="v1.15",
+        source="optical_flow_control.cpp, optflow_fusion.cpp",
+    )
+    turns_vision_velocity: bool = _behaviour(
+        "Velocity of vision is fused along north, east and down, of whatever frame it is; beside GNSS its variance is "
+        "at least that of EKF2_GPS_V_NOISE. It starts beside another source only well within its gate. v1.16 fuses "
+        "velocities of the body in their frame.",
+        since="v1.13",
+        until="v1.15",
+        source="ev_vel_control.cpp",
+    )
+    starts_vision_yaw_unjudged: bool = _behaviour(
+        "The yaw of vision is judged only where it is fused, and starts without being fused.",
+        since="v1.13",
+        until="v1.15",
+        source="ev_yaw_control.cpp",
+    )
+    rounds_vision_filter: bool = _behaviour(
+        "The rotation of vision is filtered with a gain of 0.001. v1.16 takes the one of 10 ms and 10 s.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.h",
+    )
+    asks_airspeed_for_wings: bool = _behaviour(
+        "Airspeed and sideslip are fused on a fixed wing alone; airspeed that corrects every state does not count as "
+        "horizontal velocity.",
+        since="v1.13",
+        until="v1.15",
+        source="airspeed_fusion.cpp, sideslip_fusion.cpp",
+    )
+    starts_wind_at_zero: bool = _behaviour(
+        "Sideslip and drag start with a wind of zero; sideslip before it is fused, whether or not it is then accepted.",
+        since="v1.13",
+        until="v1.15",
+        source="sideslip_fusion.cpp, drag_fusion.cpp",
+    )
+    takes_sideslip_for_ratio: bool = _behaviour(
+        "Sideslip is the ratio of sideways to forward air velocity, not its angle; EKF2_BETA_NOISE has no lower bound.",
+        since="v1.13",
+        until="v1.15",
+        source="sideslip_fusion.cpp",
+    )
+    fuses_both_drag_axes: bool = _behaviour(
+        "Drag counts as fused where both axes were.",
+        since="v1.13",
+        until="v1.15",
+        source="drag_fusion.cpp",
+    )
+    filters_terrain_apart: bool = _behaviour(
+        "The terrain is no state of the filter; a filter of its own estimates it.",
+        since="v1.13",
+        until="v1.15",
+        source="terrain_estimator.cpp",
+    )
+    levers_by_measured_rate: bool = _behaviour(
+        "What turns a lever arm is the rate as the gyro measures it, with its bias.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_control.cpp, ekf_helper.cpp",
+    )
 
 
 def _behaviours_of(release: str) -> Behaviours:

@@ -4,7 +4,7 @@
 was aligned in flight). `cs.mag_3d`: every state. `cs.mag_dec`: declination too, as nothing else fixes north.
 
 Mirrors PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`, of which `field_checks.py`, `mag_heading.py`,
-`mag_resets.py` and `world_field.py` hold the parts.
+`mag_resets.py` and `world_field.py` hold the parts. How v1.15 does stands in `mag_3d_control.py`.
 """
 
 import math
@@ -12,6 +12,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_checks import check_mag_field
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_3d_control import control_mag_3d_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     R_MAG_MIN,
     compute_mag_h,
@@ -21,7 +22,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import check_mag_heading_consistency
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
-    DECLINATION_FROM_WMM,
     MAG_TYPE_AUTO,
     MAG_TYPE_HEADING,
     MAG_TYPE_INIT,
@@ -37,8 +37,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import (
     check_world_magnetic_model,
     has_saved_declination,
     has_wmm_declination,
-    is_wmm_field_known,
-    synthetic_mag_z,
+    synthesise_z,
 )
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -65,7 +64,7 @@ DECLINATION_VARIANCE = 0.5**2
 
 
 @kernel
-def control_mag_fusion(ekf, params):
+def _control_mag_fusion(ekf, params):
     """Process the magnetometer sample that reached the fusion time horizon, if any."""
     if ekf.cs.in_air and not ekf.cs_prev.in_air:
         ekf.cs.mag_aligned_in_flight = False
@@ -107,7 +106,7 @@ def _filter_sample(ekf, params):
 def _control_with_sample(ekf, params, wmm_updated):
     """Judge the sample, choose the mode, then fuse, reset, start or stop."""
     sample, aid = ekf.sensors.mag.sample.mag, ekf.aid.mag
-    _synthesise_z(ekf, params, sample)
+    synthesise_z(ekf, params, sample)
     clear_mag_faults(ekf)
 
     R_mag = max(params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE, R_MAG_MIN)
@@ -144,18 +143,6 @@ def _control_with_sample(ekf, params, wmm_updated):
             _reset_to_filtered(ekf, params, ekf.cs.mag_hdg or ekf.cs.mag_3d)
         else:
             stop_mag_fusion(ekf, params)
-
-
-@kernel
-def _synthesise_z(ekf, params, sample):
-    """With EKF2_SYNT_MAG_Z, replace the sample's z by what the model and the other axes leave for it."""
-    ekf.cs.synthetic_mag_z = (
-        params.EKF2_SYNT_MAG_Z != 0.0
-        and (int(params.EKF2_DECL_TYPE) & DECLINATION_FROM_WMM) != 0
-        and is_wmm_field_known(ekf)
-    )
-    if ekf.cs.synthetic_mag_z:
-        sample[2] = synthetic_mag_z(ekf, sample[0], sample[1])
 
 
 @kernel
@@ -303,3 +290,7 @@ def _start(ekf, params, sample, R_mag, wmm_updated):
         ekf.cs.mag = True
     elif fuse_mag(ekf, params, sample, R_mag, False, False):
         ekf.cs.mag = True
+
+
+control_mag_fusion = by_release(_control_mag_fusion, "counts_field_resets", control_mag_3d_fusion)
+"""Process the magnetometer sample that reached the fusion time horizon, if any."""

@@ -9,9 +9,11 @@ Mirrors PX4 v1.16 `EKF/aid_sources/magnetometer/mag_fusion.cpp`; the Jacobians a
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
+from fusetune.ekf2.filter.aid_sources.magnetometer.field_limits import limit_field
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
 from fusetune.ekf2.filter.common.state import ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH
-from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov, reset_quat_cov
+from fusetune.ekf2.filter.covariance import reset_quat_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, scale_kalman_gain
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
@@ -73,8 +75,7 @@ def recover_from_bad_mag_covariance(ekf, params, update_all_states):
     """The innovation variance fell below the noise: start the covariances that made it anew."""
     if update_all_states:
         reset_quat_cov(ekf, params, params.EKF2_HEAD_NOISE)
-    reset_mag_earth_cov(ekf, params)
-    reset_mag_bias_cov(ekf, params)
+    reset_field_covariance(ekf, params)
 
 
 @kernel
@@ -111,6 +112,7 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
         elif not update_tilt:
             _hold_tilt(ekf, K)
         measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis])
+        limit_field(ekf, params)
 
     clear_mag_faults(ekf)
     aid.fused = True
@@ -169,5 +171,6 @@ def fuse_declination(ekf, params, declination, R, update_all_states):
     else:
         _hold_tilt_by_declination(ekf, ekf.scratch.K)
     measurement_update(ekf, params, R, innovation)
+    limit_field(ekf, params)
     ekf.fs.bad_mag_decl = False
     return True

@@ -54,6 +54,33 @@ _is_present_small = by_release(_is_any, "doubts_present_heading", _is_within_noi
 
 
 @kernel
+def _is_accelerating(ekf, params):
+    acceleration = math.hypot(ekf.accel_horiz_lpf[0], ekf.accel_horiz_lpf[1])
+    return is_north_east_aiding_active(ekf) and acceleration > params.EKF2_MAG_ACCLIM
+
+
+@kernel
+def _is_yaw_observable(ekf, params):
+    return ekf.field_history.yaw_observable
+
+
+_is_heading_told = by_release(_is_accelerating, "holds_yaw_observable", _is_yaw_observable)
+"""Whether the vehicle accelerates enough for GNSS to tell the heading."""
+
+
+@kernel
+def update_yaw_observability(ekf, params):
+    """Yaw becomes observable above twice EKF2_MAG_ACCLIM (m/s²) and remains so above EKF2_MAG_ACCLIM.
+
+    Mirrors `checkYawAngleObservability` of PX4 v1.15 `EKF/mag_control.cpp`.
+    """
+    history = ekf.field_history
+    limit = params.EKF2_MAG_ACCLIM if history.yaw_observable else 2.0 * params.EKF2_MAG_ACCLIM
+    acceleration = math.hypot(ekf.accel_horiz_lpf[0], ekf.accel_horiz_lpf[1])
+    history.yaw_observable = is_north_east_aiding_active(ekf) and acceleration > limit
+
+
+@kernel
 def check_mag_heading_consistency(ekf, params, mag):
     """Low-pass the heading innovation; consistent once it is small while the vehicle accelerates enough to tell."""
     innovation = 0.0
@@ -64,8 +91,7 @@ def check_mag_heading_consistency(ekf, params, mag):
         ekf.mag.heading_innovation_lpf = 0.0
 
     if abs(ekf.mag.heading_innovation_lpf) < params.EKF2_HEAD_NOISE and _is_present_small(ekf, params, innovation):
-        acceleration = math.hypot(ekf.accel_horiz_lpf[0], ekf.accel_horiz_lpf[1])
-        if is_north_east_aiding_active(ekf) and acceleration > params.EKF2_MAG_ACCLIM:
+        if _is_heading_told(ekf, params):
             ekf.cs.mag_heading_consistent = True
     else:
         ekf.cs.mag_heading_consistent = False

@@ -29,6 +29,20 @@ MAG_MEMORY = np.dtype(
 Angles are rad, strength and field Gauss (field in NED), times µs. `jacobians` is work space of the fusion.
 """
 
+FIELD_HISTORY = np.dtype(
+    [
+        ("wmm_time_last_set", "i8"),
+        ("declination_fused", "?"),
+        ("yaw_observable", "?"),
+        ("resets_available", "i8"),
+    ],
+    align=True,
+)
+"""Sub-record `ekf.field_history` of releases before v1.16: when the known field of the model was last replaced (µs);
+whether the declination was fused since the field's covariance was reset; whether the vehicle accelerates enough to tell
+the heading; and how often a fusion that fails may still reset the field.
+"""
+
 MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_NONE, MAG_TYPE_INIT = 0, 1, 5, 6
 
 DECLINATION_FROM_WMM, DECLINATION_SAVED = 1, 2

@@ -6,12 +6,14 @@ Mirrors the resets of PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import is_yaw_emergency_estimate_available
+from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import reset_mag_heading
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known
 from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
-from fusetune.ekf2.numerics.rotations import component_in_body, rotate_to_earth
+from fusetune.ekf2.numerics.rotations import component_in_body, euler_yaw, rotate_to_earth
 from fusetune.ekf2.releases.by_release import by_release
 
 EARTH_FIELD_MIN_CHANGE = 0.01
@@ -66,7 +68,7 @@ def reset_mag_states_to_measurement(ekf, params, mag, reset_heading):
 
 
 @kernel
-def reset_mag_states(ekf, params, mag, reset_heading):
+def _reset_mag_states(ekf, params, mag, reset_heading):
     """Reset field states (and yaw, if asked) from the filtered measurement `mag` (body frame, Gauss)."""
     if is_wmm_field_known(ekf):
         reset_mag_states_to_wmm(ekf, params, mag, reset_heading)
@@ -75,6 +77,46 @@ def reset_mag_states(ekf, params, mag, reset_heading):
     if ekf.cs.in_air and _aligns_field(ekf, reset_heading):
         ekf.cs.mag_aligned_in_flight = True
         ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+
+
+@kernel
+def _put_body_field(ekf, mag, turn):
+    """The body field explains what `mag` is more than the model's field, at a yaw that is greater by `turn` (rad)."""
+    field, c, s = ekf.mag.wmm_earth_field, math.cos(turn), math.sin(turn)
+    north, east = c * field[0] + s * field[1], c * field[1] - s * field[0]
+    for axis in range(3):
+        ekf.mag_B[axis] = mag[axis] - component_in_body(ekf.R_to_earth, axis, north, east, field[2])
+
+
+@kernel
+def _reset_mag_states_by_yaw_estimator(ekf, params, mag, reset_heading):
+    """As v1.16's, always with both covariances; where the yaw estimator has converged, the body field follows from it.
+
+    Mirrors `resetMagStates` of PX4 v1.15 `EKF/mag_control.cpp`.
+    """
+    reset_field_covariance(ekf, params)
+    ekf.mag_B[:] = 0.0
+    if is_wmm_field_known(ekf):
+        if is_yaw_emergency_estimate_available(ekf):
+            _put_body_field(ekf, mag, ekf.gsf.yaw - euler_yaw(ekf.R_to_earth))
+        elif not reset_heading and ekf.cs.yaw_align:
+            _put_body_field(ekf, mag, 0.0)
+        for axis in range(3):
+            ekf.mag_I[axis] = ekf.mag.wmm_earth_field[axis]
+        if reset_heading:
+            reset_mag_heading(ekf, params, mag)
+        ekf.field_history.declination_fused = True
+    else:
+        if reset_heading:
+            reset_mag_heading(ekf, params, mag)
+        ekf.mag_I[0], ekf.mag_I[1], ekf.mag_I[2] = rotate_to_earth(ekf.R_to_earth, mag[0], mag[1], mag[2])
+    if ekf.cs.in_air:
+        ekf.cs.mag_aligned_in_flight = True
+        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+
+
+reset_mag_states = by_release(_reset_mag_states, "puts_body_field_by_yaw_estimator", _reset_mag_states_by_yaw_estimator)
+"""Reset field states (and yaw, if asked) from the filtered measurement (body frame, Gauss)."""
 
 
 @kernel
@@ -122,20 +164,33 @@ _may_ask_for_yaw_reset = by_release(_always, "aligns_field_with_heading", _is_he
 
 
 @kernel
-def stop_mag_fusion(ekf, params):
-    """Stop using the magnetometer; yaw stays aligned only if horizontal aiding keeps it observable."""
-    if not ekf.cs.mag:
-        return
-    reset_mag_earth_cov(ekf, params)
-    reset_mag_bias_cov(ekf, params)
+def _forget_field_and_yaw(ekf, params):
+    """What is known of the field is forgotten; yaw stays aligned only if horizontal aiding keeps it observable."""
+    reset_field_covariance(ekf, params)
     if ekf.cs.yaw_align and (ekf.cs.mag_3d or ekf.cs.mag_hdg) and not is_north_east_aiding_active(ekf):
         ekf.cs.yaw_align = False
+    ekf.cs.mag_aligned_in_flight = False
+
+
+@kernel
+def _forget_nothing(ekf, params):
+    """Covariance and alignment remain as they are."""
+
+
+_forget_field = by_release(_forget_field_and_yaw, "counts_field_resets", _forget_nothing)
+
+
+@kernel
+def stop_mag_fusion(ekf, params):
+    """Stop using the magnetometer."""
+    if not ekf.cs.mag:
+        return
+    _forget_field(ekf, params)
     if ekf.cs.mag_hdg:
         ekf.fs.bad_hdg = False
     ekf.cs.mag = False
     ekf.cs.mag_dec = False
     ekf.cs.mag_3d = False
     ekf.cs.mag_hdg = False
-    ekf.cs.mag_aligned_in_flight = False
     clear_mag_faults(ekf)
     ekf.fs.bad_mag_decl = False

@@ -1,0 +1,276 @@
+"""What releases before v1.16 do otherwise with the magnetometer, each in the situation that tells it from v1.16.
+
+Expected: what docs/releases.md says of the behaviour, as a figure by hand; declinations of the older magnetic models as
+PX4's own tables give them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.ekf2.filter.aiding_estimator import START_US, set_time
+from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
+from tests.ekf2.releases.test_named_behaviours import Flying, flying
+
+from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
+from fusetune.ekf2.filter.aid_sources.magnetometer import field_limits, mag_heading, mag_resets, world_field
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
+from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
+from fusetune.ekf2.numerics import world_magnetic_model_table as table
+
+V115, V116 = "v1.15", "v1.16"
+FIELD = np.array([0.22, 0.03, 0.40])
+STRENGTH, DECLINATION, INCLINATION = 0.48, 0.06, 1.1
+
+
+@pytest.mark.parametrize("release", table.OLDER_EPOCHS)
+def test_older_grids_are_what_the_coefficients_give(release):
+    shipped = table.read_tables(table.older_table_path(release))
+    computed = table.compute_tables(table.OLDER_EPOCHS[release], table.OLDER_SCALES)
+    for quantity in table.QUANTITIES:
+        assert shipped[quantity].scale == pytest.approx(computed[quantity].scale, rel=1e-15)
+        np.testing.assert_array_equal(shipped[quantity].values, computed[quantity].values)
+
+
+@pytest.mark.parametrize(
+    ("release", "zurich", "sao_paulo"),
+    [("v1.13", 3.0582, -21.014), ("v1.14", 3.2287, -21.109), (V115, 3.3505, -21.173), (V116, 3.4056, -21.208)],
+)
+def test_each_release_has_the_model_of_its_date(release, zurich, sao_paulo):
+    """Degrees that PX4's own tables of each release give."""
+    ekf = flying(release).ekf
+    declination, _, strength = world_field.field_of_model(ekf, 47.397742, 8.545594)
+    assert math.degrees(declination) == pytest.approx(zurich, abs=6e-5)
+    assert strength == pytest.approx(0.482, abs=0.001)
+    declination, inclination, _ = world_field.field_of_model(ekf, -23.6, -46.6)
+    assert math.degrees(declination) == pytest.approx(sao_paulo, abs=6e-4)
+    assert math.degrees(inclination) == pytest.approx(-39.4, abs=0.5)
+
+
+def fix(latitude_deg: float, longitude_deg: float, accuracy: float = 900.0, fix_type: int = 2) -> np.void:
+    sample = np.zeros(1, GNSS_SAMPLE)[0]
+    sample["lat_deg"], sample["lon_deg"], sample["hacc"], sample["fix_type"] = (
+        latitude_deg, longitude_deg, accuracy, fix_type,
+    )  # fmt: skip
+    return sample
+
+
+def test_v1_15_looks_the_model_up_at_rough_fixes_and_keeps_it_within_a_degree():
+    ekf = flying(V115).ekf
+    look_up = world_field.look_field_up_by_fix
+    assert not look_up(ekf, fix(47.4, 8.5, accuracy=1000.0), True)
+    assert not look_up(ekf, fix(47.4, 8.5, fix_type=1), True)
+    assert not look_up(ekf, fix(47.4, 8.5), False)
+    assert not np.isfinite(ekf["mag"]["wmm_declination"])
+    assert look_up(ekf, fix(47.4, 8.5), True)
+    known = float(ekf["mag"]["wmm_declination"])
+    assert ekf["field_history"]["wmm_time_last_set"] == START_US
+    set_time(ekf, START_US + 900_000)
+    assert not look_up(ekf, fix(47.4, 8.5), True)
+    for seconds, place, kept in ((1.1, (47.4, 9.0), True), (2.2, (47.4, 14.0), False)):
+        set_time(ekf, START_US + round(seconds * 1e6))
+        assert look_up(ekf, fix(*place), True)
+        assert (ekf["mag"]["wmm_declination"] == known) == kept
+
+
+@pytest.mark.parametrize(("release", "assumed"), [("v1.13", True), ("v1.14", True), (V115, True), (V116, False)])
+def test_the_parameter_was_the_declination_without_being_asked_for(release, assumed):
+    it = flying(release, EKF2_DECL_TYPE=1.0, EKF2_MAG_DECL=10.0)
+    declination = world_field.get_mag_declination(it.ekf, it.params)
+    assert declination == pytest.approx(math.radians(10.0) if assumed else 0.0)
+
+
+def test_yaw_stays_observable_until_the_acceleration_falls_below_the_limit():
+    it = flying(V115, EKF2_MAG_ACCLIM=0.5)
+    it.ekf["cs"]["gnss_pos"] = it.ekf["cs"]["gnss_vel"] = True
+    for acceleration, observable in ((0.9, False), (1.1, True), (0.6, True), (0.4, False), (0.9, False)):
+        it.ekf["accel_horiz_lpf"][:] = 0.6 * acceleration, 0.8 * acceleration
+        mag_heading.update_yaw_observability(it.ekf, it.params)
+        assert it.ekf["field_history"]["yaw_observable"] == observable
+    it.ekf["accel_horiz_lpf"][0] = 5.0
+    it.ekf["cs"]["gnss_pos"] = it.ekf["cs"]["gnss_vel"] = False
+    mag_heading.update_yaw_observability(it.ekf, it.params)
+    assert not it.ekf["field_history"]["yaw_observable"]
+
+
+def with_model(it: Flying) -> np.ndarray:
+    """Let the model's field be known; return it (NED, Gauss)."""
+    mag = it.ekf["mag"]
+    mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = DECLINATION, INCLINATION, STRENGTH
+    world_field.earth_field_vector.py_func(DECLINATION, INCLINATION, STRENGTH, mag["wmm_earth_field"])
+    return np.array(mag["wmm_earth_field"])
+
+
+@pytest.mark.parametrize(
+    ("turned_by", "scaled_by", "turned_to", "scaled_to"),
+    [
+        (0.4, 1.0, 0.4, 1.0),
+        (0.7, 1.0, 0.5, 1.0),
+        (-0.7, 1.2, -0.5, 1.2),
+        (0.2, 0.3, 0.2, 0.5),
+        (2.0, 0.3, 0.5, 0.5),
+        (3.0, 1e-9, 0.0, 1.0),
+    ],
+)
+def test_declination_and_horizontal_field_are_limited(turned_by, scaled_by, turned_to, scaled_to):
+    """Within 0.5 rad of the model and above half of its strength; what has collapsed becomes the model's."""
+    for release in (V115, V116):
+        it = flying(release, EKF2_DECL_TYPE=3.0)
+        north, east, down = with_model(it)
+        horizontal = math.hypot(north, east)
+        it.ekf["mag_I"][:] = (
+            scaled_by * horizontal * math.cos(DECLINATION + turned_by),
+            scaled_by * horizontal * math.sin(DECLINATION + turned_by),
+            down,
+        )
+        before = np.array(it.ekf["mag_I"])
+        field_limits.limit_field(it.ekf, it.params)
+        if release == V116:
+            np.testing.assert_array_equal(it.ekf["mag_I"], before)
+            continue
+        assert math.hypot(*it.ekf["mag_I"][:2]) == pytest.approx(scaled_to * horizontal)
+        assert math.atan2(it.ekf["mag_I"][1], it.ekf["mag_I"][0]) == pytest.approx(DECLINATION + turned_to)
+
+
+def test_a_field_without_reference_is_not_limited():
+    it = flying(V115, EKF2_DECL_TYPE=1.0, EKF2_MAG_DECL=10.0)
+    it.ekf["mag_I"][:] = -0.3, 0.1, 0.4
+    field_limits.limit_field(it.ekf, it.params)
+    np.testing.assert_array_equal(it.ekf["mag_I"], [-0.3, 0.1, 0.4])
+    it.params["EKF2_DECL_TYPE"] = 2.0
+    field_limits.limit_field(it.ekf, it.params)
+    assert math.atan2(it.ekf["mag_I"][1], it.ekf["mag_I"][0]) == pytest.approx(math.radians(10.0) + 0.5)
+
+
+def with_yaw_estimate(it: Flying, yaw: float) -> None:
+    it.ekf["gsf"]["vel_fuse_started"] = True
+    it.ekf["gsf"]["yaw"], it.ekf["gsf"]["yaw_variance"] = yaw, 0.01
+
+
+@pytest.mark.parametrize("reset_heading", [False, True])
+def test_v1_15_resets_the_body_field_as_the_yaw_estimator_wants(reset_heading, monkeypatch):
+    it = flying(V115)
+    expected_field = with_model(it)
+    set_attitude(it.ekf, 0.2, 0.1, 2.5)
+    body_if_turned = it.ekf["R_to_earth"].T @ expected_field
+    set_attitude(it.ekf, 0.2, 0.1, 1.0)
+    it.ekf["cs"]["yaw_align"] = True
+    it.ekf["P"][MAG_EARTH : MAG_BODY + 3, :] = it.ekf["P"][:, MAG_EARTH : MAG_BODY + 3] = 0.3
+    with_yaw_estimate(it, 2.5)
+    monkeypatch.setattr(mag_resets, "reset_mag_heading", lambda ekf, params, mag: None)
+    mag_resets.reset_mag_states.of(V115).py_func(it.ekf, it.params, FIELD, reset_heading)
+    np.testing.assert_allclose(it.ekf["mag_I"], expected_field)
+    np.testing.assert_allclose(it.ekf["mag_B"], FIELD - body_if_turned, atol=1e-12)
+    block = it.ekf["P"][MAG_EARTH : MAG_BODY + 3, MAG_EARTH : MAG_BODY + 3]
+    np.testing.assert_allclose(block, np.eye(6) * it.params["EKF2_MAG_NOISE"] ** 2)
+    assert it.ekf["field_history"]["declination_fused"]
+    assert it.ekf["cs"]["mag_aligned_in_flight"]
+
+
+def test_v1_15_without_yaw_estimate_takes_the_present_yaw_or_none():
+    it = flying(V115)
+    field = with_model(it)
+    set_attitude(it.ekf, 0.2, 0.1, 1.0)
+    it.ekf["cs"]["yaw_align"] = True
+    mag_resets.reset_mag_states(it.ekf, it.params, FIELD, False)
+    np.testing.assert_allclose(it.ekf["mag_B"], FIELD - it.ekf["R_to_earth"].T @ field, atol=1e-12)
+    mag_resets.reset_mag_states(it.ekf, it.params, FIELD, True)
+    np.testing.assert_array_equal(it.ekf["mag_B"], 0.0)
+
+
+def feed(it: Flying, field: np.ndarray = FIELD, samples: int = 1, reset: bool = False) -> None:
+    """Advance by 20 ms and one sample, `samples` times."""
+    for _ in range(samples):
+        set_time(it.ekf, int(it.ekf["time_delayed_us"]) + 20_000)
+        it.ekf["cs_prev"] = it.ekf["cs"].copy()
+        it.ekf["state_reset_prev"]["quat_counter"] = it.ekf["state_reset"]["quat_counter"]
+        put_sample(it.ekf, "mag", 5_000, mag=field, reset=reset)
+        control_mag_fusion(it.ekf, it.params)
+
+
+def on_ground(**overrides: float) -> Flying:
+    it = flying(V115, EKF2_MAG_CHECK=0.0, **overrides)
+    it.ekf["cs"]["in_air"] = False
+    it.ekf["cs_prev"]["in_air"] = False
+    return it
+
+
+def test_v1_15_starts_with_the_sixth_sample_and_tells_it_from_the_next_on():
+    it = on_ground()
+    aid = it.ekf["aid"]["mag"]
+    told = []
+    for _ in range(8):
+        feed(it)
+        told.append((bool(it.ekf["cs"]["mag"]), bool(aid["timestamp_sample"]), bool(aid["fused"])))
+    assert told == [(False, False, False)] * 5 + [(True, False, False)] + [(True, True, True)] * 2
+    assert it.ekf["cs"]["yaw_align"]
+    assert it.ekf["cs"]["mag_dec"]
+    np.testing.assert_allclose(aid["observation"], FIELD - it.ekf["mag_B"], atol=1e-9)
+
+
+def test_v1_15_fuses_the_declination_first_once_the_covariance_is_new():
+    """0.02 rad against 0.05 Gauss of 0.22 Gauss horizontally, which is 0.22 rad: it leaves 0.02 rad."""
+    it = on_ground(EKF2_DECL_TYPE=2.0, EKF2_MAG_DECL=8.0)
+    feed(it, samples=6)
+    assert not it.ekf["field_history"]["declination_fused"]
+    feed(it, 10.0 * FIELD)
+    assert it.ekf["aid"]["mag"]["innovation_rejected"]
+    assert it.ekf["field_history"]["declination_fused"]
+    field, P = it.ekf["mag_I"], it.ekf["P"][MAG_EARTH : MAG_EARTH + 2, MAG_EARTH : MAG_EARTH + 2]
+    gradient = np.array([-field[1], field[0]]) / (field[0] ** 2 + field[1] ** 2)
+    assert math.sqrt(gradient @ P @ gradient) == pytest.approx(0.02, rel=0.01)
+
+
+def test_v1_15_starts_anew_after_another_reset_of_the_yaw():
+    it = on_ground(EKF2_DECL_TYPE=2.0, EKF2_MAG_DECL=8.0)
+    feed(it, samples=8)
+    assert it.ekf["cs"]["mag"]
+    set_time(it.ekf, int(it.ekf["time_delayed_us"]) + 10_000)
+    it.ekf["sensors"]["mag"]["data_ready"] = False
+    it.ekf["state_reset"]["quat_counter"] += 1
+    control_mag_fusion(it.ekf, it.params)
+    assert not it.ekf["cs"]["mag"]
+    assert not it.ekf["cs"]["mag_hdg"]
+    assert it.ekf["cs"]["yaw_align"]
+    assert not it.ekf["field_history"]["declination_fused"]
+
+
+def test_v1_15_resets_twice_in_flight_then_stops_and_keeps_the_yaw_aligned():
+    it = on_ground()
+    feed(it, samples=8)
+    it.ekf["cs"]["in_air"] = True
+    it.ekf["cs"]["mag_aligned_in_flight"] = True
+    counts, running = [], []
+    for _ in range(3):
+        it.ekf["aid"]["mag"]["time_last_fuse"] = int(it.ekf["time_delayed_us"]) - 7_100_000
+        it.ekf["cs_prev"]["in_air"] = True
+        feed(it, 10.0 * FIELD)
+        counts.append(int(it.ekf["field_history"]["resets_available"]))
+        running.append(bool(it.ekf["cs"]["mag"]))
+    assert counts == [1, 0, 0]
+    assert running == [True, True, False]
+    assert it.ekf["cs"]["yaw_align"]
+
+
+@pytest.mark.parametrize(
+    ("disturbed", "consistent", "mode"), [(False, True, "3d"), (True, True, "3d"), (False, False, "")]
+)
+def test_v1_15_fuses_a_disturbed_field_once_it_is_aligned_in_flight(disturbed, consistent, mode):
+    it = on_ground()
+    feed(it, samples=8)
+    it.ekf["cs"]["in_air"] = it.ekf["cs_prev"]["in_air"] = True
+    it.ekf["cs"]["mag_aligned_in_flight"] = True
+    it.ekf["cs"]["gnss_pos"] = it.ekf["cs"]["gnss_vel"] = True
+    it.ekf["cs"]["mag_heading_consistent"] = consistent
+    if not consistent:
+        it.ekf["mag"]["heading_innovation_lpf"] = 1.0
+    if disturbed:
+        it.params["EKF2_MAG_CHECK"] = 1.0
+        it.ekf["mag"]["wmm_strength"] = 5.0
+    feed(it)
+    assert it.ekf["cs"]["mag_field_disturbed"] == disturbed
+    assert bool(it.ekf["cs"]["mag_3d"]) == (mode == "3d")
+    assert not it.ekf["cs"]["mag_hdg"]
+    assert not it.ekf["cs"]["mag_dec"]
