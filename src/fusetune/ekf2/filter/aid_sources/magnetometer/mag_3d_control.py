@@ -115,7 +115,7 @@ def _control_with_sample(ekf, params):
     synthesise_z(ekf, params, sample)
     check_mag_heading_consistency(ekf, params, sample)
 
-    forget_aid_source_status(aid, 3)
+    forget_aid_source_status(ekf, aid, 3)
     # the model may have been looked up after the last fusion, in the same update
     wmm_updated = ekf.field_history.wmm_time_last_set >= aid.time_last_fuse
     continuing = _continuing_conditions_passing(ekf, sample)
