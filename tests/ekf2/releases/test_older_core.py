@@ -47,7 +47,8 @@ def test_positions_are_metres_of_the_origin_until_v1_15(it):
     if is_old(it):
         assert (north, east) == (100.0, 200.0)
         lat, lon = asked(local_origin.get_global_horizontal_position, it)
-        assert math.isclose(lat, 100.0 / RADIUS, rel_tol=1e-6) and math.isclose(lon, 200.0 / RADIUS, rel_tol=1e-6)
+        assert math.isclose(lat, 100.0 / RADIUS, rel_tol=1e-6)
+        assert math.isclose(lon, 200.0 / RADIUS, rel_tol=1e-6)
     else:
         # radii of curvature of the ellipsoid at the equator: a(1 − e²) and a
         assert math.isclose(it.ekf["gpos_lat"], 100.0 / (6_378_137.0 * (1 - 0.0818191908425**2) + 10.0), rel_tol=1e-9)
@@ -138,9 +139,11 @@ def test_variances_are_clipped_in_v1_15(it):
     P[GYRO_BIAS, GYRO_BIAS], P[GYRO_BIAS + 1, GYRO_BIAS + 1] = 2.0, 1e-8
     asked(measurement_update.constrain_state_variances, it)
     if is_old(it):
-        assert P[VELOCITY, VELOCITY] == 1e6 and P[VELOCITY, POSITION] == 50.0
+        assert P[VELOCITY, VELOCITY] == 1e6
+        assert P[VELOCITY, POSITION] == 50.0
         # the largest of a group is at most 10⁶ times its least
-        assert P[GYRO_BIAS, GYRO_BIAS] == 1.0 and P[GYRO_BIAS + 1, GYRO_BIAS + 1] == 1e-6
+        assert P[GYRO_BIAS, GYRO_BIAS] == 1.0
+        assert P[GYRO_BIAS + 1, GYRO_BIAS + 1] == 1e-6
     else:
         # P (1 − 1/11)ᵏ until below the limit, correlations with it
         assert math.isclose(P[VELOCITY, VELOCITY], 1.2e6 * (10 / 11) ** 2)
@@ -211,8 +214,10 @@ def test_velocity_resets_leave_the_position_correlated_until_v1_15(it):
     state_resets.reset_horizontal_velocity_to.py_func(it.ekf, it.params, 1.0, 2.0, 0.25, 0.25)
     state_resets.reset_vertical_velocity_to.py_func(it.ekf, it.params, 3.0, 0.5)
     kept = 1e-3 if is_old(it) else 0.0
-    assert P[POSITION, GYRO_BIAS] == kept and P[POSITION + 2, ACCEL_BIAS + 2] == kept
-    assert P[VELOCITY, VELOCITY] == 0.25 and P[VELOCITY + 2, VELOCITY + 2] == 0.5
+    assert P[POSITION, GYRO_BIAS] == kept
+    assert P[POSITION + 2, ACCEL_BIAS + 2] == kept
+    assert P[VELOCITY, VELOCITY] == 0.25
+    assert P[VELOCITY + 2, VELOCITY + 2] == 0.5
 
 
 def test_nothing_tells_of_a_constant_position_until_v1_15(it):
