@@ -19,7 +19,13 @@ from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, GNSS_TRUST, initialise_gnss_memory
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import FIELD_HISTORY, MAG_MEMORY, initialise_mag_memory
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
+    FIELD_HISTORY,
+    MAG_MEMORY,
+    MAG_MODES,
+    initialise_mag_memory,
+    initialise_mag_modes,
+)
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
@@ -95,6 +101,8 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("heading", HEADING_MEMORY))
     if does.limits_declination:
         memories.append(("field_history", FIELD_HISTORY))
+    if does.fuses_heading_or_field:
+        memories.append(("mag_modes", MAG_MODES))
     return marked(np.dtype(memories, align=True), release)
 
 
@@ -121,6 +129,7 @@ def initialise_estimator(ekf, params):
     initialise_position_bias_estimator(ekf.ev_pos_b_est)
     initialise_gnss_memory(ekf.gnss)
     initialise_mag_memory(ekf.mag)
+    initialise_mag_modes(ekf)
     initialise_range_memory(ekf.range)
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)

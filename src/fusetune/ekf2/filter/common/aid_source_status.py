@@ -102,22 +102,6 @@ def _filter_axis(aid, i, alpha, innovation, test_ratio, gate):
 
 
 @kernel
-def forget_aid_source_status(aid, n_axes):
-    """Forget an observation, but not when one was last fused; releases before v1.16 do so before the next is judged."""
-    if aid.timestamp_sample == 0:
-        return
-    aid.timestamp_sample = 0
-    for i in range(n_axes):
-        aid.observation[i] = 0.0
-        aid.observation_variance[i] = 0.0
-        aid.innovation[i] = 0.0
-        aid.innovation_variance[i] = 0.0
-        aid.test_ratio[i] = math.inf
-    aid.innovation_rejected = True
-    aid.fused = False
-
-
-@kernel
 def reset_aid_source_status_zero_innovation(ekf, aid, n_axes):
     """The state was reset to this source: keep the observation, with an innovation of zero."""
     aid.time_last_fuse = ekf.time_delayed_us
