@@ -23,7 +23,6 @@ from fusetune.design.covariance.ekf2_sensors import Ekf2Sensor
 from fusetune.design.missions.mission import Mission, load_mission
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_AXES
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.filter.common.state import PUBLISHED_POSITION
 from fusetune.ekf2.numerics.geodesy import lat_lon_difference
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS
@@ -34,6 +33,7 @@ from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import Vehicle, load_vehicle
 from fusetune.px4.flight import Flight, TopicTable, stacked
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.complete_sets import complete
 
 HERE = Path(__file__).parent
 MISSION = HERE / "decision_study" / "mission.yaml"

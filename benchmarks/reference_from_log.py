@@ -21,7 +21,7 @@ from fusetune.ekf2.replay.recording import LOCAL_POSITION_ROW
 from fusetune.errors import UserError
 from fusetune.px4.flight import Flight, TopicTable, row_count
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import atomic_path

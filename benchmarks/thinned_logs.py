@@ -35,12 +35,12 @@ from fusetune.analyze.trust.grade import grade_flight
 from fusetune.analyze.trust.grade_causes import cost_of
 from fusetune.design.missions.mission import load_mission
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_NAMES
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.execute.simulation import fly
 from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight, TopicTable, row_count, select_rows
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.ulog.reader import read_ulog
 
 PROJECT = Path(__file__).resolve().parents[1]

@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from fusetune.design.missions.mission import load_mission
 from fusetune.ekf2.feed.inputs import build_inputs
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.replay import replay
 from fusetune.execute.sensors.faults import DefaultProfile, GnssOutage
 from fusetune.execute.simulation import fly, simulate
 from fusetune.execute.vehicle import load_vehicle
 from fusetune.px4.flight import Flight, stacked
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.ulog.reader import read_ulog
 from fusetune.px4.ulog.writer import write_ulog
 

@@ -33,9 +33,9 @@ def measure(work: Workplace) -> Iterator[tuple[str, float]]:
     """CPU times of replays, µs."""
     from fusetune.ekf2.compiled.compilation import ensure_compiled
     from fusetune.ekf2.feed.inputs import build_inputs
-    from fusetune.ekf2.filter.common.parameters import complete
     from fusetune.ekf2.replay.replay import replay
     from fusetune.px4.layouts.release_layouts import canonical
+    from fusetune.px4.parameters.complete_sets import complete
     from fusetune.px4.ulog.reader import read_ulog
 
     ensure_compiled()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fusetune.errors import UserError
-from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, ParameterError, check_by
+from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, SENSOR_RATES, ParameterError, check_by
 from fusetune.px4.parameters.set_names import in_baseline_names, read_by
 from fusetune.px4.releases import BASELINE, Release
 
@@ -25,7 +25,8 @@ def parameter_problem(name: str, value: float, replayed: Release = BASELINE) -> 
 def typed_values(parameters: Mapping[str, float]) -> dict[str, float]:
     """Known parameters with `int` values where the type is INT32 and `float` values elsewhere."""
     return {
-        name: int(value) if ALL_PARAMETERS[name].type == "INT32" else float(value) for name, value in parameters.items()
+        name: int(value) if name not in SENSOR_RATES and ALL_PARAMETERS[name].type == "INT32" else float(value)
+        for name, value in parameters.items()
     }
 
 

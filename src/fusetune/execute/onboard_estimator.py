@@ -11,13 +11,13 @@ import numpy as np
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common import state as S
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_AXES, AID_SOURCE_NAMES
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS
 from fusetune.ekf2.replay.replay import replay
 from fusetune.ekf2.replay.results import ReplayResult
 from fusetune.px4.aid_sources import AID_SOURCES
 from fusetune.px4.flight import Flight, TopicKey, TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.complete_sets import complete
 
 _MESSAGE_FIELDS = (
     "gps_hvel[0]", "gps_hvel[1]", "gps_vvel", "gps_hpos[0]", "gps_hpos[1]", "gps_vpos",

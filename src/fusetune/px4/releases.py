@@ -50,6 +50,12 @@ VISION_FRAMES = (1, 14)
 ALL_HEIGHT_SOURCES = (1, 14)
 """Since then EKF2 takes the height from all sources that are enabled, before from one at a time."""
 
+CONTROL_BY_SOURCE = (1, 14)
+"""Since then each aid source has a parameter of its own, before EKF2_AID_MASK and EKF2_HGT_MODE had them all."""
+
+SENSOR_RATES_UNREAD = (1, 15)
+"""Since then EKF2 sizes its buffers by EKF2_DELAY_MAX, before by the rates of the sensors and their delays."""
+
 NO_MAG_HEADING = (1, 15)
 """Since then no heading of the magnetometer is fused: `heading` then holds its largest field innovation."""
 

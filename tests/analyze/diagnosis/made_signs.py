@@ -23,7 +23,7 @@ from fusetune.analyze.diagnosis.signs import Signs
 from fusetune.analyze.diagnosis.vision_signs import VisionSigns
 from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.px4.flight import Flight
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 
 AIR = ((10_000_000, 70_000_000),)
 FIELD, LEVEL = 0.48, 0.21

@@ -13,10 +13,10 @@ from fusetune.analyze.reconstruction.magnetometer_by_state import (
     reaction_to_offset,
 )
 from fusetune.ekf2.feed.inputs import build_inputs
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.replay.following import Departure, follow
 from fusetune.px4.flight import Flight, row_count, select_rows
 from fusetune.px4.layouts.logged_state import logged_states
+from fusetune.px4.parameters.complete_sets import complete
 
 FIELD = np.array([0.2, 0.05, 0.4])
 MAG = "vehicle_magnetometer"

@@ -11,8 +11,8 @@ from fusetune.analyze.replaying.prepared_flight import PreparedFlight, prepare
 from fusetune.analyze.replaying.replay_flight import write_replay
 from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.analyze.trust.fidelity import load_innovations
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.px4.flight import Flight, select_rows
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.quaternions import conjugate, from_rotation_vector, multiply, rotation_vector
 
 EARTH = np.array([0.21, 0.03, 0.43])

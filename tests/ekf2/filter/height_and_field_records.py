@@ -8,7 +8,7 @@ import numpy as np
 
 from fusetune.ekf2.filter.common.parameters import parameter_record
 from fusetune.ekf2.filter.estimator import EKF, initialise_estimator
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 
 
 def make_parameters(**overrides: float) -> np.void:

@@ -10,13 +10,13 @@ import pytest
 from pyulog import ULog
 
 from fusetune.px4.flight import ParameterValue
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.parameters.ekf2_parameters import (
     ALL_PARAMETERS,
     PARAMETERS,
     ParameterError,
     as_float32,
     check_value,
-    complete,
     migrate,
 )
 from fusetune.px4.releases import READ, name_of

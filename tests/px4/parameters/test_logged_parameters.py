@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fusetune.ekf2.filter.common.parameters import complete, parameter_record
+from fusetune.ekf2.filter.common.parameters import parameter_record
 from fusetune.px4.flight import Flight, ParameterChange, ParameterHistory, ReplacedParameter
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, PARAMETERS
 from fusetune.px4.parameters.logged_parameters import checked_history, flown_limits, typed_value
 

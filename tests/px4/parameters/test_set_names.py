@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fusetune.px4.flight import ParameterHistory
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, complete, defaults_of
+from fusetune.px4.parameters.complete_sets import complete
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, ParameterError, check_by, defaults_of
 from fusetune.px4.parameters.set_names import in_baseline_names, of_vehicle, read_by
 from fusetune.px4.parameters.updated_parameters import after_update, changed_by_update
 from fusetune.px4.releases import BASELINE, DEVELOPMENT, ESTIMATORS, number_of_name
@@ -52,14 +53,32 @@ def test_newer_names_are_translated_and_what_has_no_counterpart_is_refused_by_na
         read_by("EKF2_POS_LOCK", V1_17)
     with pytest.raises(ParameterError, match="Use EKF2_RNG_CTRL instead"):
         read_by("EKF2_RNG_AID")
+    assert read_by("EKF2_RNG_AID", V1_13).name == "EKF2_RNG_AID"
+    assert read_by("EKF2_GPS_CTRL", V1_13).name == "EKF2_GPS_CTRL"  # bits of EKF2_AID_MASK there
+    with pytest.raises(ParameterError, match=r"v1\.13 has no such parameter, v1\.14 to main have it"):
+        read_by("EKF2_GRAV_NOISE", V1_13)
+    with pytest.raises(ParameterError, match=r"v1\.17 has no such parameter, v1\.8 to v1\.16 have it"):
+        read_by("EKF2_RNG_A_IGATE", V1_17)
+
+
+def test_values_that_were_given_up_are_allowed_where_they_are_flown() -> None:
+    """PX4's metadata of v1.14: EKF2_MAG_TYPE 2 (3-axis) and 4 (indoor), bit 2 of EKF2_DECL_TYPE."""
+    for name, value in (("EKF2_MAG_TYPE", 2), ("EKF2_MAG_TYPE", 4), ("EKF2_DECL_TYPE", 7)):
+        for release in (V1_13, V1_14):
+            check_by(read_by(name, release), value)
+        with pytest.raises(ParameterError):
+            check_by(read_by(name, (1, 15)), value)
 
 
 def test_all_parameters_of_a_vehicle_are_those_that_its_estimator_reads() -> None:
     vehicle = {"EKF2_AID_MASK": 3, "EKF2_HGT_MODE": 2, "EKF2_WIND_NOISE": 0.2, "SENS_BARO_RATE": 20.0}
-    assert of_vehicle(vehicle, V1_13) == {
+    told = {
         "EKF2_GPS_CTRL": 7.0, "EKF2_OF_CTRL": 1.0, "EKF2_EV_CTRL": 0.0, "EKF2_DRAG_CTRL": 0.0, "EKF2_IMU_CTRL": 7.0,
         "EKF2_HGT_REF": 2.0, "EKF2_RNG_CTRL": 2.0, "EKF2_WIND_NSD": 0.02,
     }  # fmt: skip
+    assert of_vehicle(vehicle, V1_13) == vehicle
+    assert of_vehicle(vehicle, V1_14) == told | {"SENS_BARO_RATE": 20.0}
+    assert of_vehicle(vehicle, BASELINE) == told
     assert of_vehicle({"SENS_GPS0_DELAY": 90.0, "SENS_GPS1_DELAY": 50.0}, DEVELOPMENT) == {"EKF2_GPS_DELAY": 90.0}
 
 

@@ -28,7 +28,7 @@ from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.layouts.estimator_instances import instance_switches
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.checks.magnetometer_mounting import attitudes_and_fields, magnetometer_mounting, stillest_mounting
 from fusetune.save.checks.standstill import Standstill, flying_steps, standstill

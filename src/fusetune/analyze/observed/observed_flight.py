@@ -22,7 +22,7 @@ from fusetune.analyze.replaying.store.reader import read_set
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.save.verdict import Verdict, judge
 from fusetune.set_names import AS_FLOWN, PRESENT
 from fusetune.storage.freed_memory import give_back_freed_memory

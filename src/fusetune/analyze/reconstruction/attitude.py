@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from fusetune.px4.flight import TopicTable, row_count, stacked
 from fusetune.quaternions import conjugate, from_rotation_vector, multiply, normalised, rotation_vector
@@ -97,6 +96,9 @@ def steady_history(attitude: TopicTable | None, imu: TopicTable) -> AttitudeHist
     ----------
     attitude, imu : as for `attitude_history`
     """
+    # Imported here: it takes a fifth of a second to load, and few logs need it.
+    from scipy.ndimage import median_filter
+
     history = attitude_history(attitude, imu)
     if attitude is None or not len(history.time):
         return history

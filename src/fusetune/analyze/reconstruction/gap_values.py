@@ -9,7 +9,6 @@ a line between two vibrating neighbours would not do.
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
 NEIGHBOURS = 16
 """Values on each side of a gap that are looked at."""
@@ -89,6 +88,9 @@ def autocovariance(deviation: np.ndarray, present: np.ndarray, lags: int) -> np.
 
     Lags without pairs, and those beyond the end of the signal, count as uncorrelated.
     """
+    # Imported here: it takes a tenth of a second to load, and only gaps need it.
+    from scipy.fft import irfft, next_fast_len, rfft
+
     size = next_fast_len(len(deviation) + lags + 1, real=True)
 
     def products(values: np.ndarray) -> np.ndarray:

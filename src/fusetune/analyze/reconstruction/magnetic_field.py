@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fusetune.analyze.reconstruction.attitude import to_body, to_earth
 from fusetune.save.checks.magnetometer_mounting import stillest_mounting
@@ -70,6 +69,9 @@ def magnetic_field(time: np.ndarray, q: np.ndarray, measured: np.ndarray) -> Mag
     MagneticField
         Of too few samples, as measured.
     """
+    # Imported here: it takes a fifth of a second to load, and few logs need it.
+    from scipy.optimize import minimize_scalar
+
     if len(time) < MIN_SAMPLES:
         return MagneticField(to_earth(q, measured), np.zeros(3), np.eye(3))
     mounting, left = stillest_mounting(q, measured)

@@ -8,7 +8,6 @@ and put back after, as the field at rest in the body is no part of the earth's.
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from fusetune.analyze.reconstruction.attitude import AttitudeHistory
 from fusetune.analyze.reconstruction.between_samples import NewRows, interpolate, share_of_way
@@ -52,6 +51,9 @@ def _between(
     A spline is for a smooth field that its samples show without noise; a random walk between samples is on the line.
     """
     if _spline_is_nearer(earth[known]):
+        # Imported here: it takes a fifth of a second to load, and few logs need it.
+        from scipy.interpolate import CubicSpline
+
         return np.asarray(CubicSpline(sampled[known] * 1e-6, earth[known])(time * 1e-6))
     share = share_of_way(sampled, time, place)[:, None]
     return earth[place - 1] + share * (earth[place] - earth[place - 1])

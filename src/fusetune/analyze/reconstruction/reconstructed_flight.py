@@ -16,10 +16,10 @@ from fusetune.analyze.reconstruction.imu_gaps import fill_imu_gaps, find_imu_gap
 from fusetune.analyze.reconstruction.magnetometer import interpolate_magnetometer
 from fusetune.analyze.reconstruction.magnetometer_by_state import add_noise_by_state
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count
 from fusetune.px4.layouts.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states, why_no_state
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS
+from fusetune.px4.parameters.complete_sets import complete
 
 RECONSTRUCTION_TOPICS = (*ESTIMATOR_TOPICS, "vehicle_attitude", "vehicle_imu", *LOGGED_STATE_TOPICS)
 """What a reconstruction reads of a flight."""

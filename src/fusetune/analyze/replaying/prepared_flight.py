@@ -23,16 +23,18 @@ from fusetune.analyze.replaying.settings import IN_USE, ReplaySettings, StartSet
 from fusetune.analyze.replaying.start_choice import COLD, START_TOPICS, WARM, Start, choose_start
 from fusetune.analyze.replaying.withheld_gaps import plan_gaps
 from fusetune.ekf2.feed.inputs import EstimatorInputs, build_inputs
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.releases.behaviours import BASELINE
 from fusetune.ekf2.releases.modelled import demand_modelled
 from fusetune.ekf2.replay.recording import FULL, RecordArrays, Recording
 from fusetune.ekf2.replay.replay import replay, replay_into
 from fusetune.ekf2.replay.results import Gap, ReplayResult, ReplaySummary
+from fusetune.errors import UserError
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.logged_state import Handover, logged_handovers
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.complete_sets import complete
+from fusetune.px4.parameters.ekf2_parameters import ParameterError
 from fusetune.px4.releases import AUTO
 from fusetune.save.replayed_release import ReplayedRelease, replayed_release
 
@@ -67,9 +69,20 @@ class PreparedFlight:
         found = replayed_release(self.flight, self.asked_release or self.release)
         return found if found.name == self.release else replayed_release(self.flight, self.release)
 
-    def parameters(self, overrides: Mapping[str, float]) -> dict[str, float]:
-        """A complete set: the log's own parameters, but for some."""
-        return complete(self.flight.parameters.initial, overrides, self.flight.release, replayed=self.replayed.release)
+    def parameters(self, overrides: Mapping[str, float], given: Mapping[str, float] | None = None) -> dict[str, float]:
+        """A complete set: the log's own parameters, but for some; `given` counts before them, as in `complete`.
+
+        Raises
+        ------
+        UserError
+            The release whose estimator replays the flight has no such parameter, or no such value of it.
+        """
+        logged, flown = self.flight.parameters.initial, self.flight.release
+        try:
+            return complete(logged, overrides, flown, replayed=self.replayed.release, given=given or {})
+        except ParameterError as error:
+            by = f"which {self.replayed.name}'s estimator replays"
+            raise UserError(f"{error.name} on a flight {by}", error.reason, error.remedy) from error
 
     def course_of(self, overrides: Mapping[str, float]) -> tuple[Any, ...]:
         """What the replay of a set follows from beside the flight: sets that have it in common have one replay.

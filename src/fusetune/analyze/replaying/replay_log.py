@@ -57,6 +57,6 @@ def replay_log(
         reason = f"cannot be replayed ({type(error).__name__}: {error})"
         raise UserError(log, reason, "See what the command `fusetune save` says of it") from error
     for name, (params, overrides) in sets.items():
-        values = prepared.parameters(params | overrides)
+        values = prepared.parameters(overrides, params)
         write_replay(prepared, name, overrides, Path(output_folder), params=values)
     return list(sets)

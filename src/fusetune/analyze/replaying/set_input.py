@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from fusetune.errors import UserError
-from fusetune.px4.parameters.ekf2_parameters import ALL_PARAMETERS, ParameterError, number_of
+from fusetune.px4.parameters.ekf2_parameters import (
+    ALL_PARAMETERS,
+    ParameterError,
+    ParameterMetadata,
+    number_of,
+    parameters_of,
+)
 from fusetune.px4.parameters.logged_parameters import flown_limits, typed_value
-from fusetune.px4.parameters.set_names import of_vehicle, read_by
+from fusetune.px4.parameters.set_names import in_baseline_names, of_vehicle, read_by
 from fusetune.px4.releases import BASELINE, Release
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
@@ -21,6 +27,11 @@ _OF_SENSORS = "SENS_"
 """How parameters begin that a vehicle of another release has beside EKF2's, and some of which took over from them."""
 
 FORM = 'Expected {"params": {NAME: number, …}, "overrides": {NAME: number, …}}'
+
+WITHOUT_EFFECT = "overrides_without_parameter"
+"""Where a recorded set names the overrides that its release has no parameter for."""
+
+_Known = Callable[[str, Release], ParameterMetadata]
 
 SetValues = tuple[dict[str, float], dict[str, float]]
 """EKF2 parameters used, and those that differ from the log."""
@@ -62,16 +73,28 @@ def read_set_file(file: AnyPath, replayed: Release = BASELINE) -> SetValues:
         The file is no set of parameters that the release has.
     """
     content = read_document(file, remedy=FORM, sealed=False)
-    params, overrides = (_numbers(file, content.get(part, {}), replayed) for part in ("params", "overrides"))
+    params = of_vehicle(_numbers(file, content.get("params", {}), replayed, _of_whole_set), replayed)
+    overrides = _numbers(file, _with_effect(content), replayed, read_by)
     params.pop(WRITTEN_BACK, None)
-    return params, overrides
+    try:
+        return params, in_baseline_names(overrides)
+    except ParameterError as error:
+        raise UserError(file, f"{error.name} {error.reason}", error.remedy) from error
 
 
-def _numbers(file: AnyPath, values: object, replayed: Release) -> dict[str, float]:
+def _with_effect(content: Mapping[str, Any]) -> object:
+    """The overrides without those of which the file itself says that the release has no such parameter."""
+    overrides, without = content.get("overrides", {}), content.get(WITHOUT_EFFECT, ())
+    if not isinstance(overrides, Mapping) or not isinstance(without, Sequence):
+        return overrides
+    return {name: value for name, value in overrides.items() if name not in without}
+
+
+def _numbers(file: AnyPath, values: object, replayed: Release, known: _Known) -> dict[str, float]:
     if not isinstance(values, Mapping):
         raise UserError(file, "is no parameter set: it holds something else than names and numbers", FORM)
     try:
-        numbers = {name: _number(name, value, replayed) for name, value in values.items()}
+        numbers = {name: _number(name, value, known, replayed) for name, value in values.items()}
     except (ParameterError, OverflowError) as error:
         reason, remedy = (error.reason, error.remedy) if isinstance(error, ParameterError) else (str(error), FORM)
         name = f"{error.name}: " if isinstance(error, ParameterError) else ""
@@ -82,13 +105,19 @@ def _numbers(file: AnyPath, values: object, replayed: Release) -> dict[str, floa
             raise UserError(
                 file, f"{name} = {number:g} is nothing that can be flown", f"Give a number from {low:g} to {high:g}"
             )
-    return of_vehicle(numbers, replayed)
+    return numbers
 
 
-def _number(name: str, value: Any, replayed: Release) -> float:
-    known = ALL_PARAMETERS.get(name)
-    if known is not None and replayed != BASELINE and known.exists_in(replayed):
-        return number_of(known, value)
-    if known is None and replayed != BASELINE and name.startswith(_OF_SENSORS) and isinstance(value, int | float):
-        return float(value)  # of the sensors, which a vehicle of that release has beside EKF2's
-    return number_of(read_by(name, replayed), value)
+def _of_whole_set(name: str, replayed: Release) -> ParameterMetadata:
+    """Metadata of a parameter of a vehicle, which may be of another release: what this one lacks has no effect."""
+    own = ALL_PARAMETERS.get(name)
+    if own is not None and replayed != BASELINE and own.exists_in(replayed):
+        return own
+    return parameters_of(replayed).get(name) or read_by(name, replayed)
+
+
+def _number(name: str, value: Any, known: _Known, replayed: Release) -> float:
+    is_of_sensors = known is _of_whole_set and name not in ALL_PARAMETERS and name.startswith(_OF_SENSORS)
+    if is_of_sensors and replayed != BASELINE and isinstance(value, int | float):
+        return float(value)
+    return number_of(known(name, replayed), value)

@@ -17,7 +17,7 @@ from fusetune.analyze.sensor_noise.standing_still import standing_still
 from fusetune.analyze.sensor_noise.starting_noises import StartingNoise, period_s, starting_noises
 from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS, canonical
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path

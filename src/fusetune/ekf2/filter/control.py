@@ -12,7 +12,7 @@ from fusetune.ekf2.filter.aid_sources.fake_pos_control import control_fake_pos_f
 from fusetune.ekf2.filter.aid_sources.gnss.gps_control import control_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
-from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_control import control_optical_flow_fusion
+from fusetune.ekf2.filter.aid_sources.optical_flow.flow_control import control_flow_fusion
 from fusetune.ekf2.filter.aid_sources.sideslip.sideslip_fusion import control_beta_fusion
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import control_zero_gyro_update
 from fusetune.ekf2.filter.aid_sources.zero_innovation_heading_update import control_zero_innovation_heading_update
@@ -38,7 +38,7 @@ def control_fusion_modes(ekf, params):
         ekf.cs.tilt_align = tilt_variance(ekf) < TILT_ALIGNED_VARIANCE
 
     control_mag_fusion(ekf, params)
-    control_optical_flow_fusion(ekf, params)
+    control_flow_fusion(ekf, params)
     control_gnss_fusion(ekf, params)
     control_air_data_fusion(ekf, params)
     control_beta_fusion(ekf, params)

@@ -38,6 +38,7 @@ from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import (
     initialise_position_bias_estimator,
 )
 from fusetune.ekf2.filter.bias_inhibition import update_imu_bias_inhibit
+from fusetune.ekf2.filter.common.aid_source_status import OLD_AID_SOURCES
 from fusetune.ekf2.filter.common.core_memory import CORE_FIELDS, POSITION_REF_GNSS
 from fusetune.ekf2.filter.common.heading_observability import HEADING_MEMORY
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_UNKNOWN
@@ -47,6 +48,8 @@ from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
+from fusetune.ekf2.filter.terrain_filter.terrain_filter import run_terrain_filter, start_terrain_filter
+from fusetune.ekf2.filter.terrain_filter.terrain_memory import TERRAIN_FILTER
 from fusetune.ekf2.filter.wind import WIND_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL
@@ -103,7 +106,23 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("field_history", FIELD_HISTORY))
     if does.fuses_heading_or_field:
         memories.append(("mag_modes", MAG_MODES))
+    if does.filters_terrain_apart:
+        memories = [(name, OLD_AID_SOURCES if name == "aid" else memory) for name, memory in memories]
+        memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
     return marked(np.dtype(memories, align=True), release)
+
+
+@kernel
+def _initialise_nothing(ekf):
+    """v1.16's range finder has no bias."""
+
+
+@kernel
+def _initialise_bias_of_range(ekf):
+    initialise_height_bias_estimator(ekf.rng_hgt_b_est)
+
+
+_initialise_range_bias = by_release(_initialise_nothing, "takes_range_for_height", _initialise_bias_of_range)
 
 
 @kernel
@@ -126,6 +145,7 @@ def initialise_estimator(ekf, params):
     initialise_height_bias_estimator(ekf.baro_b_est)
     initialise_height_bias_estimator(ekf.gps_hgt_b_est)
     initialise_height_bias_estimator(ekf.ev_hgt_b_est)
+    _initialise_range_bias(ekf)
     initialise_position_bias_estimator(ekf.ev_pos_b_est)
     initialise_gnss_memory(ekf.gnss)
     initialise_mag_memory(ekf.mag)
@@ -144,6 +164,7 @@ def _level_filter(ekf, params, specific_force):
     quat_aligning_with_up(specific_force[0], specific_force[1], specific_force[2], ekf.q)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
     initialise_covariance(ekf, params)
+    start_terrain_filter(ekf, params)
     align_output_predictor(ekf)
     ekf.filter_initialised = True
 
@@ -172,6 +193,7 @@ def _update(ekf, params):
     predict_covariance(ekf, params)
     predict_state(ekf, params)
     control_fusion_modes(ekf, params)
+    run_terrain_filter(ekf, params)
     correct_output(ekf, params)
 
 

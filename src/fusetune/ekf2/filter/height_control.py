@@ -9,7 +9,7 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.barometer.baro_height_control import control_baro_height_fusion
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import update_ground_effect
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import control_gnss_height_fusion
-from fusetune.ekf2.filter.aid_sources.range_finder.range_height_control import control_range_hagl_fusion
+from fusetune.ekf2.filter.aid_sources.range_finder.range_control import control_range_fusion
 from fusetune.ekf2.filter.common.height_reference import (
     HEIGHT_REF_BARO,
     HEIGHT_REF_EV,
@@ -34,7 +34,7 @@ def control_height_fusion(ekf, params):
     update_ground_effect(ekf, params)
     control_baro_height_fusion(ekf, params)
     control_gnss_height_fusion(ekf, params)
-    control_range_hagl_fusion(ekf, params)
+    control_range_fusion(ekf, params)
     check_height_sensor_ref_fallback(ekf, params)
 
 

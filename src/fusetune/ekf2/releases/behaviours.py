@@ -319,6 +319,105 @@ class Behaviours:
 
     # Older releases: range finder, terrain, optical flow, vision, airspeed, drag and sideslip.
 
+    keeps_innovation_at_reset: bool = _behaviour(
+        "A reset of the state to a source leaves that source's innovation as it was, and does not count as fused; only "
+        "its time-out begins anew.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf_helper.cpp",
+    )
+    forgets_stopped_sources: bool = _behaviour(
+        "A stopped source forgets what it last judged, so that the update that stops it publishes nothing of it.",
+        since="v1.14",
+        until="v1.15",
+        source="ekf.h",
+    )
+    takes_range_for_height: bool = _behaviour(
+        "The range finder is a height source like the barometer, with a bias against the reference and, conditionally, "
+        "where the terrain is known. It never corrects the terrain on its way.",
+        since="v1.14",
+        until="v1.15",
+        source="range_height_control.cpp",
+    )
+    judges_range_in_climb: bool = _behaviour(
+        "Whether the range finder agrees with the vertical velocity is concluded only above 0.5 m/s. v1.16 asks for "
+        "that only to trust it again.",
+        since="v1.14",
+        until="v1.15",
+        source="range_finder_consistency_check.cpp",
+    )
+    sees_no_fog: bool = _behaviour(
+        "The range finder is not checked for fog; once found faulty it is not used again.",
+        since="v1.13",
+        until="v1.15",
+        source="sensor_range_finder.cpp",
+    )
+    flies_flow_over_terrain: bool = _behaviour(
+        "Flow of sufficient quality, within the sensor's rate and level enough, is fused over the terrain that the "
+        "filter apart knows, whose distance is taken as given. The sensor's gyro is taken as it is for the flow, its "
+        "bias for the lever arm alone; the velocity is reset to the single sample.",
+        since="v1.13",
+        until="v1.15",
+        source="optical_flow_control.cpp, optflow_fusion.cpp",
+    )
+    turns_vision_velocity: bool = _behaviour(
+        "Velocity of vision is fused along north, east and down, of whatever frame it is; beside GNSS its variance is "
+        "at least that of EKF2_GPS_V_NOISE. It starts beside another source only well within its gate. v1.16 fuses "
+        "velocities of the body in their frame.",
+        since="v1.13",
+        until="v1.15",
+        source="ev_vel_control.cpp",
+    )
+    starts_vision_yaw_unjudged: bool = _behaviour(
+        "The yaw of vision is judged only where it is fused, and starts without being fused.",
+        since="v1.13",
+        until="v1.15",
+        source="ev_yaw_control.cpp",
+    )
+    rounds_vision_filter: bool = _behaviour(
+        "The rotation of vision is filtered with a gain of 0.001. v1.16 takes the one of 10 ms and 10 s.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.h",
+    )
+    asks_airspeed_for_wings: bool = _behaviour(
+        "Airspeed and sideslip are fused on a fixed wing alone; airspeed that corrects every state does not count as "
+        "horizontal velocity.",
+        since="v1.13",
+        until="v1.15",
+        source="airspeed_fusion.cpp, sideslip_fusion.cpp",
+    )
+    starts_wind_at_zero: bool = _behaviour(
+        "Sideslip and drag start with a wind of zero; sideslip before it is fused, whether or not it is then accepted.",
+        since="v1.13",
+        until="v1.15",
+        source="sideslip_fusion.cpp, drag_fusion.cpp",
+    )
+    takes_sideslip_for_ratio: bool = _behaviour(
+        "Sideslip is the ratio of sideways to forward air velocity, not its angle; EKF2_BETA_NOISE has no lower bound.",
+        since="v1.13",
+        until="v1.15",
+        source="sideslip_fusion.cpp",
+    )
+    fuses_both_drag_axes: bool = _behaviour(
+        "Drag counts as fused where both axes were.",
+        since="v1.13",
+        until="v1.15",
+        source="drag_fusion.cpp",
+    )
+    filters_terrain_apart: bool = _behaviour(
+        "The terrain is no state of the filter; a filter of its own estimates it.",
+        since="v1.13",
+        until="v1.15",
+        source="terrain_estimator.cpp",
+    )
+    levers_by_measured_rate: bool = _behaviour(
+        "What turns a lever arm is the rate as the gyro measures it, with its bias.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_control.cpp, ekf_helper.cpp",
+    )
+
 
 def _behaviours_of(release: str) -> Behaviours:
     place = RELEASES.index(release)

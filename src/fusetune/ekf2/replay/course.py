@@ -163,7 +163,7 @@ class Course:
         for start, stop in pairwise(sorted(edges)):
             for run, change in self.changes:
                 if run == start:
-                    self.params[change.name] = taken_value(change.name, change.value)
+                    self.params[change.name] = taken_value(change.name, change.value, self.release)
             for run, state in self.handovers:
                 if run == start:
                     take_sensor_states(self.ekf[0], state)

@@ -133,7 +133,7 @@ def flight_schedule(
     """
 
     def steps(name: str, meaning: Callable[[float], float] = float) -> Steps:
-        changed = [(run, taken_value(name, change.value)) for run, change in changes if change.name == name]
+        changed = [(run, taken_value(name, change.value, release)) for run, change in changes if change.name == name]
         return steps_of(float(params[name]), changed, meaning)
 
     delay_max = [value for run, value in steps("EKF2_DELAY_MAX") if run == 0][-1]

@@ -15,12 +15,12 @@ from fusetune.ekf2.compiled.compilation import (
     refuse_to_compile,
 )
 from fusetune.ekf2.feed.inputs import build_inputs
-from fusetune.ekf2.filter.common.parameters import complete
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.releases.behaviours import BASELINE
 from fusetune.ekf2.replay.replay import replay
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.release_layouts import canonical
+from fusetune.px4.parameters.complete_sets import complete
 
 IMU_SAMPLES = 4
 IMU_INTERVAL_US = 4000

@@ -13,7 +13,7 @@ import numpy as np
 from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, AID_SOURCES, AidSource
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count, select_rows
 from fusetune.px4.layouts.estimator_layouts import control_bits
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.releases import NO_MAG_HEADING
 
 _SAME_PUBLICATION_US = 2000

@@ -10,16 +10,30 @@ import difflib
 import math
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from types import MappingProxyType
 from typing import Literal
 
-from fusetune.px4.parameters.parameter_migration import SENSOR_PARAMETERS, migrate_names
-from fusetune.px4.releases import BASELINE, MAG_TYPES_GIVEN_UP, Release, name_of, number_of_name
+from fusetune.px4.parameters.parameter_migration import OLDER_NAMES, SENSOR_PARAMETERS, migrate_names
+from fusetune.px4.releases import (
+    BASELINE,
+    CONTROL_BY_SOURCE,
+    MAG_TYPES_GIVEN_UP,
+    SENSOR_RATES_UNREAD,
+    Release,
+    name_of,
+    number_of_name,
+)
 
 _FLOAT = struct.Struct("<f")
+
+_OLDER_VALUES: Mapping[str, tuple[Release, Mapping[int, str]]] = {
+    "EKF2_MAG_TYPE": ((1, 14), {2: "3-axis", 4: "3-axis, indoors only with aiding"}),
+    "EKF2_DECL_TYPE": ((1, 14), {2: "always fuse declination"}),
+}
+"""Values, or bits, that a parameter could have until a release, beside those of the baseline."""
 
 
 class ParameterError(ValueError):
@@ -157,57 +171,56 @@ def migrate(
     return {name: as_float32(float(value)) for name, value in migrated.items() if name in read}
 
 
-def complete(
-    logged: Mapping[str, float | int],
-    overrides: Mapping[str, float | int],
-    release: Release | None = None,
-    replayed: Release = BASELINE,
-) -> dict[str, float]:
-    """All parameters that the estimator of a release reads: overrides before logged ones before its defaults.
-
-    Parameters
-    ----------
-    logged
-        Parameters of the log, in the names of its own release.
-    overrides
-        Parameters of a set, in the names of `parameters_of` the replayed release.
-    release
-        Firmware release of the log.
-    replayed
-        Whose estimator reads them.
-
-    Raises
-    ------
-    ParameterError
-        An override is none of these parameters.
-    """
-    read = parameters_of(replayed)
-    for name in overrides:
-        if name not in read:
-            metadata_of(name)
-    values = dict(defaults_of(replayed)) | migrate(logged, release, replayed)
-    values.update({name: as_float32(float(value)) for name, value in overrides.items()})
-    return values
-
-
 @cache
 def parameters_of(replayed: Release) -> Mapping[str, ParameterMetadata]:
     """Parameters that the estimator of a release reads, by name: the baseline's, and those that are its alone.
 
-    What a release has under another name than the baseline stands here under the baseline's (`migrate`).
+    What newer releases only call otherwise than the baseline stands here under the baseline's name (`migrate`). Those
+    of v1.13 that later became others, and the rates of sensors by which the buffers were sized until v1.14, stand here
+    beside what they tell.
     """
+    others = ALL_PARAMETERS if replayed >= SENSOR_RATES_UNREAD else {**ALL_PARAMETERS, **SENSOR_RATES}
     own = {
         name: metadata
-        for name, metadata in ALL_PARAMETERS.items()
-        if metadata.exists_in(replayed) and not metadata.became
+        for name, metadata in others.items()
+        if metadata.exists_in(replayed) and (not metadata.became or name in older_names(replayed))
     }
-    return MappingProxyType(dict(PARAMETERS) | own)
+    changed = {name: _as_in(metadata, replayed) for name, metadata in PARAMETERS.items() if name in _OLDER_VALUES}
+    return MappingProxyType(dict(PARAMETERS) | own | changed)
+
+
+def older_names(replayed: Release) -> tuple[str, ...]:
+    """Parameters that a release's estimator reads though the baseline has others in their place."""
+    return OLDER_NAMES if replayed[:2] < CONTROL_BY_SOURCE else ()
+
+
+def is_had_by(name: str, replayed: Release) -> bool:
+    """Whether a release has a parameter of `parameters_of`, under this name or those that it became another of."""
+    known = parameters_of(replayed)[name]
+    return known.exists_in(replayed) or any(
+        name in told and (old in SENSOR_PARAMETERS or ALL_PARAMETERS[old].exists_in(replayed))
+        for old, told in BECAME.items()
+    )
+
+
+def _as_in(metadata: ParameterMetadata, replayed: Release) -> ParameterMetadata:
+    """Metadata of a parameter with the values that older releases allow beside those of the baseline."""
+    last, older = _OLDER_VALUES[metadata.name]
+    if replayed[:2] > last:
+        return metadata
+    values = dict(sorted({**metadata.values, **older}.items()))
+    high = metadata.maximum
+    if metadata.kind == "bitmask" and high is not None:
+        high = float((1 << max(values) + 1) - 1)
+    return replace(metadata, values=MappingProxyType(values), maximum=high)
 
 
 @cache
 def defaults_of(replayed: Release) -> Mapping[str, float]:
     """The defaults of `parameters_of` a release: its own, under whatever name it has them."""
     own = {name: one.default_in(replayed) for name, one in ALL_PARAMETERS.items() if one.exists_in(replayed)}
+    if replayed[:2] >= CONTROL_BY_SOURCE:
+        own = {name: value for name, value in own.items() if name not in OLDER_NAMES}  # left over, and read by nothing
     nearest = {name: one.default_in(replayed) for name, one in parameters_of(replayed).items()}
     told = {name: value for name, value in as_read_by(own, replayed).items() if name in nearest}
     return MappingProxyType(nearest | {name: as_float32(value) for name, value in told.items()})
@@ -279,6 +292,24 @@ def _metadata_from(row: dict[str, str]) -> ParameterMetadata:
     )
 
 
+def _sensor_rate(name: str, default: float) -> ParameterMetadata:
+    return ParameterMetadata(
+        name=name,
+        type="FLOAT",
+        kind="float",
+        default_history=(((1, 13), default),),
+        first_release=(1, 13),
+        last_release=(1, 14),
+        minimum=1.0,
+        maximum=200.0,
+        unit="Hz",
+        reboot_required=True,
+        values=MappingProxyType({}),
+        became=(),
+        description="Rate of the driver, by which EKF2 sizes its buffers until v1.14",
+    )
+
+
 def _read_metadata() -> dict[str, ParameterMetadata]:
     file = resources.files(__package__) / "ekf2_parameters.csv"
     lines = file.read_text(encoding="utf-8").splitlines()
@@ -292,6 +323,11 @@ PARAMETERS: Mapping[str, ParameterMetadata] = MappingProxyType(
     {name: metadata for name, metadata in ALL_PARAMETERS.items() if metadata.exists_in(BASELINE)}
 )
 """EKF2 parameters of the baseline release, by name in alphabetical order."""
+
+SENSOR_RATES: Mapping[str, ParameterMetadata] = MappingProxyType(
+    {name: _sensor_rate(name, default) for name, default in (("SENS_BARO_RATE", 20.0), ("SENS_MAG_RATE", 15.0))}
+)
+"""Parameters that are none of EKF2's own, and by which its buffers are sized until v1.14."""
 
 BECAME: Mapping[str, tuple[str, ...]] = {
     **{name: metadata.became for name, metadata in ALL_PARAMETERS.items() if metadata.became},

@@ -5,15 +5,16 @@ What each replacement means is what PX4 itself does when a vehicle with stored p
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 _GPS, _OPTICAL_FLOW, _INHIBIT_ACCEL_BIAS, _VISION_POSITION, _VISION_YAW, _DRAG = (1 << bit for bit in range(6))
 _GPS_YAW, _VISION_VELOCITY = 1 << 7, 1 << 8
 """Bits of EKF2_AID_MASK (releases before v1.14)."""
 
-_GPS_CTRL_AIDING, _GPS_CTRL_ALTITUDE, _GPS_CTRL_YAW = 0b0111, 0b0010, 0b1000
+_GPS_CTRL_AIDING, _GPS_CTRL_HORIZONTAL, _GPS_CTRL_ALTITUDE, _GPS_CTRL_YAW = 0b0111, 0b0101, 0b0010, 0b1000
 _EV_CTRL_POSITION, _EV_CTRL_HEIGHT, _EV_CTRL_VELOCITY, _EV_CTRL_YAW = 0b0011, 0b0010, 0b0100, 0b1000
-_IMU_CTRL_DEFAULT, _IMU_CTRL_ACCEL_BIAS = 0b111, 0b010
+_IMU_CTRL_DEFAULT, _IMU_CTRL_ACCEL_BIAS, _IMU_CTRL_BIASES = 0b111, 0b010, 0b011
+_CONTROLS = ("EKF2_GPS_CTRL", "EKF2_OF_CTRL", "EKF2_EV_CTRL", "EKF2_DRAG_CTRL", "EKF2_IMU_CTRL")
 
 _HEIGHT_GPS, _HEIGHT_RANGE, _HEIGHT_VISION = 1, 2, 3
 """Values of EKF2_HGT_MODE and EKF2_HGT_REF."""
@@ -25,6 +26,9 @@ SENSOR_PARAMETERS: Mapping[str, tuple[str, ...]] = {
     "SENS_GPS0_OFFZ": ("EKF2_GPS_POS_Z",),
 }
 """Parameters that are none of EKF2's own and took over from one, in newer releases; with the same meaning and unit."""
+
+OLDER_NAMES = ("EKF2_AID_MASK", "EKF2_HGT_MODE", "EKF2_RNG_AID", "EKF2_WIND_NOISE")
+"""Parameters of v1.13 that became others."""
 
 CHANGED = frozenset({"EKF2_WIND_NOISE", "EKF2_AID_MASK"})
 """Parameters that became others with another meaning, which `migrate_names` knows."""
@@ -61,6 +65,42 @@ def migrate_names(
     if not keep_mag_type and migrated.get("EKF2_MAG_TYPE") in _MAG_TYPES_REMOVED:
         migrated["EKF2_MAG_TYPE"] = _MAG_TYPE_AUTOMATIC
     return migrated
+
+
+def older_values(values: Mapping[str, float], told: Container[str]) -> dict[str, float]:
+    """`OLDER_NAMES` by which v1.13 comes nearest to parameters of v1.16, where it has no way to do the same.
+
+    Parameters
+    ----------
+    values : all parameters in the names of v1.16
+    told : names of those that say something; what none of these became another of is left out
+    """
+    found: dict[str, float] = {}
+    if any(name in told for name in _CONTROLS):
+        found["EKF2_AID_MASK"] = float(_nearest_aid_mask({name: int(values[name]) for name in _CONTROLS}))
+    if "EKF2_HGT_REF" in told:
+        found["EKF2_HGT_MODE"] = values["EKF2_HGT_REF"]
+    if "EKF2_RNG_CTRL" in told:
+        found["EKF2_RNG_AID"] = float(values["EKF2_RNG_CTRL"] >= 1)
+    if "EKF2_WIND_NSD" in told:
+        found["EKF2_WIND_NOISE"] = values["EKF2_WIND_NSD"] * _STEPS_TO_DENSITY
+    return found
+
+
+def _nearest_aid_mask(controls: Mapping[str, int]) -> int:
+    """The mask that uses a sensor where its control uses part of it; heights are EKF2_HGT_MODE's."""
+    gps, vision = controls["EKF2_GPS_CTRL"], controls["EKF2_EV_CTRL"]
+    bits = {
+        _GPS: gps & _GPS_CTRL_HORIZONTAL,
+        _OPTICAL_FLOW: controls["EKF2_OF_CTRL"],
+        _INHIBIT_ACCEL_BIAS: not controls["EKF2_IMU_CTRL"] & _IMU_CTRL_BIASES,
+        _VISION_POSITION: vision & _EV_CTRL_POSITION & ~_EV_CTRL_HEIGHT,
+        _VISION_YAW: vision & _EV_CTRL_YAW,
+        _DRAG: controls["EKF2_DRAG_CTRL"],
+        _GPS_YAW: gps & _GPS_CTRL_YAW,
+        _VISION_VELOCITY: vision & _EV_CTRL_VELOCITY,
+    }
+    return sum(bit for bit, is_set in bits.items() if is_set)
 
 
 def value_before(old: str, wanted: Mapping[str, float], logged: Mapping[str, float | int]) -> float | int | None:

@@ -12,6 +12,7 @@ from fusetune.px4.parameters.ekf2_parameters import (
     ParameterError,
     ParameterMetadata,
     as_read_by,
+    is_had_by,
     metadata_of,
     parameters_of,
 )
@@ -35,18 +36,36 @@ def read_by(name: str, replayed: Release = BASELINE) -> ParameterMetadata:
     ParameterError
         It reads none of that name; the remedy names the releases that do, or what to give instead.
     """
-    read = parameters_of(replayed)
-    known = read.get(NEWER_NAMES.get(name, name))
+    known_name = NEWER_NAMES.get(name, name)
+    known = parameters_of(replayed).get(known_name)
     if known is not None:
+        demand_had(known_name, replayed)
         return known
     other = ALL_PARAMETERS.get(name)
     if other is None or other.became or name in PARAMETERS:
         return metadata_of(name)
-    having = f"{estimator_name(other.first_release)} to {estimator_name(other.last_release)} have it"
-    if other.first_release == other.last_release:
-        having = f"only {estimator_name(other.first_release)} has it"
+    raise _not_had(other, replayed)
+
+
+def demand_had(name: str, replayed: Release) -> None:
+    """See that a release has a parameter, under the name of the baseline or those that it became another of.
+
+    Raises
+    ------
+    ParameterError
+        It has not, or there is no such parameter; the remedy names the releases that do.
+    """
+    if name not in parameters_of(replayed):
+        metadata_of(name)
+    if replayed[:2] != BASELINE and not is_had_by(name, replayed):
+        raise _not_had(ALL_PARAMETERS[name], replayed)
+
+
+def _not_had(metadata: ParameterMetadata, replayed: Release) -> ParameterError:
+    first, last = estimator_name(metadata.first_release), estimator_name(metadata.last_release)
+    having = f"only {first} has it" if first == last else f"{first} to {last} have it"
     reason = f"{estimator_name(replayed)} has no such parameter, {having}"
-    raise ParameterError(name, reason, "Leave it out, or ask for the replay of a release that has it")
+    return ParameterError(metadata.name, reason, "Leave it out, or ask for the replay of a release that has it")
 
 
 def in_baseline_names(values: Mapping[str, Value]) -> dict[str, Value]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fusetune.px4.flight import ParameterHistory
-from fusetune.px4.parameters.ekf2_parameters import as_float32, complete, defaults_of, migrate
+from fusetune.px4.parameters.complete_sets import complete
+from fusetune.px4.parameters.ekf2_parameters import as_float32, defaults_of, is_had_by, migrate
 from fusetune.px4.releases import BASELINE, Release
 
 
@@ -32,7 +33,7 @@ def after_update(history: ParameterHistory, flown: Release | None, release: Rele
     followed = {
         name: new[name]
         for name, value in own.items()
-        if name not in airframe and value == system.get(name, table.get(name))
+        if is_had_by(name, release) and name not in airframe and value == system.get(name, table.get(name))
     }
     return {name: value for name, value in followed.items() if value != own[name]}
 

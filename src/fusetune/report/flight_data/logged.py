@@ -11,7 +11,7 @@ from fusetune.px4.aid_sources import vector
 from fusetune.px4.flight import Flight, TopicTable
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
 

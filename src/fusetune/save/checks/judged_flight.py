@@ -12,7 +12,7 @@ from fusetune.ekf2.feed.given_samples import GivenSamples, given_samples
 from fusetune.ekf2.feed.message_samples import gnss_refusals, taken
 from fusetune.px4.aid_sources import AID_SOURCES, SENSORS, AidSource
 from fusetune.px4.flight import Flight, LeftOut, TopicTable, row_count
-from fusetune.px4.parameters.ekf2_parameters import complete
+from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.releases import AUTO
 from fusetune.px4.sensor_limits import LACKS_FIELD
 from fusetune.save.checks.logging_advice import WHOLE_LOG, log_more
