@@ -7,7 +7,7 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_ACCEL_BIAS, IMU_CTRL_GYRO_BIAS
-from fusetune.ekf2.filter.common.imu_rates import body_rate, specific_force
+from fusetune.ekf2.filter.common.imu_rates import body_rate, measured_force, measured_rate, specific_force
 from fusetune.ekf2.releases.by_release import by_release
 
 COSINE_OF_15_DEGREES = 0.966
@@ -22,6 +22,20 @@ def _decaying_maximum(previous, vector, dt, time_constant):
 
 
 @kernel
+def _motion(ekf):
+    return body_rate(ekf), specific_force(ekf)
+
+
+@kernel
+def _measured_motion(ekf):
+    return measured_rate(ekf), measured_force(ekf)
+
+
+_judged_motion = by_release(_motion, "judges_measured_motion", _measured_motion)
+"""Rate (rad/s) and specific force (m/s²) that tell whether the vehicle manoeuvres."""
+
+
+@kernel
 def update_imu_bias_inhibit(ekf, params):
     """Set `gyro_bias_inhibit` and `accel_bias_inhibit` per axis.
 
@@ -30,7 +44,7 @@ def update_imu_bias_inhibit(ekf, params):
     """
     imu = ekf.imu_delayed
     tau = params.EKF2_ABL_TAU
-    rate, force = body_rate(ekf), specific_force(ekf)
+    rate, force = _judged_motion(ekf)
     ekf.ang_rate_magnitude_filt = _decaying_maximum(ekf.ang_rate_magnitude_filt, rate, imu.delta_ang_dt, tau)
     ekf.accel_magnitude_filt = _decaying_maximum(ekf.accel_magnitude_filt, force, imu.delta_vel_dt, tau)
     manoeuvring = (

@@ -24,8 +24,11 @@ from fusetune.ekf2.filter.covariance import tilt_variance
 from fusetune.ekf2.filter.height_control import control_height_fusion
 from fusetune.ekf2.filter.resets.state_resets import remember_reset_counters
 from fusetune.ekf2.filter.terrain_control import control_terrain_fake_fusion, update_terrain_validity
+from fusetune.ekf2.releases.by_release import does
 
 TILT_ALIGNED_VARIANCE = math.radians(3.0) ** 2
+
+_knows_no_constant_position = does("knows_no_constant_position")
 
 
 @kernel
@@ -71,4 +74,4 @@ def _follow_system_flags(ekf):
     ekf.cs.fixed_wing = flags.is_fixed_wing
     if flags.gnd_effect:
         set_gnd_effect(ekf)
-    ekf.cs.constant_pos = flags.constant_pos
+    ekf.cs.constant_pos = flags.constant_pos and not _knows_no_constant_position(ekf)

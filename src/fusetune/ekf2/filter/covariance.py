@@ -6,8 +6,11 @@ Mirrors PX4 v1.16 `EKF/covariance.cpp`, whose prediction and limits stand in `pr
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
+from fusetune.ekf2.releases.by_release import does
 
 INITIAL_WIND_UNCERTAINTY = 1.0
+
+_filters_terrain_apart = does("filters_terrain_apart")
 
 
 @kernel
@@ -124,7 +127,8 @@ def initialise_covariance(ekf, params):
     reset_mag_earth_cov(ekf, params)
     reset_mag_bias_cov(ekf, params)
     reset_wind_cov(ekf)
-    reset_covariance_block(ekf, state.TERRAIN, 1, params.EKF2_MIN_RNG**2)
+    if not _filters_terrain_apart(ekf):
+        reset_covariance_block(ekf, state.TERRAIN, 1, params.EKF2_MIN_RNG**2)
 
 
 @kernel

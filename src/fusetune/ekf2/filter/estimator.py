@@ -13,6 +13,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.buffers import BUFFER_LENGTHS
 from fusetune.ekf2.feed.sensors import SENSORS
+from fusetune.ekf2.filter.accel_bias_check import ACCEL_BIAS_CHECK
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_MEMORY
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
@@ -44,6 +45,7 @@ from fusetune.ekf2.filter.common.heading_observability import HEADING_MEMORY
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.filter.common.levelling import LEVELLING_MEMORY, follow_specific_force
 from fusetune.ekf2.filter.common.local_origin import LOCAL_ORIGIN, initialise_local_origin
+from fusetune.ekf2.filter.common.local_position import LOCAL_POSITION
 from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
@@ -102,6 +104,10 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("flow_rates", FLOW_RATES))
     if does.holds_unobservable_heading:
         memories.append(("heading", HEADING_MEMORY))
+    if does.keeps_position_local:
+        memories.append(("local", LOCAL_POSITION))
+    if does.doubts_stuck_accel_bias:
+        memories.append(("accel_bias_check", ACCEL_BIAS_CHECK))
     if does.limits_declination:
         memories.append(("field_history", FIELD_HISTORY))
     if does.fuses_heading_or_field:

@@ -6,6 +6,7 @@ Mirrors PX4 v1.16 `EKF/height_control.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.accel_bias_check import check_vertical_accel_bias
 from fusetune.ekf2.filter.aid_sources.barometer.baro_height_control import control_baro_height_fusion
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import update_ground_effect
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import control_gnss_height_fusion
@@ -19,6 +20,7 @@ from fusetune.ekf2.filter.common.height_reference import (
 )
 from fusetune.ekf2.filter.common.timing import is_recent
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
+from fusetune.ekf2.releases.by_release import by_release
 
 VERT_INNOV_TEST_LIM = 3.0
 VERT_INNOV_TEST_MIN = 1.0
@@ -30,6 +32,7 @@ FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
 @kernel
 def control_height_fusion(ekf, params):
     """Check the vertical acceleration, fuse every height source, and replace a lost height reference."""
+    check_vertical_accel_bias(ekf, params)
     check_vertical_acceleration_health(ekf)
     update_ground_effect(ekf, params)
     control_baro_height_fusion(ekf, params)
@@ -91,8 +94,7 @@ def check_vertical_acceleration_health(ekf):
 
 
 @kernel
-def _count_clipping(ekf):
-    """Count clipped samples up and clean ones down within a second's worth; return whether it is too frequent."""
+def _count_clipping_of_axes(ekf):
     limit = int(1.0 / ekf.dt_ekf_avg)
     all_axes_warning = True
     any_axis_critical = False
@@ -105,6 +107,23 @@ def _count_clipping(ekf):
         any_axis_critical = any_axis_critical or ekf.clip_counter[axis] >= limit
     ekf.fs.bad_acc_clipping = all_axes_warning or any_axis_critical
     return ekf.fs.bad_acc_clipping or ekf.clip_counter[2] >= limit // 2
+
+
+@kernel
+def _count_clipping_of_any(ekf):
+    """One counter, in the place of the first axis."""
+    limit = int(1.0 / ekf.dt_ekf_avg)
+    clipping, counter = ekf.imu_delayed.delta_vel_clipping, ekf.clip_counter
+    if (clipping[0] or clipping[1] or clipping[2]) and counter[0] < limit:
+        counter[0] += 1
+    elif counter[0] > 0:
+        counter[0] -= 1
+    ekf.fs.bad_acc_clipping = counter[0] > limit // 2
+    return counter[0] > 0
+
+
+_count_clipping = by_release(_count_clipping_of_axes, "counts_clipping_of_any_axis", _count_clipping_of_any)
+"""Count clipped samples up and clean ones down within a second's worth; return whether it is too frequent."""
 
 
 @kernel

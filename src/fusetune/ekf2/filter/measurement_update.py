@@ -15,7 +15,7 @@ of `EKF/covariance.cpp`; in double precision.
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
-from fusetune.ekf2.filter.common.global_position import add_to_global_position, single_precision
+from fusetune.ekf2.filter.common.global_position import add_to_position, single_precision
 from fusetune.ekf2.filter.common.heading_observability import is_heading_held
 from fusetune.ekf2.filter.covariance import reset_covariance_block
 from fusetune.ekf2.filter.observation_gain import scale_kalman_gain
@@ -227,10 +227,49 @@ def _raise_small_variances(ekf):
 
 
 @kernel
-def constrain_state_variances(ekf):
-    """Keep every variance within the limits of its group of states; `ekf.scratch.K` and `PH` are not kept."""
+def _reduce_and_raise_variances(ekf):
     _reduce_excessive_variances(ekf)
     _raise_small_variances(ekf)
+
+
+@kernel
+def _clip_variance(P, index, low, high):
+    P[index, index] = min(max(P[index, index], low), high)
+
+
+@kernel
+def _clip_variances(P, index, dof, low, high):
+    for i in range(index, index + dof):
+        _clip_variance(P, i, low, high)
+
+
+@kernel
+def _clip_variances_of_group(P, index, dof, low, high):
+    """As `_clip_variances`, the largest of the group at most 10⁶ times the least."""
+    largest = 0.0
+    for i in range(index, index + dof):
+        largest = max(largest, P[i, i])
+    largest = min(max(largest, low), high)
+    _clip_variances(P, index, dof, min(max(largest / VARIANCE_MAX_RATIO, low), high), largest)
+
+
+@kernel
+def _clip_all_variances(ekf):
+    P = ekf.P
+    _clip_variances(P, state.ATTITUDE, 3, ATTITUDE_VARIANCE_MIN, ATTITUDE_VARIANCE_MAX)
+    _clip_variances(P, state.VELOCITY, 3, MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX)
+    _clip_variances(P, state.POSITION, 3, MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX)
+    _clip_variances_of_group(P, state.GYRO_BIAS, 3, BIAS_VARIANCE_MIN, BIAS_VARIANCE_MAX)
+    _clip_variances_of_group(P, state.ACCEL_BIAS, 3, BIAS_VARIANCE_MIN, BIAS_VARIANCE_MAX)
+    if ekf.cs.mag:
+        _clip_variances_of_group(P, state.MAG_EARTH, 3, MAG_VARIANCE_MIN, MAG_VARIANCE_MAX)
+        _clip_variances_of_group(P, state.MAG_BODY, 3, MAG_VARIANCE_MIN, MAG_VARIANCE_MAX)
+    if ekf.cs.wind:
+        _clip_variances_of_group(P, state.WIND, 2, MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX)
+
+
+constrain_state_variances = by_release(_reduce_and_raise_variances, "clips_variances", _clip_all_variances)
+"""Keep every variance within the limits of its group of states; `ekf.scratch.K` and `PH` are not kept."""
 
 
 @kernel
@@ -268,7 +307,7 @@ def fuse(ekf, params, innovation):
         ekf.vel[i] = _limited(ekf.vel[i] - K[state.VELOCITY + i] * innovation, VELOCITY_LIMIT)
         ekf.gyro_bias[i] = _limited(ekf.gyro_bias[i] - K[state.GYRO_BIAS + i] * innovation, params.EKF2_GYR_B_LIM)
         ekf.accel_bias[i] = _limited(ekf.accel_bias[i] - K[state.ACCEL_BIAS + i] * innovation, params.EKF2_ABL_LIM)
-    add_to_global_position(
+    add_to_position(
         ekf, -K[state.POSITION] * innovation, -K[state.POSITION + 1] * innovation, -K[state.POSITION + 2] * innovation
     )
     if ekf.cs.mag:

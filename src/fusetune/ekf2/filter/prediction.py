@@ -11,22 +11,21 @@ Mirrors `predictCovariance` of PX4 v1.16 `EKF/covariance.cpp` and `predictState`
 written out and not generated.
 """
 
-import math
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
-from fusetune.ekf2.filter.common.global_position import add_to_global_position, refresh_ellipsoid
+from fusetune.ekf2.filter.common.earth_rate import update_earth_rate
+from fusetune.ekf2.filter.common.global_position import add_to_position, refresh_ellipsoid
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
 from fusetune.ekf2.filter.measurement_update import constrain_covariance
 from fusetune.ekf2.numerics.constants import ONE_G
-from fusetune.ekf2.numerics.geodesy import earth_rate_ned
 from fusetune.ekf2.numerics.rotations import (
     component_in_body,
     quat_to_dcm,
     rotate_by_body_increment,
     rotate_to_earth,
 )
+from fusetune.ekf2.releases.by_release import by_release
 
 THETA, VEL, POS, GB, AB = state.ATTITUDE, state.VELOCITY, state.POSITION, state.GYRO_BIAS, state.ACCEL_BIAS
 """Where the parts of the error state sit, by their signs in the equations."""
@@ -34,12 +33,11 @@ THETA, VEL, POS, GB, AB = state.ATTITUDE, state.VELOCITY, state.POSITION, state.
 DYNAMIC_STATES = state.POSITION + 3
 """Attitude, velocity and position come first; all that follows has no dynamics."""
 
-EARTH_RATE_LATITUDE_STEP = math.radians(1.0)
-
 BAD_ACCEL_NOISE = 4.9
 WIND_NOISE_HEIGHT_RATE_SCALER = 0.5
 ACCEL_HORIZ_LPF_TIME_CONSTANT_S = 1.0
 HEIGHT_RATE_LPF_TIME_CONSTANT_S = 10.0
+FLAT_EARTH_VELOCITY_LIMIT = 1000.0
 
 
 @kernel
@@ -62,10 +60,7 @@ def predict_covariance(ekf, params):
 
     _propagate(ekf, dt)
     _add_imu_noise(ekf, dt, gyro_variance, ax, ay, az)
-    _add_bias_noise(ekf, params, dt, gyro_variance, ax, ay, az)
-    _add_field_noise(ekf, params, dt)
-    _add_wind_noise(ekf, params, dt)
-    _add_terrain_noise(ekf, params)
+    _add_noise_of_others(ekf, params, dt, gyro_variance, ax, ay, az)
     constrain_covariance(ekf, params)
 
 
@@ -198,13 +193,18 @@ def _add_field_noise(ekf, params, dt):
 
 
 @kernel
+def wind_noise(ekf, params, dt):
+    """Variance (m²/s²) that the wind gains in `dt`: more while climbing or descending, since it changes with height."""
+    density = _unit_range(params.EKF2_WIND_NSD) * (1.0 + WIND_NOISE_HEIGHT_RATE_SCALER * abs(ekf.height_rate_lpf))
+    return density * density * dt
+
+
+@kernel
 def _add_wind_noise(ekf, params, dt):
-    """Wind drifts faster while climbing or descending, since it changes with height."""
     interval = ekf.imu_delayed.delta_vel_dt
     alpha = interval / (HEIGHT_RATE_LPF_TIME_CONSTANT_S + interval)
     ekf.height_rate_lpf += alpha * (ekf.vel[2] - ekf.height_rate_lpf)
-    density = _unit_range(params.EKF2_WIND_NSD) * (1.0 + WIND_NOISE_HEIGHT_RATE_SCALER * abs(ekf.height_rate_lpf))
-    noise = density * density * dt
+    noise = wind_noise(ekf, params, dt)
     for i in range(2):
         _add_below(ekf.P, state.WIND + i, INITIAL_WIND_UNCERTAINTY**2, noise)
 
@@ -223,18 +223,41 @@ def _add_terrain_noise(ekf, params):
 
 
 @kernel
-def _update_earth_rate(ekf):
-    """Earth rotation in NED (rad/s), looked up once per degree of latitude; zero until a latitude is known."""
-    if abs(ekf.gpos_lat - ekf.earth_rate_lat_ref) > EARTH_RATE_LATITUDE_STEP:
-        ekf.earth_rate_lat_ref = ekf.gpos_lat
-        rate = ekf.earth_rate_ned
-        rate[0], rate[1], rate[2] = earth_rate_ned(ekf.gpos_lat)
+def _add_noise_below_limits(ekf, params, dt, gyro_variance, ax, ay, az):
+    _add_bias_noise(ekf, params, dt, gyro_variance, ax, ay, az)
+    _add_field_noise(ekf, params, dt)
+    _add_wind_noise(ekf, params, dt)
+    _add_terrain_noise(ekf, params)
+
+
+@kernel
+def _add_noise_to_estimated(ekf, params, dt, gyro_variance, ax, ay, az):
+    P = ekf.P
+    gyro_noise = (dt * _unit_range(params.EKF2_GYR_B_NOISE)) ** 2
+    accel_noise = (dt * _unit_range(params.EKF2_ACC_B_NOISE)) ** 2
+    for i in range(3):
+        if not ekf.gyro_bias_inhibit[i]:
+            P[GB + i, GB + i] += gyro_noise
+        if not ekf.accel_bias_inhibit[i]:
+            P[AB + i, AB + i] += accel_noise
+    if ekf.cs.mag:
+        for i in range(3):
+            P[state.MAG_EARTH + i, state.MAG_EARTH + i] += (dt * _unit_range(params.EKF2_MAG_E_NOISE)) ** 2
+            P[state.MAG_BODY + i, state.MAG_BODY + i] += (dt * _unit_range(params.EKF2_MAG_B_NOISE)) ** 2
+    if ekf.cs.wind:
+        noise = wind_noise(ekf, params, dt)
+        P[state.WIND, state.WIND] += noise
+        P[state.WIND + 1, state.WIND + 1] += noise
+
+
+_add_noise_of_others = by_release(_add_noise_below_limits, "adds_noise_to_estimated_states", _add_noise_to_estimated)
+"""Let the states that have no dynamics drift, and the terrain with the ground covered."""
 
 
 @kernel
 def predict_state(ekf, params):
-    """Integrate `ekf.imu_delayed` into attitude, velocity and global position."""
-    _update_earth_rate(ekf)
+    """Integrate `ekf.imu_delayed` into attitude, velocity and position."""
+    update_earth_rate(ekf)
     imu = ekf.imu_delayed
     R = ekf.R_to_earth
     earth_rate = ekf.earth_rate_ned
@@ -249,16 +272,20 @@ def predict_state(ekf, params):
 
 
 @kernel
-def _integrate_velocity(ekf, params):
-    """Specific force, gravity, Coriolis and transport rate; position by the trapezoidal rule."""
+def _velocity_increment(ekf, dt):
+    """Specific force times `dt` (m/s, NED)."""
     imu = ekf.imu_delayed
-    R = ekf.R_to_earth
-    dt = imu.delta_vel_dt
     bx = imu.delta_vel[0] - ekf.accel_bias[0] * dt
     by = imu.delta_vel[1] - ekf.accel_bias[1] * dt
     bz = imu.delta_vel[2] - ekf.accel_bias[2] * dt
-    dvn, dve, dvd = rotate_to_earth(R, bx, by, bz)
+    return rotate_to_earth(ekf.R_to_earth, bx, by, bz)
 
+
+@kernel
+def _integrate_over_ellipsoid(ekf, params):
+    """Specific force, gravity, Coriolis and transport rate."""
+    dt = ekf.imu_delayed.delta_vel_dt
+    dvn, dve, dvd = _velocity_increment(ekf, dt)
     vn, ve, vd = ekf.vel[0], ekf.vel[1], ekf.vel[2]
     rate = ekf.earth_rate_ned
     refresh_ellipsoid(ekf)
@@ -270,13 +297,53 @@ def _integrate_velocity(ekf, params):
     vn_new = vn + dvn - (we * vd - wd * ve) * dt
     ve_new = ve + dve - (wd * vn - wn * vd) * dt
     vd_new = vd + dvd + (ONE_G - (wn * ve - we * vn)) * dt
+    _move_on(ekf, vn_new, ve_new, vd_new, dt, params.EKF2_VEL_LIM)
+    _filter_motion(ekf, dvn, dve, dt)
 
-    add_to_global_position(ekf, 0.5 * (vn + vn_new) * dt, 0.5 * (ve + ve_new) * dt, 0.5 * (vd + vd_new) * dt)
-    limit = params.EKF2_VEL_LIM
-    ekf.vel[0] = min(max(vn_new, -limit), limit)
-    ekf.vel[1] = min(max(ve_new, -limit), limit)
-    ekf.vel[2] = min(max(vd_new, -limit), limit)
 
+@kernel
+def _integrate_over_flat_earth(ekf, params):
+    """Specific force and gravity alone."""
+    dt = ekf.imu_delayed.delta_vel_dt
+    dvn, dve, dvd = _velocity_increment(ekf, dt)
+    down = ekf.vel[2] + dvd + ONE_G * dt
+    _move_on(ekf, ekf.vel[0] + dvn, ekf.vel[1] + dve, down, dt, FLAT_EARTH_VELOCITY_LIMIT)
+    _filter_motion(ekf, dvn, dve, dt)
+
+
+_integrate_velocity = by_release(_integrate_over_ellipsoid, "flies_over_flat_earth", _integrate_over_flat_earth)
+
+
+@kernel
+def _move_on(ekf, north, east, down, dt, limit):
+    """Take the new velocity (m/s); position by the trapezoidal rule, of the velocity before it is limited."""
+    vn, ve, vd = ekf.vel[0], ekf.vel[1], ekf.vel[2]
+    add_to_position(ekf, 0.5 * (vn + north) * dt, 0.5 * (ve + east) * dt, 0.5 * (vd + down) * dt)
+    ekf.vel[0] = min(max(north, -limit), limit)
+    ekf.vel[1] = min(max(east, -limit), limit)
+    ekf.vel[2] = min(max(down, -limit), limit)
+
+
+@kernel
+def _filter_horizontal_acceleration(ekf, dvn, dve, dt):
     alpha = dt / (ACCEL_HORIZ_LPF_TIME_CONSTANT_S + dt)
     ekf.accel_horiz_lpf[0] += alpha * (dvn / dt - ekf.accel_horiz_lpf[0])
     ekf.accel_horiz_lpf[1] += alpha * (dve / dt - ekf.accel_horiz_lpf[1])
+
+
+@kernel
+def filter_height_rate(ekf, dt):
+    """Low-pass the down velocity as releases until v1.15 do."""
+    alpha = dt / HEIGHT_RATE_LPF_TIME_CONSTANT_S
+    ekf.height_rate_lpf = ekf.height_rate_lpf * (1.0 - alpha) + ekf.vel[2] * alpha
+
+
+@kernel
+def _sum_up_motion(ekf, dvn, dve, dt):
+    """The horizontal acceleration is in m/s: a sum of increments that decays with a time constant of 1 s."""
+    ekf.accel_horiz_lpf[0] = ekf.accel_horiz_lpf[0] * (1.0 - dt) + dvn
+    ekf.accel_horiz_lpf[1] = ekf.accel_horiz_lpf[1] * (1.0 - dt) + dve
+    filter_height_rate(ekf, dt)
+
+
+_filter_motion = by_release(_filter_horizontal_acceleration, "filters_motion_plainly", _sum_up_motion)

@@ -219,6 +219,86 @@ class Behaviours:
 
     # Older releases: state, covariance, biases, start and buffers.
 
+    keeps_position_local: bool = _behaviour(
+        "Position is metres north, east and down of the origin, a map projection on a sphere, kept in single "
+        "precision. v1.16 keeps latitude, longitude and altitude on the ellipsoid.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.cpp, position_fusion.cpp",
+    )
+    flies_over_flat_earth: bool = _behaviour(
+        "Velocity is integrated without Coriolis and transport rate, within 1000 m/s; the rotation of the Earth is set "
+        "where the magnetic model is looked up, and not by the latitude of the estimate.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.cpp, gps_checks.cpp",
+    )
+    filters_motion_plainly: bool = _behaviour(
+        "The height rate is low-passed after the state is predicted, with the interval over the time constant, and the "
+        "horizontal acceleration is a decaying sum of velocity increments. v1.16 uses first-order filters.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf.cpp",
+    )
+    filters_terrain_apart: bool = _behaviour(
+        "The terrain is no state of the filter; a filter of its own estimates it.",
+        since="v1.13",
+        until="v1.15",
+        source="terrain_estimator.cpp",
+    )
+    adds_noise_to_estimated_states: bool = _behaviour(
+        "Biases drift unless their axis is inhibited, field and wind only while they are estimated, whatever their "
+        "variances. v1.16 adds no noise above a limit.",
+        since="v1.15",
+        until="v1.15",
+        source="covariance.cpp",
+    )
+    clips_variances: bool = _behaviour(
+        "A variance beyond its limit is cut to it. v1.16 reduces it by fusing an innovation of zero.",
+        since="v1.15",
+        until="v1.15",
+        source="covariance.cpp",
+    )
+    judges_measured_motion: bool = _behaviour(
+        "Whether the vehicle manoeuvres too hard to learn biases is told by rate and specific force as they are "
+        "measured. v1.16 takes the biases off first.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf_helper.cpp",
+    )
+    doubts_stuck_accel_bias: bool = _behaviour(
+        "An accelerometer bias that is near its limit, in a direction that innovations of height and vertical velocity "
+        "contradict for 7 s, gets the variances of the start.",
+        since="v1.15",
+        until="v1.15",
+        source="height_control.cpp",
+    )
+    counts_clipping_of_any_axis: bool = _behaviour(
+        "Clipping of any axis is counted in one; any count is frequent, more than half of a second's is a fault. v1.16 "
+        "counts every axis.",
+        since="v1.13",
+        until="v1.15",
+        source="height_control.cpp",
+    )
+    tells_fused_gravity: bool = _behaviour(
+        "Gravity is told as fused only where it was. v1.16 tells it at every update.",
+        since="v1.14",
+        until="v1.15",
+        source="gravity_fusion.cpp",
+    )
+    keeps_position_at_velocity_resets: bool = _behaviour(
+        "A reset of the velocity leaves the covariances of the position among themselves and with other states.",
+        since="v1.13",
+        until="v1.15",
+        source="velocity_fusion.cpp",
+    )
+    knows_no_constant_position: bool = _behaviour(
+        "Nothing can tell the filter that the position is constant.",
+        since="v1.13",
+        until="v1.15",
+        source="control.cpp",
+    )
+
     # Older releases: GNSS, height, fake aiding and the yaw estimator.
 
     # Older releases: magnetometer and heading.

@@ -23,9 +23,10 @@ from fusetune.ekf2.filter.common.conditions import (
     is_local_vertical_velocity_valid,
 )
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES, FAULT_STATUS_NAMES, REJECTION_NAMES
-from fusetune.ekf2.filter.common.local_origin import origin_altitude
+from fusetune.ekf2.filter.common.local_origin import altitude_at_origin
 from fusetune.ekf2.numerics.geodesy import metres_per_radian, project_about
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
+from fusetune.ekf2.releases.by_release import by_release
 
 INNOVATION_ROW = np.dtype(
     [
@@ -324,20 +325,20 @@ def record_update(ekf, params, views, recorder, records, timestamp):
     if recorder.mode == IS_GAP:
         if recorder.updates == 0:
             _note_published(ekf, params, recorder.published[0], timestamp)
-            _record_position(recorder.published[0], recorder, records.local_position)
+            _record_position(ekf, recorder.published[0], recorder, records.local_position)
         recorder.updates += 1
         return
     now = recorder.published[recorder.updates % PUBLISHED_KEPT]
     _note_published(ekf, params, now, timestamp)
     if recorder.mode == IS_FULL:
         _record_states(ekf, records.states[recorder.state_rows], timestamp)
-        _record_position(now, recorder, records.local_position)
+        _record_position(ekf, now, recorder, records.local_position)
     else:
         _record_scored_states(ekf, records.scored_states[recorder.state_rows])
         if recorder.mode == IS_TRACED:
-            _record_position(now, recorder, records.local_position)
+            _record_position(ekf, now, recorder, records.local_position)
         else:
-            _record_position_of_steps(recorder, records.local_position)
+            _record_position_of_steps(ekf, recorder, records.local_position)
     recorder.state_rows += 1
     recorder.diverged |= not _is_finite(ekf)
     _record_flags(views, recorder, records.flags, timestamp)
@@ -358,11 +359,11 @@ def finish_recording(ekf, params, recorder, records):
     if recorder.mode == IS_GAP:
         if recorder.updates > 1:
             _note_published(ekf, params, recorder.published[0], ekf.time_latest_us)
-            _record_position(recorder.published[0], recorder, records.local_position)
+            _record_position(ekf, recorder.published[0], recorder, records.local_position)
     elif recorder.updates > 0:
         last = recorder.published[(recorder.updates - 1) % PUBLISHED_KEPT]
         if not last.is_kept:
-            _record_position(last, recorder, records.local_position)
+            _record_position(ekf, last, recorder, records.local_position)
 
 
 @kernel
@@ -395,7 +396,7 @@ def _record_states(ekf, row, timestamp):
         states[S.PUBLISHED_ACCEL_BIAS + i] = ekf.accel_bias[i]
         states[S.PUBLISHED_MAG_EARTH + i] = ekf.mag_I[i]
         states[S.PUBLISHED_MAG_BODY + i] = ekf.mag_B[i]
-    states[S.PUBLISHED_POSITION + 2] = -ekf.gpos_alt
+    _record_position_states(ekf, states)
     states[S.PUBLISHED_WIND] = ekf.wind_vel[0]
     states[S.PUBLISHED_WIND + 1] = ekf.wind_vel[1]
     states[S.PUBLISHED_TERRAIN] = ekf.terrain
@@ -407,6 +408,22 @@ def _record_states(ekf, row, timestamp):
         row.delta_velocity[i] = imu.delta_vel[i]
     row.delta_angle_dt = imu.delta_ang_dt
     row.delta_velocity_dt = imu.delta_vel_dt
+
+
+@kernel
+def _record_height(ekf, states):
+    states[S.PUBLISHED_POSITION + 2] = -ekf.gpos_alt
+
+
+@kernel
+def _record_local_position(ekf, states):
+    states[S.PUBLISHED_POSITION] = ekf.local.north
+    states[S.PUBLISHED_POSITION + 1] = ekf.local.east
+    states[S.PUBLISHED_POSITION + 2] = -ekf.gpos_alt
+
+
+_record_position_states = by_release(_record_height, "keeps_position_local", _record_local_position)
+"""v1.16 publishes no horizontal position among the states."""
 
 
 @kernel
@@ -453,7 +470,7 @@ def _note_published(ekf, params, now, timestamp):
     for i in range(4):
         now.q[i] = newest.q[i]
     now.ref_lat, now.ref_lon, now.ref_alt = output.ref_lat, output.ref_lon, output.ref_alt
-    now.origin_lat, now.origin_lon, now.origin_alt = ekf.origin.lat_rad, ekf.origin.lon_rad, origin_altitude(ekf)
+    now.origin_lat, now.origin_lon, now.origin_alt = ekf.origin.lat_rad, ekf.origin.lon_rad, altitude_at_origin(ekf)
     now.eph = _horizontal_accuracy(ekf)
     now.epv = np.sqrt(ekf.P[S.POSITION + 2, S.POSITION + 2])
     reset = ekf.state_reset
@@ -467,12 +484,12 @@ def _note_published(ekf, params, now, timestamp):
 
 
 @kernel
-def _record_position_of_steps(recorder, rows):
+def _record_position_of_steps(ekf, recorder, rows):
     """Keep the first row, and around a step of a reset counter that of the step and the two before it."""
     published, n = recorder.published, recorder.updates
     now = published[n % PUBLISHED_KEPT]
     if n == 0:
-        _record_position(now, recorder, rows)
+        _record_position(ekf, now, recorder, rows)
         return
     before = published[(n - 1) % PUBLISHED_KEPT]
     if (
@@ -484,18 +501,18 @@ def _record_position_of_steps(recorder, rows):
     ):
         earlier = published[(n - 2) % PUBLISHED_KEPT]
         if not earlier.is_kept:
-            _record_position(earlier, recorder, rows)
+            _record_position(ekf, earlier, recorder, rows)
         if not before.is_kept:
-            _record_position(before, recorder, rows)
-        _record_position(now, recorder, rows)
+            _record_position(ekf, before, recorder, rows)
+        _record_position(ekf, now, recorder, rows)
 
 
 @kernel
-def _record_position(published, recorder, rows):
+def _record_position(ekf, published, recorder, rows):
     row = rows[recorder.position_rows]
     recorder.position_rows += 1
     published.is_kept = True
-    x, y = _local_position(published, recorder.projection)
+    x, y = _local_position(ekf, published, recorder.projection)
     row.timestamp = published.timestamp
     row.timestamp_sample = published.timestamp
     row.x = x
@@ -520,7 +537,7 @@ def _record_position(published, recorder, rows):
 
 
 @kernel
-def _local_position(published, known):
+def _projected_position(ekf, published, known):
     """North and east (m) of the local origin; `known` is a PROJECTION, renewed where it is another's."""
     if known.metres_north == 0.0 or known.ref_lat != published.ref_lat or known.ref_alt != published.ref_alt:
         known.ref_lat, known.ref_alt = published.ref_lat, published.ref_alt
@@ -531,6 +548,15 @@ def _local_position(published, known):
     lat = wrap_pi(published.ref_lat + published.pos[0] / known.metres_north)
     lon = wrap_pi(published.ref_lon + published.pos[1] / known.metres_east)
     return project_about(known.sin_origin, known.cos_origin, published.origin_lon, lat, lon)
+
+
+@kernel
+def _predicted_position(ekf, published, known):
+    """Where the predictor counts from the origin, its position is the local one."""
+    return published.pos[0], published.pos[1]
+
+
+_local_position = by_release(_projected_position, "keeps_position_local", _predicted_position)
 
 
 @kernel

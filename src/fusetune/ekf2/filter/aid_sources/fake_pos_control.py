@@ -11,6 +11,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GRAVITY_VECTOR, is_horizontal_aiding_active
+from fusetune.ekf2.filter.common.local_origin import offset_from_last_known, remember_horizontal_position
 from fusetune.ekf2.filter.common.state import POSITION
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import tilt_variance
@@ -19,7 +20,6 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_horizontal_position_to_last_known,
     reset_horizontal_velocity_to_zero,
 )
-from fusetune.ekf2.numerics.geodesy import lat_lon_difference
 from fusetune.ekf2.releases.by_release import by_release
 
 UPDATE_INTERVAL_US = 200_000
@@ -74,7 +74,7 @@ def _update_status(ekf, params, aid):
     else:
         sigma = SIGMA_OTHERWISE
     variance = sigma * sigma
-    north, east = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, ekf.last_known_lat, ekf.last_known_lon)
+    north, east = offset_from_last_known(ekf)
     set_axis(aid, 0, math.degrees(ekf.gpos_lat), variance, north, ekf.P[POSITION, POSITION] + variance)
     set_axis(aid, 1, math.degrees(ekf.gpos_lon), variance, east, ekf.P[POSITION + 1, POSITION + 1] + variance)
     update_aid_source_status(ekf, aid, 2, ekf.time_delayed_us, INNOVATION_GATE)
@@ -103,8 +103,7 @@ def _run(ekf, params, enabled, active, aid):
 @kernel
 def _reset_fake_pos_fusion(ekf, params):
     """Take the present place as the known one, at rest."""
-    ekf.last_known_lat = ekf.gpos_lat
-    ekf.last_known_lon = ekf.gpos_lon
+    remember_horizontal_position(ekf)
     reset_horizontal_position_to_last_known(ekf, params)
     reset_horizontal_velocity_to_zero(ekf, params)
     ekf.aid.fake_pos.time_last_fuse = ekf.time_delayed_us

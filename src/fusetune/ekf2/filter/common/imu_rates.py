@@ -1,4 +1,4 @@
-"""What the IMU measured at the fusion time horizon, corrected by the biases."""
+"""What the IMU measured at the fusion time horizon, as it is, or corrected by the biases."""
 
 from fusetune.ekf2.compiled.kernel import kernel
 
@@ -13,6 +13,20 @@ def body_rate(ekf):
 def specific_force(ekf):
     """Specific force (m/s², FRD)."""
     return _corrected(ekf.imu_delayed.delta_vel, ekf.imu_delayed.delta_vel_dt, ekf.accel_bias)
+
+
+@kernel
+def measured_rate(ekf):
+    """Rotation rate (rad/s, FRD) with its bias."""
+    imu = ekf.imu_delayed
+    return imu.delta_ang[0] / imu.delta_ang_dt, imu.delta_ang[1] / imu.delta_ang_dt, imu.delta_ang[2] / imu.delta_ang_dt
+
+
+@kernel
+def measured_force(ekf):
+    """Specific force (m/s², FRD) with its bias."""
+    imu = ekf.imu_delayed
+    return imu.delta_vel[0] / imu.delta_vel_dt, imu.delta_vel[1] / imu.delta_vel_dt, imu.delta_vel[2] / imu.delta_vel_dt
 
 
 @kernel

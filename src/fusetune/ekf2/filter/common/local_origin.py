@@ -9,7 +9,8 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
-from fusetune.ekf2.numerics.geodesy import project, reproject
+from fusetune.ekf2.numerics.geodesy import lat_lon_difference, project, reproject
+from fusetune.ekf2.releases.by_release import by_release
 
 LOCAL_ORIGIN = np.dtype(
     [
@@ -63,15 +64,74 @@ def reproject_to_global(ekf, north, east):
 
 
 @kernel
-def get_local_horizontal_position(ekf):
-    """Local north and east (m) of the position estimate."""
+def _project_estimate(ekf):
     return project_to_local(ekf, ekf.gpos_lat, ekf.gpos_lon)
+
+
+@kernel
+def _local_estimate(ekf):
+    return ekf.local.north, ekf.local.east
+
+
+get_local_horizontal_position = by_release(_project_estimate, "keeps_position_local", _local_estimate)
+"""Local north and east (m) of the position estimate."""
+
+
+@kernel
+def _global_estimate(ekf):
+    return ekf.gpos_lat, ekf.gpos_lon
+
+
+@kernel
+def _reproject_estimate(ekf):
+    return reproject_to_global(ekf, ekf.local.north, ekf.local.east)
+
+
+get_global_horizontal_position = by_release(_global_estimate, "keeps_position_local", _reproject_estimate)
+"""Latitude and longitude (rad) of the position estimate."""
+
+
+@kernel
+def _remember_lat_lon(ekf):
+    ekf.last_known_lat, ekf.last_known_lon = ekf.gpos_lat, ekf.gpos_lon
+
+
+@kernel
+def _remember_north_east(ekf):
+    ekf.local.last_known_north, ekf.local.last_known_east = ekf.local.north, ekf.local.east
+
+
+remember_horizontal_position = by_release(_remember_lat_lon, "keeps_position_local", _remember_north_east)
+"""Note the horizontal position as the last known one."""
+
+
+@kernel
+def _difference_of_lat_lon(ekf):
+    return lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, ekf.last_known_lat, ekf.last_known_lon)
+
+
+@kernel
+def _difference_of_north_east(ekf):
+    return ekf.local.north - ekf.local.last_known_north, ekf.local.east - ekf.local.last_known_east
+
+
+offset_from_last_known = by_release(_difference_of_lat_lon, "keeps_position_local", _difference_of_north_east)
+"""North and east (m) of the position estimate, seen from the last known one."""
 
 
 @kernel
 def origin_altitude(ekf):
     """Altitude (m) of the origin, 0 while unknown."""
     return ekf.origin.alt if math.isfinite(ekf.origin.alt) else 0.0
+
+
+@kernel
+def _zero(ekf):
+    return 0.0
+
+
+altitude_at_origin = by_release(origin_altitude, "keeps_position_local", _zero)
+"""What `ekf.gpos_alt` is (m) at the height of the local origin."""
 
 
 @kernel

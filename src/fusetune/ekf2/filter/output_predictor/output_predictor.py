@@ -6,7 +6,8 @@ delta angles, velocity and position through a correction of the whole stored his
 It feeds what the vehicle publishes (`vehicle_attitude`, `vehicle_local_position`) and never the filter.
 Mirrors PX4 v1.16 `EKF/output_predictor/output_predictor.cpp`.
 
-Positions are metres north, east and down of a global reference, which is moved when the filter resets its position.
+Positions are metres north, east and down of a global reference, which is moved when the filter resets its position;
+in releases whose filter keeps its position local, of the origin.
 A correction moves every stored velocity and position alike, so it is kept once, as an offset: the history holds
 velocities and positions less the offset at the time they were stored.
 """
@@ -27,6 +28,7 @@ from fusetune.ekf2.numerics.rotations import (
     rotate_by_body_increment,
     rotate_to_earth,
 )
+from fusetune.ekf2.releases.by_release import by_release
 
 MIN_DT_S, MAX_DT_S = 1e-4, 0.03
 MAX_TIME_CONSTANT_S = 10.0
@@ -135,17 +137,47 @@ def _velocity_of_imu_offset(output, params, delta_angle, dt):
 
 
 @kernel
+def _set_reference_here(ekf):
+    ekf.output.ref_lat = ekf.gpos_lat
+    ekf.output.ref_lon = ekf.gpos_lon
+    ekf.output.ref_alt = ekf.gpos_alt
+
+
+@kernel
+def _leave_reference(ekf):
+    """Local positions are of the origin."""
+
+
+_set_reference = by_release(_set_reference_here, "keeps_position_local", _leave_reference)
+
+
+@kernel
+def _offset_from_reference(ekf):
+    output = ekf.output
+    north, east = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, output.ref_lat, output.ref_lon)
+    return north, east, output.ref_alt - ekf.gpos_alt
+
+
+@kernel
+def _local_position(ekf):
+    return ekf.local.north, ekf.local.east, -ekf.gpos_alt
+
+
+_position = by_release(_offset_from_reference, "keeps_position_local", _local_position)
+"""The filter's position (m, NED) as the history counts it."""
+
+
+@kernel
 def align_output_predictor(ekf):
     """Bring the whole history into agreement with the filter at the horizon (at filter start)."""
     output = ekf.output
     oldest = output.history[output.tail]
     quat_multiply_inverse(ekf.q, oldest.q, output.q_work)
+    _set_reference(ekf)
+    position = _position(ekf)
     for axis in range(3):
         output.vel_offset[axis] = ekf.vel[axis] - oldest.vel[axis]
-        output.pos_offset[axis] = -oldest.pos[axis]
-    output.ref_lat = ekf.gpos_lat
-    output.ref_lon = ekf.gpos_lon
-    output.ref_alt = ekf.gpos_alt
+        output.pos_offset[axis] = position[axis] - oldest.pos[axis]
     for i in range(output.size):
         _turn(output.history[i].q, output.q_work)
     newest, stored = output.newest, output.history[output.head]
@@ -213,8 +245,7 @@ def _correct_velocity_and_position(ekf, params):
     output = ekf.output
     vel_gain = output.dt_correct_avg / min(max(params.EKF2_TAU_VEL, output.dt_correct_avg), MAX_TIME_CONSTANT_S)
     pos_gain = output.dt_correct_avg / min(max(params.EKF2_TAU_POS, output.dt_correct_avg), MAX_TIME_CONSTANT_S)
-    north, east = lat_lon_difference(ekf.gpos_lat, ekf.gpos_lon, ekf.gpos_alt, output.ref_lat, output.ref_lon)
-    pos = (north, east, output.ref_alt - ekf.gpos_alt)
+    pos = _position(ekf)
     oldest, newest = output.history[output.tail], output.newest
     for axis in range(3):
         vel_err = ekf.vel[axis] - (oldest.vel[axis] + output.vel_offset[axis])
@@ -249,11 +280,10 @@ def apply_velocity_reset(ekf, delta_north, delta_east, delta_down):
 
 
 @kernel
-def apply_position_reset(ekf, delta_north, delta_east, delta_down):
-    """Follow a position reset (m) that the filter has just made.
+def _move_reference(ekf, delta_north, delta_east, delta_down):
+    """Horizontally the global reference moves, so the tracking error stays as it is.
 
-    Horizontally the global reference moves, so the tracking error stays as it is; after a jump over a great distance
-    (the first fix) it is set so that the error at the horizon is zero.
+    After a jump over a great distance (the first fix) it is set so that the error at the horizon is zero.
     """
     output = ekf.output
     if abs(delta_north) + abs(delta_east) < FAR_RESET_M:
@@ -270,6 +300,21 @@ def apply_position_reset(ekf, delta_north, delta_east, delta_down):
         output.ref_lon = lon
     output.pos_offset[2] += delta_down
     output.newest.pos[2] += delta_down
+
+
+@kernel
+def _move_positions(ekf, delta_north, delta_east, delta_down):
+    offset, newest = ekf.output.pos_offset, ekf.output.newest.pos
+    offset[0] += delta_north
+    offset[1] += delta_east
+    offset[2] += delta_down
+    newest[0] += delta_north
+    newest[1] += delta_east
+    newest[2] += delta_down
+
+
+apply_position_reset = by_release(_move_reference, "keeps_position_local", _move_positions)
+"""Follow a position reset (m) that the filter has just made."""
 
 
 @kernel

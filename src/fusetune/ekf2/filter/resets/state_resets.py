@@ -90,13 +90,26 @@ _reset_horizontal_velocity_variances = by_release(
 
 
 @kernel
+def _uncorrelate_each(ekf, index, dof):
+    for i in range(index, index + dof):
+        uncorrelate_block(ekf, i, 1)
+
+
+@kernel
+def _keep_correlated(ekf, index, dof):
+    """Until v1.15 the position keeps what it has in common with other states."""
+
+
+_uncorrelate_position = by_release(_uncorrelate_each, "keeps_position_at_velocity_resets", _keep_correlated)
+
+
+@kernel
 def reset_horizontal_velocity_to(ekf, params, vn, ve, var_n, var_e):
     """Set north and east velocity (m/s) and their variances; horizontal position is uncorrelated."""
     delta_n, delta_e = vn - ekf.vel[0], ve - ekf.vel[1]
     ekf.vel[0], ekf.vel[1] = vn, ve
     _reset_horizontal_velocity_variances(ekf, var_n, var_e)
-    uncorrelate_block(ekf, POSITION, 1)
-    uncorrelate_block(ekf, POSITION + 1, 1)
+    _uncorrelate_position(ekf, POSITION, 2)
     apply_velocity_reset(ekf, delta_n, delta_e, 0.0)
     reset = ekf.state_reset
     before = ekf.state_reset_prev.vel_ne_counter
@@ -112,7 +125,7 @@ def reset_vertical_velocity_to(ekf, params, vd, var):
     delta = vd - ekf.vel[2]
     ekf.vel[2] = vd
     _reset_variance(ekf, VELOCITY + 2, var)
-    uncorrelate_block(ekf, POSITION + 2, 1)
+    _uncorrelate_position(ekf, POSITION + 2, 1)
     apply_velocity_reset(ekf, 0.0, 0.0, delta)
     reset = ekf.state_reset
     before = ekf.state_reset_prev.vel_d_counter
@@ -194,8 +207,7 @@ _is_bias_shifted = by_release(_is_always_shifted, "shifts_active_biases", _is_ac
 
 
 @kernel
-def reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e):
-    """Set latitude and longitude (rad) and the variances (m²) of the horizontal position."""
+def _reset_lat_lon(ekf, params, lat_rad, lon_rad, var_n, var_e):
     before_n, before_e = project_to_local(ekf, ekf.gpos_lat, ekf.gpos_lon)
     after_n, after_e = project_to_local(ekf, lat_rad, lon_rad)
     delta_n, delta_e = after_n - before_n, after_e - before_e
@@ -209,18 +221,58 @@ def reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e):
 
 
 @kernel
-def reset_local_horizontal_position_to(ekf, params, north, east, var_n, var_e):
-    """Set the horizontal position to a place given in the local frame (m)."""
+def _reset_north_east(ekf, params, north, east, var_n, var_e):
+    north, east = single_precision(north), single_precision(east)
+    delta_n, delta_e = north - ekf.local.north, east - ekf.local.east
+    ekf.local.north, ekf.local.east = north, east
+    _reset_variance(ekf, POSITION, var_n)
+    _reset_variance(ekf, POSITION + 1, var_e)
+    apply_position_reset(ekf, delta_n, delta_e, 0.0)
+    update_horizontal_position_reset_status(ekf, delta_n, delta_e)
+    # PX4 takes off all that this update has reset so far, earlier resets once more
+    change = ekf.state_reset.pos_ne_change
+    shift_external_vision_position_bias(ekf, change[0], change[1])
+    ekf.time_last_hor_pos_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _project_and_reset(ekf, params, lat_rad, lon_rad, var_n, var_e):
+    north, east = project_to_local(ekf, lat_rad, lon_rad)
+    _reset_north_east(ekf, params, north, east, var_n, var_e)
+
+
+@kernel
+def _reproject_and_reset(ekf, params, north, east, var_n, var_e):
     lat_rad, lon_rad = reproject_to_global(ekf, north, east)
-    reset_horizontal_position_to(ekf, params, lat_rad, lon_rad, var_n, var_e)
+    _reset_lat_lon(ekf, params, lat_rad, lon_rad, var_n, var_e)
+
+
+reset_horizontal_position_to = by_release(_reset_lat_lon, "keeps_position_local", _project_and_reset)
+"""Set latitude and longitude (rad) and the variances (m²) of the horizontal position."""
+
+reset_local_horizontal_position_to = by_release(_reproject_and_reset, "keeps_position_local", _reset_north_east)
+"""Set the horizontal position to a place given in the local frame (m)."""
+
+
+@kernel
+def _reset_to_last_lat_lon(ekf, params, variance):
+    _reset_lat_lon(ekf, params, ekf.last_known_lat, ekf.last_known_lon, variance, variance)
+
+
+@kernel
+def _reset_to_last_north_east(ekf, params, variance):
+    local = ekf.local
+    _reset_north_east(ekf, params, local.last_known_north, local.last_known_east, variance, variance)
+
+
+_reset_to_last_known = by_release(_reset_to_last_lat_lon, "keeps_position_local", _reset_to_last_north_east)
 
 
 @kernel
 def reset_horizontal_position_to_last_known(ekf, params):
     """Return to the last horizontal position that was aided."""
     ekf.events.reset_pos_to_last_known = True
-    variance = params.EKF2_NOAID_NOISE**2
-    reset_horizontal_position_to(ekf, params, ekf.last_known_lat, ekf.last_known_lon, variance, variance)
+    _reset_to_last_known(ekf, params, params.EKF2_NOAID_NOISE**2)
 
 
 @kernel

@@ -76,9 +76,23 @@ def _fuse_gravity(ekf, params):
 
 
 @kernel
+def _tell_fused(ekf, was_fused):
+    ekf.aid.gravity.fused = True
+    ekf.aid.gravity.time_last_fuse = ekf.imu_delayed.time_us
+
+
+@kernel
+def _tell_if_fused(ekf, was_fused):
+    if was_fused:
+        _tell_fused(ekf, was_fused)
+
+
+_note_fusion = by_release(_tell_fused, "tells_fused_gravity", _tell_if_fused)
+
+
+@kernel
 def _control_gravity_fusion(ekf, params):
     """Hold the tilt to the vertical while the vehicle hardly accelerates and no other source aids horizontally."""
-    imu, aid = ekf.imu_delayed, ekf.aid.gravity
     accel_norm_good = ACCEL_LIMIT_LOW < ekf.accel_magnitude_filt < ACCEL_LIMIT_HIGH
     ekf.cs.gravity_vector = (
         (int(params.EKF2_IMU_CTRL) & IMU_CTRL_GRAVITY_VECTOR) != 0
@@ -86,10 +100,10 @@ def _control_gravity_fusion(ekf, params):
         and not is_horizontal_aiding_active(ekf)
     )
     _update_gravity(ekf, params)
-    if _may_be_fused(ekf):
+    fused = _may_be_fused(ekf)
+    if fused:
         _fuse_gravity(ekf, params)
-    aid.fused = True
-    aid.time_last_fuse = imu.time_us
+    _note_fusion(ekf, fused)
 
 
 @kernel
