@@ -13,7 +13,6 @@ from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_checks import check_mag_field
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_limits import reference_declination
-from fusetune.ekf2.filter.aid_sources.magnetometer.judgement import forget_judgement
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     R_MAG_MIN,
     fuse_declination,
@@ -36,6 +35,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import (
     stop_mag_fusion,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import synthesise_z
+from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.common.timing import (
@@ -108,7 +108,7 @@ def _control_with_sample(ekf, params):
     synthesise_z(ekf, params, sample)
     check_mag_heading_consistency(ekf, params, sample)
 
-    forget_judgement(aid, 3)
+    forget_aid_source_status(ekf, aid, 3)
     # the model may have been looked up after the last fusion, in the same update
     wmm_updated = ekf.field_history.wmm_time_last_set >= aid.time_last_fuse
     continuing = _continuing_conditions_passing(ekf, sample)

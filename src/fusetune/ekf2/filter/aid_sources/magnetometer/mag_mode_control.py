@@ -21,7 +21,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import (
     reset_yaw_to_filtered_field,
     take_filtered_field,
 )
-from fusetune.ekf2.filter.aid_sources.magnetometer.judgement import forget_judgement
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import judge_mag, predict_mag
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import measured_heading
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_INDOOR, MAG_TYPE_NONE
@@ -32,7 +31,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import (
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import check_hagl_yaw_reset_req, put_body_field
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known, synthesise_z
-from fusetune.ekf2.filter.common.aid_source_status import set_axis
+from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status, set_axis
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.state import MAG_BODY
 from fusetune.ekf2.filter.common.timing import MAG_MAX_INTERVAL, is_newest_sample_recent, is_timed_out
@@ -100,8 +99,8 @@ def _take_sample(ekf, params):
 def _tell_sample(ekf, params, sample, time_us):
     """What is seen before it is known whether it will be fused."""
     heading, field = ekf.aid.mag_heading, ekf.aid.mag
-    forget_judgement(heading, 1)
-    forget_judgement(field, 3)
+    forget_aid_source_status(ekf, heading, 1)
+    forget_aid_source_status(ekf, field, 3)
     heading.timestamp_sample = field.timestamp_sample = time_us
     x, y, z = sample[0] - ekf.mag_B[0], sample[1] - ekf.mag_B[1], sample[2] - ekf.mag_B[2]
     observed = measured_heading(ekf, params, x, y, z)
