@@ -26,7 +26,13 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import (
     initialise_gnss_memory,
 )
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import FIELD_HISTORY, MAG_MEMORY, initialise_mag_memory
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
+    FIELD_HISTORY,
+    MAG_MEMORY,
+    MAG_MODES,
+    initialise_mag_memory,
+    initialise_mag_modes,
+)
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
@@ -108,6 +114,8 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("heading", HEADING_MEMORY))
     if does.limits_declination:
         memories.append(("field_history", FIELD_HISTORY))
+    if does.fuses_heading_or_field:
+        memories.append(("mag_modes", MAG_MODES))
     if does.filters_terrain_apart:
         memories = [(name, OLD_AID_SOURCES if name == "aid" else memory) for name, memory in memories]
         memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
@@ -161,6 +169,7 @@ def initialise_estimator(ekf, params):
     initialise_position_bias_estimator(ekf.ev_pos_b_est)
     initialise_gnss_memory(ekf.gnss)
     initialise_mag_memory(ekf.mag)
+    initialise_mag_modes(ekf)
     initialise_range_memory(ekf.range)
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)

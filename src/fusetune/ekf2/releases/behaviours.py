@@ -463,6 +463,39 @@ class Behaviours:
         until="v1.15",
         source="mag_control.cpp, mag_3d_control.cpp, mag_fusion.cpp",
     )
+    fuses_heading_or_field: bool = _behaviour(
+        "The magnetometer fuses the heading, or, once it is aligned in flight and the vehicle accelerates or turns "
+        "(EKF2_MAG_YAWLIM), the field, whose states have a covariance only then. The strength alone is checked, within "
+        "0.2 Gauss. At rest the yaw at which it came to rest is fused; while levelling it follows the field.",
+        since="v1.13",
+        until="v1.14",
+        source="mag_control.cpp, mag_fusion.cpp, zero_innovation_heading_update.cpp",
+    )
+    looks_field_up_until_origin: bool = _behaviour(
+        "The magnetic model is looked up at every fix until there is an origin, and the first asks for a yaw reset.",
+        since="v1.13",
+        until="v1.14",
+        source="gps_checks.cpp",
+    )
+    clears_field_whenever_stopped: bool = _behaviour(
+        "A magnetometer that may not be used is passed over and a yaw held in its place in every update, not stopped; "
+        "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
+    )
+    observes_yaw_by_vision: bool = _behaviour(
+        "The position of vision, too, lets accelerations tell the heading, and needs a yaw indoors.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_control.cpp",
+    )
+    bounds_declination_innovation: bool = _behaviour(
+        "The innovation of the declination is limited to 0.5 rad.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_fusion.cpp",
+    )
     puts_body_field_by_yaw_estimator: bool = _behaviour(
         "A reset of the field takes the covariances of both its states, and where the yaw estimator has converged puts "
         "the body field as its yaw wants. v1.16 keeps a field that is near the model's.",
