@@ -398,3 +398,15 @@ def test_v1_14_follows_the_field_while_it_levels():
     assert heading["observation"][0] == pytest.approx(1.0 + math.radians(5.0))
     assert heading["innovation"][0] == pytest.approx(-1.0 - math.radians(5.0))
     assert not heading["fused"]
+
+
+@pytest.mark.parametrize("release", [V115, V116])
+def test_a_body_field_is_known_to_its_noise_right_after_a_reset_of_v1_15(release):
+    """0.05² Gauss² and 1e-12 Gauss² of process noise: in single precision, as PX4 has it, that is the limit itself."""
+    it = flying(release, EKF2_MAG_NOISE=0.05)
+    it.ekf["P"][MAG_BODY : MAG_BODY + 3, MAG_BODY : MAG_BODY + 3] = np.eye(3) * (
+        it.params["EKF2_MAG_NOISE"] ** 2 + 1e-12
+    )
+    assert bool(mag_heading.is_mag_bias_good(it.ekf, it.params)) == (release == V115)
+    it.ekf["P"][MAG_BODY, MAG_BODY] += 1e-9
+    assert not mag_heading.is_mag_bias_good(it.ekf, it.params)

@@ -376,6 +376,16 @@ def unaided(release: str, **flags: bool) -> Flying:
     return it
 
 
+@pytest.mark.parametrize(("release", "seconds"), [("v1.13", 10.0), ("v1.14", 10.0), (V115, 10.0), (NEW, 3.0)])
+def test_a_bad_vertical_acceleration_is_remembered_for_10_s_until_v1_15(release, seconds):
+    it = flying(release)
+    for after, bad in ((seconds - 0.1, True), (seconds + 0.1, False)):
+        it.ekf["fs"]["bad_acc_vertical"] = True
+        it.ekf["time_bad_vert_accel"] = int(it.ekf["time_delayed_us"]) - round(after * 1e6)
+        height_control.check_vertical_acceleration_health(it.ekf)
+        assert it.ekf["fs"]["bad_acc_vertical"] == bad
+
+
 @pytest.mark.parametrize(
     ("flags", "control", "tilt_var", "wanted"),
     [

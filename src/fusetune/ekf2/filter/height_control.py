@@ -25,6 +25,7 @@ from fusetune.ekf2.releases.by_release import by_release
 VERT_INNOV_TEST_LIM = 3.0
 VERT_INNOV_TEST_MIN = 1.0
 BADACC_PROBATION = 3_000_000
+BADACC_PROBATION_UNTIL_V1_15 = 10_000_000
 
 FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
 
@@ -73,11 +74,25 @@ def _is_height_source_active(ekf, source):
 
 
 @kernel
+def _three_seconds(ekf):
+    return BADACC_PROBATION
+
+
+@kernel
+def _ten_seconds(ekf):
+    return BADACC_PROBATION_UNTIL_V1_15
+
+
+_probation = by_release(_three_seconds, "remembers_bad_acceleration", _ten_seconds)
+"""How long (µs) a vertical acceleration counts as bad after it was found so."""
+
+
+@kernel
 def check_vertical_acceleration_health(ekf):
     """Detect accelerations that clipping or vibration bias towards free fall.
 
     Such a bias shows as vertical innovations that are all positive (prediction below the observation, in NED).
-    `fs.bad_acc_vertical` persists for 3 s after the last detection.
+    `fs.bad_acc_vertical` persists for 3 s (until v1.15: 10 s) after the last detection.
     """
     falling = estimate_inertial_nav_falling_likelihood(ekf)
     is_clipping_frequently = _count_clipping(ekf)
@@ -88,7 +103,7 @@ def check_vertical_acceleration_health(ekf):
     else:
         ekf.time_good_vert_accel = ekf.time_delayed_us
     if ekf.fs.bad_acc_vertical:
-        ekf.fs.bad_acc_vertical = is_recent(ekf, ekf.time_bad_vert_accel, BADACC_PROBATION)
+        ekf.fs.bad_acc_vertical = is_recent(ekf, ekf.time_bad_vert_accel, _probation(ekf))
     else:
         ekf.fs.bad_acc_vertical = bad_vert_accel
 

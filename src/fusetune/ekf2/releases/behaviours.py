@@ -408,6 +408,13 @@ class Behaviours:
         source="EKFGSF_yaw.cpp",
     )
 
+    remembers_bad_acceleration: bool = _behaviour(
+        "A vertical acceleration that was found bad counts as bad for 10 s. v1.16 waits for 3 s.",
+        since="v1.13",
+        until="v1.15",
+        source="common.h",
+    )
+
     # Older releases: magnetometer and heading.
     knows_field_of_early_2024: bool = _behaviour(
         "The magnetic model is that of January 2024, in 10⁻⁴ rad and 10⁻⁴ Gauss. v1.16 has that of May 2024.",
