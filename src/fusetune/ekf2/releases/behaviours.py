@@ -363,6 +363,12 @@ class Behaviours:
         until="v1.15",
         source="baro_height_control.cpp",
     )
+    doubts_vertical_acceleration_for_10_s: bool = _behaviour(
+        "Vertical acceleration counts as bad for 10 s after it was last found so. v1.16 forgives it after 3 s.",
+        since="v1.13",
+        until="v1.15",
+        source="common.h, height_control.cpp",
+    )
     fakes_one_kind_of_position: bool = _behaviour(
         "There is one fake position, which starts by dead reckoning, is fused like any position, and protected from "
         "extremes alone. v1.16 tells one that is valid, at rest, from another.",
@@ -406,13 +412,6 @@ class Behaviours:
         since="v1.13",
         until="v1.14",
         source="EKFGSF_yaw.cpp",
-    )
-
-    remembers_bad_acceleration: bool = _behaviour(
-        "A vertical acceleration that was found bad counts as bad for 10 s. v1.16 waits for 3 s.",
-        since="v1.13",
-        until="v1.15",
-        source="common.h",
     )
 
     # Older releases: magnetometer and heading.
