@@ -11,6 +11,7 @@ import pytest
 from fusetune.ekf2.feed.taken_samples import AIDING
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE_AXES, AID_SOURCE_NAMES
 from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCES as STATUS
+from fusetune.ekf2.filter.common.aid_source_status import OLD_AID_SOURCES as OLD_STATUS
 from fusetune.ekf2.filter.common.parameters import DELAY_PARAMETERS
 from fusetune.ekf2.replay.recording import FLAG_COLUMNS
 from fusetune.px4.aid_sources import (
@@ -18,6 +19,8 @@ from fusetune.px4.aid_sources import (
     AXES,
     HORIZONTAL_AIDING,
     MEASURED_SOURCES,
+    OLD_SOURCES,
+    RECORDED_SOURCES,
     REPLAYED_SOURCES,
     REPORTED_SOURCES,
     SENSOR_TOPICS,
@@ -112,7 +115,9 @@ def test_control_bits_are_those_of_estimator_status() -> None:
 
 def test_codes_are_those_that_replays_were_written_with() -> None:
     # the order of the estimator's record: another one would give old tables other sources
-    assert REPLAYED_SOURCES == AID_SOURCE_NAMES == STATUS.names
+    assert STATUS.names == REPLAYED_SOURCES
+    assert RECORDED_SOURCES == AID_SOURCE_NAMES == OLD_STATUS.names
+    assert RECORDED_SOURCES[: len(REPLAYED_SOURCES)] == REPLAYED_SOURCES
     assert [AID_SOURCES[name].code for name in REPLAYED_SOURCES] == list(range(len(REPLAYED_SOURCES)))
     assert REPLAYED_SOURCES[:4] == ("baro_hgt", "rng_hgt", "fake_hgt", "fake_pos")
     assert REPLAYED_SOURCES[-1] == "drag"
@@ -121,7 +126,7 @@ def test_codes_are_those_that_replays_were_written_with() -> None:
 def test_all_sources_but_those_that_nothing_feeds_are_replayed() -> None:
     # docs/fidelity.md: all aid sources but the auxiliary global position
     assert {name for name, source in AID_SOURCES.items() if not source.is_replayed} == {
-        "mag_heading",
+        *OLD_SOURCES,
         "aux_global_position",
     }
 
@@ -131,8 +136,12 @@ def test_axes_are_those_that_px4_publishes() -> None:
     of_one = {"baro_hgt", "rng_hgt", "fake_hgt", "gnss_hgt", "ev_hgt", "gnss_yaw", "ev_yaw", "airspeed", "sideslip"}
     of_two = {"fake_pos", "gnss_pos", "ev_pos", "optical_flow", "aux_vel", "aux_global_position", "drag"}
     of_three = {"gnss_vel", "ev_vel", "mag", "gravity"}
+    # and of v1.14
+    of_one |= {"mag_heading", "terrain_range_finder"}
+    of_two |= {"terrain_optical_flow"}
     assert dict.fromkeys(of_one, 1) | dict.fromkeys(of_two, 2) | dict.fromkeys(of_three, 3) == AID_SOURCE_AXES
-    assert set(MEASURED_SOURCES) - set(AID_SOURCE_AXES) == {"mag_heading"}
+    assert set(MEASURED_SOURCES) - set(REPLAYED_SOURCES) == {"mag_heading"}
+    assert set(MEASURED_SOURCES) < set(AID_SOURCE_AXES)
 
 
 def test_axes_and_fields_are_those_that_vehicles_logged(shared_logs: Path) -> None:

@@ -384,13 +384,21 @@ AID_SOURCES: Mapping[str, AidSource] = {source.name: source for source in (
         switch=Switch("EKF2_AGP_CTRL"), gate_parameter="EKF2_AGP_GATE",
         acts=("EKF2_AGP_",), flags=("cs_aux_gpos",), stops_drift=True,
     ),
+    AidSource(
+        "terrain_range_finder", "height above ground", "m", 1, "height", _HEIGHT, sensor="range",
+        gate_parameter="EKF2_RNG_GATE", measures=False,
+    ),
+    AidSource(
+        "terrain_optical_flow", "optical flow over the terrain", "rad/s", 2, "flow", _BIAXIAL, sensor="flow",
+        gate_parameter="EKF2_OF_GATE", measures=False,
+    ),
     AidSource("fake_hgt", "fake height", "m", 1, "height", code=2, flags=("cs_fake_hgt",), measures=False),
     AidSource("fake_pos", "fake position", "m", 2, "position", code=3, flags=("cs_fake_pos",), measures=False),
 )}
 # fmt: on
 """Every aid source by name, in the order in which figures are made and shown.
 
-`mag_heading` exists only as flown, in releases before v1.15. Auxiliary positions are known but not replayed."""
+Sources without a code are those of `OLD_SOURCES`; auxiliary positions are known but not replayed."""
 
 MEASURED_SOURCES: Mapping[str, AidSource] = {source.name: source for source in AID_SOURCES.values() if source.measures}
 """Sources that measure something: those that are scored."""
@@ -401,7 +409,13 @@ REPLAYED_SOURCES: tuple[str, ...] = tuple(
         (source for source in AID_SOURCES.values() if source.code is not None), key=lambda one: one.code or 0
     )
 )
-"""Sources of the replay's estimator, by their codes."""
+"""Sources of the estimator of v1.16 and later, by their codes."""
+
+OLD_SOURCES: tuple[str, ...] = ("mag_heading", "terrain_range_finder", "terrain_optical_flow")
+"""Sources that only older estimators have: the heading until v1.14, the filter of the terrain alone until v1.15."""
+
+RECORDED_SOURCES: tuple[str, ...] = REPLAYED_SOURCES + OLD_SOURCES
+"""Sources of the replay of any release, by the number that its rows have."""
 
 WITHHOLDABLE: Mapping[str, tuple[str, ...]] = {
     source.sensor: tuple(one.name for one in AID_SOURCES.values() if one.sensor == source.sensor and one.withheld)

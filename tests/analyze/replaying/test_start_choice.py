@@ -1,5 +1,7 @@
 """Warm or cold: by the log's time on the ground and by what it holds."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fusetune.analyze.replaying.settings import StartSettings
@@ -53,6 +55,32 @@ def test_log_with_time_on_the_ground_starts_cold():
 def test_state_before_gnss_was_used_is_not_taken():
     start = choose_start(made(3, np.arange(0.5, 50), gnss_from_s=4))
     assert start.state.time_us == BEGIN + 4_500_000
+
+
+def aligning(take_off_s, aligned_from_s, gnss_from_s, checked_s, name="cs_yaw_align"):
+    """A log whose estimator aligns within it, with GNSS checks that have to hold for `checked_s`."""
+    flight = made(take_off_s, np.arange(0.5, 50), gnss_from_s)
+    flags = flight.topics["estimator_status_flags", 0] | {name: np.arange(60) >= aligned_from_s}
+    parameters = ParameterHistory({"EKF2_REQ_GPS_H": checked_s})
+    return replace(flight, topics=flight.topics | {("estimator_status_flags", 0): flags}, parameters=parameters)
+
+
+def test_log_that_holds_the_start_of_the_vehicles_estimator_starts_cold():
+    for name in ("cs_tilt_align", "cs_yaw_align"):
+        start = choose_start(aligning(5, aligned_from_s=1, gnss_from_s=2, checked_s=0.5, name=name))
+        assert start.mode == "cold"
+        assert "aligned 1.0 s after the log began" in start.why
+    asked = choose_start(aligning(5, aligned_from_s=1, gnss_from_s=2, checked_s=0.5), StartSettings(mode="warm"))
+    assert asked.state.time_us == BEGIN + 2_500_000
+
+
+def test_start_that_nothing_can_repeat_is_warm():
+    # GNSS was checked before the log began
+    assert choose_start(aligning(5, aligned_from_s=1, gnss_from_s=2, checked_s=10.0)).mode == "warm"
+    # aligned in the air
+    assert choose_start(aligning(5, aligned_from_s=7, gnss_from_s=12, checked_s=10.0)).mode == "warm"
+    # never aligned
+    assert "no state of an aligned" in choose_start(aligning(5, aligned_from_s=99, gnss_from_s=12, checked_s=10.0)).why
 
 
 def test_late_state_is_no_use_to_auto_but_to_warm():

@@ -396,7 +396,7 @@ def test_a_given_position_is_taken_over_whole(release, forced, monkeypatch):
 @pytest.mark.parametrize(("release", "left_out"), SINCE_V117)
 def test_an_unhealthy_range_sample_stops_nothing(release, left_out, monkeypatch):
     it = flying(release, EKF2_RNG_CTRL=2.0)
-    for part, value in (("is_data_healthy", False), ("_has_recent_sample", True), ("is_height_reset_required", False)):
+    for part, value in (("is_data_healthy", False), ("has_recent_range", True), ("is_height_reset_required", False)):
         monkeypatch.setattr(range_height_control, part, lambda *_, value=value: value)
     for part in ("stop_rng_hgt_fusion", "stop_rng_terr_fusion", "_fuse_or_recover"):
         monkeypatch.setattr(range_height_control, part, lambda ekf, *_: setattr(ekf.cs, "rng_terrain", False))

@@ -15,14 +15,15 @@ import pyarrow as pa
 
 from fusetune.analyze.replaying.set_input import existing_folder
 from fusetune.errors import UserError
-from fusetune.px4.aid_sources import AID_SOURCES, REPLAYED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES, OLD_SOURCES, REPLAYED_SOURCES
 from fusetune.storage.documents import read_document
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
 
 NOT_AN_AID = tuple(one.name for one in AID_SOURCES.values() if one.every_update or not one.measures)
-COMPARED_SOURCES = tuple(
-    one.name for one in map(AID_SOURCES.__getitem__, REPLAYED_SOURCES) if one.is_replayed and one.name not in NOT_AN_AID
+COMPARED_SOURCES = (
+    *(name for name in REPLAYED_SOURCES if AID_SOURCES[name].is_replayed and name not in NOT_AN_AID),
+    *OLD_SOURCES,
 )
 NLL_SOURCES = tuple(one.name for one in AID_SOURCES.values() if one.orders_sets)
 MIN_SAMPLES = 10

@@ -18,14 +18,14 @@ from fusetune.ekf2.replay.course import Course
 from fusetune.ekf2.replay.recording import RecordArrays
 from fusetune.ekf2.replay.replay import begin_course, replay
 from fusetune.ekf2.replay.results import ReplayResult
-from fusetune.px4.aid_sources import AID_SOURCES, REPLAYED_SOURCES
+from fusetune.px4.aid_sources import AID_SOURCES, RECORDED_SOURCES
 from fusetune.px4.flight import Flight
 
 Array = npt.NDArray[np.float64]
 
 MOST_INSTANTS = 48
 """Of the corrections in the window as many are looked at, evenly spread over them."""
-_IS_MEASURED = np.array([bool(AID_SOURCES[name].sensor) for name in REPLAYED_SOURCES])
+_IS_MEASURED = np.array([bool(AID_SOURCES[name].sensor) for name in RECORDED_SOURCES])
 """Of each source of the replay, by its code, whether it is a sensor's."""
 WITHOUT_AIDING_US = 200_000
 """Every so often where nothing is fused."""
@@ -108,7 +108,7 @@ def _corrections(result: ReplayResult, window_us: tuple[int, int]) -> tuple[np.n
         raise ValueError("the filter does not run in the window")
     rows = result.innovations[result.innovations["fused"] & _inside(result.innovations["timestamp_sample"], window_us)]
     measured = {
-        REPLAYED_SOURCES[code]: np.unique(rows["timestamp_sample"][rows["source"] == code])
+        RECORDED_SOURCES[code]: np.unique(rows["timestamp_sample"][rows["source"] == code])
         for code in np.unique(rows["source"])
         if _IS_MEASURED[code]
     }

@@ -18,9 +18,21 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_M
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, GNSS_TRUST, initialise_gnss_memory
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import GNSS_ARRIVALS
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import (
+    GNSS_MEMORY,
+    GNSS_TRUST,
+    GNSS_YAW_RETRIES,
+    initialise_gnss_memory,
+)
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import FIELD_HISTORY, MAG_MEMORY, initialise_mag_memory
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
+    FIELD_HISTORY,
+    MAG_MEMORY,
+    MAG_MODES,
+    initialise_mag_memory,
+    initialise_mag_modes,
+)
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
@@ -33,6 +45,7 @@ from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import (
     initialise_position_bias_estimator,
 )
 from fusetune.ekf2.filter.bias_inhibition import update_imu_bias_inhibit
+from fusetune.ekf2.filter.common.aid_source_status import OLD_AID_SOURCES
 from fusetune.ekf2.filter.common.core_memory import CORE_FIELDS, POSITION_REF_GNSS
 from fusetune.ekf2.filter.common.heading_observability import HEADING_MEMORY
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_UNKNOWN
@@ -44,8 +57,12 @@ from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
 from fusetune.ekf2.filter.quaternion_core.core_memory import QUATERNION_CORE, initialise_quaternion_core
+from fusetune.ekf2.filter.terrain_filter.terrain_filter import run_terrain_filter, start_terrain_filter
+from fusetune.ekf2.filter.terrain_filter.terrain_memory import TERRAIN_FILTER
 from fusetune.ekf2.filter.wind import WIND_MEMORY
-from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
+from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY
+from fusetune.ekf2.filter.yaw_estimator.matrix_bank import MATRIX_BANK, YAW_VELOCITY
+from fusetune.ekf2.filter.yaw_estimator.yaw_bank import initialise_yaw_bank
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL
 from fusetune.ekf2.numerics.rotations import quat_aligning_with_up, quat_to_dcm
 from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS
@@ -96,15 +113,39 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("flow_rates", FLOW_RATES))
     if does.holds_unobservable_heading:
         memories.append(("heading", HEADING_MEMORY))
+    if does.limits_declination:
+        memories.append(("field_history", FIELD_HISTORY))
+    if does.fuses_heading_or_field:
+        memories.append(("mag_modes", MAG_MODES))
+    if does.filters_terrain_apart:
+        memories = [(name, OLD_AID_SOURCES if name == "aid" else memory) for name, memory in memories]
+        memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
     if does.keeps_position_local:
         memories.append(("local", LOCAL_POSITION))
     if does.adds_quaternion_errors:
         memories.append(("quaternion", QUATERNION_CORE))
     if does.doubts_stuck_accel_bias:
         memories.append(("accel_bias_check", ACCEL_BIAS_CHECK))
-    if does.limits_declination:
-        memories.append(("field_history", FIELD_HISTORY))
+    if does.keeps_yaw_bank_as_matrices:
+        memories.append(("yaw_matrices", MATRIX_BANK))
+    if does.retries_gnss_yaw:
+        memories.append(("gnss_yaw_retries", GNSS_YAW_RETRIES))
+    if does.checks_gnss_on_arrival:
+        memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
     return marked(np.dtype(memories, align=True), release)
+
+
+@kernel
+def _initialise_nothing(ekf):
+    """v1.16's range finder has no bias."""
+
+
+@kernel
+def _initialise_bias_of_range(ekf):
+    initialise_height_bias_estimator(ekf.rng_hgt_b_est)
+
+
+_initialise_range_bias = by_release(_initialise_nothing, "takes_range_for_height", _initialise_bias_of_range)
 
 
 @kernel
@@ -127,13 +168,15 @@ def initialise_estimator(ekf, params):
     initialise_height_bias_estimator(ekf.baro_b_est)
     initialise_height_bias_estimator(ekf.gps_hgt_b_est)
     initialise_height_bias_estimator(ekf.ev_hgt_b_est)
+    _initialise_range_bias(ekf)
     initialise_position_bias_estimator(ekf.ev_pos_b_est)
     initialise_gnss_memory(ekf.gnss)
     initialise_mag_memory(ekf.mag)
+    initialise_mag_modes(ekf)
     initialise_range_memory(ekf.range)
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)
-    initialise_gsf_memory(ekf.gsf)
+    initialise_yaw_bank(ekf)
     initialise_quaternion_core(ekf)
     # on the ground, the vehicle stands this far above it
     ekf.terrain = -ekf.gpos_alt + params.EKF2_MIN_RNG
@@ -145,6 +188,7 @@ def _level_filter(ekf, params, specific_force):
     quat_aligning_with_up(specific_force[0], specific_force[1], specific_force[2], ekf.q)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
     initialise_covariance(ekf, params)
+    start_terrain_filter(ekf, params)
     align_output_predictor(ekf)
     ekf.filter_initialised = True
 
@@ -173,6 +217,7 @@ def _update(ekf, params):
     predict_covariance(ekf, params)
     predict_state(ekf, params)
     control_fusion_modes(ekf, params)
+    run_terrain_filter(ekf, params)
     correct_output(ekf, params)
 
 
@@ -183,6 +228,7 @@ def _update_after_state(ekf, params):
     update_imu_bias_inhibit(ekf, params)
     predict_covariance(ekf, params)
     control_fusion_modes(ekf, params)
+    run_terrain_filter(ekf, params)
     correct_output(ekf, params)
 
 

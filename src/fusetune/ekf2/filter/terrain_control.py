@@ -11,6 +11,7 @@ from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.state import TERRAIN
 from fusetune.ekf2.filter.common.timing import HGT_FUSION_TIMEOUT_MAX, is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import reset_covariance_block
+from fusetune.ekf2.releases.by_release import by_release
 
 NO_TERRAIN_AIDING_TIMEOUT = 1_000_000
 
@@ -23,7 +24,7 @@ def init_terrain(ekf, params):
 
 
 @kernel
-def control_terrain_fake_fusion(ekf, params):
+def _put_terrain_below(ekf, params):
     """On the ground the terrain is right below, unless a sensor says more; it starts there anew at take-off.
 
     With optical flow a distance taken too large makes the velocity too large, so take-off starts with a small one.
@@ -43,7 +44,15 @@ def control_terrain_fake_fusion(ekf, params):
 
 
 @kernel
-def update_terrain_validity(ekf):
+def _leave_terrain(ekf, params):
+    """The terrain has a filter of its own."""
+
+
+control_terrain_fake_fusion = by_release(_put_terrain_below, "filters_terrain_apart", _leave_terrain)
+
+
+@kernel
+def _judge_terrain(ekf):
     """Set `ekf.terrain_valid`.
 
     It takes a range finder (or optical flow of small variance) to become valid, and a standard deviation below 10 %
@@ -64,3 +73,11 @@ def update_terrain_validity(ekf):
         ekf.terrain_valid = hagl >= 0.0 and small_variance
     else:
         ekf.terrain_valid = hagl >= 0.0 and positive_variance and (by_range or (by_flow and small_variance))
+
+
+@kernel
+def _judge_nothing(ekf):
+    """Whether the terrain is known is found whenever that is asked."""
+
+
+update_terrain_validity = by_release(_judge_terrain, "filters_terrain_apart", _judge_nothing)

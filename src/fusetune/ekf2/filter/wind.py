@@ -9,10 +9,11 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import WIND
-from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY, reset_covariance_block
+from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY, reset_covariance_block, reset_wind_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_kalman_gain
 from fusetune.ekf2.numerics.rotations import rotate_to_body
+from fusetune.ekf2.releases.by_release import by_release
 
 WIND_MEMORY = np.dtype([("external_init", "?")], align=True)
 """Sub-record `ekf.wind`: whether the wind was given from outside and no source has used it yet."""
@@ -29,6 +30,23 @@ def air_velocity_body(ekf):
     """Velocity (m/s, FRD) of the vehicle through the air."""
     x, y, z = air_velocity(ekf)
     return rotate_to_body(ekf.R_to_earth, x, y, z)
+
+
+@kernel
+def _start_wind_as_it_is(ekf):
+    """The wind keeps its value, with the variances of one of which nothing is known, unless an operator gave it."""
+    if not ekf.wind.external_init:
+        reset_wind_cov(ekf)
+
+
+@kernel
+def reset_wind_to_zero(ekf):
+    """Nothing is known of the wind."""
+    ekf.wind_vel[0], ekf.wind_vel[1] = 0.0, 0.0
+    reset_wind_cov(ekf)
+
+
+start_wind = by_release(_start_wind_as_it_is, "starts_wind_at_zero", reset_wind_to_zero)
 
 
 @kernel

@@ -9,8 +9,9 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.releases.by_release import by_release
 from fusetune.px4.aid_sources import AID_SOURCES as SOURCE_ROWS
-from fusetune.px4.aid_sources import REPLAYED_SOURCES
+from fusetune.px4.aid_sources import RECORDED_SOURCES, REPLAYED_SOURCES
 
 AID_SOURCE = np.dtype(
     [
@@ -23,14 +24,17 @@ AID_SOURCE = np.dtype(
     align=True,
 )
 
-AID_SOURCE_NAMES = REPLAYED_SOURCES
-"""Names of the aid sources of the replay, in the order of their codes."""
+AID_SOURCE_NAMES = RECORDED_SOURCES
+"""Names of the aid sources of the replay, in the order of their codes; those of older releases alone come last."""
 
 AID_SOURCE_AXES = {name: SOURCE_ROWS[name].axes for name in AID_SOURCE_NAMES}
 """Number of axes of every aid source."""
 
-AID_SOURCES = np.dtype([(name, AID_SOURCE) for name in AID_SOURCE_NAMES], align=True)
+AID_SOURCES = np.dtype([(name, AID_SOURCE) for name in REPLAYED_SOURCES], align=True)
 """The estimator's sub-record `ekf.aid`: one status for each source."""
+
+OLD_AID_SOURCES = np.dtype([(name, AID_SOURCE) for name in AID_SOURCE_NAMES], align=True)
+"""The same until v1.15."""
 
 FILTER_TIME_CONSTANT_S = 0.5
 NORMALISED_INNOVATION_LIMIT = 2.0
@@ -102,8 +106,38 @@ def _filter_axis(aid, i, alpha, innovation, test_ratio, gate):
 
 
 @kernel
-def forget_aid_source_status(aid, n_axes):
-    """Forget an observation, but not when one was last fused; releases before v1.16 do so before the next is judged."""
+def _reset_to_zero_innovation(ekf, aid, n_axes):
+    """The state was reset to this source: keep the observation, with an innovation of zero."""
+    aid.time_last_fuse = ekf.time_delayed_us
+    for i in range(n_axes):
+        aid.innovation[i] = 0.0
+        aid.innovation_filtered[i] = 0.0
+        aid.innovation_variance[i] = aid.observation_variance[i]
+        aid.test_ratio[i] = 0.0
+        aid.test_ratio_filtered[i] = 0.0
+    aid.innovation_rejected = False
+    aid.fused = True
+
+
+@kernel
+def _begin_time_out(ekf, aid, n_axes):
+    """The state was reset to this source, which is told of by its time-out alone."""
+    aid.time_last_fuse = ekf.time_delayed_us
+
+
+reset_aid_source_status_zero_innovation = by_release(
+    _reset_to_zero_innovation, "keeps_innovation_at_reset", _begin_time_out
+)
+
+
+@kernel
+def _keep_status(ekf, aid, n_axes):
+    """v1.16 publishes what a source judged last, though it was stopped then."""
+
+
+@kernel
+def _forget_status(ekf, aid, n_axes):
+    """Nothing has been judged; when it was last fused remains."""
     if aid.timestamp_sample == 0:
         return
     aid.timestamp_sample = 0
@@ -117,15 +151,5 @@ def forget_aid_source_status(aid, n_axes):
     aid.fused = False
 
 
-@kernel
-def reset_aid_source_status_zero_innovation(ekf, aid, n_axes):
-    """The state was reset to this source: keep the observation, with an innovation of zero."""
-    aid.time_last_fuse = ekf.time_delayed_us
-    for i in range(n_axes):
-        aid.innovation[i] = 0.0
-        aid.innovation_filtered[i] = 0.0
-        aid.innovation_variance[i] = aid.observation_variance[i]
-        aid.test_ratio[i] = 0.0
-        aid.test_ratio_filtered[i] = 0.0
-    aid.innovation_rejected = False
-    aid.fused = True
+forget_aid_source_status = by_release(_keep_status, "forgets_stopped_sources", _forget_status)
+"""A source is stopped; to be called only if it was fused."""

@@ -4,8 +4,10 @@ Mirrors the questions of PX4 v1.16 `EKF/estimator_interface.cpp` and `EKF/ekf_he
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.common.timing import BAD_ACC_RESET_DELAY, HGT_FUSION_TIMEOUT_MAX, is_timed_out
+from fusetune.ekf2.filter.common.timing import BAD_ACC_RESET_DELAY, HGT_FUSION_TIMEOUT_MAX, is_recent, is_timed_out
 from fusetune.ekf2.releases.by_release import by_release
+
+TERRAIN_TIMEOUT = 5_000_000
 
 IMU_CTRL_GYRO_BIAS = 1
 IMU_CTRL_ACCEL_BIAS = 2
@@ -19,9 +21,28 @@ def get_number_of_active_horizontal_position_aiding_sources(ekf):
 
 
 @kernel
+def _count_gnss_velocity(ekf):
+    return int(ekf.cs.gnss_vel)
+
+
+@kernel
+def _count_with_position(ekf):
+    """GNSS is one source, which the position counts."""
+    return 0
+
+
+_number_of_gnss_velocities = by_release(_count_gnss_velocity, "aids_by_one_gnss_flag", _count_with_position)
+
+
+@kernel
 def get_number_of_active_horizontal_velocity_aiding_sources(ekf):
     """How many sources give horizontal velocity; airspeed and sideslip together count as one."""
-    return int(ekf.cs.gnss_vel) + int(ekf.cs.opt_flow) + int(ekf.cs.ev_vel) + int(ekf.cs.fuse_aspd and ekf.cs.fuse_beta)
+    return (
+        _number_of_gnss_velocities(ekf)
+        + int(ekf.cs.opt_flow)
+        + int(ekf.cs.ev_vel)
+        + int(ekf.cs.fuse_aspd and ekf.cs.fuse_beta)
+    )
 
 
 @kernel
@@ -144,9 +165,22 @@ def is_height_reset_required(ekf):
 
 
 @kernel
-def is_terrain_estimate_valid(ekf):
+def _is_terrain_state_valid(ekf):
     """Whether the terrain state can be used."""
     return ekf.terrain_valid
+
+
+@kernel
+def _is_terrain_aided(ekf):
+    """Whether the filter of the terrain was corrected within 5 s: by flow, or by range (on the ground, or started)."""
+    terrain, aid = ekf.terrain_filter, ekf.aid
+    by_range = (terrain.uses_range or not ekf.cs.in_air) and is_recent(
+        ekf, aid.terrain_range_finder.time_last_fuse, TERRAIN_TIMEOUT
+    )
+    return by_range or (terrain.uses_flow and is_recent(ekf, aid.terrain_optical_flow.time_last_fuse, TERRAIN_TIMEOUT))
+
+
+is_terrain_estimate_valid = by_release(_is_terrain_state_valid, "filters_terrain_apart", _is_terrain_aided)
 
 
 @kernel
@@ -158,7 +192,7 @@ def get_hagl(ekf):
 @kernel
 def get_terrain_vpos(ekf):
     """Down position (m) of the terrain: estimated, or where the vehicle last stood."""
-    if ekf.terrain_valid:
+    if is_terrain_estimate_valid(ekf):
         return ekf.terrain
     return ekf.last_on_ground_pos_d
 

@@ -77,3 +77,7 @@ def measured_force(ekf):
 @kernel
 def _corrected(delta, dt, bias):
     return delta[0] / dt - bias[0], delta[1] / dt - bias[1], delta[2] / dt - bias[2]
+
+
+lever_rate = by_release(body_rate, "levers_by_measured_rate", measured_rate)
+"""Rotation rate (rad/s, FRD) that moves what sits away from the IMU."""

@@ -277,6 +277,19 @@ def reset_horizontal_position_to_last_known(ekf, params):
 
 
 @kernel
+def _shift_nothing(ekf, delta_d):
+    """v1.16's range finder has no bias."""
+
+
+@kernel
+def _shift_bias_of_range(ekf, delta_d):
+    ekf.rng_hgt_b_est.bias += delta_d
+
+
+_shift_range_bias = by_release(_shift_nothing, "takes_range_for_height", _shift_bias_of_range)
+
+
+@kernel
 def reset_altitude_to(ekf, params, altitude, var):
     """Set the altitude (m) and its variance; height biases and the terrain move along."""
     altitude = single_precision(altitude)
@@ -291,6 +304,7 @@ def reset_altitude_to(ekf, params, altitude, var):
         ekf.ev_hgt_b_est.bias -= delta_d
     if _is_bias_shifted(ekf, ekf.cs.gps_hgt):
         ekf.gps_hgt_b_est.bias += delta_d
+    _shift_range_bias(ekf, delta_d)
     update_terrain_reset_status(ekf, delta_d)
     ekf.terrain = single_precision(ekf.terrain + delta_d)
     ekf.time_last_hgt_fuse = ekf.time_delayed_us

@@ -13,6 +13,7 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_resets import (
     reset_vel_using_airspeed,
     reset_wind_using_airspeed,
 )
+from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status
 from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.common.timing import is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
@@ -91,7 +92,9 @@ def _is_fixed_wing(ekf):
     return ekf.cs.fixed_wing
 
 
-_may_have_airspeed = by_release(_is_any_vehicle, "keeps_airspeed_to_wings", _is_fixed_wing)
+_may_have_airspeed = by_release(
+    by_release(_is_any_vehicle, "keeps_airspeed_to_wings", _is_fixed_wing), "asks_airspeed_for_wings", _is_fixed_wing
+)
 
 
 @kernel
@@ -138,4 +141,5 @@ def stop_airspeed_fusion(ekf):
     """Leave airspeed; the yaw estimator goes without."""
     if ekf.cs.fuse_aspd:
         ekf.cs.fuse_aspd = False
+        forget_aid_source_status(ekf, ekf.aid.airspeed, 1)
         set_true_airspeed(ekf.gsf, np.nan)

@@ -14,6 +14,7 @@ from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
 from fusetune.ekf2.filter.wind import air_velocity, fuse_into_wind
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
+from fusetune.ekf2.releases.by_release import by_release
 
 
 @kernel
@@ -47,6 +48,19 @@ def update_airspeed(ekf, params):
 
 
 @kernel
+def _is_velocity(ekf):
+    ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _is_no_velocity(ekf):
+    """The time-out of horizontal velocity goes on."""
+
+
+_count_as_velocity = by_release(_is_velocity, "asks_airspeed_for_wings", _is_no_velocity)
+
+
+@kernel
 def fuse_airspeed(ekf, params):
     """Fuse the judged airspeed unless it was rejected."""
     aid = ekf.aid.airspeed
@@ -60,7 +74,7 @@ def fuse_airspeed(ekf, params):
     ekf.fs.bad_airspeed = False
     fuse_into_wind(ekf, params, aid, ekf.airspeed.H, update_wind_only)
     if not update_wind_only:
-        ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+        _count_as_velocity(ekf)
 
 
 @kernel

@@ -14,11 +14,11 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.imu_rates import accel_bias
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
-from fusetune.ekf2.filter.covariance import reset_wind_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, scale_kalman_gain
-from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body
+from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, start_wind
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL, FLT_EPSILON
+from fusetune.ekf2.releases.by_release import by_release
 
 MIN_AIR_DENSITY = 0.1
 MIN_OBSERVATION_VARIANCE = 0.5
@@ -86,8 +86,7 @@ def control_drag_fusion(ekf, params):
         return
     if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
         ekf.cs.wind = True
-        if not ekf.wind.external_init:
-            reset_wind_cov(ekf)
+        start_wind(ekf)
     if ekf.sensors.drag.data_ready:
         _fuse_drag(ekf, params)
 
@@ -111,19 +110,37 @@ def _fuse_drag(ekf, params):
     for axis in range(2):
         compute_drag_jacobian(ekf, axis, rho, inverse_bcoef[axis], mcoef, drag.H[axis])
     bias = accel_bias(ekf)
+    both_fused = True
     for axis in range(2):
         measured = ekf.sensors.drag.sample.accel_xy[axis] - bias[axis]
         innovation = predicted[axis] - measured
         innovation_variance = compute_innovation_variance(ekf, drag.H[axis], R_acc)
         set_axis(aid, axis, measured, R_acc, innovation, innovation_variance)
         if not using_bcoef[axis] and not using_mcoef:
+            both_fused = False
             continue
         if innovation_variance < R_acc:
             return
         test_ratio = innovation * innovation / (DRAG_GATE * DRAG_GATE * innovation_variance)
         if ekf.cs.in_air and ekf.cs.wind and not ekf.cs.fake_pos and test_ratio < 1.0:
             scale_kalman_gain(ekf, innovation_variance)
-            measurement_update(ekf, params, R_acc, innovation)
+            both_fused = measurement_update(ekf, params, R_acc, innovation) and both_fused
+        else:
+            both_fused = False
     update_aid_source_status(ekf, aid, 2, ekf.sensors.drag.sample.time_us, DRAG_GATE)
-    aid.fused = True
-    aid.time_last_fuse = ekf.time_delayed_us
+    if _counts_as_fused(ekf, both_fused):
+        aid.fused = True
+        aid.time_last_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _always(ekf, both_fused):
+    return True
+
+
+@kernel
+def _where_both_were(ekf, both_fused):
+    return both_fused
+
+
+_counts_as_fused = by_release(_always, "fuses_both_drag_axes", _where_both_were)

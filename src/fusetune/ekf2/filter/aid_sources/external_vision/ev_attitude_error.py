@@ -21,6 +21,22 @@ FILTER_ALPHA = FILTER_INTERVAL_S / (FILTER_INTERVAL_S + FILTER_TIME_CONSTANT_S)
 """PX4 sets the gain once, from the nominal update interval."""
 
 
+OLD_FILTER_ALPHA = 0.001
+
+
+@kernel
+def _gain_by_time_constant(ekf):
+    return FILTER_ALPHA
+
+
+@kernel
+def _gain_as_given(ekf):
+    return OLD_FILTER_ALPHA
+
+
+_filter_gain = by_release(_gain_by_time_constant, "rounds_vision_filter", _gain_as_given)
+
+
 @kernel
 def update_ev_attitude_error_filter(ekf, ev_reset):
     """Filter the rotation between the vision attitude and the estimate; restart it when vision was reset."""
@@ -37,19 +53,19 @@ def update_ev_attitude_error_filter(ekf, ev_reset):
             ekf.ev.q_error_filt[i] = error[i]
         ekf.ev.q_error_initialized = True
     else:
-        _step_towards(ekf.ev.q_error_filt, error, ekf.scratch.quat_before)
+        _step_towards(ekf.ev.q_error_filt, error, ekf.scratch.quat_before, _filter_gain(ekf))
 
 
 @kernel
-def _step_towards(q, target, work):
-    """Turn `q` by the fraction `FILTER_ALPHA` of the shortest rotation to `target`."""
+def _step_towards(q, target, work, alpha):
+    """Turn `q` by the fraction `alpha` of the shortest rotation to `target`."""
     work[0], work[1], work[2], work[3] = q[0], -q[1], -q[2], -q[3]
     quat_multiply(work, target, work)
     if work[0] < 0.0:
         for i in range(4):
             work[i] = -work[i]
     x, y, z = quat_to_rotation_vector(work)
-    work[0], work[1], work[2], work[3] = rotation_vector_to_quat(FILTER_ALPHA * x, FILTER_ALPHA * y, FILTER_ALPHA * z)
+    work[0], work[1], work[2], work[3] = rotation_vector_to_quat(alpha * x, alpha * y, alpha * z)
     quat_multiply(q, work, q)
 
 

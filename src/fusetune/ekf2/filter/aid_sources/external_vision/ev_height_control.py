@@ -24,6 +24,7 @@ from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
     stop_height_source,
     update_height_bias,
 )
+from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status
 from fusetune.ekf2.filter.common.conditions import is_height_reset_required
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_EV
 from fusetune.ekf2.filter.common.timing import HGT_FUSION_TIMEOUT_MAX, is_timed_out
@@ -172,4 +173,5 @@ def stop_ev_hgt_fusion(ekf):
     """Leave external vision as height source, and as height reference."""
     if ekf.cs.ev_hgt:
         stop_height_source(ekf, ekf.ev_hgt_b_est, HEIGHT_REF_EV)
+        forget_aid_source_status(ekf, ekf.aid.ev_hgt, 1)
         ekf.cs.ev_hgt = False

@@ -7,6 +7,7 @@ from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import EV_SAMPLE
 from fusetune.ekf2.filter.common.imu_rates import body_rate
 from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu, velocity_of_offset
+from fusetune.ekf2.releases.by_release import by_release
 
 EV_MEMORY = np.dtype(
     [
@@ -48,9 +49,19 @@ def is_yaw_alignment_changed(ekf):
 
 
 @kernel
+def _raw_rate(ekf):
+    imu = ekf.imu_delayed
+    dt = imu.delta_ang_dt
+    return imu.delta_ang[0] / dt, imu.delta_ang[1] / dt, imu.delta_ang[2] / dt
+
+
+_swing_rate = by_release(body_rate, "levers_by_measured_rate", _raw_rate)
+
+
+@kernel
 def sensor_velocity_body(ekf, params):
     """Velocity (m/s, FRD) of the vision sensor relative to the IMU, from the vehicle's rotation."""
-    wx, wy, wz = body_rate(ekf)
+    wx, wy, wz = _swing_rate(ekf)
     px, py, pz = sensor_offset_body(params)
     return velocity_of_offset(wx, wy, wz, px, py, pz)
 

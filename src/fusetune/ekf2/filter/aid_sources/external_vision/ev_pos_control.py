@@ -29,7 +29,11 @@ from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import (
     set_position_bias,
     set_position_bias_noise,
 )
-from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.aid_source_status import (
+    forget_aid_source_status,
+    set_axis,
+    update_aid_source_status,
+)
 from fusetune.ekf2.filter.common.conditions import is_other_source_of_horizontal_aiding_than
 from fusetune.ekf2.filter.common.core_memory import POSITION_REF_EV
 from fusetune.ekf2.filter.common.local_origin import get_local_horizontal_position
@@ -233,4 +237,6 @@ def _recover_ev_pos(ekf, params, north, east, var_north, var_east):
 @kernel
 def stop_ev_pos_fusion(ekf):
     """Leave external vision as horizontal position source."""
+    if ekf.cs.ev_pos:
+        forget_aid_source_status(ekf, ekf.aid.ev_pos, 2)
     ekf.cs.ev_pos = False

@@ -21,6 +21,7 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
     sensor_velocity_body,
 )
 from fusetune.ekf2.filter.common.aid_source_status import (
+    forget_aid_source_status,
     reset_aid_source_status_zero_innovation,
     set_axis,
     update_aid_source_status,
@@ -42,6 +43,7 @@ BODY_RESET_VARIANCE_FACTOR = 5.0
 """A reset from the body frame leaves the axes uncorrelated, which the larger variance makes up for."""
 
 START_GATE_FACTOR = math.sqrt(10.0)
+START_TEST_RATIO = 0.1
 
 
 @kernel
@@ -174,7 +176,7 @@ def _start_ev_vel(ekf, params, yaw_alignment_changed, gate):
 
 
 @kernel
-def control_ev_vel_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
+def _control_velocity(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the velocity of external vision for one sample."""
     _prepare_measurement(ekf, params)
     yaw_alignment_changed = is_yaw_alignment_changed(ekf)
@@ -192,6 +194,117 @@ def control_ev_vel_fusion(ekf, params, common_starting_conditions_passing, ev_re
 
 
 @kernel
+def _turn_measurement(ekf, params):
+    """Turn the velocity of the IMU, of whatever frame, into that of the estimate; NaN where that is not aligned."""
+    sample, ev, R = ekf.sensors.ev.sample, ekf.ev, ekf.R_to_earth
+    ox, oy, oz = sensor_velocity_body(ekf, params)
+    vx, vy, vz = sample.vel[0], sample.vel[1], sample.vel[2]
+    frame = sample.vel_frame
+    of_vision = frame == EV_FRAME_FRD and not ekf.cs.ev_yaw
+    least = max(params.EKF2_EVV_NOISE * params.EKF2_EVV_NOISE, MIN_NOISE * MIN_NOISE)
+    uncertain = max(sample.orientation_var[0], sample.orientation_var[1], sample.orientation_var[2])
+    if of_vision:
+        refresh_ev_rotation(ekf)
+    for i in range(3):
+        measured, variance = sample.vel[i], sample.velocity_var[i]
+        if frame == EV_FRAME_BODY_FRD:
+            measured = component_in_earth(R, i, vx, vy, vz)
+            variance = variance_in_earth(R, i, sample.velocity_var)
+        elif of_vision:
+            measured = component_in_earth(ev.R_ev_to_ekf, i, vx, vy, vz)
+            variance = variance_in_earth(ev.R_ev_to_ekf, i, sample.velocity_var)
+        elif frame == EV_FRAME_NED and not ekf.cs.yaw_align:
+            measured = np.nan
+        if i < 2:
+            if of_vision:
+                variance = max(variance, uncertain)
+            if ekf.cs.gnss_pos or ekf.cs.gnss_vel:
+                variance = max(variance, params.EKF2_GPS_V_NOISE * params.EKF2_GPS_V_NOISE)
+        ev.vel_measurement[i] = measured - component_in_earth(R, i, ox, oy, oz)
+        ev.vel_measurement_var[i] = max(variance, least)
+
+
+@kernel
+def _judge_along_axes(ekf, params):
+    """While the vertical acceleration is bad, none is rejected, and the vertical innovation is limited to the gate."""
+    aid, ev, gate = ekf.aid.ev_vel, ekf.ev, max(params.EKF2_EVV_GATE, 1.0)
+    for i in range(3):
+        variance = ev.vel_measurement_var[i]
+        innovation = ekf.vel[i] - ev.vel_measurement[i]
+        set_axis(aid, i, ev.vel_measurement[i], variance, innovation, ekf.P[VELOCITY + i, VELOCITY + i] + variance)
+    update_aid_source_status(ekf, aid, 3, ekf.sensors.ev.sample.time_us, gate)
+    if ekf.fs.bad_acc_vertical and aid.innovation_rejected:
+        limit = gate * math.sqrt(aid.innovation_variance[2])
+        aid.innovation[2] = min(max(aid.innovation[2], -limit), limit)
+        aid.innovation_rejected = False
+
+
+@kernel
+def _is_turned_velocity_valid(ekf):
+    ev, valid = ekf.ev, True
+    for i in range(3):
+        valid = valid and math.isfinite(ev.vel_measurement[i]) and math.isfinite(ev.vel_measurement_var[i])
+    return valid
+
+
+@kernel
+def _reset_to_turned_velocity(ekf, params):
+    ekf.events.reset_vel_to_vision = True
+    reset_velocity_to(ekf, params, ekf.ev.vel_measurement, ekf.ev.vel_measurement_var)
+    ekf.aid.ev_vel.time_last_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _continue_turned_velocity(ekf, params, ev_reset, quality_sufficient, yaw_alignment_changed):
+    aid, ev = ekf.aid.ev_vel, ekf.ev
+    if (ev_reset and is_only_active_source_of_horizontal_aiding(ekf, ekf.cs.ev_vel)) or yaw_alignment_changed:
+        if not quality_sufficient:
+            stop_ev_vel_fusion(ekf)
+            return
+        _reset_to_turned_velocity(ekf, params)
+    elif quality_sufficient:
+        fuse_velocity(ekf, params, aid)
+    else:
+        aid.innovation_rejected = True
+    if is_timed_out(ekf, aid.time_last_fuse, NO_AID_TIMEOUT_MAX):
+        if ev.nb_vel_reset_available > 0 and quality_sufficient:
+            _reset_to_turned_velocity(ekf, params)
+            if ekf.cs.in_air:
+                ev.nb_vel_reset_available -= 1
+        else:
+            stop_ev_vel_fusion(ekf)
+
+
+@kernel
+def _control_turned_velocity(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
+    """As v1.16's, with the velocity turned to the estimate's axes before anything else."""
+    aid, aiding = ekf.aid.ev_vel, is_horizontal_aiding_active(ekf)
+    _turn_measurement(ekf, params)
+    _judge_along_axes(ekf, params)
+    yaw_alignment_changed = is_yaw_alignment_changed(ekf)
+    continuing = (int(params.EKF2_EV_CTRL) & EV_CTRL_VEL) != 0 and ekf.cs.tilt_align and _is_turned_velocity_valid(ekf)
+    if ekf.cs.ev_vel:
+        if continuing:
+            _continue_turned_velocity(ekf, params, ev_reset, quality_sufficient, yaw_alignment_changed)
+        else:
+            stop_ev_vel_fusion(ekf)
+        return
+    agrees = max(aid.test_ratio[0], aid.test_ratio[1], aid.test_ratio[2]) < START_TEST_RATIO
+    if common_starting_conditions_passing and continuing and (agrees or not aiding):
+        if not aiding or yaw_alignment_changed:
+            _reset_to_turned_velocity(ekf, params)
+        aid.time_last_fuse = ekf.time_delayed_us
+        ekf.ev.nb_vel_reset_available = RESETS_AVAILABLE_AT_START
+        ekf.events.starting_vision_vel_fusion = True
+        ekf.cs.ev_vel = True
+
+
+control_ev_vel_fusion = by_release(_control_velocity, "turns_vision_velocity", _control_turned_velocity)
+
+
+@kernel
 def stop_ev_vel_fusion(ekf):
     """Leave external vision as velocity source."""
+    if ekf.cs.ev_vel:
+        forget_aid_source_status(ekf, ekf.aid.ev_vel, 3)
     ekf.cs.ev_vel = False

@@ -12,11 +12,16 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_FRD, EV_FRAME_NED
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_CTRL_YAW, MIN_NOISE, RESETS_AVAILABLE_AT_START
-from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.aid_source_status import (
+    forget_aid_source_status,
+    set_axis,
+    update_aid_source_status,
+)
 from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw
 from fusetune.ekf2.numerics.rotations import euler_yaw, quat_to_dcm, wrap_pi
+from fusetune.ekf2.releases.by_release import by_release
 
 RESTART_INTERVAL_US = 1_000_000
 
@@ -53,7 +58,47 @@ def control_ev_yaw_fusion(ekf, params, common_starting_conditions_passing, ev_re
 
 
 @kernel
-def _update_ev_yaw(ekf, params):
+def _observe_ev_yaw(ekf, params):
+    """Store the observed yaw, and how far the estimate is from it."""
+    aid, R = ekf.aid.ev_yaw, ekf.scratch.R
+    quat_to_dcm(ekf.sensors.ev.sample.quat, R)
+    observation = euler_yaw(R)
+    variance = max(ekf.sensors.ev.sample.orientation_var[2], params.EKF2_EVA_NOISE, MIN_NOISE * MIN_NOISE)
+    set_axis(aid, 0, observation, variance, wrap_pi(euler_yaw(ekf.R_to_earth) - observation), 0.0)
+    aid.timestamp_sample = ekf.sensors.ev.sample.time_us
+    aid.test_ratio[0] = math.inf
+    aid.innovation_rejected = True
+    aid.fused = False
+
+
+@kernel
+def _fuse_judged_yaw(ekf, params):
+    return fuse_yaw(ekf, params, ekf.aid.ev_yaw, ekf.scratch.H)
+
+
+@kernel
+def _judge_and_fuse_yaw(ekf, params):
+    aid = ekf.aid.ev_yaw
+    aid.innovation_variance[0] = compute_yaw_innov_var_and_h(ekf, aid.observation_variance[0], ekf.scratch.H)
+    update_aid_source_status(ekf, aid, 1, aid.timestamp_sample, max(params.EKF2_HDG_GATE, 1.0))
+    return fuse_yaw(ekf, params, aid, ekf.scratch.H)
+
+
+_fuse_ev_yaw = by_release(_fuse_judged_yaw, "starts_vision_yaw_unjudged", _judge_and_fuse_yaw)
+
+
+@kernel
+def _join_unjudged(ekf, params):
+    """The yaw is aligned already, and will be fused from the next sample on."""
+    ekf.aid.ev_yaw.time_last_fuse = ekf.time_delayed_us
+    return True
+
+
+_join_yaw = by_release(_fuse_judged_yaw, "starts_vision_yaw_unjudged", _join_unjudged)
+
+
+@kernel
+def _judge_ev_yaw(ekf, params):
     R = ekf.scratch.R
     quat_to_dcm(ekf.sensors.ev.sample.quat, R)
     observation = euler_yaw(R)
@@ -62,6 +107,9 @@ def _update_ev_yaw(ekf, params):
     innovation_variance = compute_yaw_innov_var_and_h(ekf, variance, ekf.scratch.H)
     set_axis(ekf.aid.ev_yaw, 0, observation, variance, innovation, innovation_variance)
     update_aid_source_status(ekf, ekf.aid.ev_yaw, 1, ekf.sensors.ev.sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
+
+
+_update_ev_yaw = by_release(_judge_ev_yaw, "starts_vision_yaw_unjudged", _observe_ev_yaw)
 
 
 @kernel
@@ -80,7 +128,7 @@ def _continue_ev_yaw(ekf, params, ev_reset, quality_sufficient):
             return
         _reset_yaw_to_ev(ekf, params)
     elif quality_sufficient:
-        fuse_yaw(ekf, params, aid, ekf.scratch.H)
+        _fuse_ev_yaw(ekf, params)
     else:
         aid.innovation_rejected = True
 
@@ -98,7 +146,7 @@ def _start_ev_yaw(ekf, params):
     frame = ekf.sensors.ev.sample.pos_frame
     if frame == EV_FRAME_NED:
         if ekf.cs.yaw_align:
-            ekf.cs.ev_yaw = fuse_yaw(ekf, params, ekf.aid.ev_yaw, ekf.scratch.H)
+            ekf.cs.ev_yaw = _join_yaw(ekf, params)
         else:
             _reset_yaw_to_ev(ekf, params)
             ekf.cs.yaw_align = True
@@ -115,4 +163,6 @@ def _start_ev_yaw(ekf, params):
 @kernel
 def stop_ev_yaw_fusion(ekf):
     """Leave external vision as yaw source."""
+    if ekf.cs.ev_yaw:
+        forget_aid_source_status(ekf, ekf.aid.ev_yaw, 1)
     ekf.cs.ev_yaw = False

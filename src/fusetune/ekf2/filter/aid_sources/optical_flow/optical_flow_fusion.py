@@ -18,6 +18,7 @@ from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
 from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu, velocity_of_offset
 from fusetune.ekf2.numerics.rotations import component_in_earth, rotate_to_body
+from fusetune.ekf2.releases.by_release import by_release
 
 MIN_HAGL = 1e-2
 HAGL_EPSILON = 1e-3
@@ -32,10 +33,25 @@ def flow_sensor_offset_body(params):
 
 
 @kernel
-def predict_flow_hagl(ekf, params):
-    """Height (m) of the flow sensor above the terrain estimate, never less than 1 cm."""
+def _flow_hagl(ekf, params):
+    """Height (m) of the flow sensor above the terrain estimate."""
     px, py, pz = flow_sensor_offset_body(params)
-    return max(abs(get_hagl(ekf) - component_in_earth(ekf.R_to_earth, 2, px, py, pz)), MIN_HAGL)
+    return get_hagl(ekf) - component_in_earth(ekf.R_to_earth, 2, px, py, pz)
+
+
+@kernel
+def _flow_hagl_of_any_sign(ekf, params):
+    """The height above or below the terrain estimate, never less than 1 cm."""
+    return max(abs(_flow_hagl(ekf, params)), MIN_HAGL)
+
+
+@kernel
+def _flow_hagl_beyond_clearance(ekf, params):
+    """The height above the terrain estimate, never less than the vehicle has on the ground, nor 1 cm."""
+    return max(_flow_hagl(ekf, params), params.EKF2_MIN_RNG, MIN_HAGL)
+
+
+predict_flow_hagl = by_release(_flow_hagl_of_any_sign, "flies_flow_over_terrain", _flow_hagl_beyond_clearance)
 
 
 @kernel

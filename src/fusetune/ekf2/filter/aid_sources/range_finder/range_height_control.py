@@ -10,6 +10,7 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.range_finder.range_finder_consistency_check import (
+    MIN_VZ_FOR_VALID_CONSISTENCY,
     MISTAKEN_MOTION_HOLD,
     MOTION_HOLD,
     update_range_consistency,
@@ -53,29 +54,30 @@ def control_range_hagl_fusion(ekf, params):
     """Process the range sample that reached the fusion time horizon, if any, and watch over the sensor."""
     if not ekf.sensors.range.exists:
         return
-    _check_sensor(ekf, params)
+    check_range_sensor(ekf, params)
     if ekf.sensors.range.data_ready:
         update_range_hagl(ekf, params)
         _control_with_sample(ekf, params)
-    elif (ekf.cs.rng_hgt or ekf.cs.rng_terrain) and not _has_recent_sample(ekf):
+    elif (ekf.cs.rng_hgt or ekf.cs.rng_terrain) and not has_recent_range(ekf):
         stop_rng_hgt_fusion(ekf)
         stop_rng_terr_fusion(ekf)
 
 
 @kernel
-def _has_recent_sample(ekf):
+def has_recent_range(ekf):
+    """Whether samples still come."""
     return is_newest_sample_recent(ekf, ekf.sensors.range.newest_time_us, 2 * RNG_MAX_INTERVAL)
 
 
 @kernel
-def _check_sensor(ekf, params):
+def check_range_sensor(ekf, params):
     """Run the sensor's checks; a healthy sample is moved to the IMU and tested against the vertical velocity."""
     rng, R = ekf.range, ekf.R_to_earth
     rng.is_sample_ready = ekf.sensors.range.data_ready
     if ekf.sensors.range.data_ready:
         rng.sample = ekf.sensors.range.sample
     update_cos_tilt(rng, R, params.EKF2_RNG_PITCH)
-    run_range_sensor_checks(rng, ekf.time_delayed_us, params.EKF2_RNG_QLTY_T, params.EKF2_RNG_FOG)
+    _run_checks(ekf, params)
 
     if is_data_healthy(rng):
         x, y, z = position_relative_to_imu(params, params.EKF2_RNG_POS_X, params.EKF2_RNG_POS_Y, params.EKF2_RNG_POS_Z)
@@ -87,6 +89,24 @@ def _check_sensor(ekf, params):
         rng.sample.range = params.EKF2_MIN_RNG
         rng.is_sample_valid = True
     ekf.cs.rng_kin_consistent = rng.is_kinematically_consistent
+
+
+@kernel
+def _check_with_fog(ekf, params):
+    run_range_sensor_checks(ekf.range, ekf.time_delayed_us, params.EKF2_RNG_QLTY_T, params.EKF2_RNG_FOG)
+
+
+@kernel
+def _check_unless_faulty(ekf, params):
+    """As v1.16's, but no fog is looked for, and a sensor once found faulty stays out."""
+    rng = ekf.range
+    run_range_sensor_checks(rng, ekf.time_delayed_us, params.EKF2_RNG_QLTY_T, 0.0)
+    if ekf.terrain_filter.range_is_faulty:
+        rng.is_sample_valid = False
+        rng.is_regularly_sending_data = False
+
+
+_run_checks = by_release(_check_with_fog, "sees_no_fog", _check_unless_faulty)
 
 
 @kernel
@@ -116,7 +136,7 @@ _motion_hold_us = by_release(_mistaken_hold, "holds_range_motion", _intended_hol
 
 
 @kernel
-def _check_consistency(ekf, params):
+def _compare_with_velocity(ekf, params):
     speed_squared = ekf.vel[0] * ekf.vel[0] + ekf.vel[1] * ekf.vel[1]
     speed_variance = ekf.P[VELOCITY, VELOCITY] + ekf.P[VELOCITY + 1, VELOCITY + 1]
     horizontal_motion = ekf.cs.fixed_wing or speed_squared > max(speed_variance, 0.1)
@@ -133,6 +153,20 @@ def _check_consistency(ekf, params):
         ekf.time_delayed_us,
         params.EKF2_RNG_K_GATE,
     )
+
+
+@kernel
+def _compare_and_judge_in_climb(ekf, params):
+    """As v1.16's, but without vertical motion the verdict stays."""
+    rng = ekf.range
+    verdict, since = rng.is_kinematically_consistent, rng.kin_time_last_inconsistent
+    _compare_with_velocity(ekf, params)
+    if abs(ekf.vel[2]) < MIN_VZ_FOR_VALID_CONSISTENCY:
+        rng.is_kinematically_consistent = verdict
+        rng.kin_time_last_inconsistent = since
+
+
+_check_consistency = by_release(_compare_with_velocity, "judges_range_in_climb", _compare_and_judge_in_climb)
 
 
 @kernel
@@ -167,7 +201,7 @@ def _control_with_every_sample(ekf, params):
     """Choose between height and terrain, then fuse, reset, start or stop."""
     rng = ekf.range
     continuing = _is_range_wanted(ekf, params) and is_data_healthy(rng) and rng.is_kinematically_consistent
-    starting = continuing and _has_recent_sample(ekf) and rng.is_regularly_sending_data
+    starting = continuing and has_recent_range(ekf) and rng.is_regularly_sending_data
     _choose_height_aiding(ekf, params, True)
     if ekf.cs.rng_hgt or ekf.cs.rng_terrain:
         if continuing:
@@ -184,7 +218,7 @@ def _control_with_healthy_samples(ekf, params):
     """As v1.16's, but a sample that is not healthy, or not consistent, is left out, and stops nothing."""
     rng = ekf.range
     continuing = _is_range_wanted(ekf, params)
-    starting = continuing and _has_recent_sample(ekf) and rng.is_regularly_sending_data and is_data_healthy(rng)
+    starting = continuing and has_recent_range(ekf) and rng.is_regularly_sending_data and is_data_healthy(rng)
     conditional_aid = _choose_height_aiding(ekf, params, starting)
     if ekf.cs.rng_hgt or ekf.cs.rng_terrain:
         if continuing:

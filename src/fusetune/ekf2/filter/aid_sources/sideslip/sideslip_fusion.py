@@ -14,8 +14,9 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_wind_cov
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
-from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, fuse_into_wind
+from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, fuse_into_wind, reset_wind_to_zero
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
+from fusetune.ekf2.releases.by_release import by_release
 
 FUSION_INTERVAL_US = 150_000
 FORWARD_SPEED_EPSILON = 1e-3
@@ -37,23 +38,64 @@ def _air_velocity_in_plane(ekf):
 
 
 @kernel
-def predict_sideslip(ekf):
+def _predict_angle(ekf):
     """Sideslip angle (rad)."""
     forward, sideways = _air_velocity_in_plane(ekf)
     return math.atan2(sideways, forward)
 
 
 @kernel
-def compute_sideslip_jacobian(ekf, H):
-    """Write the derivative of the sideslip angle into `H` (24,)."""
+def _velocity_ratio(ekf):
+    """Forward velocity (m/s), kept from zero by its own sign, and the ratio of sideways to forward."""
+    forward, sideways, _ = air_velocity_body(ekf)
+    forward += FLT_EPSILON if forward >= 0.0 else -FLT_EPSILON
+    return forward, sideways / forward
+
+
+@kernel
+def _predict_ratio(ekf):
+    """Sideways over forward air velocity: the sideslip angle (rad) where that is small."""
+    _, ratio = _velocity_ratio(ekf)
+    return ratio
+
+
+predict_sideslip = by_release(_predict_angle, "takes_sideslip_for_ratio", _predict_ratio)
+
+
+@kernel
+def _angle_by_velocity(ekf):
+    """Derivative of the angle by the velocity (NED)."""
     R = ekf.R_to_earth
-    x, y, z = air_velocity(ekf)
     forward, sideways = _air_velocity_in_plane(ekf)
     inverse = 1.0 / (forward * forward + sideways * sideways)
     # the derivative of atan2(a, b) is (b da - a db) / (a² + b²): one earth vector takes both body axes
     ex = (forward * R[0, 1] - sideways * R[0, 0]) * inverse
     ey = (forward * R[1, 1] - sideways * R[1, 0]) * inverse
     ez = (forward * R[2, 1] - sideways * R[2, 0]) * inverse
+    return ex, ey, ez
+
+
+@kernel
+def _ratio_by_velocity(ekf):
+    """Derivative of the ratio by the velocity (NED)."""
+    R = ekf.R_to_earth
+    forward, ratio = _velocity_ratio(ekf)
+    inverse = 1.0 / forward
+    return (
+        (R[0, 1] - ratio * R[0, 0]) * inverse,
+        (R[1, 1] - ratio * R[1, 0]) * inverse,
+        (R[2, 1] - ratio * R[2, 0]) * inverse,
+    )
+
+
+_sideslip_by_velocity = by_release(_angle_by_velocity, "takes_sideslip_for_ratio", _ratio_by_velocity)
+
+
+@kernel
+def compute_sideslip_jacobian(ekf, H):
+    """Write the derivative of the sideslip angle into `H` (24,)."""
+    x, y, z = air_velocity(ekf)
+    ex, ey, ez = _sideslip_by_velocity(ekf)
     clear_jacobian(H)
     H[ATTITUDE] = ey * z - ez * y
     H[ATTITUDE + 1] = ez * x - ex * z
@@ -66,28 +108,68 @@ def compute_sideslip_jacobian(ekf, H):
 
 
 @kernel
+def _flies_like_a_wing(ekf):
+    return ekf.cs.fixed_wing or ekf.cs.fuse_aspd
+
+
+@kernel
+def _is_fixed_wing(ekf):
+    return ekf.cs.fixed_wing
+
+
+_may_have_sideslip = by_release(_flies_like_a_wing, "asks_airspeed_for_wings", _is_fixed_wing)
+
+
+@kernel
 def control_beta_fusion(ekf, params):
     """Fuse a sideslip of zero at regular intervals while a fixed wing, or a vehicle with airspeed, flies."""
     ekf.cs.fuse_beta = (
-        int(params.EKF2_FUSE_BETA) != 0
-        and (ekf.cs.fixed_wing or ekf.cs.fuse_aspd)
-        and ekf.cs.in_air
-        and not ekf.cs.fake_pos
+        int(params.EKF2_FUSE_BETA) != 0 and _may_have_sideslip(ekf) and ekf.cs.in_air and not ekf.cs.fake_pos
     )
-    aid = ekf.aid.sideslip
-    if ekf.cs.fuse_beta and is_timed_out(ekf, aid.time_last_fuse, FUSION_INTERVAL_US):
+    if ekf.cs.fuse_beta and is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
         _update_sideslip(ekf, params)
-        ekf.reject.sideslip = aid.innovation_rejected
-        if _fuse_sideslip(ekf, params):
-            ekf.cs.wind = True
-        elif not ekf.wind.external_init and not ekf.cs.wind:
-            reset_wind_cov(ekf)
+        ekf.reject.sideslip = ekf.aid.sideslip.innovation_rejected
+        _use_sideslip(ekf, params)
+
+
+@kernel
+def _fuse_or_start_wind(ekf, params):
+    if _fuse_sideslip(ekf, params):
+        ekf.cs.wind = True
+    elif not ekf.wind.external_init and not ekf.cs.wind:
+        reset_wind_cov(ekf)
+
+
+@kernel
+def _start_wind_and_fuse(ekf, params):
+    """The innovation is the one of before the wind's start."""
+    if not ekf.cs.wind:
+        ekf.cs.wind = True
+        ekf.aid.sideslip.time_last_fuse = ekf.time_delayed_us
+        reset_wind_to_zero(ekf)
+    _fuse_sideslip(ekf, params)
+
+
+_use_sideslip = by_release(_fuse_or_start_wind, "starts_wind_at_zero", _start_wind_and_fuse)
+
+
+@kernel
+def _bounded_noise(ekf, params):
+    return max(params.EKF2_BETA_NOISE * params.EKF2_BETA_NOISE, MIN_NOISE * MIN_NOISE)
+
+
+@kernel
+def _noise_as_given(ekf, params):
+    return params.EKF2_BETA_NOISE * params.EKF2_BETA_NOISE
+
+
+_sideslip_noise = by_release(_bounded_noise, "takes_sideslip_for_ratio", _noise_as_given)
 
 
 @kernel
 def _update_sideslip(ekf, params):
     H = ekf.scratch.H
-    variance = max(params.EKF2_BETA_NOISE * params.EKF2_BETA_NOISE, MIN_NOISE * MIN_NOISE)
+    variance = _sideslip_noise(ekf, params)
     compute_sideslip_jacobian(ekf, H)
     innovation_variance = compute_innovation_variance(ekf, H, variance)
     set_axis(ekf.aid.sideslip, 0, 0.0, variance, predict_sideslip(ekf), innovation_variance)
