@@ -12,6 +12,7 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.imu_rates import accel_bias
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, scale_kalman_gain
@@ -108,9 +109,10 @@ def _fuse_drag(ekf, params):
     )
     for axis in range(2):
         compute_drag_jacobian(ekf, axis, rho, inverse_bcoef[axis], mcoef, drag.H[axis])
+    bias = accel_bias(ekf)
     both_fused = True
     for axis in range(2):
-        measured = ekf.sensors.drag.sample.accel_xy[axis] - ekf.accel_bias[axis]
+        measured = ekf.sensors.drag.sample.accel_xy[axis] - bias[axis]
         innovation = predicted[axis] - measured
         innovation_variance = compute_innovation_variance(ekf, drag.H[axis], R_acc)
         set_axis(aid, axis, measured, R_acc, innovation, innovation_variance)
