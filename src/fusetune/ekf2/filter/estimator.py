@@ -22,6 +22,7 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, GNSS_
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import FIELD_HISTORY, MAG_MEMORY, initialise_mag_memory
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
+from fusetune.ekf2.filter.aid_sources.optical_flow.integrated_flow import FLOW_INTEGRALS
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
@@ -107,6 +108,8 @@ def ekf_record(release: str) -> np.dtype:
     if does.filters_terrain_apart:
         memories = [(name, OLD_AID_SOURCES if name == "aid" else memory) for name, memory in memories]
         memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
+    if does.integrates_flow:
+        memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
     return marked(np.dtype(memories, align=True), release)
 
 

@@ -9,6 +9,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import apply_antenna_yaw_offset, apply_vision_noise
 from fusetune.ekf2.feed.sensors import SENSOR_MEMORIES
+from fusetune.ekf2.releases.by_release import by_release
 from fusetune.ekf2.schedule.sensor_actions import BUFFERED, DUE
 from fusetune.ekf2.schedule.timeline import place_at
 
@@ -49,10 +50,26 @@ def take_actions(ekf, inputs, drag, actions, place, update, from_run, stop_run, 
         if action.what == DUE:
             if with_due:
                 _take_due(ekf.sensors, inputs, drag, action, notes)
+                if action.sensor == FLOW:
+                    _note_interval(ekf, inputs, action)
         elif from_run <= action.run < stop_run:
             _arrive(ekf, inputs, action)
         place += 1
     return place
+
+
+@kernel
+def _need_no_interval(ekf, inputs, action):
+    """Since v1.15 flow is a rate."""
+
+
+@kernel
+def _note_flow_interval(ekf, inputs, action):
+    ekf.flow_interval = inputs.flow_limits[action.slot, 3] * 1e-6
+
+
+_note_interval = by_release(_need_no_interval, "integrates_flow", _note_flow_interval)
+"""Over what time (s) the flow was integrated."""
 
 
 @kernel

@@ -79,6 +79,19 @@ def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
 
 
 @kernel
+def _at_any_time(ekf):
+    return True
+
+
+@kernel
+def _while_flying(ekf):
+    return ekf.cs.in_air and not ekf.cs.fake_pos
+
+
+_is_drag_judged = by_release(_at_any_time, "feels_drag_in_air", _while_flying)
+
+
+@kernel
 def control_drag_fusion(ekf, params):
     """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
     if int(params.EKF2_DRAG_CTRL) <= 0 or not ekf.sensors.drag.exists:
@@ -86,7 +99,7 @@ def control_drag_fusion(ekf, params):
     if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
         ekf.cs.wind = True
         start_wind(ekf)
-    if ekf.sensors.drag.data_ready:
+    if ekf.sensors.drag.data_ready and _is_drag_judged(ekf):
         _fuse_drag(ekf, params)
 
 
