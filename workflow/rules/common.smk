@@ -7,6 +7,7 @@ from fusetune.analyze.flight_files import CONFORMANCE_FILE, DELAYS_FILE, DIAGNOS
 from fusetune.analyze.replaying.store.parts import PARTS
 from fusetune.apply.parameter_files.names import PARAMETER_FILES
 from fusetune.design.covariance.named_files import files_of_design
+from fusetune.report.flight_data.shown_limit import MOST_SHOWN_SETS
 from fusetune.storage.cells import as_it_was
 from fusetune.storage.checksum_file import check_checksum
 from fusetune.errors import RUN_AGAIN
@@ -239,6 +240,8 @@ def told_in_report():
 
 # around the present values each parameter makes two sets at the most
 MOST_SETS = len(SETS.scored) + 2 * len(SETS.around)
+SHOWS_SOME_SETS = 2 * MOST_SETS > MOST_SHOWN_SETS
+"""Whether a flight's page, with sets whose delays are mended, may show some alone: then it asks for the chosen one."""
 
 
 def closing_words():

@@ -6,6 +6,7 @@ rule flight_page:
         track="results/analyze/{flight}/track.parquet",
         conformance="results/analyze/{flight}/conformance.json",
         scores=of_a_replayed_flight("scoring.json"),
+        decision="results/apply/decision.json" if SHOWS_SOME_SETS else [],
     output:
         # told again is not told otherwise: the job looks up whether what it shows is as it was
         page=update(

@@ -19,7 +19,7 @@ from fusetune.analyze.replaying.replayed_set import ReplayedSet
 from fusetune.design.tunable_parameters import ARM_PARAMETERS, DELAY_LIMIT
 from fusetune.px4.aid_sources import AID_SOURCES, SENSORS
 from fusetune.px4.flight import Flight
-from fusetune.px4.parameters.ekf2_parameters import PARAMETERS
+from fusetune.px4.parameters.ekf2_parameters import PARAMETERS, is_had_by
 
 CONFIDENCE = 0.95
 LAG_UNCERTAINTY = 2.0
@@ -48,7 +48,8 @@ class SensorDelay:
     value_ms, lower_ms, upper_ms : the delay and its interval (`CONFIDENCE`)
     standard_error_ms : of the delay
     n : measurements behind it
-    reach_ms : EKF2_DELAY_MAX that the vehicle flew with
+    reach_ms : EKF2_DELAY_MAX that the vehicle flew with; None where the release that replays it has none, for there
+        the delays alone size the buffers
     """
 
     sensor: str
@@ -59,7 +60,7 @@ class SensorDelay:
     upper_ms: float
     standard_error_ms: float
     n: int
-    reach_ms: float
+    reach_ms: float | None
 
     def document(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -87,7 +88,8 @@ def sensor_delays(
     places : sensor → what `velocity_place_of` told of it, of this replay, where it has been asked
     """
     intervals, known = airborne_intervals(prepared.flight, record.flags), places or {}
-    found = []
+    has_reach = is_had_by(DELAY_LIMIT, prepared.replayed.release)
+    reach_ms, found = _told(record, DELAY_LIMIT) if has_reach else None, []
     for sensor in (*VELOCITIES, *LAGGED):
         parameter = SENSORS[sensor].delay_parameter
         told_s = _told(record, parameter) * 1e-3
@@ -102,7 +104,7 @@ def sensor_delays(
             series = LAGGED[sensor](prepared.flight, motion, record.parameters) if motion is not None else None
             lag = _lag(series, intervals, told_s)
         if lag is not None:
-            found.append(_delay(sensor, parameter, told_s, lag, _told(record, DELAY_LIMIT)))
+            found.append(_delay(sensor, parameter, told_s, lag, reach_ms))
     return tuple(found)
 
 
@@ -133,7 +135,7 @@ def _lag(series: LaggedSeries | None, intervals: Sequence[Any], told_s: float) -
     return Lag(lag.delay_s, error_s, lag.freedom, lag.samples) if error_s <= CERTAIN_S else None
 
 
-def _delay(sensor: str, parameter: str, told_s: float, lag: Lag, reach_ms: float) -> SensorDelay:
+def _delay(sensor: str, parameter: str, told_s: float, lag: Lag, reach_ms: float | None) -> SensorDelay:
     value, half, error = (
         round(1e3 * one, 1) for one in (lag.delay_s, lag.half_width_s(CONFIDENCE), lag.standard_error_s)
     )

@@ -45,7 +45,7 @@ class JoinedDelay:
         flight
     flights : names of the flights behind it
     mended_ms : value to set, where the told one is proved wrong
-    reach_ms : EKF2_DELAY_MAX now
+    reach_ms : EKF2_DELAY_MAX now; None where the vehicle's release has none
     """
 
     sensor: str
@@ -56,12 +56,14 @@ class JoinedDelay:
     upper_ms: float
     flights: tuple[str, ...]
     mended_ms: float | None
-    reach_ms: float
+    reach_ms: float | None
 
     @property
     def needed_ms(self) -> float | None:
-        """EKF2_DELAY_MAX to set along with the mended value; None where the present one is long enough."""
-        needed = 0.0 if self.mended_ms is None else reach_ms(self.mended_ms)
+        """EKF2_DELAY_MAX to set along with the mended value; None where it need not, or none can be."""
+        if self.mended_ms is None or self.reach_ms is None:
+            return None
+        needed = reach_ms(self.mended_ms)
         return needed if needed > self.reach_ms else None
 
     @property

@@ -33,8 +33,10 @@ FALLS_BY, GROWS_BY = 0.002, 0.005
 """Smaller differences of mean ratios say nothing: quotients of tiny numbers are no evidence."""
 SAME = 1e-3
 """A replay whose ratios change by less did as the flight did."""
-SOUND = 0.02
-"""Half of what a filter that claims the right noise shows behind a gate of 5 σ (1/25): nothing is left to mend."""
+RIGHT_NOISE = 0.04
+"""What a filter that claims the right noise shows behind a gate of 5 σ (1/25): a source within is not spoilt."""
+SOUND = 0.5 * RIGHT_NOISE
+"""Nothing is left to mend."""
 SURER, NOT_BORNE_OUT, LESS_SURE = 0.5, 0.9, 0.6
 """A claim that the experiment bears out loses half of its doubt; one that it does not bear out, or contradicts, keeps
 this of its confidence."""
@@ -193,7 +195,8 @@ def tried(diagnosis: Diagnosis, signs: Signs) -> Diagnosis | None:
     compared = _compared(before, after, experiment.judged)
     if compared is None:
         return diagnosis
-    grown = [name for name in _shared(before, after, experiment.judged) if _grows(before[name].mean, after[name].mean)]
+    shared = _shared(before, after, experiment.judged)
+    grown = [name for name in shared if _is_spoilt(before[name].mean, after[name].mean)]
     trial = trial_of(experiment.words, _named(before, after, experiment.judged), *compared, grown)
     sure = diagnosis.confidence
     if trial.outcome == "better":
@@ -231,6 +234,10 @@ def trial_of(done: str, sources: str, before: float, after: float, grown: Sequen
         words = f"the replay {done} tells nothing, these sources are fine with it as well: {figures}"
         return Trial(words, before, after, "tells nothing")
     return Trial(f"the replay {done} is no better: {figures}", before, after, "no better")
+
+
+def _is_spoilt(before: float, after: float) -> bool:
+    return _grows(before, after) and after > RIGHT_NOISE
 
 
 def _grows(before: float, after: float) -> bool:

@@ -28,7 +28,6 @@ from fusetune.analyze.observed.observed_flight import ObservedFlight
 from fusetune.finding import Finding
 from fusetune.px4.flight import TopicTable
 from fusetune.px4.layouts.estimator_instances import instance_switches
-from fusetune.px4.parameters.complete_sets import complete
 from fusetune.save.checks.judged_flight import JudgedFlight
 from fusetune.save.checks.magnetometer_mounting import attitudes_and_fields, magnetometer_mounting, stillest_mounting
 from fusetune.save.checks.standstill import Standstill, flying_steps, standstill
@@ -77,8 +76,7 @@ class Signs:
     @cached_property
     def parameters(self) -> dict[str, float]:
         """Parameters of the estimator, those that the log lacks at their defaults."""
-        flight = self.observed.flight
-        return complete(flight.parameters.initial, {}, flight.release)
+        return self.observed.parameters
 
     def table(self, topic: str) -> TopicTable | None:
         """A topic in v1.16's layout."""

@@ -23,6 +23,7 @@ from fusetune.px4.flight import Flight
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
 from fusetune.px4.parameters.complete_sets import complete
+from fusetune.save.replayed_release import replayed_release
 from fusetune.save.verdict import Verdict, judge
 from fusetune.set_names import AS_FLOWN, PRESENT
 from fusetune.storage.freed_memory import give_back_freed_memory
@@ -60,8 +61,12 @@ class ObservedFlight:
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """Parameters of the estimator that the log begins with, those that it lacks at their defaults."""
-        return complete(self.flight.parameters.initial, {}, self.flight.release)
+        """Parameters of the estimator that the log begins with, those that it lacks at their defaults.
+
+        These are the defaults of the release whose estimator replays it.
+        """
+        replayed = replayed_release(self.flight, self.settings.release).release
+        return complete(self.flight.parameters.initial, {}, self.flight.release, replayed=replayed)
 
     @cached_property
     def airborne(self) -> tuple[Interval, ...]:

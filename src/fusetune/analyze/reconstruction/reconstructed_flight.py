@@ -17,9 +17,9 @@ from fusetune.analyze.reconstruction.magnetometer import interpolate_magnetomete
 from fusetune.analyze.reconstruction.magnetometer_by_state import add_noise_by_state
 from fusetune.analyze.reconstruction.settings import ReconstructionSettings
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count
+from fusetune.px4.flown_parameters import flown_parameters
 from fusetune.px4.layouts.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states, why_no_state
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS
-from fusetune.px4.parameters.complete_sets import complete
 
 RECONSTRUCTION_TOPICS = (*ESTIMATOR_TOPICS, "vehicle_attitude", "vehicle_imu", *LOGGED_STATE_TOPICS)
 """What a reconstruction reads of a flight."""
@@ -111,7 +111,7 @@ def reconstruct(
 def _with_noise(
     step: Step, flight: Flight, measured: np.ndarray, start: LoggedState | None, topics: dict[TopicKey, TopicTable]
 ) -> Step:
-    parameters = complete(flight.parameters.initial, {}, flight.release)
+    parameters = flown_parameters(flight)
     states = tuple(logged_states(flight))
     if not states and flight.has("estimator_states"):
         return replace(step, what=f"{step.what}; without its noise, since {why_no_state(flight)}")

@@ -81,8 +81,9 @@ class PreparedFlight:
         try:
             return complete(logged, overrides, flown, replayed=self.replayed.release, given=given or {})
         except ParameterError as error:
-            by = f"which {self.replayed.name}'s estimator replays"
-            raise UserError(f"{error.name} on a flight {by}", error.reason, error.remedy) from error
+            told_of = f"{self.flight.name}, which {self.replayed.name}'s estimator replays: {error.name}"
+            remedy = f"{error.remedy}; or let the estimator of v1.16 replay all flights (release: {BASELINE})"
+            raise UserError(told_of, error.reason, remedy) from error
 
     def course_of(self, overrides: Mapping[str, float]) -> tuple[Any, ...]:
         """What the replay of a set follows from beside the flight: sets that have it in common have one replay.

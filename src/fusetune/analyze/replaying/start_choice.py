@@ -8,9 +8,9 @@ import numpy as np
 
 from fusetune.analyze.replaying.settings import StartSettings
 from fusetune.px4.flight import Flight, TopicTable, row_count
+from fusetune.px4.flown_parameters import flown_parameters
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.logged_state import LOGGED_STATE_TOPICS, LoggedState, logged_states, why_no_state
-from fusetune.px4.parameters.complete_sets import complete
 
 AUTO, WARM, COLD = "auto", "warm", "cold"
 START_TOPICS = (*LOGGED_STATE_TOPICS, "sensor_combined", "vehicle_land_detected", "vehicle_gps_position")
@@ -91,7 +91,7 @@ def _aligned_after_s(flight: Flight, begin: int) -> float | None:
     after_s = _since_s(flags, int(aligned[0]), begin)
     used = [np.flatnonzero(flags[name] != 0) for name in ("cs_gnss_pos", "cs_gnss_vel") if name in flags]
     uses = [int(rows[0]) for rows in used if len(rows)]
-    needed_s = complete(flight.parameters.initial, {}, flight.release)["EKF2_REQ_GPS_H"]
+    needed_s = flown_parameters(flight)["EKF2_REQ_GPS_H"]
     if uses and _since_s(flags, min(uses), begin) < needed_s:
         return None
     on_ground_s = _seconds_before_take_off(flight, begin)

@@ -16,8 +16,8 @@ from fusetune.analyze.sensor_noise.sensor_series import SensorName, sensor_serie
 from fusetune.analyze.sensor_noise.standing_still import standing_still
 from fusetune.analyze.sensor_noise.starting_noises import StartingNoise, period_s, starting_noises
 from fusetune.px4.flight import Flight
+from fusetune.px4.flown_parameters import flown_parameters
 from fusetune.px4.layouts.release_layouts import ESTIMATOR_TOPICS, canonical
-from fusetune.px4.parameters.complete_sets import complete
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.documents import write_document
 from fusetune.storage.files import AnyPath, atomic_path
@@ -91,7 +91,7 @@ def sensor_noise(flight: Flight, airborne: Sequence[Interval]) -> SensorNoise:
         still = standing_still(flight, series["gyro"], series["accel"], airborne)
     command = throttle(flight)
     found = {name: sensor_character(one, still, airborne, command) for name, one in series.items()}
-    flown = complete(flight.parameters.initial, {}, flight.release)
+    flown = flown_parameters(flight)
     starting = starting_noises(flight, found, flown)
     return SensorNoise(flight.name, flight.start_timestamp, still, tuple(airborne), found, starting, period_s(flown))
 

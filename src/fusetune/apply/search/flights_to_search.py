@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -12,6 +13,10 @@ from fusetune.apply.search.searched_flights import SearchedFlights
 from fusetune.apply.settings import DecisionSettings
 from fusetune.design.around_present import not_exercised
 from fusetune.design.search_settings import SearchSettings
+from fusetune.design.tunable_parameters import DELAY_LIMIT
+from fusetune.ekf2.releases.behaviours import BASELINE
+from fusetune.px4.parameters.ekf2_parameters import is_had_by
+from fusetune.px4.releases import number_of_name
 from fusetune.save.exercise import exercise_of
 from fusetune.save.flight_folder import read_metadata
 from fusetune.storage.files import AnyPath
@@ -50,8 +55,15 @@ def flights_to_search(
                 f"its replay has trust grade {grade.grade}, and none below {decision.lowest_grade} is taken"
             )
     taken = tuple(name for name in own if name not in left_out)
-    vehicle = read_metadata(folders[present_flight])["ekf2_parameters"]
+    vehicle = _present_of(read_metadata(folders[present_flight]))
     return SearchedFlights(taken, left_out, vehicle, _exercised(search, [folders[name] for name in taken]))
+
+
+def _present_of(metadata: Mapping[str, Any]) -> dict[str, float]:
+    """The vehicle's EKF2 parameters; where its release has no EKF2_DELAY_MAX, nothing bounds its delays."""
+    replayed = metadata.get("release", {}).get("replayed") or BASELINE
+    unbounded = not is_had_by(DELAY_LIMIT, number_of_name(replayed))
+    return {**metadata["ekf2_parameters"], **({DELAY_LIMIT: math.inf} if unbounded else {})}
 
 
 def _exercised(search: SearchSettings, folders: Iterable[AnyPath]) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ import numpy as np
 
 from fusetune.px4.aid_sources import AID_SOURCE_TOPIC, AID_SOURCES, AidSource
 from fusetune.px4.flight import Flight, TopicKey, TopicTable, row_count, select_rows
+from fusetune.px4.flown_parameters import flown_parameters
 from fusetune.px4.layouts.estimator_layouts import control_bits
-from fusetune.px4.parameters.complete_sets import complete
 from fusetune.px4.releases import NO_MAG_HEADING
 
 _SAME_PUBLICATION_US = 2000
@@ -42,7 +42,7 @@ def aid_source_tables(flight: Flight) -> dict[TopicKey, TopicTable]:
     tables: dict[TopicKey, TopicTable] = {}
     own = {instance for name, instance in flight.topics if name.startswith(AID_SOURCE_TOPIC)}
     logged = {*flight.instances("estimator_innovations"), *flight.instances("ekf2_innovations")}
-    gates = complete(flight.parameters.initial, {}, flight.release) if logged - own else {}
+    gates = flown_parameters(flight) if logged - own else {}
     for instance in sorted(logged - own):
         series = _modern_series(flight, instance) if flight.topic("estimator_innovations", instance) else None
         series = series or _old_series(flight, instance)

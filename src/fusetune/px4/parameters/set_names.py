@@ -20,6 +20,8 @@ from fusetune.px4.releases import BASELINE, Release, estimator_name
 
 Value = TypeVar("Value")
 
+GOES_ALONG = "EKF2_DELAY_MAX"
+
 NEWER_NAMES: Mapping[str, str] = {
     name: told[0]
     for name, told in BECAME.items()
@@ -50,6 +52,8 @@ def read_by(name: str, replayed: Release = BASELINE) -> ParameterMetadata:
 def demand_had(name: str, replayed: Release) -> None:
     """See that a release has a parameter, under the name of the baseline or those that it became another of.
 
+    EKF2_DELAY_MAX goes along with a delay, and is taken without effect where the delays alone size the buffers.
+
     Raises
     ------
     ParameterError
@@ -57,7 +61,7 @@ def demand_had(name: str, replayed: Release) -> None:
     """
     if name not in parameters_of(replayed):
         metadata_of(name)
-    if replayed[:2] != BASELINE and not is_had_by(name, replayed):
+    if replayed[:2] != BASELINE and name != GOES_ALONG and not is_had_by(name, replayed):
         raise _not_had(ALL_PARAMETERS[name], replayed)
 
 

@@ -9,9 +9,9 @@ from functools import cached_property
 from fusetune.analyze.replaying.onboard import INNOVATION_TOPICS
 from fusetune.px4.aid_sources import vector
 from fusetune.px4.flight import Flight, TopicTable
+from fusetune.px4.flown_parameters import flown_parameters
 from fusetune.px4.layouts.estimator_instances import rows_of_primary
 from fusetune.px4.layouts.release_layouts import canonical
-from fusetune.px4.parameters.complete_sets import complete
 from fusetune.save.flight_folder import load_flight
 from fusetune.storage.files import AnyPath
 
@@ -70,7 +70,7 @@ class Logged:
     @cached_property
     def parameters(self) -> Mapping[str, float]:
         """All that the estimator had when the log began."""
-        return complete(self.flight.parameters.initial, {}, self.flight.release)
+        return flown_parameters(self.flight)
 
     @cached_property
     def status_flags(self) -> TopicTable | None:

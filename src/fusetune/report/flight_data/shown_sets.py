@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from fusetune.report.flight_data.content import Role, ShownSet
+from fusetune.report.flight_data.shown_limit import MOST_SHOWN_SETS
 from fusetune.report.set_styles import set_style, set_styles
 from fusetune.set_names import AS_FLOWN, ONBOARD
 from fusetune.storage.files import AnyPath
 from fusetune.storage.parquet import read_table
 
-MOST_SETS = 24
-"""Beside the present one: of more, those that predict the flight best."""
 _DRAWN = ("scored", "excluded", "not_scored")
 """States of a set whose replay ran to the end."""
 
@@ -49,7 +48,7 @@ UNDECIDED = Choice()
 
 
 def replayed_sets(
-    scoring: Mapping[str, Any] | None, scores: AnyPath, first: Sequence[str] = (), most: int = MOST_SETS
+    scoring: Mapping[str, Any] | None, scores: AnyPath, first: Sequence[str] = (), most: int = MOST_SHOWN_SETS
 ) -> list[str]:
     """Names of the sets that are shown: the present one, then those that are to be first, then the others.
 

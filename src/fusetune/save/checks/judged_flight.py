@@ -67,8 +67,12 @@ class JudgedFlight:
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """Parameters of the estimator that the log begins with, those that it lacks at their defaults."""
-        return complete(self.flight.parameters.initial, {}, self.flight.release)
+        """Parameters of the estimator that the log begins with, those that it lacks at their defaults.
+
+        These are the defaults of the release whose estimator replays it.
+        """
+        initial, flown = self.flight.parameters.initial, self.flight.release
+        return complete(initial, {}, flown, replayed=self.replayed.release)
 
     def may_fuse(self, source: AidSource) -> bool:
         """Whether the parameters let a source be fused."""
