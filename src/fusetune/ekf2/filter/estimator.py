@@ -57,6 +57,7 @@ from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
+from fusetune.ekf2.filter.quaternion_core.core_memory import QUATERNION_CORE, initialise_quaternion_core
 from fusetune.ekf2.filter.terrain_filter.terrain_filter import run_terrain_filter, start_terrain_filter
 from fusetune.ekf2.filter.terrain_filter.terrain_memory import TERRAIN_FILTER
 from fusetune.ekf2.filter.wind import WIND_MEMORY
@@ -122,6 +123,8 @@ def ekf_record(release: str) -> np.dtype:
         memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
     if does.keeps_position_local:
         memories.append(("local", LOCAL_POSITION))
+    if does.adds_quaternion_errors:
+        memories.append(("quaternion", QUATERNION_CORE))
     if does.doubts_stuck_accel_bias:
         memories.append(("accel_bias_check", ACCEL_BIAS_CHECK))
     if does.keeps_yaw_bank_as_matrices:
@@ -177,6 +180,7 @@ def initialise_estimator(ekf, params):
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)
     initialise_yaw_bank(ekf)
+    initialise_quaternion_core(ekf)
     # on the ground, the vehicle stands this far above it
     ekf.terrain = -ekf.gpos_alt + params.EKF2_MIN_RNG
 
@@ -221,10 +225,23 @@ def _update(ekf, params):
 
 
 @kernel
+def _update_after_state(ekf, params):
+    """As v1.16, with the state predicted first."""
+    predict_state(ekf, params)
+    update_imu_bias_inhibit(ekf, params)
+    predict_covariance(ekf, params)
+    control_fusion_modes(ekf, params)
+    run_terrain_filter(ekf, params)
+    correct_output(ekf, params)
+
+
+@kernel
 def _update_and_follow_force(ekf, params):
     """As v1.16, after the specific force at the horizon has been low-passed."""
     follow_specific_force(ekf)
     _update(ekf, params)
 
 
-update = by_release(_update, "levels_at_the_horizon", _update_and_follow_force)
+update = by_release(
+    by_release(_update, "levels_at_the_horizon", _update_and_follow_force), "predicts_state_first", _update_after_state
+)

@@ -292,6 +292,92 @@ class Behaviours:
         until="v1.15",
         source="velocity_fusion.cpp",
     )
+    adds_quaternion_errors: bool = _behaviour(
+        "Attitude errors are additive in the four elements of the quaternion. Updates have no Joseph form, and one "
+        "that would make a variance negative is refused; states are limited once per prediction; covariances of what "
+        "is not estimated are zero, and variances of biases that are not learnt are kept. v1.16's errors turn about "
+        "north, east and down.",
+        since="v1.13",
+        until="v1.14",
+        source="covariance.cpp, ekf_helper.cpp, vel_pos_fusion.cpp",
+    )
+    keeps_biases_as_increments: bool = _behaviour(
+        "Biases of gyro and accelerometer are increments of angle and velocity over the mean interval of the filter. "
+        "v1.16 keeps rates.",
+        since="v1.13",
+        until="v1.14",
+        source="ekf.h",
+    )
+    sizes_buffers_by_sources: bool = _behaviour(
+        "Buffers are as long as the longest delay of a source that is asked for, and the longest interval of "
+        "barometer and magnetometer. v1.16 has EKF2_DELAY_MAX.",
+        since="v1.13",
+        until="v1.14",
+        source="estimator_interface.cpp, ../EKF2.cpp",
+    )
+    observes_acceleration_of_gravity: bool = _behaviour(
+        "Gravity is fused in m/s², by the low-passed vector of the specific force, with a gate of one and gains that "
+        "all stem from before the first axis.",
+        since="v1.13",
+        until="v1.14",
+        source="gravity_fusion.cpp",
+    )
+    measures_no_gyro_bias: bool = _behaviour(
+        "The mean rate at rest is no observation of the gyro's bias.",
+        since="v1.13",
+        until="v1.14",
+        source="control.cpp",
+    )
+    yields_to_velocity_before_alignment: bool = _behaviour(
+        "Zero velocity is not fused beside a vertical velocity, whether or not the tilt is aligned.",
+        since="v1.13",
+        until="v1.14",
+        source="zero_velocity_update.cpp",
+    )
+    predicts_state_first: bool = _behaviour(
+        "The state is predicted before the covariance, which so belongs to the new one and to the new mean interval.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
+    takes_bias_increments_off: bool = _behaviour(
+        "The increments of the biases are taken off as they are, however long the interval of the sample.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
+    learns_gyro_bias_always: bool = _behaviour(
+        "The gyro's bias is learnt always, within 20°/s; the accelerometer's unless EKF2_AID_MASK, a manoeuvre, "
+        "clipping or a bad acceleration stops it.",
+        since="v1.13",
+        until="v1.13",
+        source="covariance.cpp, ekf_helper.cpp",
+    )
+    adds_wind_noise_by_update: bool = _behaviour(
+        "The wind's noise is EKF2_WIND_NOISE times the interval, whose square is added. v1.14 has a spectral density.",
+        since="v1.13",
+        until="v1.13",
+        source="covariance.cpp",
+    )
+    selects_sources_by_mask: bool = _behaviour(
+        "EKF2_AID_MASK and EKF2_HGT_MODE say which sources are asked for. v1.14 has a parameter for each.",
+        since="v1.13",
+        until="v1.13",
+        source="common.h",
+    )
+    starts_with_samples: bool = _behaviour(
+        "The filter starts once the buffers could have been filled with samples of the magnetometer, where a heading "
+        "is taken from it, and of the barometer; with the heading, and a height that the barometer tells at once.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
+    fuses_no_gravity: bool = _behaviour(
+        "Gravity is not fused.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp",
+    )
     knows_no_constant_position: bool = _behaviour(
         "Nothing can tell the filter that the position is constant.",
         since="v1.13",

@@ -16,6 +16,7 @@ import numpy as np
 
 from fusetune.ekf2.feed.buffers import BUFFER_LENGTHS, RING
 from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, BIAS_RESETS, EstimatorInputs
+from fusetune.ekf2.feed.longest_delay import longest_delay_ms
 from fusetune.ekf2.feed.sample_arrival import NOTE, NOTED
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_ACCUMULATOR
@@ -136,7 +137,10 @@ def flight_schedule(
         changed = [(run, taken_value(name, change.value, release)) for run, change in changes if change.name == name]
         return steps_of(float(params[name]), changed, meaning)
 
-    delay_max = [value for run, value in steps("EKF2_DELAY_MAX") if run == 0][-1]
+    def at_start(name: str) -> float:
+        return [value for run, value in steps(name) if run == 0][-1]
+
+    delay_max = longest_delay_ms(at_start, release)
     clock = (steps("EKF2_PREDICT_US"), delay_max, NEVER if start_us is None else start_us, release)
     told = {}
     for sensor in SENSOR_NAMES:

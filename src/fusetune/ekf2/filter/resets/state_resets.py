@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.output_predictor.output_predictor import (
     apply_quaternion_reset,
     apply_velocity_reset,
 )
+from fusetune.ekf2.filter.quaternion_core.quaternion_covariance import add_yaw_variance, uncorrelate_quaternion
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import (
     dcm_to_quat,
@@ -330,10 +331,36 @@ def reset_height_to_last_known(ekf, params):
 
 
 @kernel
-def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
-    """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
+def _reset_yaw_error_variance(ekf, yaw_var):
     if math.isfinite(yaw_var) and yaw_var > FLT_EPSILON:
         reset_covariance_block(ekf, ATTITUDE + 2, 1, yaw_var)
+
+
+@kernel
+def _do_not_yet(ekf, yaw_var):
+    """The covariance of the quaternion follows once it has turned."""
+
+
+@kernel
+def _done_already(ekf, yaw_var):
+    """That of an error in the NED frame was set before the turn."""
+
+
+@kernel
+def _add_to_yaw_variance(ekf, yaw_var):
+    uncorrelate_quaternion(ekf)
+    if yaw_var > FLT_EPSILON:
+        add_yaw_variance(ekf, yaw_var)
+
+
+_set_yaw_variance = by_release(_reset_yaw_error_variance, "adds_quaternion_errors", _do_not_yet)
+_uncorrelate_attitude = by_release(_done_already, "adds_quaternion_errors", _add_to_yaw_variance)
+
+
+@kernel
+def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
+    """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
+    _set_yaw_variance(ekf, yaw_var)
     yaw_before = euler_yaw(ekf.R_to_earth)
     before, error = ekf.scratch.quat_before, ekf.scratch.quat_error
     for i in range(4):
@@ -341,6 +368,7 @@ def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     quat_to_dcm(ekf.q, ekf.scratch.R)
     update_yaw_in_rot_mat(yaw, ekf.scratch.R, ekf.R_to_earth)
     dcm_to_quat(ekf.R_to_earth, ekf.q)
+    _uncorrelate_attitude(ekf, yaw_var)
     quat_multiply_inverse(ekf.q, before, error)
     quat_normalise(error)
     _propagate_quat_reset(ekf, error)

@@ -14,6 +14,7 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_wind_cov
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, fuse_into_wind, reset_wind_to_zero
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.releases.by_release import by_release
@@ -106,6 +107,7 @@ def compute_sideslip_jacobian(ekf, H):
     H[VELOCITY + 2] = ez
     H[WIND] = -ex
     H[WIND + 1] = -ey
+    complete_attitude_jacobian(ekf, H, 0.0)
 
 
 @kernel
