@@ -563,12 +563,6 @@ class Behaviours:
         until="v1.14",
         source="mag_control.cpp, mag_fusion.cpp, zero_innovation_heading_update.cpp",
     )
-    looks_field_up_until_origin: bool = _behaviour(
-        "The magnetic model is looked up at every fix until there is an origin, and the first asks for a yaw reset.",
-        since="v1.13",
-        until="v1.14",
-        source="gps_checks.cpp",
-    )
     clears_field_whenever_stopped: bool = _behaviour(
         "A magnetometer that may not be used is passed over and a yaw held in its place in every update, not stopped; "
         "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course.",
