@@ -115,7 +115,7 @@ def test_control_bits_are_those_of_estimator_status() -> None:
 
 def test_codes_are_those_that_replays_were_written_with() -> None:
     # the order of the estimator's record: another one would give old tables other sources
-    assert REPLAYED_SOURCES == STATUS.names
+    assert STATUS.names == REPLAYED_SOURCES
     assert RECORDED_SOURCES == AID_SOURCE_NAMES == OLD_STATUS.names
     assert RECORDED_SOURCES[: len(REPLAYED_SOURCES)] == REPLAYED_SOURCES
     assert [AID_SOURCES[name].code for name in REPLAYED_SOURCES] == list(range(len(REPLAYED_SOURCES)))
