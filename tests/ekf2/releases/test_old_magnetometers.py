@@ -15,12 +15,20 @@ from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
-from fusetune.ekf2.filter.aid_sources.magnetometer import field_limits, mag_heading, mag_resets, world_field
+from fusetune.ekf2.filter.aid_sources.magnetometer import (
+    field_checks,
+    field_limits,
+    mag_fusion,
+    mag_heading,
+    mag_modes,
+    mag_resets,
+    world_field,
+)
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
-from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
+from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH, TERRAIN
 from fusetune.ekf2.numerics import world_magnetic_model_table as table
 
-V115, V116 = "v1.15", "v1.16"
+V113, V114, V115, V116 = "v1.13", "v1.14", "v1.15", "v1.16"
 FIELD = np.array([0.22, 0.03, 0.40])
 STRENGTH, DECLINATION, INCLINATION = 0.48, 0.06, 1.1
 
@@ -274,3 +282,119 @@ def test_v1_15_fuses_a_disturbed_field_once_it_is_aligned_in_flight(disturbed, c
     assert bool(it.ekf["cs"]["mag_3d"]) == (mode == "3d")
     assert not it.ekf["cs"]["mag_hdg"]
     assert not it.ekf["cs"]["mag_dec"]
+
+
+@pytest.mark.parametrize("release", [V113, V114])
+def test_older_field_jacobian_is_by_the_quaternion(release):
+    """Central differences of Rᵀm, R the matrix of a quaternion of any length; the last element stands at the end."""
+    it = flying(release)
+    set_attitude(it.ekf, 0.4, -0.3, 2.0)
+    it.ekf["mag_I"][:] = 0.2, -0.1, 0.4
+    q = np.array(it.ekf["q"])
+
+    def body_field(q: np.ndarray) -> np.ndarray:
+        w, u = q[0], q[1:]
+        field = np.array(it.ekf["mag_I"])
+        return (w * w - u @ u) * field + 2.0 * u * (u @ field) - 2.0 * w * np.cross(u, field)
+
+    np.testing.assert_allclose(body_field(q), it.ekf["R_to_earth"].T @ it.ekf["mag_I"], atol=1e-12)
+    H = np.zeros(24)
+    for axis in range(3):
+        mag_fusion.compute_mag_h(it.ekf, axis, H)
+        for element, place in enumerate((ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, TERRAIN)):
+            step = np.zeros(4)
+            step[element] = 1e-6
+            derivative = (body_field(q + step) - body_field(q - step))[axis] / 2e-6
+            assert H[place] == pytest.approx(derivative, abs=1e-8)
+        np.testing.assert_allclose(H[MAG_EARTH : MAG_EARTH + 3], it.ekf["R_to_earth"][:, axis])
+        np.testing.assert_array_equal(H[MAG_BODY : MAG_BODY + 3], np.eye(3)[axis])
+
+
+def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covariance_is_kept():
+    it = flying(V114, EKF2_MAG_TYPE=0.0, EKF2_MAG_ACCLIM=0.5)
+    it.params["EKF2_MAG_YAWLIM"] = 0.2
+    modes, P = it.ekf["mag_modes"], it.ekf["P"]
+    it.ekf["cs"]["mag_aligned_in_flight"] = True
+    mag_modes.select_mode(it.ekf, it.params)
+    assert it.ekf["cs"]["mag_hdg"]
+    # turning at 0.25 rad/s for a second, then at 0.12: 0.95^n of the filter is left after n steps
+    for _ in range(100):
+        mag_modes.follow_turn(it.ekf, 0.0025, 0.01)
+    assert modes["turn_rate_lpf"] == pytest.approx(0.25 * (1.0 - 0.95**100))
+    modes["saved_body_variance"][:] = 1e-4, 2e-4, 3e-4
+    modes["saved_down_variance"] = 4e-4
+    modes["saved_horizontal_covariance"][:] = [[5e-4, 1e-5], [1e-5, 6e-4]]
+    mag_modes.select_mode(it.ekf, it.params)
+    assert it.ekf["cs"]["mag_3d"]
+    assert not it.ekf["cs"]["mag_hdg"]
+    expected = np.diag([5e-4, 6e-4, 4e-4, 1e-4, 2e-4, 3e-4])
+    expected[0, 1] = expected[1, 0] = 1e-5
+    np.testing.assert_array_equal(P[MAG_EARTH : MAG_BODY + 3, MAG_EARTH : MAG_BODY + 3], expected)
+    assert not P[:MAG_EARTH, MAG_EARTH : MAG_BODY + 3].any()
+    for rate, fused in ((0.12, True), (0.08, True), (0.08, False)):
+        set_time(it.ekf, int(it.ekf["time_delayed_us"]) + 1_900_000)
+        mag_modes.follow_turn(it.ekf, rate * 1.9, 1.9)
+        modes["turn_rate_lpf"] = rate
+        mag_modes.select_mode(it.ekf, it.params)
+        assert bool(it.ekf["cs"]["mag_3d"]) == fused
+
+
+@pytest.mark.parametrize(("wanted", "gnss", "fused"), [(0, False, True), (0, True, False), (4, True, True)])
+def test_the_declination_is_fused_with_the_field_where_gnss_does_not_tell_north(wanted, gnss, fused):
+    it = flying(V114, EKF2_DECL_TYPE=float(wanted))
+    it.ekf["cs"]["gnss_pos"] = it.ekf["cs"]["gnss_vel"] = gnss
+    it.ekf["cs"]["mag_3d"] = True
+    mag_modes.update_declination_mode(it.ekf, it.params)
+    assert it.ekf["cs"]["mag_dec"] == fused
+    it.ekf["cs"]["mag_3d"] = False
+    mag_modes.update_declination_mode(it.ekf, it.params)
+    assert not it.ekf["cs"]["mag_dec"]
+
+
+@pytest.mark.parametrize(
+    ("strength", "known", "disturbed"),
+    [(0.69, True, True), (0.67, True, False), (0.69, False, False), (0.86, False, True)],
+)
+def test_the_strength_is_checked_within_a_fifth_of_a_gauss_of_the_model(strength, known, disturbed):
+    """0.48 ± 0.2 Gauss, or 0.45 ± 0.4 Gauss."""
+    it = flying(V114, EKF2_MAG_CHECK=1.0)
+    if known:
+        with_model(it)
+    field = np.array([0.0, 0.6, 0.8]) * strength
+    assert field_checks.is_strength_disturbed(it.ekf, it.params, field) == disturbed
+    it.params["EKF2_MAG_CHECK"] = 0.0
+    assert not field_checks.is_strength_disturbed(it.ekf, it.params, field)
+    it.params["EKF2_MAG_CHECK"], it.params["EKF2_MAG_TYPE"] = 1.0, 4.0
+    assert not field_checks.is_strength_disturbed(it.ekf, it.params, field)
+
+
+def test_every_rough_fix_is_looked_up_until_v1_14_and_the_first_asks_for_the_yaw():
+    ekf = flying(V114).ekf
+    assert not world_field.look_field_up_by_fix(ekf, fix(47.4, 8.5), False)
+    assert world_field.look_field_up_by_fix(ekf, fix(47.4, 8.5), True)
+    assert ekf["mag_modes"]["yaw_reset_requested"]
+    first, ekf["mag_modes"]["yaw_reset_requested"] = float(ekf["mag"]["wmm_declination"]), False
+    assert world_field.look_field_up_by_fix(ekf, fix(47.4, 8.6), True)
+    assert ekf["mag"]["wmm_declination"] != first
+    assert not ekf["mag_modes"]["yaw_reset_requested"]
+
+
+def test_v1_14_follows_the_field_while_it_levels():
+    it = flying(V114, EKF2_DECL_TYPE=0.0, EKF2_MAG_DECL=5.0)
+    it.ekf["cs"]["tilt_align"] = it.ekf["cs"]["in_air"] = it.ekf["cs_prev"]["in_air"] = False
+    set_attitude(it.ekf, 0.2, 0.1, 1.0)
+    body = it.ekf["R_to_earth"].T @ np.array([0.25, 0.0, 0.4])
+    set_attitude(it.ekf, 0.2, 0.1, 0.0)
+    it.ekf["mag"]["counter"] = 1
+    it.ekf["mag"]["lpf"] = body
+    put_sample(it.ekf, "mag", 5_000, mag=body)
+    control_mag_fusion.of(V114).py_func(it.ekf, it.params)
+    R = it.ekf["R_to_earth"]
+    assert math.atan2(R[1, 0], R[0, 0]) == pytest.approx(1.0 + math.radians(5.0), abs=1e-9)
+    assert math.atan2(it.ekf["mag_I"][1], it.ekf["mag_I"][0]) == pytest.approx(math.radians(5.0), abs=1e-9)
+    assert not it.ekf["cs"]["yaw_align"]
+    heading = it.ekf["aid"]["mag_heading"]
+    assert heading["timestamp_sample"] == START_US - 5_000
+    assert heading["observation"][0] == pytest.approx(1.0 + math.radians(5.0))
+    assert heading["innovation"][0] == pytest.approx(-1.0 - math.radians(5.0))
+    assert not heading["fused"]

@@ -8,7 +8,7 @@ from fusetune.ekf2.filter.aid_sources.auxvel.auxvel_fusion import control_aux_ve
 from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import control_drag_fusion
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_control import control_external_vision_fusion
 from fusetune.ekf2.filter.aid_sources.fake_height_control import control_fake_hgt_fusion
-from fusetune.ekf2.filter.aid_sources.fake_pos_control import control_fake_pos_fusion
+from fusetune.ekf2.filter.aid_sources.fake_pos_until_v1_15 import control_fake_position
 from fusetune.ekf2.filter.aid_sources.gnss.gps_control import control_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
@@ -57,7 +57,7 @@ def control_fusion_modes(ekf, params):
     control_zero_velocity_update(ekf, params)
     if int(params.EKF2_IMU_CTRL) & IMU_CTRL_GYRO_BIAS:
         control_zero_gyro_update(ekf, params)
-    control_fake_pos_fusion(ekf, params)
+    control_fake_position(ekf, params)
     control_fake_hgt_fusion(ekf, params)
     update_dead_reckoning_status(ekf, params)
     update_heading_observability(ekf)

@@ -18,9 +18,21 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_M
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GNSS_MEMORY, GNSS_TRUST, initialise_gnss_memory
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import GNSS_ARRIVALS
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import (
+    GNSS_MEMORY,
+    GNSS_TRUST,
+    GNSS_YAW_RETRIES,
+    initialise_gnss_memory,
+)
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import FIELD_HISTORY, MAG_MEMORY, initialise_mag_memory
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
+    FIELD_HISTORY,
+    MAG_MEMORY,
+    MAG_MODES,
+    initialise_mag_memory,
+    initialise_mag_modes,
+)
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
@@ -47,7 +59,9 @@ from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
 from fusetune.ekf2.filter.terrain_filter.terrain_filter import run_terrain_filter, start_terrain_filter
 from fusetune.ekf2.filter.terrain_filter.terrain_memory import TERRAIN_FILTER
 from fusetune.ekf2.filter.wind import WIND_MEMORY
-from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY, initialise_gsf_memory
+from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY
+from fusetune.ekf2.filter.yaw_estimator.matrix_bank import MATRIX_BANK, YAW_VELOCITY
+from fusetune.ekf2.filter.yaw_estimator.yaw_bank import initialise_yaw_bank
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL
 from fusetune.ekf2.numerics.rotations import quat_aligning_with_up, quat_to_dcm
 from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS
@@ -98,15 +112,23 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("flow_rates", FLOW_RATES))
     if does.holds_unobservable_heading:
         memories.append(("heading", HEADING_MEMORY))
+    if does.limits_declination:
+        memories.append(("field_history", FIELD_HISTORY))
+    if does.fuses_heading_or_field:
+        memories.append(("mag_modes", MAG_MODES))
+    if does.filters_terrain_apart:
+        memories = [(name, OLD_AID_SOURCES if name == "aid" else memory) for name, memory in memories]
+        memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
     if does.keeps_position_local:
         memories.append(("local", LOCAL_POSITION))
     if does.doubts_stuck_accel_bias:
         memories.append(("accel_bias_check", ACCEL_BIAS_CHECK))
-    if does.limits_declination:
-        memories.append(("field_history", FIELD_HISTORY))
-    if does.filters_terrain_apart:
-        memories = [(name, OLD_AID_SOURCES if name == "aid" else memory) for name, memory in memories]
-        memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
+    if does.keeps_yaw_bank_as_matrices:
+        memories.append(("yaw_matrices", MATRIX_BANK))
+    if does.retries_gnss_yaw:
+        memories.append(("gnss_yaw_retries", GNSS_YAW_RETRIES))
+    if does.checks_gnss_on_arrival:
+        memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
     return marked(np.dtype(memories, align=True), release)
 
 
@@ -147,10 +169,11 @@ def initialise_estimator(ekf, params):
     initialise_position_bias_estimator(ekf.ev_pos_b_est)
     initialise_gnss_memory(ekf.gnss)
     initialise_mag_memory(ekf.mag)
+    initialise_mag_modes(ekf)
     initialise_range_memory(ekf.range)
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)
-    initialise_gsf_memory(ekf.gsf)
+    initialise_yaw_bank(ekf)
     # on the ground, the vehicle stands this far above it
     ekf.terrain = -ekf.gpos_alt + params.EKF2_MIN_RNG
 

@@ -141,6 +141,20 @@ def _is_far(innovation, innovation_variance):
 
 
 @kernel
+def _of_distance(ekf):
+    return -ekf.aid.rng_hgt.innovation[0]
+
+
+@kernel
+def _of_height(ekf):
+    return ekf.aid.rng_hgt.innovation[0]
+
+
+_range_innovation = by_release(_of_distance, "takes_range_for_height", _of_height)
+"""Innovation (m) of the height that range tells, positive where the estimate is below it."""
+
+
+@kernel
 def estimate_inertial_nav_falling_likelihood(ekf):
     """How likely the inertial navigation falls away from the height and vertical velocity observations.
 
@@ -165,7 +179,7 @@ def estimate_inertial_nav_falling_likelihood(ekf):
         _normalised(cs.gnss_vel and knows_gnss, aid.gnss_vel.innovation[2], aid.gnss_vel.innovation_variance[2]),
     )
     ground = max(
-        _normalised(cs.rng_hgt, -aid.rng_hgt.innovation[0], aid.rng_hgt.innovation_variance[0]),
+        _normalised(cs.rng_hgt, _range_innovation(ekf), aid.rng_hgt.innovation_variance[0]),
         _normalised(cs.ev_hgt, aid.ev_hgt.innovation[0], aid.ev_hgt.innovation_variance[0]),
         _normalised(cs.ev_vel, aid.ev_vel.innovation[2], aid.ev_vel.innovation_variance[2]),
     )

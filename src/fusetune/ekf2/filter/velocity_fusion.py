@@ -3,6 +3,8 @@
 Mirrors PX4 v1.16 `EKF/velocity_fusion.cpp`, whose resets stand in `resets/`.
 """
 
+import math
+
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.measurement_update import fuse_direct_state
@@ -37,3 +39,11 @@ def _fuse_velocity_axes(ekf, params, aid, n_axes):
         )
     aid.time_last_fuse = ekf.time_delayed_us
     return True
+
+
+@kernel
+def limit_vertical_innovation(aid, gate):
+    """Limit the vertical innovation to the gate, and take the velocity as it is."""
+    limit = gate * math.sqrt(aid.innovation_variance[2])
+    aid.innovation[2] = min(max(aid.innovation[2], -limit), limit)
+    aid.innovation_rejected = False

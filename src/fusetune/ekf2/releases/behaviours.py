@@ -301,6 +301,113 @@ class Behaviours:
 
     # Older releases: GNSS, height, fake aiding and the yaw estimator.
 
+    keeps_yaw_bank_as_matrices: bool = _behaviour(
+        "The yaw estimator keeps attitudes as rotation matrices, turned to first order. An innovation beyond 5 σ "
+        "weighs in full, though it corrects as one of 5 σ; if all models weigh next to nothing, they start anew.",
+        since="v1.13",
+        until="v1.15",
+        source="yaw_estimator/EKFGSF_yaw.cpp",
+    )
+    aids_by_one_gnss_flag: bool = _behaviour(
+        "GNSS velocity and position start and stop together and count as one source. Where both time out they are "
+        "reset after they were fused; both bits of EKF2_GPS_CTRL only say what is taken. v1.16 starts each by itself.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_control.cpp",
+    )
+    compares_gnss_climb: bool = _behaviour(
+        "The check of the vertical speed is of what GNSS and filter differ by, in the air, too; none asks for a limit "
+        "of the speed, nor for spoofing.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_checks.cpp",
+    )
+    waits_half_health_time: bool = _behaviour(
+        "A GNSS sample is used once the checks have passed for half of EKF2_REQ_GPS_H. v1.16 waits for a tenth, and "
+        "for 1 s at least.",
+        since="v1.15",
+        until="v1.15",
+        source="gps_control.cpp",
+    )
+    places_origin_by_checks: bool = _behaviour(
+        "The first GNSS sample for which the checks have passed gives the origin its place and altitude, before "
+        "anything is fused, and a rough fix the magnetic field. v1.16 does so as position and height are reset.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_checks.cpp",
+    )
+    limits_climb_of_all_rejected: bool = _behaviour(
+        "While the vertical acceleration is bad no axis of a velocity is rejected, and the vertical innovation "
+        "limited. v1.16 does so where the vertical axis alone fails and GNSS tells a good accuracy.",
+        since="v1.13",
+        until="v1.15",
+        source="velocity_fusion.cpp",
+    )
+    levers_by_measured_rate: bool = _behaviour(
+        "What turns a lever arm is the rate as the gyro measures it, with its bias.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_control.cpp, ekf_helper.cpp",
+    )
+    resets_height_to_each_source: bool = _behaviour(
+        "Where height fails, every source that is fused resets it, keeping its bias, and vertical velocity with it. "
+        "v1.16 resets the height to its reference alone.",
+        since="v1.14",
+        until="v1.15",
+        source="baro_height_control.cpp, gnss_height_control.cpp",
+    )
+    starts_at_filtered_baro: bool = _behaviour(
+        "The barometer starts as height reference at the low-passed height less the bias that was found meanwhile, so "
+        "the height stays near zero, and a fault lasts. v1.16 takes the measurement as altitude.",
+        since="v1.14",
+        until="v1.15",
+        source="baro_height_control.cpp",
+    )
+    fakes_one_kind_of_position: bool = _behaviour(
+        "There is one fake position, which starts by dead reckoning, is fused like any position, and protected from "
+        "extremes alone. v1.16 tells one that is valid, at rest, from another.",
+        since="v1.13",
+        until="v1.15",
+        source="fake_pos_control.cpp",
+    )
+    fakes_position_whenever_unaided: bool = _behaviour(
+        "The fake position is used whenever nothing aids, in the air with at least EKF2_GPS_P_NOISE. v1.15 uses it at "
+        "rest, and while the tilt is uncertain.",
+        since="v1.13",
+        until="v1.14",
+        source="fake_pos_control.cpp",
+    )
+    counts_aiding_of_any_kind: bool = _behaviour(
+        "GNSS or vision aid while either position or velocity is fused, air data while the wind is estimated; "
+        "standing still is no aid.",
+        since="v1.13",
+        until="v1.15",
+        source="ekf_helper.cpp",
+    )
+    retries_gnss_yaw: bool = _behaviour(
+        "A GNSS heading that times out resets the yaw once in flight before it stops as faulty. It starts with a reset "
+        "always, and stopping on ground gives the alignment up.",
+        since="v1.13",
+        until="v1.15",
+        source="gps_control.cpp, gps_yaw_fusion.cpp",
+    )
+
+    checks_gnss_on_arrival: bool = _behaviour(
+        "GNSS is checked, the origin placed, the position projected as a sample arrives. Checks that have not failed "
+        "for 5 s let GNSS start, checks that have failed for 5 s stop it beside another source; the yaw is aligned by "
+        "the yaw estimator without magnetometer alone. v1.15 does all that when a sample is due.",
+        since="v1.13",
+        until="v1.14",
+        source="estimator_interface.cpp, gps_control.cpp",
+    )
+    runs_yaw_bank_in_air: bool = _behaviour(
+        "The yaw estimator runs in the air alone, from the first velocity on, with the accuracy that GNSS tells as "
+        "standard deviation; its yaw follows at every IMU sample. v1.15 lets it run on the ground, too.",
+        since="v1.13",
+        until="v1.14",
+        source="EKFGSF_yaw.cpp",
+    )
+
     # Older releases: magnetometer and heading.
     knows_field_of_early_2024: bool = _behaviour(
         "The magnetic model is that of January 2024, in 10⁻⁴ rad and 10⁻⁴ Gauss. v1.16 has that of May 2024.",
@@ -355,6 +462,39 @@ class Behaviours:
         since="v1.15",
         until="v1.15",
         source="mag_control.cpp, mag_3d_control.cpp, mag_fusion.cpp",
+    )
+    fuses_heading_or_field: bool = _behaviour(
+        "The magnetometer fuses the heading, or, once it is aligned in flight and the vehicle accelerates or turns "
+        "(EKF2_MAG_YAWLIM), the field, whose states have a covariance only then. The strength alone is checked, within "
+        "0.2 Gauss. At rest the yaw at which it came to rest is fused; while levelling it follows the field.",
+        since="v1.13",
+        until="v1.14",
+        source="mag_control.cpp, mag_fusion.cpp, zero_innovation_heading_update.cpp",
+    )
+    looks_field_up_until_origin: bool = _behaviour(
+        "The magnetic model is looked up at every fix until there is an origin, and the first asks for a yaw reset.",
+        since="v1.13",
+        until="v1.14",
+        source="gps_checks.cpp",
+    )
+    clears_field_whenever_stopped: bool = _behaviour(
+        "A magnetometer that may not be used is passed over and a yaw held in its place in every update, not stopped; "
+        "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
+    )
+    observes_yaw_by_vision: bool = _behaviour(
+        "The position of vision, too, lets accelerations tell the heading, and needs a yaw indoors.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_control.cpp",
+    )
+    bounds_declination_innovation: bool = _behaviour(
+        "The innovation of the declination is limited to 0.5 rad.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_fusion.cpp",
     )
     puts_body_field_by_yaw_estimator: bool = _behaviour(
         "A reset of the field takes the covariances of both its states, and where the yaw estimator has converged puts "
@@ -451,12 +591,6 @@ class Behaviours:
         since="v1.13",
         until="v1.15",
         source="drag_fusion.cpp",
-    )
-    filters_terrain_apart: bool = _behaviour(
-        "The terrain is no state of the filter; a filter of its own estimates it.",
-        since="v1.13",
-        until="v1.15",
-        source="terrain_estimator.cpp",
     )
     levers_by_measured_rate: bool = _behaviour(
         "What turns a lever arm is the rate as the gyro measures it, with its bias.",

@@ -129,7 +129,7 @@ def run_estimator(main, branch, inputs, schedule, notes, room, gaps, gap_room, s
         sample = _predict_output_until(ekf, params, inputs.imu, sample, events[event].run)
         event = _handle_events(ekf, params, inputs, schedule, event, events[event].run)
     if stop > start:
-        take_actions(ekf, inputs, schedule.drag, schedule.actions, place, number, from_run, stop, False, notes)
+        take_actions(ekf, params, inputs, schedule, place, number, from_run, stop, False, notes)
         _predict_output_until(ekf, params, inputs.imu, sample, stop)
         _set_clock(ekf, inputs, schedule, stop)
     if is_last:
@@ -154,9 +154,7 @@ def _go_on(ekf, params, inputs, schedule, notes, views, recorder, room, number, 
         ekf.time_latest_us = imu[run].time_us
         ekf.dt_ekf_avg = updates[number].average_dt
         nothing_is_due(ekf.sensors)
-        place = take_actions(
-            ekf, inputs, schedule.drag, schedule.actions, place, number, from_run, NO_STOP, True, notes
-        )
+        place = take_actions(ekf, params, inputs, schedule, place, number, from_run, NO_STOP, True, notes)
         from_run = 0
         pretend_fused(ekf)
         if not ekf.filter_initialised:

@@ -9,8 +9,11 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import apply_antenna_yaw_offset, apply_vision_noise
 from fusetune.ekf2.feed.sensors import SENSOR_MEMORIES
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import look_at_arrived_gnss, recall_arrived_gnss
+from fusetune.ekf2.releases.by_release import by_release
+from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.sensor_actions import BUFFERED, DUE
-from fusetune.ekf2.schedule.timeline import place_at
+from fusetune.ekf2.schedule.timeline import first_at, place_at
 
 SENSOR_NAMES = tuple(SENSOR_MEMORIES)
 """In the order of their numbers in an ACTION."""
@@ -34,29 +37,30 @@ def nothing_is_due(sensors):
 
 
 @kernel
-def take_actions(ekf, inputs, drag, actions, place, update, from_run, stop_run, with_due, notes):
+def take_actions(ekf, params, inputs, schedule, place, update, from_run, stop_run, with_due, notes):
     """Carry out the actions before an update, from index `place` on; return the index of the first of a later one.
 
     Parameters
     ----------
-    drag : DRAG_SAMPLE, which stand in no input
+    schedule : of the flight, with the samples of drag, which stand in no input
     from_run, stop_run : only what arrives at the runs between is carried out
     with_due : whether samples that are due are taken
     notes : NOTE, what the parameters said since when
     """
+    actions = schedule.actions
     while actions[place].update == update:
         action = actions[place]
         if action.what == DUE:
             if with_due:
-                _take_due(ekf.sensors, inputs, drag, action, notes)
+                _take_due(ekf, inputs, schedule.drag, action, notes)
         elif from_run <= action.run < stop_run:
-            _arrive(ekf, inputs, action)
+            _arrive(ekf, params, inputs, schedule, action)
         place += 1
     return place
 
 
 @kernel
-def _arrive(ekf, inputs, action):
+def _arrive(ekf, params, inputs, schedule, action):
     sensors, slot, sensor = ekf.sensors, action.slot, action.sensor
     if sensor == MAG:
         _note_arrival(sensors.mag, action)
@@ -67,6 +71,8 @@ def _arrive(ekf, inputs, action):
         _note_arrival(sensors.gnss, action)
         if action.what == BUFFERED and math.isfinite(inputs.gnss[slot].yaw):
             sensors.gnss.newest_yaw_time_us = action.time_us
+        if action.what == BUFFERED:
+            _gnss_arrives(ekf, params, inputs, schedule, action)
     elif sensor == RANGE:
         ekf.range.sensor_min_distance = inputs.range_limits[slot, 0]
         ekf.range.sensor_max_distance = inputs.range_limits[slot, 1]
@@ -91,6 +97,28 @@ def _arrive(ekf, inputs, action):
 
 
 @kernel
+def _wait_until_due(ekf, params, inputs, schedule, action):
+    """v1.15 looks at a sample when it is due."""
+
+
+@kernel
+def _look_at_gnss(ekf, params, inputs, schedule, action):
+    """Look at a sample with the clocks at its run, which may be before that of the update to come."""
+    delayed_us, latest_us = ekf.time_delayed_us, ekf.time_latest_us
+    ekf.time_latest_us = inputs.imu[action.run].time_us
+    newest = first_at(schedule.intervals.run, action.run + 1) - 1
+    if newest < 0:
+        ekf.time_delayed_us = inputs.imu[0].time_us
+    else:
+        ekf.time_delayed_us = schedule.intervals[oldest_buffered(newest, schedule.lengths[0].imu_length)].time_us
+    look_at_arrived_gnss(ekf, params, inputs.gnss[action.slot], action.slot)
+    ekf.time_delayed_us, ekf.time_latest_us = delayed_us, latest_us
+
+
+_gnss_arrives = by_release(_wait_until_due, "checks_gnss_on_arrival", _look_at_gnss)
+
+
+@kernel
 def _note_arrival(sensor, action):
     sensor.exists = True
     if action.what == BUFFERED:
@@ -98,8 +126,8 @@ def _note_arrival(sensor, action):
 
 
 @kernel
-def _take_due(sensors, inputs, drag, action, notes):
-    sensor = action.sensor
+def _take_due(ekf, inputs, drag, action, notes):
+    sensors, sensor = ekf.sensors, action.sensor
     if sensor == MAG:
         _take(sensors.mag, inputs.mag, action)
     elif sensor == BARO:
@@ -107,6 +135,7 @@ def _take_due(sensors, inputs, drag, action, notes):
     elif sensor == GNSS:
         _take(sensors.gnss, inputs.gnss, action)
         apply_antenna_yaw_offset(sensors.gnss.sample, notes[place_at(notes, action.run)])
+        recall_arrived_gnss(ekf, action.slot)
     elif sensor == RANGE:
         _take(sensors.range, inputs.range, action)
     elif sensor == FLOW:

@@ -4,6 +4,7 @@ Mirrors PX4 v1.16 `EKF/aid_sources/fake_height_control.cpp`.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status
 from fusetune.ekf2.filter.common.conditions import is_vertical_aiding_active
 from fusetune.ekf2.filter.common.state import POSITION
 from fusetune.ekf2.filter.common.timing import is_timed_out
@@ -21,7 +22,9 @@ EXTREME_TEST_RATIO = (100.0 / INNOVATION_GATE) ** 2
 def control_fake_hgt_fusion(ekf, params):
     """Fuse, start, reset or stop the fake height."""
     if is_vertical_aiding_active(ekf):
-        ekf.cs.fake_hgt = False
+        if ekf.cs.fake_hgt:
+            ekf.cs.fake_hgt = False
+            forget_aid_source_status(ekf, ekf.aid.fake_hgt, 1)
         return
     aid = ekf.aid.fake_hgt
     if not is_timed_out(ekf, aid.time_last_fuse, UPDATE_INTERVAL_US):

@@ -86,7 +86,7 @@ def _run(ekf, params, enabled, active, aid):
     if not enabled:
         return False
     if not active:
-        _reset_fake_pos_fusion(ekf, params)
+        reset_fake_pos_fusion(ekf, params)
         return True
     if not aid.innovation_rejected:
         for i in range(2):
@@ -96,12 +96,12 @@ def _run(ekf, params, enabled, active, aid):
         aid.fused = True
         aid.time_last_fuse = ekf.time_delayed_us
     if is_timed_out(ekf, aid.time_last_fuse, FAILURE_TIMEOUT_US):
-        _reset_fake_pos_fusion(ekf, params)
+        reset_fake_pos_fusion(ekf, params)
     return True
 
 
 @kernel
-def _reset_fake_pos_fusion(ekf, params):
+def reset_fake_pos_fusion(ekf, params):
     """Take the present place as the known one, at rest."""
     remember_horizontal_position(ekf)
     reset_horizontal_position_to_last_known(ekf, params)

@@ -21,9 +21,28 @@ def get_number_of_active_horizontal_position_aiding_sources(ekf):
 
 
 @kernel
+def _count_gnss_velocity(ekf):
+    return int(ekf.cs.gnss_vel)
+
+
+@kernel
+def _count_with_position(ekf):
+    """GNSS is one source, which the position counts."""
+    return 0
+
+
+_number_of_gnss_velocities = by_release(_count_gnss_velocity, "aids_by_one_gnss_flag", _count_with_position)
+
+
+@kernel
 def get_number_of_active_horizontal_velocity_aiding_sources(ekf):
     """How many sources give horizontal velocity; airspeed and sideslip together count as one."""
-    return int(ekf.cs.gnss_vel) + int(ekf.cs.opt_flow) + int(ekf.cs.ev_vel) + int(ekf.cs.fuse_aspd and ekf.cs.fuse_beta)
+    return (
+        _number_of_gnss_velocities(ekf)
+        + int(ekf.cs.opt_flow)
+        + int(ekf.cs.ev_vel)
+        + int(ekf.cs.fuse_aspd and ekf.cs.fuse_beta)
+    )
 
 
 @kernel

@@ -9,6 +9,7 @@ from fusetune.ekf2.filter.common.conditions import (
     is_vertical_velocity_aiding_active,
 )
 from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, is_recent, is_timed_out
+from fusetune.ekf2.releases.by_release import by_release
 
 
 @kernel
@@ -24,7 +25,28 @@ def _is_fused_recently(ekf, time_last_fuse):
 
 
 @kernel
-def _update_horizontal(ekf, params):
+def _update_by_any_aiding(ekf, params):
+    """As v1.16's, but position and velocity stand in for each other, and nothing stands in for aiding on the ground."""
+    cs = ekf.cs
+    fused = _is_fused_recently(ekf, ekf.time_last_hor_pos_fuse) or _is_fused_recently(ekf, ekf.time_last_hor_vel_fuse)
+    aided = (cs.gnss_vel or cs.gnss_pos or cs.ev_pos or cs.ev_vel or cs.aux_gpos) and fused
+    flow = cs.opt_flow and _is_fused_recently(ekf, ekf.aid.optical_flow.time_last_fuse)
+    air_data = (
+        cs.wind
+        and _is_fused_recently(ekf, ekf.aid.airspeed.time_last_fuse)
+        and _is_fused_recently(ekf, ekf.aid.sideslip.time_last_fuse)
+    )
+    cs.wind_dead_reckoning = air_data and not (aided or flow)
+    cs.inertial_dead_reckoning = not (aided or flow or air_data)
+    if not cs.inertial_dead_reckoning and ekf.time_delayed_us > NO_AID_TIMEOUT_MAX:
+        ekf.time_last_horizontal_aiding = ekf.time_delayed_us - NO_AID_TIMEOUT_MAX
+    ekf.horizontal_deadreckon_time_exceeded = is_timed_out(
+        ekf, ekf.time_last_horizontal_aiding, int(params.EKF2_NOAID_TOUT)
+    )
+
+
+@kernel
+def _update_by_each_aiding(ekf, params):
     """Nothing that bounds horizontal drift fused for a second is inertial dead reckoning.
 
     On ground, standing still counts as aiding if air data or optical flow will take over once in the air.
@@ -77,6 +99,9 @@ def _is_air_data_expected_in_air(ekf, params):
         and params.EKF2_ARSP_THR > 0.0
         and _is_fused_recently(ekf, ekf.aid.airspeed.timestamp_sample)
     )
+
+
+_update_horizontal = by_release(_update_by_each_aiding, "counts_aiding_of_any_kind", _update_by_any_aiding)
 
 
 @kernel

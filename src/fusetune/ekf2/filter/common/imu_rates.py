@@ -1,6 +1,7 @@
 """What the IMU measured at the fusion time horizon, as it is, or corrected by the biases."""
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.releases.by_release import by_release
 
 
 @kernel
@@ -32,3 +33,13 @@ def measured_force(ekf):
 @kernel
 def _corrected(delta, dt, bias):
     return delta[0] / dt - bias[0], delta[1] / dt - bias[1], delta[2] / dt - bias[2]
+
+
+lever_rate = by_release(body_rate, "levers_by_measured_rate", measured_rate)
+"""Rotation rate (rad/s, FRD) that moves what sits away from the IMU."""
+
+
+@kernel
+def gyro_bias_rate(ekf):
+    """Bias of the gyro (rad/s, FRD)."""
+    return ekf.gyro_bias[0], ekf.gyro_bias[1], ekf.gyro_bias[2]

@@ -49,8 +49,8 @@ def filter_acceleration(gsf, imu):
 @kernel
 def try_align_tilt(gsf, imu):
     """Take the tilt from the accelerometer if the vehicle looks at rest (0.9–1.1 g, now and filtered)."""
-    now = _norm(imu.delta_vel) / imu.delta_vel_dt
-    filtered = _norm(gsf.accel_lpf)
+    now = length_of(imu.delta_vel) / imu.delta_vel_dt
+    filtered = length_of(gsf.accel_lpf)
     if not (ALIGNMENT_LOW < now < ALIGNMENT_HIGH and ALIGNMENT_LOW < filtered < ALIGNMENT_HIGH):
         return False
     quat_aligning_with_up(imu.delta_vel[0], imu.delta_vel[1], imu.delta_vel[2], gsf.q_aligned)
@@ -87,9 +87,9 @@ def align_yaw_of_attitudes(gsf):
 @kernel
 def accel_fusion_gain(gsf):
     """Tilt correction gain (1/s): full at 1 g, nought at 0.5 g and 1.5 g, or 2 g where airspeed is known."""
-    norm = _norm(gsf.accel_lpf)
+    norm = length_of(gsf.accel_lpf)
     attenuation = 2.0
-    if _knows_airspeed(gsf) and norm > ONE_G:
+    if knows_airspeed(gsf) and norm > ONE_G:
         attenuation = 1.0
     fade = 1.0 - min(attenuation * abs(norm - ONE_G) / ONE_G, 1.0)
     return TILT_GAIN * fade * fade
@@ -119,8 +119,8 @@ def _correct_rotations(gsf, imu, gain):
     turn_x, turn_y, turn_z = imu.delta_ang[0], imu.delta_ang[1], imu.delta_ang[2]
     measured_x, measured_y, measured_z = turn_x / rate_dt, turn_y / rate_dt, turn_z / rate_dt
     force_x, force_y, force_z = gsf.accel_lpf[0], gsf.accel_lpf[1], gsf.accel_lpf[2]
-    scale = gain / _norm(gsf.accel_lpf) if gain > 0.0 else 0.0
-    airspeed = gsf.true_airspeed if _knows_airspeed(gsf) else 0.0
+    scale = gain / length_of(gsf.accel_lpf) if gain > 0.0 else 0.0
+    airspeed = gsf.true_airspeed if knows_airspeed(gsf) else 0.0
     for model in range(LANES):
         bias_x, bias_y, bias_z = gsf.gyro_bias[0, model], gsf.gyro_bias[1, model], gsf.gyro_bias[2, model]
         rate_x, rate_y, rate_z = measured_x - bias_x, measured_y - bias_y, measured_z - bias_z
@@ -136,9 +136,9 @@ def _correct_rotations(gsf, imu, gain):
         tilt_z = (down_x * side - down_y * force_x) * scale
 
         learns = rate_x * rate_x + rate_y * rate_y + rate_z * rate_z < BIAS_LEARNING_SPIN_LIMIT**2
-        bias_x = _limited_bias(bias_x - tilt_x * GYRO_BIAS_GAIN * dt) if learns else bias_x
-        bias_y = _limited_bias(bias_y - tilt_y * GYRO_BIAS_GAIN * dt) if learns else bias_y
-        bias_z = _limited_bias(bias_z - tilt_z * GYRO_BIAS_GAIN * dt) if learns else bias_z
+        bias_x = limited_bias(bias_x - tilt_x * GYRO_BIAS_GAIN * dt) if learns else bias_x
+        bias_y = limited_bias(bias_y - tilt_y * GYRO_BIAS_GAIN * dt) if learns else bias_y
+        bias_z = limited_bias(bias_z - tilt_z * GYRO_BIAS_GAIN * dt) if learns else bias_z
         gsf.gyro_bias[0, model], gsf.gyro_bias[1, model], gsf.gyro_bias[2, model] = bias_x, bias_y, bias_z
 
         rotation_x = turn_x + (tilt_x - bias_x) * dt
@@ -160,15 +160,18 @@ def _rotate_a_little(gsf):
 
 
 @kernel
-def _knows_airspeed(gsf):
+def knows_airspeed(gsf):
+    """Whether a true airspeed has been given."""
     return math.isfinite(gsf.true_airspeed) and gsf.true_airspeed > 1.2e-7
 
 
 @kernel
-def _limited_bias(bias):
+def limited_bias(bias):
+    """A gyro bias (rad/s) within its limits."""
     return min(max(bias, -GYRO_BIAS_LIMIT), GYRO_BIAS_LIMIT)
 
 
 @kernel
-def _norm(v):
+def length_of(v):
+    """Length of a vector of three."""
     return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])

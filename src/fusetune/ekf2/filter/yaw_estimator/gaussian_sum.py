@@ -52,7 +52,7 @@ def fuse_gsf_velocity(gsf, vel_n, vel_e, vel_accuracy, in_air):
         look_up_yaw(gsf, model)
         update_model(gsf, model, vel_n, vel_e, vel_accuracy)
     _update_weights(gsf)
-    _combine_yaw(gsf)
+    combine_yaw(gsf)
     if not gsf.yaw_variance > 0.0 or not math.isfinite(gsf.yaw_variance):
         reset_gsf(gsf)
 
@@ -68,7 +68,7 @@ def _update_weights(gsf):
 
 
 @kernel
-def _combine_yaw(gsf):
+def combine_yaw(gsf):
     """Weighted mean direction of the yaws, and the variance of their mixture."""
     north, east = 0.0, 0.0
     for model in range(N_MODELS):

@@ -102,13 +102,13 @@ def look_up_yaw(gsf, model):
 
 
 @kernel
-def update_model(gsf, model, vel_n, vel_e, vel_accuracy):
-    """Fuse a horizontal velocity, its innovation shortened to 5 σ; the yaw correction turns the attitude, too."""
-    R = max(vel_accuracy, MIN_VELOCITY_ACCURACY) ** 2
-    P, x = gsf.P, gsf.x
-    innovation_n = x[0, model] - vel_n
-    innovation_e = x[1, model] - vel_e
+def correct_covariance(gsf, model, innovation_n, innovation_e, vel_accuracy):
+    """Correct the covariance of one model by a horizontal velocity of given accuracy (m/s).
 
+    Return the gains of its three states, a pair each (north, east), and the normalised innovation squared.
+    """
+    R = max(vel_accuracy, MIN_VELOCITY_ACCURACY) ** 2
+    P = gsf.P
     p00, p01, p02 = P[P_VN_VN, model], P[P_VN_VE, model], P[P_VN_YAW, model]
     p11, p12, p22 = P[P_VE_VE, model], P[P_VE_YAW, model], P[P_YAW_YAW, model]
     s00, s11 = p00 + R, p11 + R
@@ -131,6 +131,16 @@ def update_model(gsf, model, vel_n, vel_e, vel_accuracy):
     nis = innovation_n * (i00 * innovation_n + i01 * innovation_e) + innovation_e * (
         i01 * innovation_n + i11 * innovation_e
     )
+    return (k00, k01), (k10, k11), (k20, k21), nis
+
+
+@kernel
+def update_model(gsf, model, vel_n, vel_e, vel_accuracy):
+    """Fuse a horizontal velocity, its innovation shortened to 5 σ; the yaw correction turns the attitude, too."""
+    x = gsf.x
+    innovation_n = x[0, model] - vel_n
+    innovation_e = x[1, model] - vel_e
+    gain_n, gain_e, gain_yaw, nis = correct_covariance(gsf, model, innovation_n, innovation_e, vel_accuracy)
     if nis > NIS_LIMIT:
         shrink = math.sqrt(NIS_LIMIT / nis)
         innovation_n *= shrink
@@ -139,9 +149,9 @@ def update_model(gsf, model, vel_n, vel_e, vel_accuracy):
     gsf.nis[model] = nis
     gsf.innovation[0, model], gsf.innovation[1, model] = innovation_n, innovation_e
 
-    yaw_correction = -(k20 * innovation_n + k21 * innovation_e)
-    x[0, model] -= k00 * innovation_n + k01 * innovation_e
-    x[1, model] -= k10 * innovation_n + k11 * innovation_e
+    yaw_correction = -(gain_yaw[0] * innovation_n + gain_yaw[1] * innovation_e)
+    x[0, model] -= gain_n[0] * innovation_n + gain_n[1] * innovation_e
+    x[1, model] -= gain_e[0] * innovation_n + gain_e[1] * innovation_e
     x[2, model] = wrap_pi(x[2, model] + yaw_correction)
     turn = rotation_vector_to_quat(0.0, 0.0, yaw_correction)
     w, i, j, k = quat_product(turn, attitude(gsf, model))

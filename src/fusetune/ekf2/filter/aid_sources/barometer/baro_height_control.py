@@ -16,7 +16,10 @@ from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
     stop_height_source,
     update_height_bias,
 )
-from fusetune.ekf2.filter.common.aid_source_status import reset_aid_source_status_zero_innovation
+from fusetune.ekf2.filter.common.aid_source_status import (
+    forget_aid_source_status,
+    reset_aid_source_status_zero_innovation,
+)
 from fusetune.ekf2.filter.common.conditions import is_height_reset_required, is_vertical_velocity_aiding_active
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO
 from fusetune.ekf2.filter.common.timing import (
@@ -29,8 +32,12 @@ from fusetune.ekf2.filter.common.timing import (
 from fusetune.ekf2.filter.position_fusion import fuse_vertical_position, update_vertical_position_aid_status
 from fusetune.ekf2.filter.resets.origin_resets import initialise_altitude_to
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_vertical_velocity_to_zero
+from fusetune.ekf2.releases.by_release import by_release, does
 
 BARO_LPF_ALPHA = 0.1
+
+_keeps_fault = does("starts_at_filtered_baro")
+_resets_always = does("resets_height_to_each_source")
 
 
 @kernel
@@ -62,7 +69,8 @@ def _filter_measurement(ekf, measurement):
     if baro.counter == 0 or ekf.sensors.baro.sample.reset:
         baro.lpf = measurement
         baro.counter = 1
-        ekf.cs.baro_fault = False
+        if not _keeps_fault(ekf):
+            ekf.cs.baro_fault = False
     else:
         baro.lpf += BARO_LPF_ALPHA * (measurement - baro.lpf)
         baro.counter += 1
@@ -110,12 +118,12 @@ def _fuse_or_recover(ekf, params, variance):
     fuse_vertical_position(ekf, params, aid)
     is_fusion_failing = is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX)
 
-    if is_height_reset_required(ekf) and ekf.height_sensor_ref == HEIGHT_REF_BARO:
+    if is_height_reset_required(ekf) and (ekf.height_sensor_ref == HEIGHT_REF_BARO or _resets_always(ekf)):
         ekf.events.reset_hgt_to_baro = True
         reset_altitude_to(ekf, params, ekf.baro.lpf - ekf.baro_b_est.bias, variance)
         set_bias(ekf.baro_b_est, ekf.baro.lpf - ekf.gpos_alt)
         reset_aid_source_status_zero_innovation(ekf, aid, 1)
-        if not is_vertical_velocity_aiding_active(ekf):
+        if _resets_always(ekf) or not is_vertical_velocity_aiding_active(ekf):
             reset_vertical_velocity_to_zero(ekf, params)
         aid.time_last_fuse = ekf.time_delayed_us
     elif is_fusion_failing:
@@ -131,13 +139,27 @@ def _start(ekf, params, measurement, variance):
     if int(params.EKF2_HGT_REF) == HEIGHT_REF_BARO:
         ekf.height_sensor_ref = HEIGHT_REF_BARO
         ekf.events.reset_hgt_to_baro = True
-        initialise_altitude_to(ekf, params, measurement, variance)
-        reset_bias(ekf.baro_b_est)
-        reset_aid_source_status_zero_innovation(ekf, ekf.aid.baro_hgt, 1)
+        _set_altitude(ekf, params, measurement, variance)
     else:
         set_bias(ekf.baro_b_est, ekf.baro.lpf - ekf.gpos_alt)
     start_height_source(ekf, ekf.baro_b_est, ekf.aid.baro_hgt)
     ekf.cs.baro_hgt = True
+
+
+@kernel
+def _take_measured_altitude(ekf, params, measurement, variance):
+    initialise_altitude_to(ekf, params, measurement, variance)
+    reset_bias(ekf.baro_b_est)
+    reset_aid_source_status_zero_innovation(ekf, ekf.aid.baro_hgt, 1)
+
+
+@kernel
+def _take_filtered_height(ekf, params, measurement, variance):
+    reset_altitude_to(ekf, params, ekf.baro.lpf - ekf.baro_b_est.bias, variance)
+    set_bias(ekf.baro_b_est, ekf.baro.lpf - ekf.gpos_alt)
+
+
+_set_altitude = by_release(_take_measured_altitude, "starts_at_filtered_baro", _take_filtered_height)
 
 
 @kernel
@@ -146,3 +168,4 @@ def stop_baro_hgt_fusion(ekf):
     if ekf.cs.baro_hgt:
         stop_height_source(ekf, ekf.baro_b_est, HEIGHT_REF_BARO)
         ekf.cs.baro_hgt = False
+        forget_aid_source_status(ekf, ekf.aid.baro_hgt, 1)

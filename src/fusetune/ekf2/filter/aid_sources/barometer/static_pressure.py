@@ -8,7 +8,7 @@ Mirrors `compensateBaroForDynamicPressure` of PX4 v1.16 `EKF/aid_sources/baromet
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import is_local_horizontal_position_valid
-from fusetune.ekf2.filter.common.imu_rates import body_rate
+from fusetune.ekf2.filter.common.imu_rates import lever_rate
 from fusetune.ekf2.filter.wind import air_velocity_body
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
@@ -35,7 +35,7 @@ def compensate_baro_for_dynamic_pressure(ekf, params, height):
         return height
 
     x, y, z = air_velocity_body(ekf)
-    wx, wy, wz = body_rate(ekf)
+    wx, wy, wz = lever_rate(ekf)
     # the velocity is the IMU's, less that of the IMU around the body's origin it is the body's
     ox, oy, oz = velocity_of_offset(wx, wy, wz, params.EKF2_IMU_POS_X, params.EKF2_IMU_POS_Y, params.EKF2_IMU_POS_Z)
     return height + static_pressure_height_correction(params, x - ox, y - oy, z - oz)

@@ -45,6 +45,10 @@ GNSS_TRUST = np.dtype([*fields("?", "passed", "fault", "height_fault"), ("height
 """Sub-record `ekf.gnss_trust`, since v1.17: whether the latest sample passed the checks, whether position and velocity,
 or the height, count as faulty, and when the height was last rejected (µs)."""
 
+GNSS_YAW_RETRIES = np.dtype([("resets_left", "i8"), ("signed_test_ratio_lpf", "f8")], align=True)
+"""Sub-record `ekf.gnss_yaw_retries`, until v1.15: how often a heading that fails may still reset the yaw in flight, and
+its low-passed test ratio with the sign of the innovation."""
+
 GPS_CTRL_HPOS, GPS_CTRL_VPOS, GPS_CTRL_VEL, GPS_CTRL_YAW = 1, 2, 4, 8
 """Bits of EKF2_GPS_CTRL."""
 
@@ -81,7 +85,16 @@ def _forget_checks_and_result(ekf):
     ekf.gnss_trust.passed = False
 
 
-forget_checks = by_release(_forget_checks, "simplifies_gnss_checks", _forget_checks_and_result)
+@kernel
+def _keep_checks(ekf):
+    """v1.14 checks whatever arrives, whether or not it is used."""
+
+
+forget_checks = by_release(
+    by_release(_forget_checks, "simplifies_gnss_checks", _forget_checks_and_result),
+    "checks_gnss_on_arrival",
+    _keep_checks,
+)
 
 
 @kernel

@@ -3,13 +3,12 @@
 Mirrors the velocity part of PX4 v1.16 `EKF/aid_sources/gnss/gps_control.cpp`.
 """
 
-import math
-
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.antenna_offset import antenna_offset_body
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_VEL, forget_checks, have_checks_passed
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_resets import is_gnss_reset_allowed, may_start_without_reset
 from fusetune.ekf2.filter.common.aid_source_status import (
+    forget_aid_source_status,
     reset_aid_source_status_zero_innovation,
     set_axis,
     update_aid_source_status,
@@ -20,11 +19,11 @@ from fusetune.ekf2.filter.common.conditions import (
     is_horizontal_aiding_active,
     is_other_source_than,
 )
-from fusetune.ekf2.filter.common.imu_rates import body_rate
+from fusetune.ekf2.filter.common.imu_rates import lever_rate
 from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.resets.state_resets import reset_velocity_to, reset_vertical_velocity_to
-from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
+from fusetune.ekf2.filter.velocity_fusion import fuse_velocity, limit_vertical_innovation
 from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
 from fusetune.ekf2.numerics.rotations import rotate_to_earth
 from fusetune.ekf2.releases.by_release import by_release
@@ -37,7 +36,7 @@ VERTICAL_NOISE_RATIO = 1.5
 def update_gnss_velocity(ekf, params, sample):
     """Judge a velocity sample, moved from the antenna to the IMU."""
     aid = ekf.aid.gnss_vel
-    vel_n, vel_e, vel_d = _velocity_of_antenna_offset(ekf, params)
+    vel_n, vel_e, vel_d = velocity_of_antenna_offset(ekf, params)
     variance = max(sample.sacc, params.EKF2_GPS_V_NOISE, MIN_NOISE) ** 2
     _set_velocity_axis(ekf, aid, 0, sample.vel[0] - vel_n, variance)
     _set_velocity_axis(ekf, aid, 1, sample.vel[1] - vel_e, variance)
@@ -46,21 +45,32 @@ def update_gnss_velocity(ekf, params, sample):
     update_aid_source_status(ekf, aid, 3, sample.time_us, gate)
 
     # while the vertical acceleration is bad, an accurate velocity is what can still hold the height: limit, not reject
-    only_vertical_rejected = aid.test_ratio[2] > 1.0 and aid.test_ratio[0] < 1.0 and aid.test_ratio[1] < 1.0
     relied_on = ekf.fs.bad_acc_vertical and not ekf.sensors.gnss.withheld
-    if relied_on and only_vertical_rejected and sample.sacc < params.EKF2_REQ_SACC:
-        limit = gate * math.sqrt(aid.innovation_variance[2])
-        aid.innovation[2] = min(max(aid.innovation[2], -limit), limit)
-        aid.innovation_rejected = False
+    if relied_on and _may_be_limited(ekf, params, aid, sample):
+        limit_vertical_innovation(aid, gate)
 
 
 @kernel
-def _velocity_of_antenna_offset(ekf, params):
+def _is_vertical_rejected_alone(ekf, params, aid, sample):
+    only_vertical_rejected = aid.test_ratio[2] > 1.0 and aid.test_ratio[0] < 1.0 and aid.test_ratio[1] < 1.0
+    return only_vertical_rejected and sample.sacc < params.EKF2_REQ_SACC
+
+
+@kernel
+def _is_rejected(ekf, params, aid, sample):
+    return aid.innovation_rejected
+
+
+_may_be_limited = by_release(_is_vertical_rejected_alone, "limits_climb_of_all_rejected", _is_rejected)
+
+
+@kernel
+def velocity_of_antenna_offset(ekf, params):
     """Velocity (m/s, NED) of the antenna relative to the IMU, from the rotation rate."""
     x, y, z = antenna_offset_body(params)
     if x == 0.0 and y == 0.0 and z == 0.0:
         return 0.0, 0.0, 0.0
-    wx, wy, wz = body_rate(ekf)
+    wx, wy, wz = lever_rate(ekf)
     vx, vy, vz = velocity_of_offset(wx, wy, wz, x, y, z)
     return rotate_to_earth(ekf.R_to_earth, vx, vy, vz)
 
@@ -89,14 +99,19 @@ def _control_gnss_vel_fusion(ekf, params, force_reset):
             reset_vertical_velocity_to(ekf, params, aid.observation[2], aid.observation_variance[2])
     elif continuing and have_checks_passed(ekf):
         ekf.events.starting_gps_fusion = True
-        # another source of horizontal aiding makes a reset unnecessary, unless the yaw has only now become known
-        if (
-            not is_horizontal_aiding_active(ekf)
-            or is_timed_out(ekf, ekf.time_last_hor_vel_fuse, RESET_TIMEOUT_MAX)
-            or not ekf.cs_prev.yaw_align
-        ):
+        if needs_velocity_reset(ekf):
             reset_velocity_to_gnss(ekf, params)
         ekf.cs.gnss_vel = True
+
+
+@kernel
+def needs_velocity_reset(ekf):
+    """Whether to start with a reset: not with another source that aids, unless the yaw has only now become known."""
+    return (
+        not is_horizontal_aiding_active(ekf)
+        or is_timed_out(ekf, ekf.time_last_hor_vel_fuse, RESET_TIMEOUT_MAX)
+        or not ekf.cs_prev.yaw_align
+    )
 
 
 @kernel
@@ -151,5 +166,6 @@ def stop_gnss_vel_fusion(ekf):
     """Stop fusing velocity; with position stopped, too, the quality checks start anew."""
     if ekf.cs.gnss_vel:
         ekf.cs.gnss_vel = False
+        forget_aid_source_status(ekf, ekf.aid.gnss_vel, 3)
         if not ekf.cs.gnss_pos:
             forget_checks(ekf)

@@ -11,8 +11,10 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import is_gnss_distrusted, is_gnss_trusted
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW, have_checks_passed
 from fusetune.ekf2.filter.common.aid_source_status import (
+    forget_aid_source_status,
     reset_aid_source_status_zero_innovation,
     set_axis,
     update_aid_source_status,
@@ -31,6 +33,7 @@ from fusetune.ekf2.filter.observation_gain import multiply_covariance
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.numerics.constants import FLT_EPSILON_IN_EIGHT_DIGITS
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
+from fusetune.ekf2.releases.by_release import by_release
 
 HEADING_NOISE = 0.1
 """Least standard deviation (rad) of the observed heading."""
@@ -38,6 +41,7 @@ HEADING_NOISE = 0.1
 STEEP_BASELINE = math.cos(math.radians(30.0))
 WRONG_GYRO_BIAS_TEST_RATIO = 0.2
 GYRO_BIAS_RESET_INTERVAL = 1_000_000
+SIGNED_TEST_RATIO_ALPHA = 0.1
 
 
 @kernel
@@ -65,7 +69,7 @@ def gnss_yaw_innovation_variance(P, H, R):
 
 
 @kernel
-def control_gnss_yaw_fusion(ekf, params, sample):
+def _control_gnss_yaw_fusion(ekf, params, sample):
     """Start, continue or stop fusing the heading of a GNSS sample."""
     if int(params.EKF2_GPS_CTRL) & GPS_CTRL_YAW == 0 or ekf.cs.gnss_yaw_fault:
         stop_gnss_yaw_fusion(ekf)
@@ -76,24 +80,61 @@ def control_gnss_yaw_fusion(ekf, params, sample):
         return
 
     update_gnss_yaw(ekf, params, sample)
-    continuing = ekf.cs.tilt_align
-    if ekf.cs.gnss_yaw:
-        if continuing:
-            _continue_gnss_yaw(ekf, params, sample)
-        else:
-            stop_gnss_yaw_fusion(ekf)
-        return
-    if (
+    continuing = _may_continue(ekf)
+    starting = (
         continuing
-        and have_checks_passed(ekf)
+        and _may_start(ekf)
         and not ekf.gnss.intermittent
         and is_newest_sample_recent(ekf, ekf.sensors.gnss.newest_yaw_time_us, 2 * GNSS_YAW_MAX_INTERVAL)
-    ):
+    )
+    if ekf.cs.gnss_yaw:
+        if continuing:
+            _continue_gnss_yaw(ekf, params, sample, starting)
+        else:
+            stop_gnss_yaw_fusion(ekf)
+    elif starting:
         _start_gnss_yaw(ekf, params, sample)
 
 
 @kernel
-def _continue_gnss_yaw(ekf, params, sample):
+def _control_and_give_up_alignment(ekf, params, sample):
+    """As v1.15's, but on the ground the alignment is lost whenever the heading has stopped in this update."""
+    _control_gnss_yaw_fusion(ekf, params, sample)
+    if not ekf.cs.in_air and not ekf.cs.gnss_yaw and ekf.cs_prev.gnss_yaw:
+        ekf.cs.yaw_align = False
+
+
+control_gnss_yaw_fusion = by_release(_control_gnss_yaw_fusion, "checks_gnss_on_arrival", _control_and_give_up_alignment)
+
+
+@kernel
+def _is_levelled(ekf):
+    return ekf.cs.tilt_align
+
+
+@kernel
+def _is_not_distrusted(ekf):
+    return not is_gnss_distrusted(ekf)
+
+
+_may_continue = by_release(_is_levelled, "checks_gnss_on_arrival", _is_not_distrusted)
+
+
+@kernel
+def _have_checks_passed(ekf):
+    return have_checks_passed(ekf)
+
+
+@kernel
+def _is_levelled_and_trusted(ekf):
+    return ekf.cs.tilt_align and is_gnss_trusted(ekf)
+
+
+_may_start = by_release(_have_checks_passed, "checks_gnss_on_arrival", _is_levelled_and_trusted)
+
+
+@kernel
+def _fuse_or_stop_gnss_yaw(ekf, params, sample, may_start):
     fuse_gnss_yaw(ekf, params, sample.yaw_offset)
     if is_timed_out(ekf, ekf.aid.gnss_yaw.time_last_fuse, RESET_TIMEOUT_MAX):
         stop_gnss_yaw_fusion(ekf)
@@ -103,7 +144,59 @@ def _continue_gnss_yaw(ekf, params, sample):
 
 
 @kernel
-def _start_gnss_yaw(ekf, params, sample):
+def _fuse_or_retry_gnss_yaw(ekf, params, sample, may_start):
+    """Fuse; once it has failed for long the yaw is reset, in flight a single time, before the heading is given up."""
+    retries = ekf.gnss_yaw_retries
+    fuse_gnss_yaw(ekf, params, sample.yaw_offset)
+    if not is_timed_out(ekf, ekf.aid.gnss_yaw.time_last_fuse, RESET_TIMEOUT_MAX):
+        return
+    if retries.resets_left > 0:
+        _reset_and_forget_ratio(ekf, params, sample)
+        if ekf.cs.in_air:
+            retries.resets_left -= 1
+    else:
+        ekf.cs.gnss_yaw_fault = ekf.cs.gnss_yaw_fault or may_start
+        stop_gnss_yaw_fusion(ekf)
+
+
+_continue_gnss_yaw = by_release(_fuse_or_stop_gnss_yaw, "retries_gnss_yaw", _fuse_or_retry_gnss_yaw)
+
+
+@kernel
+def _reset_and_forget_ratio(ekf, params, sample):
+    done = reset_yaw_to_gnss(ekf, params, sample.yaw, sample.yaw_offset)
+    if done:
+        ekf.aid.gnss_yaw.time_last_fuse = ekf.time_delayed_us
+        ekf.gnss_yaw_retries.signed_test_ratio_lpf = 0.0
+    return done
+
+
+@kernel
+def _start_with_reset(ekf, params, sample):
+    if _reset_and_forget_ratio(ekf, params, sample):
+        _make_room_for_gnss_yaw(ekf, params)
+        ekf.cs.gnss_yaw = True
+        ekf.cs.yaw_align = True
+        ekf.gnss_yaw_retries.resets_left = 1
+
+
+@kernel
+def _leave_mag(ekf, params):
+    """v1.15's magnetometer gives way by itself."""
+
+
+@kernel
+def _stop_mag(ekf, params):
+    ekf.cs.mag_dec = False
+    ekf.cs.mag_hdg = False
+    ekf.cs.mag_3d = False
+
+
+_make_room_for_gnss_yaw = by_release(_leave_mag, "checks_gnss_on_arrival", _stop_mag)
+
+
+@kernel
+def _start_in_agreement(ekf, params, sample):
     if not ekf.cs.in_air or not ekf.cs.yaw_align or not is_north_east_aiding_active(ekf):
         if reset_yaw_to_gnss(ekf, params, sample.yaw, sample.yaw_offset):
             reset_aid_source_status_zero_innovation(ekf, ekf.aid.gnss_yaw, 1)
@@ -113,6 +206,9 @@ def _start_gnss_yaw(ekf, params, sample):
         # in flight with a known heading: wait until both agree
         ekf.cs.gnss_yaw = True
         fuse_gnss_yaw(ekf, params, sample.yaw_offset)
+
+
+_start_gnss_yaw = by_release(_start_in_agreement, "retries_gnss_yaw", _start_with_reset)
 
 
 @kernel
@@ -155,7 +251,7 @@ def fuse_gnss_yaw(ekf, params, yaw_offset):
     ekf.reject.yaw = False
 
     if (
-        abs(aid.test_ratio_filtered[0]) > WRONG_GYRO_BIAS_TEST_RATIO
+        abs(_signed_test_ratio(ekf)) > WRONG_GYRO_BIAS_TEST_RATIO
         and not ekf.cs.in_air
         and is_timed_out(ekf, aid.time_last_fuse, GYRO_BIAS_RESET_INTERVAL)
     ):
@@ -173,6 +269,23 @@ def fuse_gnss_yaw(ekf, params, yaw_offset):
 
 
 @kernel
+def _ratio_of_status(ekf):
+    return ekf.aid.gnss_yaw.test_ratio_filtered[0]
+
+
+@kernel
+def _ratio_of_fused(ekf):
+    """Low-passed over the headings that are fused."""
+    aid, retries = ekf.aid.gnss_yaw, ekf.gnss_yaw_retries
+    ratio = np.sign(aid.innovation[0]) * aid.test_ratio[0]
+    retries.signed_test_ratio_lpf += SIGNED_TEST_RATIO_ALPHA * (ratio - retries.signed_test_ratio_lpf)
+    return retries.signed_test_ratio_lpf
+
+
+_signed_test_ratio = by_release(_ratio_of_status, "retries_gnss_yaw", _ratio_of_fused)
+
+
+@kernel
 def reset_yaw_to_gnss(ekf, params, yaw, yaw_offset):
     """Set the yaw to the receiver's heading, unless the antenna baseline is within 30° of the vertical."""
     _, _, v_d = rotate_to_earth(ekf.R_to_earth, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
@@ -183,6 +296,27 @@ def reset_yaw_to_gnss(ekf, params, yaw, yaw_offset):
 
 
 @kernel
-def stop_gnss_yaw_fusion(ekf):
-    """Stop fusing the GNSS heading."""
+def _stop(ekf):
     ekf.cs.gnss_yaw = False
+
+
+@kernel
+def _stop_and_lose_alignment(ekf):
+    if ekf.cs.gnss_yaw:
+        ekf.cs.gnss_yaw = False
+        forget_aid_source_status(ekf, ekf.aid.gnss_yaw, 1)
+        if not ekf.cs.in_air:
+            ekf.cs.yaw_align = False
+
+
+@kernel
+def _stop_and_forget(ekf):
+    if ekf.cs.gnss_yaw:
+        ekf.cs.gnss_yaw = False
+        forget_aid_source_status(ekf, ekf.aid.gnss_yaw, 1)
+
+
+stop_gnss_yaw_fusion = by_release(
+    by_release(_stop, "retries_gnss_yaw", _stop_and_lose_alignment), "checks_gnss_on_arrival", _stop_and_forget
+)
+"""Stop fusing the GNSS heading."""

@@ -46,13 +46,27 @@ def _check_gnss_sample(ekf, params, sample):
     required_us = int(params.EKF2_REQ_GPS_H * 1e6)
     if not run_gnss_checks(ekf, params, sample):
         return False
-    if not is_timed_out(ekf, gnss.last_fail_us, max(MIN_PASSING_TIME_US, required_us // 10)):
+    if not is_timed_out(ekf, gnss.last_fail_us, _passing_time_us(ekf, required_us)):
         return False
     if is_timed_out(ekf, gnss.last_fail_us, required_us):
         if not gnss.checks_passed:
             ekf.events.gps_checks_passed = True
         gnss.checks_passed = True
     return True
+
+
+@kernel
+def _tenth_or_second(ekf, required_us):
+    return max(MIN_PASSING_TIME_US, required_us // 10)
+
+
+@kernel
+def _half(ekf, required_us):
+    return required_us // 2
+
+
+_passing_time_us = by_release(_tenth_or_second, "waits_half_health_time", _half)
+"""How long the checks must have passed before a sample is used."""
 
 
 @kernel
@@ -136,8 +150,7 @@ def run_gnss_checks(ekf, params, sample):
     """Judge one sample by the enabled checks and note the time of success or failure."""
     gnss = ekf.gnss
     _check_reported_quality(gnss.fail, params, sample)
-    _check_drift(ekf, params, sample)
-    _check_speed_limit(gnss.fail, params, sample)
+    _check_motion(ekf, params, sample)
     _remember_fix(gnss, sample)
     if gnss.last_fail_us == 0:
         gnss.last_fail_us = ekf.time_delayed_us
@@ -183,8 +196,14 @@ def _check_drift(ekf, params, sample):
 
 
 @kernel
+def _interval(gnss, sample):
+    """Time (s) since the last fix."""
+    return min(max((sample.time_us - gnss.prev_time_us) * 1e-6, MIN_DT_S), DRIFT_TIME_CONSTANT_S)
+
+
+@kernel
 def _filter_drift(gnss, params, sample):
-    dt = min(max((sample.time_us - gnss.prev_time_us) * 1e-6, MIN_DT_S), DRIFT_TIME_CONSTANT_S)
+    dt = _interval(gnss, sample)
     coefficient = dt / DRIFT_TIME_CONSTANT_S
     hdrift, vdrift = params.EKF2_REQ_HDRIFT, params.EKF2_REQ_VDRIFT
     h_limit, v_limit = DRIFT_LIMIT_FACTOR * hdrift, DRIFT_LIMIT_FACTOR * vdrift
@@ -219,6 +238,28 @@ def _check_speed_limit(fail, params, sample):
         fail.hspeed = True
     if abs(sample.vel[2]) > params.EKF2_VEL_LIM:
         fail.vspeed = True
+
+
+@kernel
+def _check_drift_and_limit(ekf, params, sample):
+    _check_drift(ekf, params, sample)
+    _check_speed_limit(ekf.gnss.fail, params, sample)
+
+
+@kernel
+def _check_drift_and_climb(ekf, params, sample):
+    """Drift as v1.16; the vertical speed is compared with the filter's, whether or not the vehicle moves."""
+    gnss = ekf.gnss
+    gnss.fail.spoofed = False
+    coefficient = _interval(gnss, sample) / DRIFT_TIME_CONSTANT_S
+    limit = DRIFT_LIMIT_FACTOR * params.EKF2_REQ_VDRIFT
+    difference = _low_pass(gnss.vel_d_filt, _limited(sample.vel[2] - ekf.vel[2], limit), coefficient)
+    _check_drift(ekf, params, sample)
+    gnss.vel_d_filt = difference
+    gnss.fail.vspeed = abs(difference) > params.EKF2_REQ_VDRIFT
+
+
+_check_motion = by_release(_check_drift_and_limit, "compares_gnss_climb", _check_drift_and_climb)
 
 
 @kernel

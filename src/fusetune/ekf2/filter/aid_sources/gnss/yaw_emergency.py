@@ -10,7 +10,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, GPS_CTRL_VEL
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
-from fusetune.ekf2.filter.yaw_estimator.gaussian_sum import fuse_gsf_velocity
+from fusetune.ekf2.filter.yaw_estimator.yaw_bank import fuse_yaw_bank_velocity
 from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
 
@@ -51,7 +51,7 @@ _has_yaw_been_reset = by_release(_is_yaw_reset_new, "repeats_yaw_emergency_reset
 
 
 @kernel
-def reset_yaw_to_ekf_gsf(ekf, params):
+def _reset_yaw_unless_new(ekf, params):
     """Set the yaw to the yaw estimator's, if that has converged and the yaw was not reset in this update already."""
     if not is_yaw_emergency_estimate_available(ekf):
         return False
@@ -61,6 +61,26 @@ def reset_yaw_to_ekf_gsf(ekf, params):
     ekf.cs.yaw_align = True
     ekf.events.yaw_aligned_to_imu_gps = True
     return True
+
+
+@kernel
+def _reset_yaw_and_blame(ekf, params):
+    """As v1.15's, in any update, with the blame that v1.15 lays in flight alone, for one of magnetometer and GNSS."""
+    if not is_yaw_emergency_estimate_available(ekf):
+        return False
+    reset_quat_state_yaw(ekf, params, ekf.gsf.yaw, ekf.gsf.yaw_variance)
+    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+    ekf.cs.yaw_align = True
+    if ekf.cs.mag_hdg or ekf.cs.mag_3d:
+        ekf.cs.mag_fault = True
+    elif ekf.cs.gnss_yaw:
+        ekf.cs.gnss_yaw_fault = True
+    if ekf.cs.ev_yaw:
+        ekf.gnss_arrivals.inhibits_ev_yaw = True
+    return True
+
+
+reset_yaw_to_ekf_gsf = by_release(_reset_yaw_unless_new, "checks_gnss_on_arrival", _reset_yaw_and_blame)
 
 
 @kernel
@@ -100,7 +120,7 @@ def control_gnss_yaw_estimator(ekf, params):
         return
     if not (np.isfinite(aid.observation[0]) and np.isfinite(aid.observation[1])):
         return
-    fuse_gsf_velocity(ekf.gsf, aid.observation[0], aid.observation[1], accuracy, ekf.cs.in_air)
+    fuse_yaw_bank_velocity(ekf, aid.observation[0], aid.observation[1], accuracy, ekf.cs.in_air)
     uses_gnss = int(params.EKF2_GPS_CTRL) & (GPS_CTRL_VEL | GPS_CTRL_HPOS) != 0
     if uses_gnss and not ekf.cs.yaw_align and ekf.cs.tilt_align:
         reset_yaw_to_ekf_gsf(ekf, params)

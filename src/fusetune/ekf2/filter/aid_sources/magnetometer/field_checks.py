@@ -8,11 +8,19 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import CHECK_FORCE_WMM, CHECK_INCLINATION, CHECK_STRENGTH
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
+    CHECK_FORCE_WMM,
+    CHECK_INCLINATION,
+    CHECK_STRENGTH,
+    MAG_TYPE_3D,
+    MAG_TYPE_INDOOR,
+)
+from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.numerics.rotations import component_in_earth, wrap_pi
 
 AVERAGE_STRENGTH = 0.45
 AVERAGE_STRENGTH_TOLERANCE = 0.40
+MODEL_STRENGTH_TOLERANCE = 0.2
 MIN_HEALTH_TIME = 1_000_000
 NORM_FLOOR = 1e-4
 
@@ -29,6 +37,22 @@ def is_strength_wrong(ekf, params):
     if np.isfinite(ekf.mag.wmm_strength):
         return not is_measured_matching_expected(ekf.mag.strength, ekf.mag.wmm_strength, params.EKF2_MAG_CHK_STR)
     return not is_measured_matching_expected(ekf.mag.strength, AVERAGE_STRENGTH, AVERAGE_STRENGTH_TOLERANCE)
+
+
+@kernel
+def is_strength_disturbed(ekf, params, field):
+    """Whether a field (3,) is off the model's strength by more than 0.2 Gauss, or beyond what the Earth has anywhere.
+
+    Mirrors `magFieldStrengthDisturbed` of PX4 v1.14 `EKF/mag_control.cpp`.
+    """
+    mag_type = int(params.EKF2_MAG_TYPE)
+    is_asked = mag_type <= MAG_TYPE_3D or (mag_type == MAG_TYPE_INDOOR and is_north_east_aiding_active(ekf))
+    if int(params.EKF2_MAG_CHECK) == 0 or not is_asked:
+        return False
+    strength = math.sqrt(field[0] ** 2 + field[1] ** 2 + field[2] ** 2)
+    if np.isfinite(ekf.mag.wmm_strength):
+        return not is_measured_matching_expected(strength, ekf.mag.wmm_strength, MODEL_STRENGTH_TOLERANCE)
+    return not is_measured_matching_expected(strength, AVERAGE_STRENGTH, AVERAGE_STRENGTH_TOLERANCE)
 
 
 @kernel

@@ -15,10 +15,9 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_limits import reference_declination
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     R_MAG_MIN,
-    compute_mag_h,
     fuse_declination,
     fuse_mag,
-    predict_mag,
+    judge_mag,
     recover_from_bad_mag_covariance,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import (
@@ -29,7 +28,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     MAG_TYPE_AUTO,
     MAG_TYPE_HEADING,
     MAG_TYPE_NONE,
-    clear_mag_faults,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import (
     check_hagl_yaw_reset_req,
@@ -37,11 +35,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import (
     stop_mag_fusion,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import synthesise_z
-from fusetune.ekf2.filter.common.aid_source_status import (
-    forget_aid_source_status,
-    set_axis,
-    update_aid_source_status,
-)
+from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.common.timing import (
@@ -50,7 +44,6 @@ from fusetune.ekf2.filter.common.timing import (
     is_newest_sample_recent,
     is_timed_out,
 )
-from fusetune.ekf2.filter.observation_gain import compute_innovation_variance
 
 MAG_LPF_ALPHA = 0.1
 MIN_SAMPLES_TO_START = 5
@@ -144,7 +137,7 @@ def _judge_withheld(ekf, params, sample):
     synthesise_z(ekf, params, sample)
     if ekf.cs.mag:
         ekf.aid.mag.timestamp_sample = ekf.sensors.mag.sample.time_us
-        _judge(ekf, params, sample)
+        judge_mag(ekf, params, sample, _mag_variance(params))
 
 
 @kernel
@@ -223,29 +216,17 @@ def _fuse_known_declination(ekf, params, deviation):
 
 
 @kernel
-def _judge(ekf, params, sample):
-    """Innovations and variances of all axes, and their verdict; return whether every variance is above the noise."""
-    H, aid = ekf.scratch.H, ekf.aid.mag
-    R_mag = max(params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE, R_MAG_MIN)
-    sound = True
-    for axis in range(3):
-        compute_mag_h(ekf, axis, H)
-        variance = compute_innovation_variance(ekf, H, R_mag)
-        innovation = predict_mag(ekf, axis) - sample[axis]
-        if axis == 2 and ekf.cs.synthetic_mag_z:
-            innovation = 0.0
-        set_axis(aid, axis, sample[axis] - ekf.mag_B[axis], R_mag, innovation, variance)
-        sound = sound and variance >= R_mag
-    # a sample that starts the fusion has no time, and is not told
-    update_aid_source_status(ekf, aid, 3, aid.timestamp_sample, max(params.EKF2_MAG_GATE, 1.0))
-    clear_mag_faults(ekf)
-    return sound
+def _mag_variance(params):
+    """Variance (Gauss²) of an axis."""
+    return max(params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE, R_MAG_MIN)
 
 
 @kernel
 def _judge_and_fuse(ekf, params, sample, update_all_states, update_tilt):
-    if _judge(ekf, params, sample):
-        fuse_mag(ekf, params, sample, ekf.aid.mag.observation_variance[0], update_all_states, update_tilt)
+    """A sample that starts the fusion has no time, and is not told."""
+    R_mag = _mag_variance(params)
+    if judge_mag(ekf, params, sample, R_mag):
+        fuse_mag(ekf, params, sample, R_mag, update_all_states, update_tilt)
     else:
         recover_from_bad_mag_covariance(ekf, params, update_all_states)
 

@@ -4,7 +4,8 @@
 was aligned in flight). `cs.mag_3d`: every state. `cs.mag_dec`: declination too, as nothing else fixes north.
 
 Mirrors PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`, of which `field_checks.py`, `mag_heading.py`,
-`mag_resets.py` and `world_field.py` hold the parts. How v1.15 does stands in `mag_3d_control.py`.
+`mag_resets.py` and `world_field.py` hold the parts. How v1.15 does stands in `mag_3d_control.py`, v1.14 in
+`mag_mode_control.py`, v1.13 in `mag_inhibition_control.py`.
 """
 
 import math
@@ -21,6 +22,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     predict_mag,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import check_mag_heading_consistency
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_inhibition_control import control_mag_with_inhibition
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     MAG_TYPE_AUTO,
     MAG_TYPE_HEADING,
@@ -28,6 +30,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     MAG_TYPE_NONE,
     clear_mag_faults,
 )
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_mode_control import control_mag_modes
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import (
     check_hagl_yaw_reset_req,
     reset_mag_states,
@@ -292,5 +295,13 @@ def _start(ekf, params, sample, R_mag, wmm_updated):
         ekf.cs.mag = True
 
 
-control_mag_fusion = by_release(_control_mag_fusion, "counts_field_resets", control_mag_3d_fusion)
+control_mag_fusion = by_release(
+    by_release(
+        by_release(_control_mag_fusion, "counts_field_resets", control_mag_3d_fusion),
+        "fuses_heading_or_field",
+        control_mag_modes,
+    ),
+    "clears_field_whenever_stopped",
+    control_mag_with_inhibition,
+)
 """Process the magnetometer sample that reached the fusion time horizon, if any."""

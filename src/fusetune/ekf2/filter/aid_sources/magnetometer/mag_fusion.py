@@ -12,7 +12,8 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_limits import limit_field
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
-from fusetune.ekf2.filter.common.state import ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH
+from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.state import ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
 from fusetune.ekf2.filter.covariance import reset_quat_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, scale_kalman_gain
@@ -31,7 +32,7 @@ def predict_mag(ekf, axis):
 
 
 @kernel
-def compute_mag_h(ekf, axis, H):
+def _compute_mag_h(ekf, axis, H):
     """Write the observation Jacobian of one body axis into H (24,)."""
     R, field = ekf.R_to_earth, ekf.mag_I
     rx, ry, rz = R[0, axis], R[1, axis], R[2, axis]
@@ -43,6 +44,63 @@ def compute_mag_h(ekf, axis, H):
     H[MAG_EARTH + 1] = ry
     H[MAG_EARTH + 2] = rz
     H[MAG_BODY + axis] = 1.0
+
+
+@kernel
+def _compute_mag_h_by_quaternion(ekf, axis, H):
+    """As v1.16's, by the elements w and u of the quaternion: Rᵀm = (w² - |u|²) m + 2 u (u·m) - 2 w u × m."""
+    R, field, q = ekf.R_to_earth, ekf.mag_I, ekf.q
+    along = q[1] * field[0] + q[2] * field[1] + q[3] * field[2]
+    after, last = (axis + 1) % 3, (axis + 2) % 3
+    crossed = q[1 + after] * field[last] - q[1 + last] * field[after]
+    H[:] = 0.0
+    _set_quaternion_derivative(H, 0, 2.0 * (q[0] * field[axis] - crossed))
+    _set_quaternion_derivative(H, 1 + axis, 2.0 * along)
+    _set_quaternion_derivative(
+        H, 1 + after, 2.0 * (q[1 + axis] * field[after] - q[1 + after] * field[axis] - q[0] * field[last])
+    )
+    _set_quaternion_derivative(
+        H, 1 + last, 2.0 * (q[1 + axis] * field[last] - q[1 + last] * field[axis] + q[0] * field[after])
+    )
+    H[MAG_EARTH] = R[0, axis]
+    H[MAG_EARTH + 1] = R[1, axis]
+    H[MAG_EARTH + 2] = R[2, axis]
+    H[MAG_BODY + axis] = 1.0
+
+
+@kernel
+def _set_quaternion_derivative(H, element, value):
+    """Of the four elements of the quaternion, the last stands where v1.16 has the terrain."""
+    H[TERRAIN if element == 3 else ATTITUDE + element] = value
+
+
+compute_mag_h = by_release(_compute_mag_h, "fuses_heading_or_field", _compute_mag_h_by_quaternion)
+"""Write the observation Jacobian of one body axis into H (24,)."""
+
+
+@kernel
+def judge_mag(ekf, params, sample, R_mag):
+    """Innovations and variances of all axes, and their verdict, as releases before v1.16 tell them of a fused field.
+
+    What is observed is told less the body field. The time of the sample is that which the status has already.
+
+    Returns
+    -------
+    bool : whether every innovation variance is above the noise
+    """
+    H, aid = ekf.scratch.H, ekf.aid.mag
+    sound = True
+    for axis in range(3):
+        compute_mag_h(ekf, axis, H)
+        variance = compute_innovation_variance(ekf, H, R_mag)
+        innovation = predict_mag(ekf, axis) - sample[axis]
+        if axis == 2 and ekf.cs.synthetic_mag_z:
+            innovation = 0.0
+        set_axis(aid, axis, sample[axis] - ekf.mag_B[axis], R_mag, innovation, variance)
+        sound = sound and variance >= R_mag
+    update_aid_source_status(ekf, aid, 3, aid.timestamp_sample, max(params.EKF2_MAG_GATE, 1.0))
+    clear_mag_faults(ekf)
+    return sound
 
 
 @kernel
@@ -71,11 +129,33 @@ _hold_tilt = by_release(_hold_attitude, "keeps_level_gyro_bias", _hold_attitude_
 
 
 @kernel
-def recover_from_bad_mag_covariance(ekf, params, update_all_states):
+def _recover_what_is_fused(ekf, params, update_all_states):
     """The innovation variance fell below the noise: start the covariances that made it anew."""
     if update_all_states:
         reset_quat_cov(ekf, params, params.EKF2_HEAD_NOISE)
     reset_field_covariance(ekf, params)
+
+
+@kernel
+def _recover_all(ekf, params, update_all_states):
+    """As v1.16's, with the attitude always."""
+    _recover_what_is_fused(ekf, params, True)
+
+
+recover_from_bad_mag_covariance = by_release(_recover_what_is_fused, "fuses_heading_or_field", _recover_all)
+
+
+@kernel
+def _note_heading(ekf):
+    ekf.time_last_heading_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _note_no_heading(ekf):
+    """Until v1.14 only an angle counts as a heading."""
+
+
+_note_heading_by_field = by_release(_note_heading, "fuses_heading_or_field", _note_no_heading)
 
 
 @kernel
@@ -94,6 +174,7 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
         compute_mag_h(ekf, axis, jacobians[axis])
 
     K = ekf.scratch.K
+    healthy = True
     for axis in range(3):
         if axis == 2 and ekf.cs.synthetic_mag_z:
             continue
@@ -111,14 +192,18 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
             keep_only_mag_gains(K)
         elif not update_tilt:
             _hold_tilt(ekf, K)
-        measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis])
-        limit_field(ekf, params)
+        if measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis]):
+            limit_field(ekf, params)
+        else:
+            healthy = False
 
+    if not healthy:
+        return False
     clear_mag_faults(ekf)
     aid.fused = True
     aid.time_last_fuse = ekf.time_delayed_us
     if update_all_states:
-        ekf.time_last_heading_fuse = ekf.time_delayed_us
+        _note_heading_by_field(ekf)
     return True
 
 
@@ -154,11 +239,25 @@ _hold_tilt_by_declination = by_release(_hold_nothing, "keeps_level_gyro_bias", _
 
 
 @kernel
+def _wrapped(ekf, difference):
+    return wrap_pi(difference)
+
+
+@kernel
+def _bounded(ekf, difference):
+    """No more than 0.5 rad at a time."""
+    return min(max(difference, -0.5), 0.5)
+
+
+_declination_innovation = by_release(_wrapped, "bounds_declination_innovation", _bounded)
+
+
+@kernel
 def fuse_declination(ekf, params, declination, R, update_all_states):
     """Fuse a declination (rad) of variance R (rad²) into the earth field states; return whether it was fused."""
     H = ekf.scratch.H
     predicted = compute_declination_h(ekf.mag_I, H)
-    innovation = wrap_pi(predicted - declination)
+    innovation = _declination_innovation(ekf, predicted - declination)
 
     innovation_variance = compute_innovation_variance(ekf, H, R)
     if innovation_variance < R:
@@ -170,7 +269,9 @@ def fuse_declination(ekf, params, declination, R, update_all_states):
         keep_only_mag_gains(ekf.scratch.K)
     else:
         _hold_tilt_by_declination(ekf, ekf.scratch.K)
-    measurement_update(ekf, params, R, innovation)
+    if not measurement_update(ekf, params, R, innovation):
+        ekf.fs.bad_mag_decl = True
+        return False
     limit_field(ekf, params)
     ekf.fs.bad_mag_decl = False
     return True

@@ -41,6 +41,14 @@ def field_azimuth(ekf, params, mag):
 
 
 @kernel
+def measured_heading(ekf, params, x, y, z):
+    """Heading (rad) that a body-frame field shows, as an angle from -π to π plus the declination."""
+    north, east, _ = rotate_to_earth(ekf.R_to_earth, x, y, z)
+    azimuth = wrap_pi(math.atan2(east, north) - euler_yaw(ekf.R_to_earth))
+    return get_mag_declination(ekf, params) - azimuth
+
+
+@kernel
 def _is_any(ekf, params, innovation):
     return True
 
@@ -69,6 +77,20 @@ _is_heading_told = by_release(_is_accelerating, "holds_yaw_observable", _is_yaw_
 
 
 @kernel
+def _by_gnss(ekf):
+    return is_north_east_aiding_active(ekf)
+
+
+@kernel
+def _by_gnss_or_vision(ekf):
+    return is_north_east_aiding_active(ekf) or ekf.cs.ev_pos
+
+
+is_course_told = by_release(_by_gnss, "observes_yaw_by_vision", _by_gnss_or_vision)
+"""Whether something is fused by which accelerations tell the heading."""
+
+
+@kernel
 def update_yaw_observability(ekf, params):
     """Yaw becomes observable above twice EKF2_MAG_ACCLIM (m/s²) and remains so above EKF2_MAG_ACCLIM.
 
@@ -77,7 +99,7 @@ def update_yaw_observability(ekf, params):
     history = ekf.field_history
     limit = params.EKF2_MAG_ACCLIM if history.yaw_observable else 2.0 * params.EKF2_MAG_ACCLIM
     acceleration = math.hypot(ekf.accel_horiz_lpf[0], ekf.accel_horiz_lpf[1])
-    history.yaw_observable = is_north_east_aiding_active(ekf) and acceleration > limit
+    history.yaw_observable = is_course_told(ekf) and acceleration > limit
 
 
 @kernel

@@ -3,7 +3,10 @@
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.filter.common.aid_source_status import AID_SOURCE
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
+from fusetune.ekf2.releases.by_release import by_release
 
 MAG_MEMORY = np.dtype(
     [
@@ -43,10 +46,31 @@ whether the declination was fused since the field's covariance was reset; whethe
 the heading; and how often a fusion that fails may still reset the field.
 """
 
-MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_NONE, MAG_TYPE_INIT = 0, 1, 5, 6
+MAG_MODES = np.dtype(
+    [
+        *fields("?", "yaw_reset_requested", "bias_observable", "inhibited", "inhibited_for_long", "other_yaw_before"),
+        *fields("i8", "time_last_suitable", "time_last_used", "time_turn_started", "bad_yaw_events"),
+        *fields("f8", "turn", "turn_rate_lpf", "saved_down_variance", "static_yaw"),
+        ("saved_body_variance", "f8", (3,)),
+        ("saved_horizontal_covariance", "f8", (2, 2)),
+        ("held_yaw", AID_SOURCE),
+    ],
+    align=True,
+)
+"""Sub-record `ekf.mag_modes` of releases before v1.15, which fuse either the heading or the field.
 
-DECLINATION_FROM_WMM, DECLINATION_SAVED = 1, 2
-"""Bits of EKF2_DECL_TYPE."""
+Whether the yaw is to be reset; whether the vehicle turns enough to tell the body field, and when it last moved enough
+to tell it or the heading (µs); when the magnetometer was last used (µs), and whether it may not be used, or could not
+for long; whether the yaw came from elsewhere; the turn about down since `time_turn_started` (rad) and its filtered rate
+(rad/s); variances of the field states while they are not estimated; the yaw at which the vehicle came to rest (rad, NaN
+if it did not), and what becomes of fusing that.
+"""
+
+MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_3D, MAG_TYPE_INDOOR, MAG_TYPE_NONE, MAG_TYPE_INIT = 0, 1, 2, 4, 5, 6
+"""Values of EKF2_MAG_TYPE; 2 and 4 until v1.14, 6 since v1.15."""
+
+DECLINATION_FROM_WMM, DECLINATION_SAVED, DECLINATION_FUSED = 1, 2, 4
+"""Bits of EKF2_DECL_TYPE; the last until v1.14."""
 
 CHECK_STRENGTH, CHECK_INCLINATION, CHECK_FORCE_WMM = 1, 2, 4
 """Bits of EKF2_MAG_CHECK."""
@@ -58,6 +82,20 @@ def initialise_mag_memory(mag):
     mag.wmm_declination = np.nan
     mag.wmm_inclination = np.nan
     mag.wmm_strength = np.nan
+
+
+@kernel
+def _have_no_modes(ekf):
+    """Since v1.15 there are none."""
+
+
+@kernel
+def _never_came_to_rest(ekf):
+    ekf.mag_modes.static_yaw = np.nan
+
+
+initialise_mag_modes = by_release(_have_no_modes, "fuses_heading_or_field", _never_came_to_rest)
+"""What of `ekf.mag_modes` is not zero at start."""
 
 
 @kernel

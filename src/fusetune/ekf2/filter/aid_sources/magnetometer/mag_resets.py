@@ -10,6 +10,7 @@ from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import is_yaw_emergency
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import reset_mag_heading
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import clear_heading_and_field, stop_heading_and_field
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known
 from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
@@ -80,7 +81,7 @@ def _reset_mag_states(ekf, params, mag, reset_heading):
 
 
 @kernel
-def _put_body_field(ekf, mag, turn):
+def put_body_field(ekf, mag, turn):
     """The body field explains what `mag` is more than the model's field, at a yaw that is greater by `turn` (rad)."""
     field, c, s = ekf.mag.wmm_earth_field, math.cos(turn), math.sin(turn)
     north, east = c * field[0] + s * field[1], c * field[1] - s * field[0]
@@ -98,9 +99,9 @@ def _reset_mag_states_by_yaw_estimator(ekf, params, mag, reset_heading):
     ekf.mag_B[:] = 0.0
     if is_wmm_field_known(ekf):
         if is_yaw_emergency_estimate_available(ekf):
-            _put_body_field(ekf, mag, ekf.gsf.yaw - euler_yaw(ekf.R_to_earth))
+            put_body_field(ekf, mag, ekf.gsf.yaw - euler_yaw(ekf.R_to_earth))
         elif not reset_heading and ekf.cs.yaw_align:
-            _put_body_field(ekf, mag, 0.0)
+            put_body_field(ekf, mag, 0.0)
         for axis in range(3):
             ekf.mag_I[axis] = ekf.mag.wmm_earth_field[axis]
         if reset_heading:
@@ -181,7 +182,7 @@ _forget_field = by_release(_forget_field_and_yaw, "counts_field_resets", _forget
 
 
 @kernel
-def stop_mag_fusion(ekf, params):
+def _stop_mag_fusion(ekf, params):
     """Stop using the magnetometer."""
     if not ekf.cs.mag:
         return
@@ -194,3 +195,11 @@ def stop_mag_fusion(ekf, params):
     ekf.cs.mag_hdg = False
     clear_mag_faults(ekf)
     ekf.fs.bad_mag_decl = False
+
+
+stop_mag_fusion = by_release(
+    by_release(_stop_mag_fusion, "fuses_heading_or_field", stop_heading_and_field),
+    "clears_field_whenever_stopped",
+    clear_heading_and_field,
+)
+"""Stop using the magnetometer."""

@@ -1,0 +1,105 @@
+"""GNSS until v1.14: a sample is checked, and its position projected, as it arrives and not when it is due.
+
+So it is judged by what the filter knows then, and a position that arrives before the origin is placed is zero for good.
+
+Mirrors `setGpsData` and `collect_gps` of PX4 v1.14 `EKF/estimator_interface.cpp` and `EKF/gps_checks.cpp`.
+"""
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import run_gnss_checks
+from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import is_rough_fix, place_origin
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import take_field_of_place
+from fusetune.ekf2.filter.common.earth_rate import set_earth_rate
+from fusetune.ekf2.filter.common.local_origin import project_to_local
+from fusetune.ekf2.filter.common.timing import is_timed_out
+from fusetune.ekf2.releases.by_release import by_release
+
+KEPT = 256
+"""Places of the longest buffer."""
+
+GNSS_ARRIVALS = np.dtype(
+    [
+        ("positions", "f8", (KEPT, 2)),
+        *fields("f8", "north", "east"),
+        *fields("?", "inhibits_ev_yaw", "asks_for_mag_yaw"),
+    ],
+    align=True,
+)
+"""Sub-record `ekf.gnss_arrivals`: where samples that wait were, north and east (m) of the origin; and where the one was
+that is due; whether vision may not give the yaw since GNSS has started, and whether the magnetic heading is to be
+aligned anew."""
+
+MIN_FIX_TYPE = 3
+TRUST_US = 5_000_000
+"""How long no check may fail before GNSS is trusted, or none pass before it is not."""
+
+
+@kernel
+def _wait_until_due(ekf, params, sample, slot):
+    """v1.15 looks at a sample when it is due."""
+
+
+@kernel
+def _check_and_project(ekf, params, sample, slot):
+    run_gnss_checks(ekf, params, sample)
+    ekf.gnss.checks_passed = is_timed_out(ekf, ekf.gnss.last_fail_us, int(params.EKF2_REQ_GPS_H * 1e6))
+    if not ekf.origin.valid:
+        if ekf.filter_initialised and ekf.gnss.checks_passed:
+            place_origin(ekf, sample)
+            set_earth_rate(ekf, ekf.origin.lat_rad)
+            _take_field(ekf, params, sample)
+        elif is_rough_fix(sample):
+            set_earth_rate(ekf, math.radians(sample.lat_deg))
+            _take_field(ekf, params, sample)
+
+    north, east = 0.0, 0.0
+    if ekf.origin.valid and sample.fix_type >= MIN_FIX_TYPE:
+        north, east = project_to_local(ekf, math.radians(sample.lat_deg), math.radians(sample.lon_deg))
+    positions, place = ekf.gnss_arrivals.positions, slot % KEPT
+    positions[place, 0], positions[place, 1] = north, east
+
+
+@kernel
+def _take_field(ekf, params, sample):
+    """Look the field up; when its direction is known for the first time, the magnetic heading is to be aligned anew."""
+    was_known = math.isfinite(ekf.mag.wmm_declination)
+    take_field_of_place(ekf, sample.lat_deg, sample.lon_deg)
+    if not was_known and math.isfinite(ekf.mag.wmm_declination) and int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE:
+        ekf.gnss_arrivals.asks_for_mag_yaw = True
+
+
+look_at_arrived_gnss = by_release(_wait_until_due, "checks_gnss_on_arrival", _check_and_project)
+"""What a sample, at a slot of its array, changes as it is buffered."""
+
+
+@kernel
+def _nothing_to_recall(ekf, slot):
+    """v1.15 projects a sample when it is due."""
+
+
+@kernel
+def _recall_position(ekf, slot):
+    positions, place = ekf.gnss_arrivals.positions, slot % KEPT
+    ekf.gnss_arrivals.north, ekf.gnss_arrivals.east = positions[place, 0], positions[place, 1]
+
+
+recall_arrived_gnss = by_release(_nothing_to_recall, "checks_gnss_on_arrival", _recall_position)
+"""The sample at a slot of its array is due."""
+
+
+@kernel
+def is_gnss_trusted(ekf):
+    """Whether no check has failed for 5 s."""
+    return is_timed_out(ekf, ekf.gnss.last_fail_us, TRUST_US)
+
+
+@kernel
+def is_gnss_distrusted(ekf):
+    """Whether checks have failed for 5 s."""
+    return is_timed_out(ekf, ekf.gnss.last_pass_us, TRUST_US)
