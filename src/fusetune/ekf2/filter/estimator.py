@@ -34,6 +34,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     initialise_mag_modes,
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
+from fusetune.ekf2.filter.aid_sources.optical_flow.integrated_flow import FLOW_INTEGRALS
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
@@ -134,6 +135,8 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("gnss_yaw_retries", GNSS_YAW_RETRIES))
     if does.checks_gnss_on_arrival:
         memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
+    if does.integrates_flow:
+        memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
     return marked(np.dtype(memories, align=True), release)
 
 

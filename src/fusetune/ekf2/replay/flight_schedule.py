@@ -167,13 +167,24 @@ def flight_schedule(
     told = {}
     for sensor in SENSOR_NAMES:
         delay = SENSORS[sensor].delay_parameter if sensor in SENSORS else None
-        wanted = steps(*_WANTED[sensor]) if sensor in _WANTED else ((0, 1.0),)
+        wanted = steps(*_WANTED[sensor]) if _is_asked_by_parameter(sensor, release) else ((0, 1.0),)
         if sensor == "gnss" and _told_gnss_times(inputs, release) is not None:
             delay = None
         told[sensor] = (steps(delay) if delay else ((0, 0.0),), wanted)
     memo = inputs.memo
     key = ("schedule", clock, tuple(told.values()))
     return memo.get(key, lambda: _Builder(inputs, clock).schedule(told), lambda made: _bytes(made.tables))
+
+
+def _is_asked_by_parameter(sensor: str, release: str) -> bool:
+    """Flow over a terrain that is estimated apart is asked for always: it may tell of the terrain."""
+    return sensor in _WANTED and not (sensor == "flow" and BEHAVIOURS[release].flies_flow_over_terrain)
+
+
+def _flow_times(inputs: EstimatorInputs) -> Rows:
+    """When the intervals of the flow ended, (samples,) int64."""
+    timespan = inputs.arrays.flow_limits[:, 3].astype(np.int64)
+    return np.ascontiguousarray(inputs.arrays.flow["time_us"]) + timespan // 2
 
 
 def _told_gnss_times(inputs: EstimatorInputs, release: str) -> Rows | None:
@@ -285,9 +296,11 @@ class _Builder:
         arrived = _arrived(self.inputs, name)
         times = np.ascontiguousarray(getattr(self.inputs.arrays, name)["time_us"])
         told = _told_gnss_times(self.inputs, self.clock.release) if name == "gnss" else None
+        number = SENSOR_NAMES.index(name)
         if told is not None:
             times = told
-        number = SENSOR_NAMES.index(name)
+        elif number == FLOW and BEHAVIOURS[self.clock.release].integrates_flow:
+            times = _flow_times(self.inputs)
         places = "imu_length" if number == FLOW else "observation_length"
         actions = np.zeros(2 * len(arrived), ACTION)
         count = find_actions(

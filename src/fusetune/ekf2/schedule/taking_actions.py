@@ -54,10 +54,26 @@ def take_actions(ekf, params, inputs, schedule, place, update, from_run, stop_ru
         if action.what == DUE:
             if with_due:
                 _take_due(ekf, inputs, schedule.drag, action, notes)
+                if action.sensor == FLOW:
+                    _note_interval(ekf, inputs, action)
         elif from_run <= action.run < stop_run:
             _arrive(ekf, params, inputs, schedule, action)
         place += 1
     return place
+
+
+@kernel
+def _need_no_interval(ekf, inputs, action):
+    """Since v1.15 flow is a rate."""
+
+
+@kernel
+def _note_flow_interval(ekf, inputs, action):
+    ekf.flow_interval = inputs.flow_limits[action.slot, 3] * 1e-6
+
+
+_note_interval = by_release(_need_no_interval, "integrates_flow", _note_flow_interval)
+"""Over what time (s) the flow was integrated."""
 
 
 @kernel

@@ -28,7 +28,8 @@ _leaves_declination_mode = does("clears_field_whenever_stopped")
 
 
 @kernel
-def _stop_field(ekf):
+def stop_field(ekf):
+    """Fuse the field no more; what is known of its covariance is saved."""
     if not ekf.cs.mag_3d:
         return
     save_field_covariance(ekf)
@@ -40,7 +41,8 @@ def _stop_field(ekf):
 
 
 @kernel
-def _stop_heading(ekf):
+def stop_heading(ekf):
+    """Fuse the heading no more."""
     if ekf.cs.mag_hdg:
         ekf.cs.mag_hdg = False
         ekf.fs.bad_hdg = False
@@ -49,8 +51,8 @@ def _stop_heading(ekf):
 @kernel
 def clear_heading_and_field(ekf, params):
     """Fuse neither; no field is known from now on."""
-    _stop_field(ekf)
-    _stop_heading(ekf)
+    stop_field(ekf)
+    stop_heading(ekf)
     clear_field_covariance(ekf)
 
 
@@ -64,14 +66,14 @@ def stop_heading_and_field(ekf, params):
 @kernel
 def _start_heading(ekf):
     if not ekf.cs.mag_hdg:
-        _stop_field(ekf)
+        stop_field(ekf)
         ekf.cs.mag_hdg = True
 
 
 @kernel
 def _start_field(ekf):
     if not ekf.cs.mag_3d:
-        _stop_heading(ekf)
+        stop_heading(ekf)
         restore_field_covariance(ekf)
         ekf.cs.mag_3d = True
 
