@@ -359,6 +359,21 @@ class Behaviours:
         until="v1.13",
         source="covariance.cpp",
     )
+    updates_by_jacobian: bool = _behaviour(
+        "An update takes the gain times the Jacobian times the covariance off, made symmetric, so states whose gain "
+        "was zeroed lose half of their covariances with others; the rotation matrix follows the quaternion only at the "
+        "next prediction.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.h, ekf_helper.cpp",
+    )
+    follows_flags_at_once: bool = _behaviour(
+        "What the vehicle's status and the land detector say acts as it arrives, each on its own, and not once the "
+        "horizon has come there; only the land detector tells of flying.",
+        since="v1.13",
+        until="v1.13",
+        source="../EKF2.cpp",
+    )
     selects_sources_by_mask: bool = _behaviour(
         "EKF2_AID_MASK and EKF2_HGT_MODE say which sources are asked for. v1.14 has a parameter for each.",
         since="v1.13",
@@ -563,6 +578,12 @@ class Behaviours:
         until="v1.14",
         source="mag_control.cpp, mag_fusion.cpp, zero_innovation_heading_update.cpp",
     )
+    looks_field_up_until_origin: bool = _behaviour(
+        "The magnetic model is looked up at every fix until there is an origin, and the first asks for a yaw reset.",
+        since="v1.13",
+        until="v1.14",
+        source="gps_checks.cpp",
+    )
     clears_field_whenever_stopped: bool = _behaviour(
         "A magnetometer that may not be used is passed over and a yaw held in its place in every update, not stopped; "
         "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course.",
@@ -678,11 +699,71 @@ class Behaviours:
         until="v1.15",
         source="drag_fusion.cpp",
     )
-    levers_by_measured_rate: bool = _behaviour(
-        "What turns a lever arm is the rate as the gyro measures it, with its bias.",
+    sees_terrain_in_air: bool = _behaviour(
+        "The range finder corrects the terrain in the air alone and starts with its distance; on the ground the "
+        "terrain is right below whatever is measured, so that nothing is to be reset at take-off.",
         since="v1.13",
-        until="v1.15",
-        source="gps_control.cpp, ekf_helper.cpp",
+        until="v1.14",
+        source="terrain_estimator.cpp",
+    )
+    keeps_terrain_known: bool = _behaviour(
+        "The terrain counts as known for 5 s after a sensor, or standing on the ground, has told of it, whether or not "
+        "that goes on; flow corrects it along each axis by itself.",
+        since="v1.13",
+        until="v1.13",
+        source="terrain_estimator.cpp",
+    )
+    leaves_terrain_at_height_resets: bool = _behaviour(
+        "A reset of the height does not move the terrain.",
+        since="v1.13",
+        until="v1.14",
+        source="ekf_helper.cpp",
+    )
+    integrates_flow: bool = _behaviour(
+        "Flow and its gyro are integrals, whose interval is held against the time in which the IMU was summed up; on "
+        "the ground bad flow counts as none and motion must be calm; without range for 10 s it waits. A start or a "
+        "reset of the velocity takes the last known position along.",
+        since="v1.13",
+        until="v1.14",
+        source="optical_flow_control.cpp, optflow_fusion.cpp",
+    )
+    takes_vision_rotation_unfiltered: bool = _behaviour(
+        "The rotation from the frame of vision to NED is that of the sample.",
+        since="v1.14",
+        until="v1.14",
+        source="ev_pos_control.cpp, ev_vel_control.cpp, ev_height_control.cpp",
+    )
+    follows_vision_height_by_sample: bool = _behaviour(
+        "The height bias of vision is predicted at its samples alone, over one update.",
+        since="v1.14",
+        until="v1.14",
+        source="ev_height_control.cpp",
+    )
+    gives_north_up_for_vision: bool = _behaviour(
+        "The yaw of vision in its own frame stops GNSS and magnetometer as it starts; GNSS that starts in its place "
+        "holds it back until it stops.",
+        since="v1.14",
+        until="v1.14",
+        source="ev_yaw_control.cpp, gps_control.cpp",
+    )
+    starts_airspeed_by_wind: bool = _behaviour(
+        "Airspeed that starts never sets the velocity, only a wind that is not known or whose variances add up to more "
+        "than 1 m²/s²; that is given those of a heading known to 10°.",
+        since="v1.13",
+        until="v1.14",
+        source="airspeed_fusion.cpp",
+    )
+    slips_at_speed: bool = _behaviour(
+        "Sideslip is fused above 7 m/s through the air.",
+        since="v1.13",
+        until="v1.14",
+        source="sideslip_fusion.cpp",
+    )
+    feels_drag_in_air: bool = _behaviour(
+        "Drag is judged in the air alone, and not told of.",
+        since="v1.13",
+        until="v1.14",
+        source="drag_fusion.cpp",
     )
 
 

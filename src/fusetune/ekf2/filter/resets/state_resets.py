@@ -277,6 +277,20 @@ def reset_horizontal_position_to_last_known(ekf, params):
 
 
 @kernel
+def _move_terrain_along(ekf, delta_d):
+    update_terrain_reset_status(ekf, delta_d)
+    ekf.terrain = single_precision(ekf.terrain + delta_d)
+
+
+@kernel
+def _leave_terrain(ekf, delta_d):
+    """Until v1.14 the terrain stays where it was, and its filter finds the new height."""
+
+
+_move_terrain = by_release(_move_terrain_along, "leaves_terrain_at_height_resets", _leave_terrain)
+
+
+@kernel
 def _shift_nothing(ekf, delta_d):
     """v1.16's range finder has no bias."""
 
@@ -305,8 +319,7 @@ def reset_altitude_to(ekf, params, altitude, var):
     if _is_bias_shifted(ekf, ekf.cs.gps_hgt):
         ekf.gps_hgt_b_est.bias += delta_d
     _shift_range_bias(ekf, delta_d)
-    update_terrain_reset_status(ekf, delta_d)
-    ekf.terrain = single_precision(ekf.terrain + delta_d)
+    _move_terrain(ekf, delta_d)
     ekf.time_last_hgt_fuse = ekf.time_delayed_us
 
 

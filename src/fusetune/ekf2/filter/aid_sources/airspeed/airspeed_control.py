@@ -65,7 +65,7 @@ def _use_airspeed_sample(ekf, params):
     starting_conditions_passing = (
         continuing_conditions_passing
         and is_significant
-        and (is_consistent or not ekf.cs.wind or ekf.cs.inertial_dead_reckoning)
+        and (is_consistent or not ekf.cs.wind or _may_reset_velocity(ekf))
     )
     if ekf.cs.fuse_aspd:
         if not continuing_conditions_passing:
@@ -78,7 +78,6 @@ def _use_airspeed_sample(ekf, params):
             stop_airspeed_fusion(ekf)
     elif starting_conditions_passing:
         _start_airspeed(ekf, params, is_consistent)
-        ekf.cs.wind = True
         ekf.cs.fuse_aspd = True
 
 
@@ -98,6 +97,19 @@ _may_have_airspeed = by_release(
 
 
 @kernel
+def _where_lost(ekf):
+    return ekf.cs.inertial_dead_reckoning
+
+
+@kernel
+def _never(ekf):
+    return False
+
+
+_may_reset_velocity = by_release(_where_lost, "starts_airspeed_by_wind", _never)
+
+
+@kernel
 def _reset_to_airspeed(ekf, params, is_consistent):
     """Set the velocity when dead reckoning, else an unknown wind."""
     largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
@@ -106,6 +118,7 @@ def _reset_to_airspeed(ekf, params, is_consistent):
         reset_vel_using_airspeed(ekf, params)
     elif _is_wind_free(ekf, wind_unknown):
         _reset_wind(ekf, params)
+    ekf.cs.wind = True
 
 
 @kernel
@@ -120,9 +133,23 @@ def _reset_or_fuse_airspeed(ekf, params, is_consistent):
         _reset_wind(ekf, params)
     else:
         fuse_airspeed(ekf, params)
+    ekf.cs.wind = True
 
 
-_start_airspeed = by_release(_reset_to_airspeed, "keeps_airspeed_to_wings", _reset_or_fuse_airspeed)
+@kernel
+def _reset_uncertain_wind(ekf, params, is_consistent):
+    """Airspeed never sets the velocity; a wind that is not known, or not well, is set by it."""
+    largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
+    if not ekf.cs.wind or ekf.P[WIND, WIND] + ekf.P[WIND + 1, WIND + 1] > largest:
+        ekf.cs.wind = True
+        _reset_wind(ekf, params)
+
+
+_start_airspeed = by_release(
+    by_release(_reset_to_airspeed, "keeps_airspeed_to_wings", _reset_or_fuse_airspeed),
+    "starts_airspeed_by_wind",
+    _reset_uncertain_wind,
+)
 
 
 @kernel

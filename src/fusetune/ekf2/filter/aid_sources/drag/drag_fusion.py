@@ -16,6 +16,7 @@ from fusetune.ekf2.filter.common.imu_rates import accel_bias
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, scale_kalman_gain
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, start_wind
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL, FLT_EPSILON
 from fusetune.ekf2.releases.by_release import by_release
@@ -77,6 +78,21 @@ def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
     H[VELOCITY + 2] = az + through_speed * z
     H[WIND] = -H[VELOCITY]
     H[WIND + 1] = -H[VELOCITY + 1]
+    # the air along the axis grows with the square of the quaternion's norm, and so does the speed
+    complete_attitude_jacobian(ekf, H, 2.0 * b[axis] * (own + bluff * speed))
+
+
+@kernel
+def _at_any_time(ekf):
+    return True
+
+
+@kernel
+def _while_flying(ekf):
+    return ekf.cs.in_air and not ekf.cs.fake_pos
+
+
+_is_drag_judged = by_release(_at_any_time, "feels_drag_in_air", _while_flying)
 
 
 @kernel
@@ -87,7 +103,7 @@ def control_drag_fusion(ekf, params):
     if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
         ekf.cs.wind = True
         start_wind(ekf)
-    if ekf.sensors.drag.data_ready:
+    if ekf.sensors.drag.data_ready and _is_drag_judged(ekf):
         _fuse_drag(ekf, params)
 
 
@@ -109,10 +125,9 @@ def _fuse_drag(ekf, params):
     )
     for axis in range(2):
         compute_drag_jacobian(ekf, axis, rho, inverse_bcoef[axis], mcoef, drag.H[axis])
-    bias = accel_bias(ekf)
     both_fused = True
     for axis in range(2):
-        measured = ekf.sensors.drag.sample.accel_xy[axis] - bias[axis]
+        measured = ekf.sensors.drag.sample.accel_xy[axis] - accel_bias(ekf)[axis]
         innovation = predicted[axis] - measured
         innovation_variance = compute_innovation_variance(ekf, drag.H[axis], R_acc)
         set_axis(aid, axis, measured, R_acc, innovation, innovation_variance)

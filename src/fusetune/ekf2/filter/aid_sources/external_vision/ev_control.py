@@ -24,6 +24,7 @@ from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import predict_
 from fusetune.ekf2.filter.common.core_memory import POSITION_REF_EV
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_EV
 from fusetune.ekf2.filter.common.timing import EV_MAX_INTERVAL, is_newest_sample_recent, is_timed_out
+from fusetune.ekf2.releases.by_release import by_release
 
 
 @kernel
@@ -48,11 +49,24 @@ def _are_starting_conditions_passing(ekf, minimum_quality):
 
 
 @kernel
+def _predict_at_every_update(ekf):
+    predict_height_bias(ekf, ekf.ev_hgt_b_est, HEIGHT_REF_EV, ekf.dt_ekf_avg)
+
+
+@kernel
+def _predict_later(ekf):
+    """Only where a sample comes."""
+
+
+_predict_height_bias = by_release(_predict_at_every_update, "follows_vision_height_by_sample", _predict_later)
+
+
+@kernel
 def control_external_vision_fusion(ekf, params):
     """Use the external vision sample due now, if there is one; stop when none has come for two intervals."""
     ev, sample = ekf.ev, ekf.sensors.ev.sample
     predict_position_bias(ekf, ekf.ev_pos_b_est, POSITION_REF_EV, ekf.dt_ekf_avg)
-    predict_height_bias(ekf, ekf.ev_hgt_b_est, HEIGHT_REF_EV, ekf.dt_ekf_avg)
+    _predict_height_bias(ekf)
     if ekf.sensors.ev.data_ready:
         _assume_missing_frames(sample)
         minimum_quality = int(params.EKF2_EV_QMIN)

@@ -1,7 +1,12 @@
 """Which control of optical flow a release has."""
 
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_over_terrain import control_flow_over_terrain
+from fusetune.ekf2.filter.aid_sources.optical_flow.integrated_flow import control_integrated_flow
 from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_control import control_optical_flow_fusion
 from fusetune.ekf2.releases.by_release import by_release
 
-control_flow_fusion = by_release(control_optical_flow_fusion, "flies_flow_over_terrain", control_flow_over_terrain)
+control_flow_fusion = by_release(
+    by_release(control_optical_flow_fusion, "flies_flow_over_terrain", control_flow_over_terrain),
+    "integrates_flow",
+    control_integrated_flow,
+)

@@ -31,6 +31,7 @@ from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, RESET_TIMEOUT
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.filter.resets.state_resets import reset_horizontal_velocity_to, reset_local_horizontal_position_to
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 
@@ -123,6 +124,7 @@ def compute_flow_jacobian_at(ekf, axis, distance, H):
     H[VELOCITY] = scale * bx
     H[VELOCITY + 1] = scale * by
     H[VELOCITY + 2] = scale * bz
+    complete_attitude_jacobian(ekf, H, 2.0 * scale * (bx * v[0] + by * v[1] + bz * v[2]))
 
 
 @kernel

@@ -14,12 +14,14 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_wind_cov
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, fuse_into_wind, reset_wind_to_zero
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.releases.by_release import by_release
 
 FUSION_INTERVAL_US = 150_000
 FORWARD_SPEED_EPSILON = 1e-3
+LEAST_AIR_SPEED = 7.0
 MIN_NOISE = 0.01
 
 
@@ -105,6 +107,7 @@ def compute_sideslip_jacobian(ekf, H):
     H[VELOCITY + 2] = ez
     H[WIND] = -ex
     H[WIND + 1] = -ey
+    complete_attitude_jacobian(ekf, H, 0.0)
 
 
 @kernel
@@ -141,13 +144,28 @@ def _fuse_or_start_wind(ekf, params):
 
 
 @kernel
+def _at_any_speed(ekf):
+    return True
+
+
+@kernel
+def _above_least_speed(ekf):
+    north, east, _ = air_velocity(ekf)
+    return math.hypot(north, east) > LEAST_AIR_SPEED
+
+
+_is_fast_enough = by_release(_at_any_speed, "slips_at_speed", _above_least_speed)
+
+
+@kernel
 def _start_wind_and_fuse(ekf, params):
     """The innovation is the one of before the wind's start."""
     if not ekf.cs.wind:
         ekf.cs.wind = True
         ekf.aid.sideslip.time_last_fuse = ekf.time_delayed_us
         reset_wind_to_zero(ekf)
-    _fuse_sideslip(ekf, params)
+    if _is_fast_enough(ekf):
+        _fuse_sideslip(ekf, params)
 
 
 _use_sideslip = by_release(_fuse_or_start_wind, "starts_wind_at_zero", _start_wind_and_fuse)
