@@ -365,6 +365,19 @@ def test_range_tells_a_height_or_a_distance(release, old):
     assert asked(height_control._range_innovation, it) == (0.5 if old else -0.5)
 
 
+@pytest.mark.parametrize(("release", "old"), OLD_AND_NEW)
+def test_vertical_acceleration_is_doubted_for_10_s_until_v1_15(release, old):
+    it = flying(release)
+    it.ekf["fs"]["bad_acc_vertical"] = True
+    it.ekf["time_bad_vert_accel"] = START_US
+    set_time(it.ekf, START_US + 9_900_000)
+    height_control.check_vertical_acceleration_health(it.ekf)
+    assert it.ekf["fs"]["bad_acc_vertical"] == old
+    set_time(it.ekf, START_US + 10_100_000)
+    height_control.check_vertical_acceleration_health(it.ekf)
+    assert not it.ekf["fs"]["bad_acc_vertical"]
+
+
 # fake position
 
 

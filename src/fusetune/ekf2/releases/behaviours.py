@@ -449,6 +449,12 @@ class Behaviours:
         until="v1.15",
         source="baro_height_control.cpp",
     )
+    doubts_vertical_acceleration_for_10_s: bool = _behaviour(
+        "Vertical acceleration counts as bad for 10 s after it was last found so. v1.16 forgives it after 3 s.",
+        since="v1.13",
+        until="v1.15",
+        source="common.h, height_control.cpp",
+    )
     fakes_one_kind_of_position: bool = _behaviour(
         "There is one fake position, which starts by dead reckoning, is fused like any position, and protected from "
         "extremes alone. v1.16 tells one that is valid, at rest, from another.",
@@ -556,12 +562,6 @@ class Behaviours:
         since="v1.13",
         until="v1.14",
         source="mag_control.cpp, mag_fusion.cpp, zero_innovation_heading_update.cpp",
-    )
-    looks_field_up_until_origin: bool = _behaviour(
-        "The magnetic model is looked up at every fix until there is an origin, and the first asks for a yaw reset.",
-        since="v1.13",
-        until="v1.14",
-        source="gps_checks.cpp",
     )
     clears_field_whenever_stopped: bool = _behaviour(
         "A magnetometer that may not be used is passed over and a yaw held in its place in every update, not stopped; "

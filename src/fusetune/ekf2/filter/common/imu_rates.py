@@ -81,9 +81,3 @@ def _corrected(delta, dt, bias):
 
 lever_rate = by_release(body_rate, "levers_by_measured_rate", measured_rate)
 """Rotation rate (rad/s, FRD) that moves what sits away from the IMU."""
-
-
-@kernel
-def gyro_bias_rate(ekf):
-    """Bias of the gyro (rad/s, FRD)."""
-    return ekf.gyro_bias[0], ekf.gyro_bias[1], ekf.gyro_bias[2]

@@ -25,14 +25,13 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_velocity import (
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion, stop_gnss_yaw_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.gps_control import has_yaw_failed, should_reset_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import reset_yaw_to_ekf_gsf
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.conditions import is_other_source_of_horizontal_aiding_than
 from fusetune.ekf2.filter.common.timing import GNSS_MAX_INTERVAL, is_newest_sample_recent
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
 from fusetune.ekf2.filter.yaw_estimator.matrix_bank import run_matrix_bank_in_air, tell_matrix_bank_velocity
 
-MAG_TYPE_3D = 2
 LONGEST_SILENCE_US = 10_000_000
 LONGEST_SILENCE_WITH_OTHERS_US = 1_000_000
 

@@ -27,13 +27,12 @@ GNSS_ARRIVALS = np.dtype(
     [
         ("positions", "f8", (KEPT, 2)),
         *fields("f8", "north", "east"),
-        *fields("?", "inhibits_ev_yaw", "asks_for_mag_yaw"),
+        ("inhibits_ev_yaw", "?"),
     ],
     align=True,
 )
 """Sub-record `ekf.gnss_arrivals`: where samples that wait were, north and east (m) of the origin; and where the one was
-that is due; whether vision may not give the yaw since GNSS has started, and whether the magnetic heading is to be
-aligned anew."""
+that is due; whether vision may not give the yaw since GNSS has started."""
 
 MIN_FIX_TYPE = 3
 TRUST_US = 5_000_000
@@ -71,7 +70,7 @@ def _take_field(ekf, params, sample):
     was_known = math.isfinite(ekf.mag.wmm_declination)
     take_field_of_place(ekf, sample.lat_deg, sample.lon_deg)
     if not was_known and math.isfinite(ekf.mag.wmm_declination) and int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE:
-        ekf.gnss_arrivals.asks_for_mag_yaw = True
+        ekf.mag_modes.yaw_reset_requested = True
 
 
 look_at_arrived_gnss = by_release(_wait_until_due, "checks_gnss_on_arrival", _check_and_project)

@@ -13,6 +13,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import is_gnss_distrusted, is_gnss_trusted
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW, have_checks_passed
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import stop_field, stop_heading
 from fusetune.ekf2.filter.common.aid_source_status import (
     forget_aid_source_status,
     reset_aid_source_status_zero_innovation,
@@ -188,8 +189,8 @@ def _leave_mag(ekf, params):
 @kernel
 def _stop_mag(ekf, params):
     ekf.cs.mag_dec = False
-    ekf.cs.mag_hdg = False
-    ekf.cs.mag_3d = False
+    stop_heading(ekf)
+    stop_field(ekf)
 
 
 _make_room_for_gnss_yaw = by_release(_leave_mag, "checks_gnss_on_arrival", _stop_mag)

@@ -81,7 +81,7 @@ def _take_sample(ekf, params):
     if arrived.reset or mag.counter == 0:
         ekf.mag_B[:] = 0.0
         reset_mag_bias_cov(ekf, params)
-        ekf.mag_modes.saved_body_variance[:] = 0.0
+        ekf.quaternion.kept_field_bias_var[:] = 0.0
         ekf.cs.mag_fault = False
         for axis in range(3):
             mag.lpf[axis] = sample[axis]
