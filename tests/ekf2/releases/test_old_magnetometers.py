@@ -26,6 +26,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer import (
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH, TERRAIN
+from fusetune.ekf2.filter.quaternion_core import quaternion_prediction
 from fusetune.ekf2.numerics import world_magnetic_model_table as table
 
 V113, V114, V115, V116 = "v1.13", "v1.14", "v1.15", "v1.16"
@@ -310,17 +311,27 @@ def test_older_field_jacobian_is_by_the_quaternion(release):
         np.testing.assert_array_equal(H[MAG_BODY : MAG_BODY + 3], np.eye(3)[axis])
 
 
+def follow_turn(it: Flying, turn: float, dt: float) -> None:
+    """Predict a turn about down (rad) in an interval (s), level."""
+    it.ekf["scratch"]["quat_before"][:3] = 0.0, 0.0, turn
+    it.ekf["imu_delayed"]["delta_ang_dt"] = dt
+    quaternion_prediction.follow_turn(it.ekf)
+
+
 def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covariance_is_kept():
     it = flying(V114, EKF2_MAG_TYPE=0.0, EKF2_MAG_ACCLIM=0.5)
     it.params["EKF2_MAG_YAWLIM"] = 0.2
-    turned, P = it.ekf["quaternion"], it.ekf["P"]
+    modes, P = it.ekf["mag_modes"], it.ekf["P"]
     it.ekf["cs"]["mag_aligned_in_flight"] = True
     mag_modes.select_mode(it.ekf, it.params)
     assert it.ekf["cs"]["mag_hdg"]
-    turned["yaw_rate_lpf"] = 0.25
-    turned["kept_field_bias_var"][:] = 1e-4, 2e-4, 3e-4
-    turned["kept_field_var"][:] = 5e-4, 6e-4, 4e-4
-    turned["kept_field_ne_cov"] = 1e-5
+    # turning at 0.25 rad/s for a second, then at 0.12: 0.95^n of the filter is left after n steps
+    for _ in range(100):
+        follow_turn(it, 0.0025, 0.01)
+    assert modes["turn_rate_lpf"] == pytest.approx(0.25 * (1.0 - 0.95**100))
+    modes["saved_body_variance"][:] = 1e-4, 2e-4, 3e-4
+    modes["saved_down_variance"] = 4e-4
+    modes["saved_horizontal_covariance"][:] = [[5e-4, 1e-5], [1e-5, 6e-4]]
     mag_modes.select_mode(it.ekf, it.params)
     assert it.ekf["cs"]["mag_3d"]
     assert not it.ekf["cs"]["mag_hdg"]
@@ -328,10 +339,10 @@ def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covarian
     expected[0, 1] = expected[1, 0] = 1e-5
     np.testing.assert_array_equal(P[MAG_EARTH : MAG_BODY + 3, MAG_EARTH : MAG_BODY + 3], expected)
     assert not P[:MAG_EARTH, MAG_EARTH : MAG_BODY + 3].any()
-    # turning on at half the limit of 0.2 rad/s suffices, and for 2 s what was
     for rate, fused in ((0.12, True), (0.08, True), (0.08, False)):
         set_time(it.ekf, int(it.ekf["time_delayed_us"]) + 1_900_000)
-        turned["yaw_change"], turned["yaw_rate_lpf"] = rate * 1.9, rate
+        follow_turn(it, rate * 1.9, 1.9)
+        modes["turn_rate_lpf"] = rate
         mag_modes.select_mode(it.ekf, it.params)
         assert bool(it.ekf["cs"]["mag_3d"]) == fused
 
@@ -363,6 +374,17 @@ def test_the_strength_is_checked_within_a_fifth_of_a_gauss_of_the_model(strength
     assert not field_checks.is_strength_disturbed(it.ekf, it.params, field)
     it.params["EKF2_MAG_CHECK"], it.params["EKF2_MAG_TYPE"] = 1.0, 4.0
     assert not field_checks.is_strength_disturbed(it.ekf, it.params, field)
+
+
+def test_every_rough_fix_is_looked_up_until_v1_14_and_the_first_asks_for_the_yaw():
+    ekf = flying(V114).ekf
+    assert not world_field.look_field_up_by_fix(ekf, fix(47.4, 8.5), False)
+    assert world_field.look_field_up_by_fix(ekf, fix(47.4, 8.5), True)
+    assert ekf["mag_modes"]["yaw_reset_requested"]
+    first, ekf["mag_modes"]["yaw_reset_requested"] = float(ekf["mag"]["wmm_declination"]), False
+    assert world_field.look_field_up_by_fix(ekf, fix(47.4, 8.6), True)
+    assert ekf["mag"]["wmm_declination"] != first
+    assert not ekf["mag_modes"]["yaw_reset_requested"]
 
 
 def test_v1_14_follows_the_field_while_it_levels():

@@ -12,9 +12,8 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import run_gnss_checks
-from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import is_rough_fix, place_origin
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import take_field_of_place
+from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import place_origin
+from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import look_field_up_by_fix
 from fusetune.ekf2.filter.common.earth_rate import set_earth_rate
 from fusetune.ekf2.filter.common.local_origin import project_to_local
 from fusetune.ekf2.filter.common.timing import is_timed_out
@@ -27,7 +26,7 @@ GNSS_ARRIVALS = np.dtype(
     [
         ("positions", "f8", (KEPT, 2)),
         *fields("f8", "north", "east"),
-        ("inhibits_ev_yaw", "?"),
+        *fields("?", "inhibits_ev_yaw", "asks_for_mag_yaw"),
     ],
     align=True,
 )
@@ -51,26 +50,16 @@ def _check_and_project(ekf, params, sample, slot):
     if not ekf.origin.valid:
         if ekf.filter_initialised and ekf.gnss.checks_passed:
             place_origin(ekf, sample)
+            look_field_up_by_fix(ekf, sample, True)
             set_earth_rate(ekf, ekf.origin.lat_rad)
-            _take_field(ekf, params, sample)
-        elif is_rough_fix(sample):
+        elif look_field_up_by_fix(ekf, sample, True):
             set_earth_rate(ekf, math.radians(sample.lat_deg))
-            _take_field(ekf, params, sample)
 
     north, east = 0.0, 0.0
     if ekf.origin.valid and sample.fix_type >= MIN_FIX_TYPE:
         north, east = project_to_local(ekf, math.radians(sample.lat_deg), math.radians(sample.lon_deg))
     positions, place = ekf.gnss_arrivals.positions, slot % KEPT
     positions[place, 0], positions[place, 1] = north, east
-
-
-@kernel
-def _take_field(ekf, params, sample):
-    """Look the field up; when its direction is known for the first time, the magnetic heading is to be aligned anew."""
-    was_known = math.isfinite(ekf.mag.wmm_declination)
-    take_field_of_place(ekf, sample.lat_deg, sample.lon_deg)
-    if not was_known and math.isfinite(ekf.mag.wmm_declination) and int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE:
-        ekf.mag_modes.yaw_reset_requested = True
 
 
 look_at_arrived_gnss = by_release(_wait_until_due, "checks_gnss_on_arrival", _check_and_project)

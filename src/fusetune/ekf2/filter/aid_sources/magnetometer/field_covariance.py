@@ -1,15 +1,12 @@
-"""Covariance of the field states at their start.
+"""Covariance of the field states at their start and, until v1.14, while they are not estimated.
 
-Mirrors `resetMagCov` of PX4 v1.15 `EKF/covariance.cpp`, which v1.16 has for earth and body field apart, and
-`clearMagCov` of PX4 v1.14; how that keeps it while the field is not estimated stands in
-`quaternion_core/field_covariance.py`.
+Mirrors `resetMagCov`, `clearMagCov`, `saveMagCovData` and `loadMagCovData` of PX4 v1.14 `EKF/covariance.cpp` and
+`EKF/ekf_helper.cpp`; v1.16 has `resetMagCov` for earth and body field apart.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.common.covariance_blocks import zero_covariance_block
-from fusetune.ekf2.filter.common.state import MAG_EARTH
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
-from fusetune.ekf2.filter.quaternion_core.field_covariance import reset_field_covariance as reset_kept_field_covariance
+from fusetune.ekf2.filter.quaternion_core.field_covariance import save_field_covariance, zero_field_covariance
 from fusetune.ekf2.releases.by_release import by_release
 
 
@@ -27,16 +24,17 @@ def _reset_both_and_forget_declination(ekf, params):
 
 
 @kernel
-def _reset_or_keep(ekf, params):
-    """While the field is not fused, its covariance is for when it will be."""
-    reset_kept_field_covariance(ekf, params)
-    ekf.field_history.declination_fused = False
+def _reset_both_or_save(ekf, params):
+    """As v1.15; while the field is not fused the covariance is for when it will be."""
+    _reset_both_and_forget_declination(ekf, params)
+    if not ekf.cs.mag_3d:
+        save_field_covariance(ekf)
 
 
 reset_field_covariance = by_release(
     by_release(_reset_both, "limits_declination", _reset_both_and_forget_declination),
-    "adds_quaternion_errors",
-    _reset_or_keep,
+    "fuses_heading_or_field",
+    _reset_both_or_save,
 )
 """Forget what is known of earth and body field."""
 
@@ -44,5 +42,5 @@ reset_field_covariance = by_release(
 @kernel
 def clear_field_covariance(ekf):
     """The field states are not estimated, and their declination is not known when they will be."""
-    zero_covariance_block(ekf, MAG_EARTH, 6)
+    zero_field_covariance(ekf)
     ekf.field_history.declination_fused = False

@@ -85,7 +85,7 @@ def _take_sample(ekf, params):
         ekf.mag_B[:] = 0.0
         reset_mag_bias_cov(ekf, params)
         for axis in range(3):
-            ekf.quaternion.kept_field_bias_var[axis] = mag_variance(params)
+            ekf.mag_modes.saved_body_variance[axis] = mag_variance(params)
     filter_mag_sample(ekf)
     synthesise_z(ekf, params, ekf.sensors.mag.sample.mag)
     ekf.cs.mag_field_disturbed = is_strength_disturbed(ekf, params, ekf.sensors.mag.sample.mag)

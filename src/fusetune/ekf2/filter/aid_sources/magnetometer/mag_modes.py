@@ -17,9 +17,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     clear_mag_faults,
 )
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
-from fusetune.ekf2.filter.common.covariance_blocks import zero_covariance_block
-from fusetune.ekf2.filter.common.state import MAG_EARTH
-from fusetune.ekf2.filter.quaternion_core.field_covariance import keep_field_covariance, restore_field_covariance
+from fusetune.ekf2.filter.quaternion_core.field_covariance import restore_field_covariance, save_field_covariance
 from fusetune.ekf2.releases.by_release import does
 
 SUITABLE_FOR_US = 2_000_000
@@ -34,7 +32,7 @@ def stop_field(ekf):
     """Fuse the field no more; what is known of its covariance is saved."""
     if not ekf.cs.mag_3d:
         return
-    keep_field_covariance(ekf)
+    save_field_covariance(ekf)
     ekf.cs.mag_3d = False
     if not _leaves_declination_mode(ekf):
         ekf.cs.mag_dec = False
@@ -76,7 +74,6 @@ def _start_heading(ekf):
 def _start_field(ekf):
     if not ekf.cs.mag_3d:
         stop_heading(ekf)
-        zero_covariance_block(ekf, MAG_EARTH, 6)
         restore_field_covariance(ekf)
         ekf.cs.mag_3d = True
 
@@ -107,14 +104,14 @@ def _may_fuse_field(ekf, params):
 @kernel
 def _update_bias_observability(ekf, params):
     """The body field can be told above a turn rate of EKF2_MAG_YAWLIM (rad/s), and then above half of it on average."""
-    modes, turned = ekf.mag_modes, ekf.quaternion
+    modes = ekf.mag_modes
     limit = params.EKF2_MAG_YAWLIM
     if not modes.bias_observable:
-        modes.bias_observable = abs(turned.yaw_rate_lpf) > limit
+        modes.bias_observable = abs(modes.turn_rate_lpf) > limit
     else:
         duration = (ekf.time_delayed_us - modes.time_turn_started) * 1e-6
-        modes.bias_observable = abs(turned.yaw_change) > SUSTAINED_SHARE * limit * duration
-    turned.yaw_change = 0.0
+        modes.bias_observable = abs(modes.turn) > SUSTAINED_SHARE * limit * duration
+    modes.turn = 0.0
     modes.time_turn_started = ekf.time_delayed_us
 
 

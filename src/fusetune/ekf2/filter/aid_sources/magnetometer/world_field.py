@@ -140,7 +140,7 @@ def take_field_of_place(ekf, latitude_deg, longitude_deg):
 
 
 @kernel
-def look_field_up_by_fix(ekf, sample, is_usable):
+def _look_up_every_second(ekf, sample, is_usable):
     """Look the field up at a GNSS fix, once a second; keep the known one unless a direction differs by 1°.
 
     Parameters
@@ -168,6 +168,24 @@ def look_field_up_by_fix(ekf, sample, is_usable):
     if not is_kept:
         take_field_of_place(ekf, sample.lat_deg, sample.lon_deg)
     return True
+
+
+@kernel
+def _look_up_until_origin(ekf, sample, is_usable):
+    """Know the field of every rough fix until there is an origin, and then of that fix; the first resets the yaw.
+
+    Mirrors `collect_gps` of PX4 v1.14 `EKF/gps_checks.cpp`.
+    """
+    if not (is_usable and sample.fix_type >= ROUGH_FIX_TYPE and sample.hacc < ROUGH_FIX_ACCURACY):
+        return False
+    if not np.isfinite(ekf.mag.wmm_declination):
+        ekf.mag_modes.yaw_reset_requested = True
+    take_field_of_place(ekf, sample.lat_deg, sample.lon_deg)
+    return True
+
+
+look_field_up_by_fix = by_release(_look_up_every_second, "looks_field_up_until_origin", _look_up_until_origin)
+"""Look the field up at a GNSS fix (`sample`) that `is_usable`, if it is due; True if the fix was used."""
 
 
 @kernel
