@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from tests.ekf2.releases.test_named_behaviours import Flying, asked, flying
 
-from fusetune.ekf2.feed.longest_delay import longest_delay_ms
 from fusetune.ekf2.filter import (
     bias_inhibition,
     covariance,
@@ -30,6 +29,7 @@ from fusetune.ekf2.filter.quaternion_core import attitude_jacobians, quaternion_
 from fusetune.ekf2.filter.quaternion_core.core_memory import Q3
 from fusetune.ekf2.filter.resets import state_resets
 from fusetune.ekf2.numerics.rotations import quat_to_dcm
+from fusetune.ekf2.schedule.longest_delay import longest_delay_ms
 
 V113, V114, V115 = "v1.13", "v1.14", "v1.15"
 QUATERNION = [0, 1, 2, Q3]
@@ -323,7 +323,7 @@ def test_the_start_adds_what_a_heading_is_uncertain_by(release, heading):
     assert np.isclose(asked(covariance.tilt_variance, it), 2.0 * tilt)
     assert np.isclose(asked(covariance.yaw_variance, it), tilt + heading)
     assert np.isclose(it.ekf["P"][GYRO_BIAS, GYRO_BIAS], (it.params["EKF2_GBIAS_INIT"] * 0.01) ** 2)
-    assert np.isclose(it.ekf["quaternion"]["kept_field_bias_var"][0], it.params["EKF2_MAG_NOISE"] ** 2)
+    assert np.isclose(it.ekf["mag_modes"]["saved_body_variance"][0], it.params["EKF2_MAG_NOISE"] ** 2)
 
 
 def test_gravity_is_observed_as_an_acceleration(it):

@@ -58,6 +58,8 @@ from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
 from fusetune.ekf2.filter.quaternion_core.core_memory import QUATERNION_CORE, initialise_quaternion_core
+from fusetune.ekf2.filter.quaternion_core.quaternion_start import add_heading_uncertainty
+from fusetune.ekf2.filter.sample_start import start_by_angles_and_field
 from fusetune.ekf2.filter.terrain_filter.terrain_filter import run_terrain_filter, start_terrain_filter
 from fusetune.ekf2.filter.terrain_filter.terrain_memory import TERRAIN_FILTER
 from fusetune.ekf2.filter.wind import WIND_MEMORY
@@ -186,8 +188,9 @@ def initialise_estimator(ekf, params):
 
 
 @kernel
-def _level_filter(ekf, params, specific_force):
+def _level_filter(ekf, params, levelling):
     """Start the filter: level it by the specific force (m/s², body), the attitude that it measures at rest."""
+    specific_force = levelling.accel
     quat_aligning_with_up(specific_force[0], specific_force[1], specific_force[2], ekf.q)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
     initialise_covariance(ekf, params)
@@ -197,14 +200,33 @@ def _level_filter(ekf, params, specific_force):
 
 
 @kernel
-def _level_filter_and_remember(ekf, params, specific_force):
+def _level_filter_and_remember(ekf, params, levelling):
     """As v1.16, with the low-passed specific force kept."""
     for axis in range(3):
-        ekf.levelling.specific_force[axis] = specific_force[axis]
-    _level_filter(ekf, params, specific_force)
+        ekf.levelling.specific_force[axis] = levelling.accel[axis]
+    _level_filter(ekf, params, levelling)
 
 
-level_filter = by_release(_level_filter, "levels_at_the_horizon", _level_filter_and_remember)
+@kernel
+def _start_with_samples(ekf, params, levelling):
+    """Start with tilt, heading and the barometer's height."""
+    start_by_angles_and_field(ekf, params, levelling)
+    initialise_covariance(ekf, params)
+    add_heading_uncertainty(ekf, params)
+    start_terrain_filter(ekf, params)
+    ekf.time_last_hgt_fuse = ekf.time_delayed_us
+    ekf.time_last_hor_pos_fuse = ekf.time_delayed_us
+    ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+    align_output_predictor(ekf)
+    ekf.filter_initialised = True
+
+
+level_filter = by_release(
+    by_release(_level_filter, "levels_at_the_horizon", _level_filter_and_remember),
+    "starts_with_samples",
+    _start_with_samples,
+)
+"""Start the filter by what LEVELLING holds: the tilt by the specific force; in v1.13 also heading and height."""
 
 
 @kernel

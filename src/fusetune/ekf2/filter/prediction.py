@@ -22,7 +22,7 @@ from fusetune.ekf2.filter.common.imu_rates import accel_bias, gyro_bias
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
 from fusetune.ekf2.filter.measurement_update import constrain_covariance
 from fusetune.ekf2.filter.quaternion_core.quaternion_limits import limit_states
-from fusetune.ekf2.filter.quaternion_core.quaternion_prediction import note_turn, predict_quaternion_covariance
+from fusetune.ekf2.filter.quaternion_core.quaternion_prediction import follow_turn, predict_quaternion_covariance
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.rotations import (
     component_in_body,
@@ -298,7 +298,7 @@ def _finish_nothing(ekf, params):
 @kernel
 def _finish_by_params(ekf, params):
     limit_states(ekf, params.EKF2_GYR_B_LIM, params.EKF2_ABL_LIM)
-    note_turn(ekf)
+    follow_turn(ekf)
     ekf.quaternion.mean_dt = ekf.dt_ekf_avg
 
 

@@ -359,6 +359,21 @@ class Behaviours:
         until="v1.13",
         source="covariance.cpp",
     )
+    updates_by_jacobian: bool = _behaviour(
+        "An update takes the gain times the Jacobian times the covariance off, made symmetric, so states whose gain "
+        "was zeroed lose half of their covariances with others; the rotation matrix follows the quaternion only at the "
+        "next prediction.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.h, ekf_helper.cpp",
+    )
+    follows_flags_at_once: bool = _behaviour(
+        "What the vehicle's status and the land detector say acts as it arrives, each on its own, and not once the "
+        "horizon has come there; only the land detector tells of flying.",
+        since="v1.13",
+        until="v1.13",
+        source="../EKF2.cpp",
+    )
     selects_sources_by_mask: bool = _behaviour(
         "EKF2_AID_MASK and EKF2_HGT_MODE say which sources are asked for. v1.14 has a parameter for each.",
         since="v1.13",

@@ -10,6 +10,7 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import apply_antenna_yaw_offset, apply_vision_noise
 from fusetune.ekf2.feed.sensors import SENSOR_MEMORIES
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import look_at_arrived_gnss, recall_arrived_gnss
+from fusetune.ekf2.filter.common.conditions import follow_system_flags_at_once
 from fusetune.ekf2.releases.by_release import by_release
 from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.sensor_actions import BUFFERED, DUE
@@ -166,7 +167,20 @@ def _take_due(ekf, inputs, drag, action, notes):
     elif sensor == DRAG:
         _take(sensors.drag, drag, action)
     else:
-        _take(sensors.system_flags, inputs.system_flags, action)
+        _take_flags(ekf, inputs, action)
+
+
+@kernel
+def _keep_flags_for_control(ekf, inputs, action):
+    _take(ekf.sensors.system_flags, inputs.system_flags, action)
+
+
+@kernel
+def _follow_flags(ekf, inputs, action):
+    follow_system_flags_at_once(ekf, inputs.system_flags[action.slot])
+
+
+_take_flags = by_release(_keep_flags_for_control, "follows_flags_at_once", _follow_flags)
 
 
 @kernel

@@ -229,3 +229,16 @@ def set_gnd_effect(ekf):
     """Note that rotor downwash near the ground may be raising the static pressure."""
     ekf.cs.gnd_effect = True
     ekf.time_last_gnd_effect_on = ekf.time_delayed_us
+
+
+@kernel
+def follow_system_flags_at_once(ekf, flags):
+    """Apply what arrived of the vehicle's status or of the land detector; times are noted as flying begins or ends."""
+    if flags.status_is_new:
+        ekf.cs.fixed_wing = flags.is_fixed_wing
+    if flags.land_is_new:
+        ekf.cs.vehicle_at_rest = flags.at_rest
+        if flags.gnd_effect:
+            set_gnd_effect(ekf)
+        if flags.in_air != ekf.cs.in_air:
+            set_in_air_status(ekf, flags.in_air)

@@ -16,10 +16,7 @@ QUATERNION_CORE = np.dtype(
     [
         *fields("f8", "mean_dt", "innovation_variance"),
         *fields("f8", "kept_gyro_bias_var", "kept_accel_bias_var", "mean_force", shape=(3,)),
-        *fields("f8", "yaw_change", "yaw_rate_lpf"),
         ("time_accel_bias_passed", "i8"),
-        *fields("f8", "kept_field_var", "kept_field_bias_var", shape=(3,)),
-        ("kept_field_ne_cov", "f8"),
         ("gains", "f8", (3, ERROR_STATE_SIZE)),
     ],
     align=True,
@@ -28,9 +25,8 @@ QUATERNION_CORE = np.dtype(
 
 `mean_dt` (s) is the mean interval by which biases are scaled now; `innovation_variance` that by which the present gain
 was divided; `kept_…_bias_var` what the variances of a bias were when its learning was stopped; `mean_force` the
-low-passed specific force (m/s², body); `yaw_change` (rad) and `yaw_rate_lpf` (rad/s) turn about the vertical;
-`kept_field_…` the covariance of the field while it is not estimated; `gains` those of axes that are fused one after the
-other but computed at once.
+low-passed specific force (m/s², body); `time_accel_bias_passed` when the accelerometer's bias was last beyond doubt
+(µs); `gains` those of axes that are fused one after the other but computed at once.
 """
 
 

@@ -5,14 +5,14 @@ forces symmetry, the covariance is symmetric here: every update writes both halv
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.accel_bias_check import (
+from fusetune.ekf2.filter.common import state
+from fusetune.ekf2.filter.common.accel_bias_doubt import (
     DOUBT_BEFORE_RESET_US,
     SHARE_OF_LIMIT,
     contradicts_height,
     contradicts_vertical_velocity,
     down_accel_bias,
 )
-from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.covariance_blocks import uncorrelate_block, zero_covariance_block
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.quaternion_core.core_memory import Q3

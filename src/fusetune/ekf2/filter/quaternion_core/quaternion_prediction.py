@@ -23,6 +23,7 @@ MOST_FIELD_VARIANCE = 0.1
 MOST_WIND_VARIANCE = 1.0
 MOST_POSITION_VARIANCE = 1e4
 WIND_NOISE_HEIGHT_RATE_SCALER = 0.5
+TURN_RATE_LPF_ALPHA = 0.05
 
 
 @kernel
@@ -61,12 +62,12 @@ def _filter_height_rate(ekf, dt):
 
 
 @kernel
-def note_turn(ekf):
+def follow_turn(ekf):
     """Sum and low-pass the turn about the vertical, of `ekf.scratch.quat_before` (rad, body), after the state moved."""
-    R, turn, core = ekf.R_to_earth, ekf.scratch.quat_before, ekf.quaternion
-    yaw = turn[0] * R[2, 0] + turn[1] * R[2, 1] + turn[2] * R[2, 2]
-    core.yaw_change += yaw
-    core.yaw_rate_lpf = 0.95 * core.yaw_rate_lpf + 0.05 * yaw / ekf.imu_delayed.delta_ang_dt
+    R, turn, modes = ekf.R_to_earth, ekf.scratch.quat_before, ekf.mag_modes
+    about_down = turn[0] * R[2, 0] + turn[1] * R[2, 1] + turn[2] * R[2, 2]
+    modes.turn += about_down
+    modes.turn_rate_lpf += TURN_RATE_LPF_ALPHA * (about_down / ekf.imu_delayed.delta_ang_dt - modes.turn_rate_lpf)
 
 
 @kernel

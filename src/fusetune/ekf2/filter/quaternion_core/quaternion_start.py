@@ -6,7 +6,7 @@ Mirrors `initialiseCovariance` and `resetQuatCov` of PX4 v1.14 `EKF/covariance.c
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.covariance_blocks import reset_covariance_block, uncorrelate_set_variance_vector
-from fusetune.ekf2.filter.quaternion_core.field_covariance import reset_field_covariance
+from fusetune.ekf2.filter.quaternion_core.field_covariance import save_field_covariance
 from fusetune.ekf2.filter.quaternion_core.quaternion_covariance import add_yaw_variance, set_quaternion_covariance
 from fusetune.ekf2.releases.by_release import does
 
@@ -56,5 +56,7 @@ def initialise_quaternion_covariance(ekf, params):
     for i in range(3):
         core.kept_gyro_bias_var[i] = gyro
         core.kept_accel_bias_var[i] = accel
-    reset_field_covariance(ekf, params)
+    reset_covariance_block(ekf, state.MAG_EARTH, 6, params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE)
+    ekf.field_history.declination_fused = False
+    save_field_covariance(ekf)
     reset_covariance_block(ekf, state.WIND, 2, INITIAL_WIND_VARIANCE)

@@ -7,11 +7,7 @@ Mirrors the starts and stops of PX4 v1.14 `EKF/mag_control.cpp`.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import (
-    clear_field_covariance,
-    restore_field_covariance,
-    save_field_covariance,
-)
+from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import clear_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import update_yaw_observability
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     DECLINATION_FUSED,
@@ -21,11 +17,11 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     clear_mag_faults,
 )
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.quaternion_core.field_covariance import restore_field_covariance, save_field_covariance
 from fusetune.ekf2.releases.by_release import does
 
 SUITABLE_FOR_US = 2_000_000
 SUSTAINED_SHARE = 0.5
-TURN_RATE_LPF_ALPHA = 0.05
 
 
 _leaves_declination_mode = does("clears_field_whenever_stopped")
@@ -117,14 +113,6 @@ def _update_bias_observability(ekf, params):
         modes.bias_observable = abs(modes.turn) > SUSTAINED_SHARE * limit * duration
     modes.turn = 0.0
     modes.time_turn_started = ekf.time_delayed_us
-
-
-@kernel
-def follow_turn(ekf, turn, dt):
-    """Note how much the vehicle turned about down (rad) in an interval `dt` (s)."""
-    modes = ekf.mag_modes
-    modes.turn += turn
-    modes.turn_rate_lpf += TURN_RATE_LPF_ALPHA * (turn / dt - modes.turn_rate_lpf)
 
 
 @kernel
