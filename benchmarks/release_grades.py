@@ -148,7 +148,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _summary(changes: Counter[tuple[str, str]]) -> str:
     """How often each grade was given, and to how many logs another one."""
-    before, after = Counter(), Counter()
+    before: Counter[str] = Counter()
+    after: Counter[str] = Counter()
     for (first, second), number in changes.items():
         before[first] += number
         after[second] += number

@@ -554,7 +554,7 @@ def integrated(**overrides: float) -> Flying:
     it.ekf["flow_interval"] = 0.02
     flow_of(it, 0.5, -0.25)
     it.ekf["sensors"]["flow"]["sample"]["gyro_rate"] = 0.05, 0.0, 0.0
-    integrated_flow._integrate_sample.py_func(it.ekf)
+    integrated_flow.integrate_sample.py_func(it.ekf)
     memory = it.ekf["flow_integrals"]
     memory["imu_time"] = 0.02
     memory["imu_angle"] = 0.001, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""v1.17 and main against what their own estimators computed on synthetic logs, where those are at hand."""
+"""Other releases than v1.16 against what their own estimators computed on synthetic logs, where those are at hand."""
 
 from __future__ import annotations
 

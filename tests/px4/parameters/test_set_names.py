@@ -90,6 +90,9 @@ def test_an_update_takes_defaults_along_and_leaves_what_was_set() -> None:
     assert changed["EKF2_GPS_CHECK"] == (245.0, 2047.0)
     assert changed["EKF2_REQ_FIX"] == (None, 3.0)
     assert "EKF2_TAS_GATE" not in changed
+    # back to v1.13, which has a mask and takes the height from one source: GPS alone, the barometer
+    newer = ParameterHistory({"EKF2_GPS_CTRL": 7, "EKF2_OF_CTRL": 1, "EKF2_HGT_REF": 1, "EKF2_GRAV_NOISE": 1.0})
+    assert after_update(newer, BASELINE, V1_13) == {"EKF2_AID_MASK": 1.0, "EKF2_HGT_MODE": 0.0}
     # the airframe's default is no default of the release
     airframe = ParameterHistory({"EKF2_GPS_CHECK": 245}, default_current_setup={"EKF2_GPS_CHECK": 245})
     assert after_update(airframe, V1_14, V1_17) == {}

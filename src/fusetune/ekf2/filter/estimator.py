@@ -18,6 +18,7 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_M
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
+from fusetune.ekf2.filter.aid_sources.external_vision.vision_by_mask import VISION_STEPS
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import GNSS_ARRIVALS
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import (
     GNSS_MEMORY,
@@ -137,6 +138,8 @@ def ekf_record(release: str) -> np.dtype:
         memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
     if does.integrates_flow:
         memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
+    if does.fuses_vision_by_mask:
+        memories.append(("vision_steps", VISION_STEPS))
     return marked(np.dtype(memories, align=True), release)
 
 

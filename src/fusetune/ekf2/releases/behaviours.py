@@ -765,6 +765,41 @@ class Behaviours:
         until="v1.14",
         source="drag_fusion.cpp",
     )
+    compares_range_in_slow_flight: bool = _behaviour(
+        "The range finder is held against the vertical velocity only where a multicopter does not move horizontally; "
+        "on the ground it says what it says, unless it leads.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp",
+    )
+    fuses_flow_at_once: bool = _behaviour(
+        "Flow is judged where it is fused, both axes from the covariance of before, and from its start on; the bias of "
+        "its gyro is put on the flow. It waits for a heading. The velocity is reset by the range finder's tilt.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp, optflow_fusion.cpp",
+    )
+    fuses_vision_by_mask: bool = _behaviour(
+        "EKF2_AID_MASK says what of vision is fused, and whether it is turned; beside GNSS steps of its position. "
+        "Nothing counts its resets or asks for its quality, and its velocity is as certain as it says.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp, ekf_helper.cpp",
+    )
+    judges_air_data_when_fused: bool = _behaviour(
+        "Airspeed and sideslip are judged only where they are fused: the one above 1 m/s, and started whatever it "
+        "says, the other above 7 m/s in all directions.",
+        since="v1.13",
+        until="v1.13",
+        source="airspeed_fusion.cpp, sideslip_fusion.cpp, control.cpp",
+    )
+    linearises_drag_by_force: bool = _behaviour(
+        "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
+        "force; it corrects the wind alone.",
+        since="v1.13",
+        until="v1.13",
+        source="drag_fusion.cpp",
+    )
 
 
 def _behaviours_of(release: str) -> Behaviours:

@@ -136,6 +136,23 @@ _gnss_arrives = by_release(_wait_until_due, "checks_gnss_on_arrival", _look_at_g
 
 
 @kernel
+def _apply_to_all(ekf, sample, note):
+    apply_vision_noise(sample, note)
+
+
+@kernel
+def _apply_but_to_velocity(ekf, sample, note):
+    """The variances that the sample tells of its velocity stay as they are."""
+    north, east, down = sample.velocity_var[0], sample.velocity_var[1], sample.velocity_var[2]
+    apply_vision_noise(sample, note)
+    if note.noise_mode == 0 and math.isfinite(north) and math.isfinite(east) and math.isfinite(down):
+        sample.velocity_var[0], sample.velocity_var[1], sample.velocity_var[2] = north, east, down
+
+
+_apply_noise_of_vision = by_release(_apply_to_all, "fuses_vision_by_mask", _apply_but_to_velocity)
+
+
+@kernel
 def _note_arrival(sensor, action):
     sensor.exists = True
     if action.what == BUFFERED:
@@ -159,7 +176,7 @@ def _take_due(ekf, inputs, drag, action, notes):
         _take(sensors.flow, inputs.flow, action)
     elif sensor == EV:
         _take(sensors.ev, inputs.ev, action)
-        apply_vision_noise(sensors.ev.sample, notes[place_at(notes, action.run)])
+        _apply_noise_of_vision(ekf, sensors.ev.sample, notes[place_at(notes, action.run)])
     elif sensor == AIRSPEED:
         _take(sensors.airspeed, inputs.airspeed, action)
     elif sensor == AUXVEL:

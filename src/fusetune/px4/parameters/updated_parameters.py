@@ -6,7 +6,15 @@ from collections.abc import Mapping
 
 from fusetune.px4.flight import ParameterHistory
 from fusetune.px4.parameters.complete_sets import complete
-from fusetune.px4.parameters.ekf2_parameters import as_float32, defaults_of, is_had_by, migrate
+from fusetune.px4.parameters.ekf2_parameters import (
+    ALL_PARAMETERS,
+    as_float32,
+    defaults_of,
+    is_had_by,
+    migrate,
+    older_names,
+)
+from fusetune.px4.parameters.parameter_migration import older_values
 from fusetune.px4.releases import BASELINE, Release
 
 
@@ -35,7 +43,21 @@ def after_update(history: ParameterHistory, flown: Release | None, release: Rele
         for name, value in own.items()
         if is_had_by(name, release) and name not in airframe and value == system.get(name, table.get(name))
     }
-    return {name: value for name, value in followed.items() if value != own[name]}
+    return _in_own_names(
+        {name: value for name, value in followed.items() if value != own[name]}, history, before, release
+    )
+
+
+def _in_own_names(
+    found: dict[str, float], history: ParameterHistory, flown: Release, release: Release
+) -> dict[str, float]:
+    """The same in the parameters of v1.13 where that is the release and others became of them; the nearest it has."""
+    if not older_names(release):
+        return found
+    values = complete(history.initial, {}, flown, replayed=release) | found
+    own = older_values(values, found)
+    told = {name for old in own for name in ALL_PARAMETERS[old].became}
+    return {name: value for name, value in found.items() if name not in told} | own
 
 
 def changed_by_update(

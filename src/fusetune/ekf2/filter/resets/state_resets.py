@@ -358,6 +358,21 @@ _uncorrelate_attitude = by_release(_done_already, "adds_quaternion_errors", _add
 
 
 @kernel
+def _hold_no_yaw(ekf):
+    """The yaw at which the vehicle came to rest is held by v1.14 alone, v1.13 takes it anew."""
+
+
+@kernel
+def _hold_new_yaw(ekf):
+    ekf.mag_modes.static_yaw = math.nan
+
+
+_forget_static_yaw = by_release(
+    by_release(_hold_no_yaw, "fuses_heading_or_field", _hold_new_yaw), "clears_field_whenever_stopped", _hold_no_yaw
+)
+
+
+@kernel
 def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
     _set_yaw_variance(ekf, yaw_var)
@@ -373,6 +388,7 @@ def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     quat_normalise(error)
     _propagate_quat_reset(ekf, error)
     ekf.time_last_heading_fuse = ekf.time_delayed_us
+    _forget_static_yaw(ekf)
     _turn_velocity_along(ekf, params, wrap_pi(yaw - yaw_before))
 
 

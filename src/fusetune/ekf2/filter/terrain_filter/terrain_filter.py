@@ -10,6 +10,7 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import TERRAIN_TIMEOUT
 from fusetune.ekf2.filter.common.timing import is_recent
 from fusetune.ekf2.filter.terrain_filter.terrain_by_flow import control_terrain_by_flow, stop_terrain_by_flow
+from fusetune.ekf2.filter.terrain_filter.terrain_by_flow_axes import control_terrain_by_flow_axes
 from fusetune.ekf2.filter.terrain_filter.terrain_by_range import control_terrain_by_range
 from fusetune.ekf2.filter.terrain_filter.terrain_in_air import control_terrain_in_air, stop_terrain_in_air
 from fusetune.ekf2.releases.by_release import by_release
@@ -70,6 +71,7 @@ def _go_on_at_take_off(ekf, params):
 
 
 _take_off = by_release(_start_at_take_off, "sees_terrain_in_air", _go_on_at_take_off)
+_control_by_flow = by_release(control_terrain_by_flow, "keeps_terrain_known", control_terrain_by_flow_axes)
 _control_by_range = by_release(control_terrain_by_range, "sees_terrain_in_air", control_terrain_in_air)
 
 
@@ -88,7 +90,7 @@ def _run_beside_main_filter(ekf, params):
         _take_off(ekf, params)
     _predict(ekf, params)
     _control_by_range(ekf, params)
-    control_terrain_by_flow(ekf, params)
+    _control_by_flow(ekf, params)
     _hold_on_ground(ekf, params)
     ekf.terrain = max(ekf.terrain, params.EKF2_MIN_RNG - ekf.gpos_alt)
     _note_validity(ekf)

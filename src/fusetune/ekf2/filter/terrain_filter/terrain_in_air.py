@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.terrain_filter.terrain_by_range import (
     range_variance,
     reset_terrain_to_range,
 )
+from fusetune.ekf2.releases.by_release import by_release
 
 NEVER_PUBLISHED = 0
 
@@ -73,17 +74,44 @@ def _judge(ekf, params):
     measured, variance, aid = dist_bottom(ekf.range), range_variance(ekf, params), ekf.aid.terrain_range_finder
     innovation_variance = max(ekf.terrain_filter.variance + variance, variance)
     set_axis(aid, 0, measured, variance, get_hagl(ekf) - measured, innovation_variance)
-    update_aid_source_status(ekf, aid, 1, NEVER_PUBLISHED, max(params.EKF2_RNG_GATE, 1.0))
+    update_aid_source_status(ekf, aid, 1, _time_of_row(ekf), max(params.EKF2_RNG_GATE, 1.0))
+
+
+@kernel
+def _never(ekf):
+    return NEVER_PUBLISHED
+
+
+@kernel
+def _now(ekf):
+    return ekf.time_delayed_us
+
+
+_time_of_row = by_release(_never, "keeps_terrain_known", _now)
+"""PX4 v1.14 publishes nothing of the range finder; of v1.13 the figures are those of its fusion."""
+
+
+@kernel
+def _forget_agreement(ekf):
+    aid = ekf.aid.terrain_range_finder
+    aid.innovation[0] = 0.0
+    aid.innovation_variance[0] = 0.0
+    aid.test_ratio[0] = 0.0
+    ekf.reject.hagl = False
+
+
+@kernel
+def _keep_agreement(ekf):
+    """What was found last stands."""
+
+
+_leave_agreement = by_release(_forget_agreement, "keeps_terrain_known", _keep_agreement)
 
 
 @kernel
 def stop_terrain_in_air(ekf):
-    """Leave the range finder, and forget how well it agreed."""
+    """Leave the range finder."""
     if ekf.terrain_filter.uses_range:
-        aid = ekf.aid.terrain_range_finder
-        aid.innovation[0] = 0.0
-        aid.innovation_variance[0] = 0.0
-        aid.test_ratio[0] = 0.0
-        ekf.reject.hagl = False
+        _leave_agreement(ekf)
         ekf.terrain_filter.uses_range = False
     ekf.terrain_filter.time_last_healthy_range = 0

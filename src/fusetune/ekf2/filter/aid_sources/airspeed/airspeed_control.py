@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_fusion import fuse_airspeed, update_airspeed
+from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_fusion import fuse_airspeed, predict_airspeed, update_airspeed
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_resets import (
     reset_vel_using_airspeed,
     reset_wind_using_airspeed,
@@ -17,10 +17,12 @@ from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_stat
 from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.common.timing import is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
+from fusetune.ekf2.filter.wind import is_drag_enabled
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import set_true_airspeed
 from fusetune.ekf2.releases.by_release import by_release
 
 WIND_TIMEOUT_US = 10_000_000
+LEAST_AIRSPEED = 1.0
 DATA_STOPPED_US = 1_000_000
 
 
@@ -30,7 +32,7 @@ def control_air_data_fusion(ekf, params):
     aid = ekf.aid.airspeed
     airspeed_timed_out = is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US)
     sideslip_timed_out = is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, WIND_TIMEOUT_US)
-    if ekf.cs.fake_pos or (airspeed_timed_out and sideslip_timed_out and int(params.EKF2_DRAG_CTRL) == 0):
+    if ekf.cs.fake_pos or (airspeed_timed_out and sideslip_timed_out and not is_drag_enabled(ekf, params)):
         ekf.cs.wind = False
     if ekf.cs.wind and ekf.wind.external_init:
         ekf.wind.external_init = False
@@ -39,7 +41,7 @@ def control_air_data_fusion(ekf, params):
     if params.EKF2_ARSP_THR <= 0.0:
         stop_airspeed_fusion(ekf)
     elif ekf.sensors.airspeed.data_ready:
-        _use_airspeed_sample(ekf, params)
+        _take_airspeed_sample(ekf, params)
     elif ekf.cs.fuse_aspd and not is_recent(ekf, ekf.sensors.airspeed.sample.time_us, DATA_STOPPED_US):
         stop_airspeed_fusion(ekf)
 
@@ -79,6 +81,29 @@ def _use_airspeed_sample(ekf, params):
     elif starting_conditions_passing:
         _start_airspeed(ekf, params, is_consistent)
         ekf.cs.fuse_aspd = True
+
+
+@kernel
+def _judge_where_fused(ekf, params):
+    """Judge the airspeed where it is fused, if the air is fast enough to have a direction."""
+    aid, sample = ekf.aid.airspeed, ekf.sensors.airspeed.sample
+    may_go_on = ekf.cs.in_air and ekf.cs.fixed_wing and not ekf.cs.fake_pos
+    is_significant = sample.true_airspeed > params.EKF2_ARSP_THR
+    if ekf.cs.fuse_aspd:
+        if may_go_on and is_significant and predict_airspeed(ekf) >= LEAST_AIRSPEED:
+            update_airspeed(ekf, params)
+            ekf.reject.airspeed = aid.innovation_rejected
+            fuse_airspeed(ekf, params)
+        if not may_go_on or is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US):
+            stop_airspeed_fusion(ekf)
+    elif may_go_on and is_significant:
+        if not ekf.cs.wind:
+            ekf.cs.wind = True
+            _reset_wind(ekf, params)
+        ekf.cs.fuse_aspd = True
+
+
+_take_airspeed_sample = by_release(_use_airspeed_sample, "judges_air_data_when_fused", _judge_where_fused)
 
 
 @kernel

@@ -11,6 +11,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_fusion import (
     calc_opt_flow_meas_var,
+    flow_sensor_offset_body,
     predict_flow,
     predict_flow_range,
     set_flow_rejection,
@@ -34,6 +35,8 @@ from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innova
 from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.filter.resets.state_resets import reset_horizontal_velocity_to, reset_local_horizontal_position_to
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
+from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
+from fusetune.ekf2.numerics.rotations import rotate_to_body
 
 COS_MAX_TILT = 0.7071
 RESTART_INTERVAL_US = 2_000_000
@@ -106,6 +109,16 @@ def predict_flow_of_sample(ekf, params):
     """Predicted rates (rad/s) about body X and Y for the sample at hand."""
     rate, bias = ekf.sensors.flow.sample.gyro_rate, ekf.flow.gyro_bias
     return predict_flow(ekf, params, rate[0] - bias[0], rate[1] - bias[1], rate[2] - bias[2])
+
+
+@kernel
+def predict_flow_velocity(ekf, params):
+    """Velocity (m/s) of the flow sensor along body X and Y, for the sample at hand."""
+    rate, bias = ekf.sensors.flow.sample.gyro_rate, ekf.flow.gyro_bias
+    px, py, pz = flow_sensor_offset_body(params)
+    offset_x, offset_y, _ = velocity_of_offset(bias[0] - rate[0], bias[1] - rate[1], bias[2] - rate[2], px, py, pz)
+    forward, right, _ = rotate_to_body(ekf.R_to_earth, ekf.vel[0], ekf.vel[1], ekf.vel[2])
+    return forward + offset_x, right + offset_y
 
 
 @kernel

@@ -64,12 +64,12 @@ def control_integrated_flow(ekf, params):
     if not terrain.flow_is_good or (not ekf.cs.opt_flow and not terrain.uses_flow):
         terrain.flow_is_good = ekf.sensors.flow.data_ready
         if ekf.sensors.flow.data_ready:
-            _integrate_sample(ekf)
-    _watch_motion(ekf)
+            integrate_sample(ekf)
+    watch_motion(ekf)
     _integrate_imu(ekf)
     if terrain.flow_is_good:
         _prepare_sample(ekf, params)
-        _publish_rates(ekf, memory)
+        publish_rates(ekf, memory)
         judge_flow(ekf, params, ekf.aid.optical_flow)
     if terrain.flow_is_good:
         _use_flow(ekf, params)
@@ -78,7 +78,7 @@ def control_integrated_flow(ekf, params):
 
 
 @kernel
-def _integrate_sample(ekf):
+def integrate_sample(ekf):
     """Turn the rates of the sample back into what was measured."""
     memory, sample = ekf.flow_integrals, ekf.sensors.flow.sample
     dt = ekf.flow_interval
@@ -90,7 +90,7 @@ def _integrate_sample(ekf):
 
 
 @kernel
-def _publish_rates(ekf, memory):
+def publish_rates(ekf, memory):
     """What the prediction and the observation are made of, over the interval that the sample has now."""
     sample, dt = ekf.sensors.flow.sample, memory.sample_time
     for i in range(3):
@@ -98,7 +98,7 @@ def _publish_rates(ekf, memory):
 
 
 @kernel
-def _watch_motion(ekf):
+def watch_motion(ekf):
     """On the ground, see that the vehicle is not shaken, turned too fast or tilted too far for the sensor."""
     memory, force = ekf.flow_integrals, ekf.quaternion.mean_force
     memory_time = ekf.time_delayed_us
@@ -230,7 +230,7 @@ def _is_required(ekf, params):
 
 
 @kernel
-def _is_inhibited(ekf, params):
+def is_flow_inhibited(ekf, params):
     """Whether motion on the ground, or an unknown terrain in the air, keep the flow from being used."""
     memory, now = ekf.flow_integrals, ekf.time_delayed_us
     if ekf.cs.in_air:
@@ -244,7 +244,7 @@ def _is_inhibited(ekf, params):
 
 @kernel
 def _use_flow(ekf, params):
-    enabled, inhibited = int(params.EKF2_OF_CTRL) == 1, _is_inhibited(ekf, params)
+    enabled, inhibited = int(params.EKF2_OF_CTRL) == 1, is_flow_inhibited(ekf, params)
     if not ekf.cs.opt_flow:
         if enabled and not inhibited:
             _start(ekf, params)

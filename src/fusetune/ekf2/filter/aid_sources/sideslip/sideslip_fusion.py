@@ -124,18 +124,6 @@ _may_have_sideslip = by_release(_flies_like_a_wing, "asks_airspeed_for_wings", _
 
 
 @kernel
-def control_beta_fusion(ekf, params):
-    """Fuse a sideslip of zero at regular intervals while a fixed wing, or a vehicle with airspeed, flies."""
-    ekf.cs.fuse_beta = (
-        int(params.EKF2_FUSE_BETA) != 0 and _may_have_sideslip(ekf) and ekf.cs.in_air and not ekf.cs.fake_pos
-    )
-    if ekf.cs.fuse_beta and is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
-        _update_sideslip(ekf, params)
-        ekf.reject.sideslip = ekf.aid.sideslip.innovation_rejected
-        _use_sideslip(ekf, params)
-
-
-@kernel
 def _fuse_or_start_wind(ekf, params):
     if _fuse_sideslip(ekf, params):
         ekf.cs.wind = True
@@ -212,3 +200,37 @@ def _fuse_sideslip(ekf, params):
     ekf.fs.bad_sideslip = False
     fuse_into_wind(ekf, params, aid, ekf.scratch.H, update_wind_only)
     return True
+
+
+@kernel
+def _control_by_flag(ekf, params):
+    """As v1.16's; the flag says what is configured, and what is judged is fused: above 7 m/s."""
+    ekf.cs.fuse_beta = int(params.EKF2_FUSE_BETA) == 1 and ekf.cs.fixed_wing
+    if not ekf.cs.fuse_beta or not ekf.cs.in_air or ekf.cs.fake_pos:
+        return
+    if not is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
+        return
+    if not ekf.cs.wind:
+        ekf.cs.wind = True
+        ekf.aid.sideslip.time_last_fuse = ekf.time_delayed_us
+        reset_wind_to_zero(ekf)
+    x, y, z = air_velocity(ekf)
+    if math.sqrt(x * x + y * y + z * z) > LEAST_AIR_SPEED:
+        _update_sideslip(ekf, params)
+        ekf.reject.sideslip = ekf.aid.sideslip.innovation_rejected
+        _fuse_sideslip(ekf, params)
+
+
+@kernel
+def _control_at_intervals(ekf, params):
+    """Fuse a sideslip of zero at regular intervals while a fixed wing, or a vehicle with airspeed, flies."""
+    ekf.cs.fuse_beta = (
+        int(params.EKF2_FUSE_BETA) != 0 and _may_have_sideslip(ekf) and ekf.cs.in_air and not ekf.cs.fake_pos
+    )
+    if ekf.cs.fuse_beta and is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
+        _update_sideslip(ekf, params)
+        ekf.reject.sideslip = ekf.aid.sideslip.innovation_rejected
+        _use_sideslip(ekf, params)
+
+
+control_beta_fusion = by_release(_control_at_intervals, "judges_air_data_when_fused", _control_by_flag)
