@@ -309,11 +309,17 @@ class Behaviours:
         source="ekf.h",
     )
     sizes_buffers_by_sources: bool = _behaviour(
-        "Buffers are as long as the longest delay of a source that is asked for, and the longest interval of "
-        "barometer and magnetometer. v1.16 has EKF2_DELAY_MAX.",
+        "Buffers are as long as the longest delay of a source that is asked for. v1.16 has EKF2_DELAY_MAX.",
         since="v1.13",
         until="v1.14",
-        source="estimator_interface.cpp, ../EKF2.cpp",
+        source="estimator_interface.cpp",
+    )
+    waits_for_averaged_sensors: bool = _behaviour(
+        "Buffers are as long as the longest interval of barometer and magnetometer, too. v1.14 has the same lines, but "
+        "where GNSS is not asked for its outputs show the shorter buffers.",
+        since="v1.13",
+        until="v1.13",
+        source="../EKF2.cpp",
     )
     observes_acceleration_of_gravity: bool = _behaviour(
         "Gravity is fused in m/s², by the low-passed vector of the specific force, with a gate of one and gains that "
@@ -764,6 +770,13 @@ class Behaviours:
         since="v1.13",
         until="v1.14",
         source="drag_fusion.cpp",
+    )
+    looks_at_range_first: bool = _behaviour(
+        "The range finder is looked at before any source acts. It gives the height where EKF2_HGT_MODE asks for it, or "
+        "EKF2_RNG_AID low and slow, when an offset and no bias keeps the height.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp, height_fusion.cpp",
     )
     compares_range_in_slow_flight: bool = _behaviour(
         "The range finder is held against the vertical velocity only where a multicopter does not move horizontally; "
