@@ -26,6 +26,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer import (
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH, TERRAIN
+from fusetune.ekf2.filter.quaternion_core import quaternion_prediction
 from fusetune.ekf2.numerics import world_magnetic_model_table as table
 
 V113, V114, V115, V116 = "v1.13", "v1.14", "v1.15", "v1.16"
@@ -310,6 +311,13 @@ def test_older_field_jacobian_is_by_the_quaternion(release):
         np.testing.assert_array_equal(H[MAG_BODY : MAG_BODY + 3], np.eye(3)[axis])
 
 
+def follow_turn(it: Flying, turn: float, dt: float) -> None:
+    """Predict a turn about down (rad) in an interval (s), level."""
+    it.ekf["scratch"]["quat_before"][:3] = 0.0, 0.0, turn
+    it.ekf["imu_delayed"]["delta_ang_dt"] = dt
+    quaternion_prediction.follow_turn(it.ekf)
+
+
 def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covariance_is_kept():
     it = flying(V114, EKF2_MAG_TYPE=0.0, EKF2_MAG_ACCLIM=0.5)
     it.params["EKF2_MAG_YAWLIM"] = 0.2
@@ -319,7 +327,7 @@ def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covarian
     assert it.ekf["cs"]["mag_hdg"]
     # turning at 0.25 rad/s for a second, then at 0.12: 0.95^n of the filter is left after n steps
     for _ in range(100):
-        mag_modes.follow_turn(it.ekf, 0.0025, 0.01)
+        follow_turn(it, 0.0025, 0.01)
     assert modes["turn_rate_lpf"] == pytest.approx(0.25 * (1.0 - 0.95**100))
     modes["saved_body_variance"][:] = 1e-4, 2e-4, 3e-4
     modes["saved_down_variance"] = 4e-4
@@ -333,7 +341,7 @@ def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covarian
     assert not P[:MAG_EARTH, MAG_EARTH : MAG_BODY + 3].any()
     for rate, fused in ((0.12, True), (0.08, True), (0.08, False)):
         set_time(it.ekf, int(it.ekf["time_delayed_us"]) + 1_900_000)
-        mag_modes.follow_turn(it.ekf, rate * 1.9, 1.9)
+        follow_turn(it, rate * 1.9, 1.9)
         modes["turn_rate_lpf"] = rate
         mag_modes.select_mode(it.ekf, it.params)
         assert bool(it.ekf["cs"]["mag_3d"]) == fused
@@ -398,3 +406,15 @@ def test_v1_14_follows_the_field_while_it_levels():
     assert heading["observation"][0] == pytest.approx(1.0 + math.radians(5.0))
     assert heading["innovation"][0] == pytest.approx(-1.0 - math.radians(5.0))
     assert not heading["fused"]
+
+
+@pytest.mark.parametrize("release", [V115, V116])
+def test_a_body_field_is_known_to_its_noise_right_after_a_reset_of_v1_15(release):
+    """0.05² Gauss² and 1e-12 Gauss² of process noise: in single precision, as PX4 has it, that is the limit itself."""
+    it = flying(release, EKF2_MAG_NOISE=0.05)
+    it.ekf["P"][MAG_BODY : MAG_BODY + 3, MAG_BODY : MAG_BODY + 3] = np.eye(3) * (
+        it.params["EKF2_MAG_NOISE"] ** 2 + 1e-12
+    )
+    assert bool(mag_heading.is_mag_bias_good(it.ekf, it.params)) == (release == V115)
+    it.ekf["P"][MAG_BODY, MAG_BODY] += 1e-9
+    assert not mag_heading.is_mag_bias_good(it.ekf, it.params)

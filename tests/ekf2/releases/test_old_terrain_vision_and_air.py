@@ -15,10 +15,10 @@ from tests.ekf2.releases.test_named_behaviours import Flying, asked, flying
 
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_NED
 from fusetune.ekf2.filter import wind
-from fusetune.ekf2.filter.aid_sources.airspeed import airspeed_control, airspeed_fusion
+from fusetune.ekf2.filter.aid_sources.airspeed import airspeed_control, airspeed_fusion, airspeed_resets
 from fusetune.ekf2.filter.aid_sources.drag import drag_fusion
 from fusetune.ekf2.filter.aid_sources.external_vision import ev_attitude_error, ev_vel_control, ev_yaw_control
-from fusetune.ekf2.filter.aid_sources.optical_flow import flow_over_terrain, optical_flow_fusion
+from fusetune.ekf2.filter.aid_sources.optical_flow import flow_over_terrain, integrated_flow, optical_flow_fusion
 from fusetune.ekf2.filter.aid_sources.range_finder import range_for_height, range_height_control
 from fusetune.ekf2.filter.aid_sources.sideslip import sideslip_fusion
 from fusetune.ekf2.filter.common import aid_source_status
@@ -26,17 +26,20 @@ from fusetune.ekf2.filter.common.conditions import get_hagl, is_terrain_estimate
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, TERRAIN, VELOCITY, WIND
 from fusetune.ekf2.filter.resets import state_resets
-from fusetune.ekf2.filter.terrain_filter import terrain_by_flow, terrain_by_range, terrain_filter
+from fusetune.ekf2.filter.terrain_filter import terrain_by_flow, terrain_by_range, terrain_filter, terrain_in_air
 from fusetune.ekf2.numerics.rotations import quat_to_dcm
+from fusetune.ekf2.replay import flight_schedule
 from fusetune.ekf2.replay.recording import views_of
 
 V115 = "v1.15"
+V114 = "v1.14"
 UNTIL_V115 = [(V115, True), (V116, False)]
+UNTIL_V114 = [(V114, True), (V115, False)]
 
 
-def over_terrain(**overrides: float) -> Flying:
-    """10 m above a terrain that the filter of v1.15 knows to 0.5 m, moving at 3 m/s north and 4 m/s east."""
-    it = flying(V115, **overrides)
+def over_terrain(release: str = V115, **overrides: float) -> Flying:
+    """10 m above a terrain that its filter knows to 0.5 m, moving at 3 m/s north and 4 m/s east."""
+    it = flying(release, **overrides)
     it.ekf["vel"] = 3.0, 4.0, 0.0
     it.ekf["terrain_filter"]["variance"] = 0.25
     return it
@@ -494,3 +497,162 @@ def test_drag_counts_as_fused_where_both_axes_were(release, both):
     it = flying(release)
     assert bool(asked(drag_fusion._counts_as_fused, it, False)) != both
     assert asked(drag_fusion._counts_as_fused, it, True)
+
+
+@pytest.mark.parametrize(("release", "in_air_only"), UNTIL_V114)
+def test_the_terrain_is_seen_on_the_ground_since_v1_15(release, in_air_only, monkeypatch):
+    it = over_terrain(release, EKF2_MIN_RNG=0.1)
+    monkeypatch.setattr(terrain_filter, "control_terrain_by_flow", lambda *_: None)
+    it.ekf["cs"]["in_air"] = False
+    it.ekf["aid"]["terrain_range_finder"]["time_last_fuse"] = START_US - 500_000
+    terrain_filter._hold_on_ground.py_func(it.ekf, it.params)
+    assert it.ekf["terrain"] == (pytest.approx(-9.9) if in_air_only else 0.0)
+    # and at take-off v1.15 starts it anew
+    it.ekf["terrain"], it.ekf["cs"]["in_air"], it.ekf["cs_prev"]["in_air"] = 0.0, True, False
+    asked(terrain_filter._take_off, it, it.params)
+    assert it.ekf["terrain"] == (0.0 if in_air_only else pytest.approx(-9.9))
+
+
+def test_range_of_v1_14_corrects_the_terrain_in_the_air_and_publishes_nothing():
+    it = over_terrain(V114, EKF2_RNG_NOISE=0.5, EKF2_RNG_SFE=0.0, EKF2_RNG_GATE=5.0)
+    distance(it, 11.0)
+    aid, terrain = it.ekf["aid"]["terrain_range_finder"], it.ekf["terrain_filter"]
+    terrain_in_air.control_terrain_in_air(it.ekf, it.params)
+    assert terrain["uses_range"]
+    assert it.ekf["terrain"] == pytest.approx(1.0)  # it starts with the distance, as uncertain as that is
+    assert terrain["variance"] == pytest.approx(0.25)
+    distance(it, 12.0)
+    terrain_in_air.control_terrain_in_air(it.ekf, it.params)
+    assert it.ekf["terrain"] == pytest.approx(1.5)
+    assert aid["timestamp_sample"] == 0
+    it.ekf["cs"]["in_air"] = False
+    terrain_in_air.control_terrain_in_air(it.ekf, it.params)
+    assert not terrain["uses_range"]
+    assert aid["innovation"][0] == 0.0
+    assert not is_terrain_estimate_valid.of(V114).py_func(it.ekf)
+
+
+def test_range_of_v1_14_joins_flow_where_they_agree():
+    it = over_terrain(V114, EKF2_RNG_NOISE=0.5, EKF2_RNG_SFE=0.0, EKF2_RNG_GATE=5.0)
+    # the innovation variance is 0.5 m²: 1² / (5²·0.5) = 0.08, 2² / (5²·0.5) = 0.32
+    for measured, agrees in ((11.0, True), (12.0, False)):
+        distance(it, measured)
+        assert terrain_in_air._agrees(it.ekf, it.params) == agrees
+
+
+@pytest.mark.parametrize(("release", "left"), UNTIL_V114)
+def test_a_height_reset_moves_the_terrain_since_v1_15(release, left):
+    it = flying(release)
+    asked(state_resets._move_terrain, it, -2.0)
+    assert it.ekf["terrain"] == (0.0 if left else -2.0)
+
+
+def integrated(**overrides: float) -> Flying:
+    """A sample of flow of v1.14: 0.02 s in which the image turned 0.01 rad, and the IMU was summed up as long."""
+    it = over_terrain(V114, EKF2_OF_QMIN=10.0, EKF2_OF_QMIN_GND=10.0, **overrides)
+    it.ekf["flow"]["max_rate"] = 5.0
+    it.ekf["flow_interval"] = 0.02
+    flow_of(it, 0.5, -0.25)
+    it.ekf["sensors"]["flow"]["sample"]["gyro_rate"] = 0.05, 0.0, 0.0
+    integrated_flow.integrate_sample.py_func(it.ekf)
+    memory = it.ekf["flow_integrals"]
+    memory["imu_time"] = 0.02
+    memory["imu_angle"] = 0.001, 0.0, 0.0
+    it.ekf["terrain_filter"]["flow_is_good"] = True
+    return it
+
+
+def test_integrals_of_flow_are_compensated_by_the_gyro_less_its_bias():
+    it = integrated()
+    integrated_flow._prepare_sample.py_func(it.ekf, it.params)
+    # the gyro reads 0.05 rad/s, the IMU 0.05 rad/s the other way round: PX4 takes their difference of 0 for the bias
+    assert it.ekf["flow_integrals"]["gyro_bias"] == pytest.approx((0.0, 0.0, 0.0))
+    assert it.ekf["flow"]["rate_compensated"] == pytest.approx((0.45, -0.25))
+    assert it.ekf["flow_integrals"]["imu_time"] == 0.0
+    it = integrated()
+    it.ekf["flow_integrals"]["imu_angle"] = -0.001, 0.0, 0.0
+    integrated_flow._prepare_sample.py_func(it.ekf, it.params)
+    assert it.ekf["flow_integrals"]["gyro_bias"][0] == pytest.approx(0.01 * 0.1)
+    assert it.ekf["flow"]["rate_compensated"][0] == pytest.approx(0.5 - (0.05 - 0.001))
+
+
+def test_flow_without_a_gyro_takes_the_imu():
+    it = integrated()
+    it.ekf["flow_integrals"]["gyro"] = math.nan
+    integrated_flow._prepare_sample.py_func(it.ekf, it.params)
+    assert it.ekf["flow"]["rate_compensated"] == pytest.approx((0.5 + 0.05, -0.25))
+
+
+@pytest.mark.parametrize("in_air", [True, False])
+def test_bad_flow_is_left_out_in_the_air_and_counts_as_none_on_the_ground(in_air):
+    it = integrated()
+    it.ekf["cs"]["in_air"] = in_air
+    it.ekf["sensors"]["flow"]["sample"]["quality"] = 5
+    integrated_flow._prepare_sample.py_func(it.ekf, it.params)
+    assert it.ekf["flow"]["rate_compensated"].tolist() == [0.0, 0.0]
+    assert it.ekf["terrain_filter"]["flow_is_good"] != in_air
+
+
+def test_an_interval_of_flow_far_from_that_of_the_imu_begins_it_anew():
+    it = integrated()
+    it.ekf["imu_delayed"]["delta_ang"] = 0.002, 0.0, 0.0
+    assert integrated_flow._is_interval_good.py_func(it.ekf, 0.014, 0.026)
+    it.ekf["flow_integrals"]["imu_time"] = 0.1
+    assert integrated_flow._is_interval_good.py_func(it.ekf, 0.07, 0.13)
+    assert it.ekf["flow_integrals"]["imu_time"] == 0.01
+    assert it.ekf["flow_integrals"]["imu_angle"][0] == pytest.approx(0.002)
+    it.ekf["flow_integrals"]["sample_time"] = 0.15
+    assert not integrated_flow._is_interval_good.py_func(it.ekf, 0.07, 0.13)
+
+
+@pytest.mark.parametrize(("release", "gain"), UNTIL_V114)
+def test_the_rotation_of_vision_is_that_of_the_sample(release, gain):
+    it = flying(release)
+    pitched(it, 0.3)
+    it.ekf["sensors"]["ev"]["sample"]["quat"] = 1.0, 0.0, 0.0, 0.0
+    it.ekf["ev"]["q_error_filt"] = 1.0, 0.0, 0.0, 0.0
+    asked(ev_attitude_error.refresh_ev_rotation, it)
+    assert it.ekf["ev"]["R_ev_to_ekf"][0, 0] == pytest.approx(math.cos(0.3) if gain else 1.0)
+
+
+def test_wind_by_airspeed_is_as_uncertain_as_a_heading_of_ten_degrees(monkeypatch):
+    it = flying(V114, EKF2_EAS_NOISE=1.0)
+    it.ekf["sensors"]["airspeed"]["sample"]["true_airspeed"] = 10.0
+    it.ekf["sensors"]["airspeed"]["sample"]["eas2tas"] = 1.0
+    it.ekf["wind_vel"] = 3.0, 2.0
+    monkeypatch.setattr(airspeed_resets, "reset_covariance_block", lambda ekf, *_: ekf["P"].__setitem__(22, 0.0))
+    asked(airspeed_resets._reset_wind_covariance, it, it.params, 10.0, 1.0, 0.0)
+    yaw, slip = math.radians(10.0) ** 2, (10.0 * math.sin(math.radians(15.0))) ** 2
+    P = it.ekf["P"]
+    assert P[WIND, WIND] == pytest.approx(1.0 + yaw * 4.0 + 0.01)
+    assert P[WIND + 1, WIND + 1] == pytest.approx(yaw * 9.0 + slip + 0.01)
+    assert P[WIND, WIND + 1] == pytest.approx(yaw * -2.0 * 3.0)
+
+
+@pytest.mark.parametrize(("release", "wind_only"), UNTIL_V114)
+def test_airspeed_does_not_set_the_velocity_until_v1_15(release, wind_only):
+    it = flying(release)
+    it.ekf["cs"]["inertial_dead_reckoning"] = True
+    assert bool(asked(airspeed_control._may_reset_velocity, it)) != wind_only
+
+
+@pytest.mark.parametrize(("release", "fast_only"), UNTIL_V114)
+def test_sideslip_is_fused_at_speed(release, fast_only):
+    it = flying(release)
+    it.ekf["vel"][:2] = 6.0, 3.0
+    assert asked(sideslip_fusion._is_fast_enough, it) == (not fast_only or math.hypot(6.0, 3.0) > 7.0)
+    it.ekf["wind_vel"] = -4.0, 0.0
+    assert asked(sideslip_fusion._is_fast_enough, it)
+
+
+@pytest.mark.parametrize(("release", "in_air_only"), UNTIL_V114)
+def test_drag_is_judged_in_the_air(release, in_air_only):
+    it = flying(release)
+    it.ekf["cs"]["in_air"] = False
+    assert bool(asked(drag_fusion._is_drag_judged, it)) != in_air_only
+
+
+def test_flow_is_asked_for_whatever_the_main_filter_uses_until_v1_15():
+    assert not flight_schedule._is_asked_by_parameter("flow", V115)
+    assert flight_schedule._is_asked_by_parameter("flow", V116)
+    assert flight_schedule._is_asked_by_parameter("airspeed", V115)

@@ -17,6 +17,8 @@ from fusetune.ekf2.filter import height_control
 from fusetune.ekf2.filter.aid_sources import fake_pos_until_v1_15
 from fusetune.ekf2.filter.aid_sources.barometer import baro_height_control
 from fusetune.ekf2.filter.aid_sources.gnss import (
+    arrived_gnss_control,
+    gnss_arrival,
     gnss_height_control,
     gnss_position,
     gnss_velocity,
@@ -24,6 +26,7 @@ from fusetune.ekf2.filter.aid_sources.gnss import (
     gps_checks,
     gps_control,
     origin_by_checks,
+    yaw_emergency,
 )
 from fusetune.ekf2.filter.common import conditions, dead_reckoning, imu_rates
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT_REF_GNSS
@@ -365,6 +368,19 @@ def test_range_tells_a_height_or_a_distance(release, old):
     assert asked(height_control._range_innovation, it) == (0.5 if old else -0.5)
 
 
+@pytest.mark.parametrize(("release", "old"), OLD_AND_NEW)
+def test_vertical_acceleration_is_doubted_for_10_s_until_v1_15(release, old):
+    it = flying(release)
+    it.ekf["fs"]["bad_acc_vertical"] = True
+    it.ekf["time_bad_vert_accel"] = START_US
+    set_time(it.ekf, START_US + 9_900_000)
+    height_control.check_vertical_acceleration_health(it.ekf)
+    assert it.ekf["fs"]["bad_acc_vertical"] == old
+    set_time(it.ekf, START_US + 10_100_000)
+    height_control.check_vertical_acceleration_health(it.ekf)
+    assert not it.ekf["fs"]["bad_acc_vertical"]
+
+
 # fake position
 
 
@@ -545,3 +561,164 @@ def test_accelerations_are_twice_as_uncertain_on_the_ground(levelled, in_air):
     expected = 0.25 + ((2.0 if in_air else 4.0) * 0.01) ** 2
     assert np.allclose(gsf["P"][P_VN_VN, :5], expected, rtol=1e-6)
     assert np.allclose(gsf["P"][P_VE_VE, :5], expected, rtol=1e-6)
+
+
+# v1.14: GNSS is judged as it arrives
+
+
+V114 = "v1.14"
+
+
+def arrives(it: Flying, fix: np.record, slot: int = 0) -> None:
+    gnss_arrival.look_at_arrived_gnss(it.ekf, it.params, fix, slot)
+
+
+def test_a_message_has_whole_numbers_of_1e_7_degrees_and_millimetres(sample):
+    sample["lat_deg"], sample["lon_deg"], sample["alt"] = 47.39776123456, 8.54556149999, 487.5475769
+    gnss_arrival.round_to_message.py_func(sample)
+    assert (sample["lat_deg"], sample["lon_deg"]) == (47.3977612, 8.5455615)
+    assert sample["alt"] == float(np.float32(487548.0) * np.float32(1e-3))
+
+
+def test_the_origin_is_placed_by_the_sample_that_arrives(sample):
+    it = flying(V114, EKF2_REQ_GPS_H=10.0)
+    it.ekf["filter_initialised"] = True
+    it.ekf["gpos_alt"] = 0.0
+    arrives(it, sample)
+    assert not it.ekf["gnss"]["checks_passed"]
+    assert not it.ekf["origin"]["valid"]
+    # a rough fix tells the rotation of the Earth nevertheless
+    assert math.isclose(it.ekf["earth_rate_ned"][0], 7.2921150e-5 * math.cos(math.radians(47.4)))
+    set_time(it.ekf, START_US + 10_100_000)
+    arrives(it, sample)
+    assert it.ekf["origin"]["valid"]
+    assert math.isclose(it.ekf["origin"]["alt"], 488.0, abs_tol=1e-4)
+
+
+def test_checks_that_fail_take_the_result_back_at_once(sample):
+    it = flying(V114, EKF2_REQ_GPS_H=10.0, EKF2_GPS_CHECK=1.0)
+    arrives(it, sample)
+    set_time(it.ekf, START_US + 10_100_000)
+    arrives(it, sample)
+    assert it.ekf["gnss"]["checks_passed"]
+    sample["nsats"] = 3
+    arrives(it, sample)
+    assert not it.ekf["gnss"]["checks_passed"]
+
+
+def test_a_position_that_arrives_before_the_origin_is_zero_for_good(sample):
+    it = flying(V114)
+    sample["lat_deg"] += math.degrees(10.0 / 6_371_000.0)
+    arrives(it, sample, slot=3)
+    place(it, 47.4, 8.5, 488.0)
+    arrives(it, sample, slot=4)
+    for slot, north in ((3, 0.0), (4, 10.0)):
+        gnss_arrival.recall_arrived_gnss(it.ekf, slot)
+        # 1e-7 degrees are 11 mm
+        assert math.isclose(it.ekf["gnss_arrivals"]["north"], north, abs_tol=0.006)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "trusted", "distrusted"),
+    [((4.9, 6.0), False, True), ((5.1, 4.9), True, False), ((5.1, 5.1), True, True)],
+)
+def test_gnss_is_trusted_by_checks_of_5_s(seconds, trusted, distrusted):
+    it = flying(V114)
+    since_failure, since_pass = seconds
+    it.ekf["gnss"]["last_fail_us"] = START_US - round(since_failure * 1e6)
+    it.ekf["gnss"]["last_pass_us"] = START_US - round(since_pass * 1e6)
+    assert gnss_arrival.is_gnss_trusted(it.ekf) == trusted
+    assert gnss_arrival.is_gnss_distrusted(it.ekf) == distrusted
+    assert asked(gnss_height_control._is_trusted, it) == (trusted and not distrusted)
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_a_distrusted_gnss_goes_on_where_it_is_the_only_aid(other, sample):
+    it = flying(V114)
+    starting(it, sample, gnss_vel=True, gnss_pos=True, opt_flow=other)
+    it.ekf["gnss"]["last_pass_us"] = START_US - 6_000_000
+    arrived_gnss_control._control_with_sample.py_func(it.ekf, it.params)
+    assert it.ekf["cs"]["gnss_pos"] == (not other)
+
+
+def test_without_magnetometer_the_yaw_estimator_aligns_the_yaw(sample):
+    it = flying(V114, EKF2_MAG_TYPE=5.0)
+    starting(it, sample)
+    it.ekf["cs"]["yaw_align"] = False
+    it.ekf["gnss"]["last_fail_us"] = START_US - 6_000_000
+    it.ekf["gnss"]["last_pass_us"] = START_US
+    gsf = it.ekf["gsf"]
+    gsf["vel_fuse_started"], gsf["yaw"], gsf["yaw_variance"] = True, 0.7, 0.01
+    arrived_gnss_control._control_with_sample.py_func(it.ekf, it.params)
+    assert it.ekf["cs"]["yaw_align"]
+    assert math.isclose(euler_yaw(it.ekf["R_to_earth"]), 0.7)
+    assert it.ekf["vel"].tolist() == [1.0, 2.0, 0.5]
+    # GNSS itself starts with the next sample
+    assert not it.ekf["cs"]["gnss_pos"]
+
+
+def test_a_yaw_put_right_blames_one_of_magnetometer_and_gnss():
+    it = flying(V114)
+    gsf = it.ekf["gsf"]
+    gsf["vel_fuse_started"], gsf["yaw"], gsf["yaw_variance"] = True, 0.7, 0.01
+    it.ekf["cs"]["mag_3d"] = it.ekf["cs"]["gnss_yaw"] = it.ekf["cs"]["ev_yaw"] = True
+    assert asked(yaw_emergency.reset_yaw_to_ekf_gsf, it, it.params)
+    assert it.ekf["cs"]["mag_fault"]
+    assert not it.ekf["cs"]["gnss_yaw_fault"]
+    assert it.ekf["gnss_arrivals"]["inhibits_ev_yaw"]
+
+
+@pytest.mark.parametrize(("seconds", "other", "stopped"), [(2.0, False, False), (2.0, True, True), (10.1, False, True)])
+def test_gnss_is_waited_for_10_s_or_with_others_1_s(seconds, other, stopped):
+    it = flying(V114)
+    it.ekf["cs"]["gnss_vel"] = it.ekf["cs"]["gnss_pos"] = True
+    it.ekf["cs"]["opt_flow"] = other
+    it.ekf["sensors"]["gnss"]["exists"] = True
+    it.ekf["sensors"]["gnss"]["newest_time_us"] = START_US
+    set_time(it.ekf, START_US + round(seconds * 1e6))
+    arrived_gnss_control.control_arrived_gnss_fusion(it.ekf, it.params)
+    assert it.ekf["cs"]["gnss_pos"] == (not stopped)
+
+
+@pytest.fixture
+def in_air() -> Flying:
+    it = flying(V114)
+    matrix_bank.run_matrix_bank_in_air(it.ekf, imu(it, (0.0, 0.0, 0.0), (0.0, 0.0, -CONSTANTS_ONE_G * 0.01)), True)
+    assert it.ekf["gsf"]["tilt_aligned"]
+    return it
+
+
+def test_the_bank_of_v1_14_starts_in_the_air_with_the_gyro_bias_of_the_filter(in_air):
+    # a bias is kept as increment over 10 ms
+    in_air.ekf["quaternion"]["mean_dt"], in_air.ekf["gyro_bias"][2] = 0.01, 0.0003
+    gsf, still = in_air.ekf["gsf"], imu(in_air, (0.0, 0.0, 0.0), (0.0, 0.0, -CONSTANTS_ONE_G * 0.01))
+    matrix_bank.tell_matrix_bank_velocity(in_air.ekf, 3.0, 4.0, 0.5)
+    matrix_bank.run_matrix_bank_in_air(in_air.ekf, still, False)
+    assert not gsf["vel_fuse_started"]
+    matrix_bank.tell_matrix_bank_velocity(in_air.ekf, 3.0, 4.0, 0.5)
+    matrix_bank.run_matrix_bank_in_air(in_air.ekf, still, True)
+    assert gsf["vel_fuse_started"]
+    assert math.isclose(gsf["gyro_bias"][2, 4], 0.03)
+    matrix_bank.run_matrix_bank_in_air(in_air.ekf, still, False)
+    assert not gsf["vel_fuse_started"]
+
+
+def test_the_yaw_of_v1_14_follows_every_sample(in_air):
+    gsf = in_air.ekf["gsf"]
+    matrix_bank.tell_matrix_bank_velocity(in_air.ekf, 3.0, 4.0, 0.5)
+    matrix_bank.run_matrix_bank_in_air(in_air.ekf, in_air.ekf["imu_delayed"], True)
+    gsf["weight"][:] = 0.0, 0.0, 1.0, 0.0, 0.0
+    gsf["gyro_bias"][:] = 0.0
+    matrix_bank.run_matrix_bank_in_air(in_air.ekf, imu(in_air, (0.0, 0.0, 0.01), (0.0, 0.0, -0.0981)), True)
+    # the third model started at zero, and its variance grows by (0.1 · 0.01)² alone
+    assert math.isclose(gsf["yaw"], 0.01, rel_tol=1e-3)
+    assert math.isclose(gsf["yaw_variance"], (math.pi / 5.0) ** 2 + 1e-6, rel_tol=1e-9)
+
+
+@pytest.mark.parametrize(("noise", "sigma"), [(0.5, 10.0), (20.0, 20.0)])
+def test_the_fake_position_of_v1_14_needs_no_reason(noise, sigma):
+    it = unaided(V114)
+    it.params["EKF2_GPS_P_NOISE"] = noise
+    fake_pos_until_v1_15.control_fake_position(it.ekf, it.params)
+    assert it.ekf["cs"]["fake_pos"]
+    assert math.isclose(it.ekf["aid"]["fake_pos"]["observation_variance"][0], sigma**2)

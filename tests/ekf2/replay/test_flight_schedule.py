@@ -74,7 +74,7 @@ def inputs_of(arrivals: dict[str, list[Arrival]], imu_us: list[int]) -> Estimato
         arrivals=np.array(sorted(rows), ARRIVAL),
         air_density=np.full(len(samples["baro"]), 1.2),
         range_limits=np.zeros((0, 2)),
-        flow_limits=np.zeros((len(samples["flow"]), 3)),
+        flow_limits=np.zeros((len(samples["flow"]), 4)),
         command=np.zeros(0, COMMAND),
         **samples,
     )

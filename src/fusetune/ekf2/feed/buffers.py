@@ -102,7 +102,7 @@ def newest_time_us(ring):
 
 @kernel
 def size_buffers(lengths, predict_us, delay_max_ms):
-    """Lengths of the buffers by EKF2_PREDICT_US and EKF2_DELAY_MAX, which act on them at start-up only."""
+    """Lengths of the buffers by EKF2_PREDICT_US and the longest delay, which act on them at start-up only."""
     update_period_ms = predict_us / 1000.0
     imu_length = min(max(2, int(np.ceil(delay_max_ms / update_period_ms))), RING_CAPACITY - 1)
     lengths.imu_length = imu_length

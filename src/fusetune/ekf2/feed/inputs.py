@@ -210,6 +210,7 @@ def _system_flags(flight: Flight, runs: RunSchedule) -> tuple[np.ndarray, np.nda
     position[at] = np.arange(len(at))
     samples = np.zeros(len(at), SYSTEM_FLAGS_SAMPLE)
     samples["time_us"] = runs.timestamp[at]
+    samples["status_is_new"], samples["land_is_new"] = status_new[at], land_new[at]
     status = _fresh(flight, "vehicle_status", status_row[at], runs.timestamp[at])
     if status is not None:
         rows, table = status

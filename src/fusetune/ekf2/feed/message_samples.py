@@ -207,7 +207,9 @@ def flow_refusals(table: TopicTable) -> list[Refusal]:
 
 
 def flow_samples(table: TopicTable) -> tuple[np.ndarray, np.ndarray]:
-    """`vehicle_optical_flow` → FLOW_SAMPLE, and sensor limits (max rate rad/s, min and max distance m).
+    """`vehicle_optical_flow` → FLOW_SAMPLE, and the sensor's limits and its interval.
+
+    The former are the largest rate (rad/s), the least and the largest distance (m), the latter is µs.
 
     The estimator counts a line-of-sight rate positive for a right-handed turn of the image about the sensor axis,
     the sensor the other way round. Rates are means over the integration time, so the sample is stamped at its middle.
@@ -222,10 +224,8 @@ def flow_samples(table: TopicTable) -> tuple[np.ndarray, np.ndarray]:
         samples["flow_rate"] = np.where(integrated, -flow / dt, 0.0)
         samples["gyro_rate"] = np.where(integrated, -gyro / dt, 0.0)
     samples["quality"] = column(table, "quality", 0.0)
-    limits = np.column_stack(
-        [column(table, name) for name in ("max_flow_rate", "min_ground_distance", "max_ground_distance")]
-    )
-    return samples, limits
+    limits = [column(table, name) for name in ("max_flow_rate", "min_ground_distance", "max_ground_distance")]
+    return samples, np.column_stack([*limits, timespan])
 
 
 def range_refusals(table: TopicTable) -> list[Refusal]:

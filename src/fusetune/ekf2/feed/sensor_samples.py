@@ -65,7 +65,9 @@ AUXVEL_SAMPLE = np.dtype([("time_us", "i8"), ("vel", "f8", (2,)), ("vel_var", "f
 SYSTEM_FLAGS_SAMPLE = np.dtype(
     [
         ("time_us", "i8"),
-        *fields("?", "at_rest", "in_air", "is_fixed_wing", "gnd_effect", "constant_pos"),
+        *fields(
+            "?", "at_rest", "in_air", "is_fixed_wing", "gnd_effect", "constant_pos", "status_is_new", "land_is_new"
+        ),
     ],
     align=True,
 )

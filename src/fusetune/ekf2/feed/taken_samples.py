@@ -143,7 +143,7 @@ AIDING: Mapping[str, Callable[[Flight, RunSchedule], TakenSamples]] = {
     "baro": OfOneTopic("baro", BARO_SAMPLE, convert.baro_samples),
     "range": _range,
     "flow": OfOneTopic(
-        "flow", FLOW_SAMPLE, convert.flow_samples, _in_every_release(convert.flow_refusals), beside_nothing=(0, 3)
+        "flow", FLOW_SAMPLE, convert.flow_samples, _in_every_release(convert.flow_refusals), beside_nothing=(0, 4)
     ),
     "ev": _vision,
     "airspeed": _airspeed,

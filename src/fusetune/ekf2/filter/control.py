@@ -9,7 +9,7 @@ from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import control_drag_fusio
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_control import control_external_vision_fusion
 from fusetune.ekf2.filter.aid_sources.fake_height_control import control_fake_hgt_fusion
 from fusetune.ekf2.filter.aid_sources.fake_pos_until_v1_15 import control_fake_position
-from fusetune.ekf2.filter.aid_sources.gnss.gps_control import control_gnss_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_fusion import control_gnss
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_control import control_flow_fusion
@@ -42,7 +42,7 @@ def control_fusion_modes(ekf, params):
 
     control_mag_fusion(ekf, params)
     control_flow_fusion(ekf, params)
-    control_gnss_fusion(ekf, params)
+    control_gnss(ekf, params)
     control_air_data_fusion(ekf, params)
     control_beta_fusion(ekf, params)
     control_drag_fusion(ekf, params)

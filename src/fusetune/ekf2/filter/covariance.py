@@ -6,7 +6,23 @@ Mirrors PX4 v1.16 `EKF/covariance.cpp`, whose prediction and limits stand in `pr
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
-from fusetune.ekf2.releases.by_release import does
+from fusetune.ekf2.filter.common.covariance_blocks import (
+    reset_covariance_block,
+    uncorrelate_block,
+    uncorrelate_set_variance_vector,
+)
+from fusetune.ekf2.filter.common.imu_rates import bias_unit
+from fusetune.ekf2.filter.quaternion_core.quaternion_covariance import (
+    tilt_variance_of_quaternion,
+    yaw_variance_of_quaternion,
+)
+from fusetune.ekf2.filter.quaternion_core.quaternion_start import (
+    initialise_quaternion_covariance,
+    reset_quaternion_covariance,
+)
+from fusetune.ekf2.releases.by_release import by_release, does
+
+__all__ = ["reset_covariance_block", "uncorrelate_block", "uncorrelate_set_variance_vector"]
 
 INITIAL_WIND_UNCERTAINTY = 1.0
 
@@ -14,58 +30,32 @@ _filters_terrain_apart = does("filters_terrain_apart")
 
 
 @kernel
-def uncorrelate_block(ekf, index, dof):
-    """Zero every covariance of the states [index, index + dof), among themselves and with the others."""
-    P = ekf.P
-    for i in range(index, index + dof):
-        variance = P[i, i]
-        for j in range(state.ERROR_STATE_SIZE):
-            P[i, j] = 0.0
-            P[j, i] = 0.0
-        P[i, i] = variance
-
-
-@kernel
-def reset_covariance_block(ekf, index, dof, variance):
-    """Uncorrelate the states [index, index + dof) and give them all the same variance."""
-    uncorrelate_block(ekf, index, dof)
-    for i in range(index, index + dof):
-        ekf.P[i, i] = variance
-
-
-@kernel
-def uncorrelate_set_variance_vector(ekf, index, v0, v1, v2):
-    """Uncorrelate three states from `index` on and set their variances."""
-    uncorrelate_block(ekf, index, 3)
-    ekf.P[index, index] = v0
-    ekf.P[index + 1, index + 1] = v1
-    ekf.P[index + 2, index + 2] = v2
-
-
-@kernel
-def reset_quat_cov(ekf, params, yaw_noise):
-    """Attitude variances at alignment: tilt from `EKF2_ANGERR_INIT`, yaw from `yaw_noise` (rad, one sigma)."""
+def _reset_attitude_cov(ekf, params, yaw_noise):
     tilt_sigma = max(params.EKF2_ANGERR_INIT, 0.01)
     tilt_variance = tilt_sigma * tilt_sigma
     uncorrelate_set_variance_vector(ekf, state.ATTITUDE, tilt_variance, tilt_variance, yaw_noise * yaw_noise)
 
 
+reset_quat_cov = by_release(_reset_attitude_cov, "adds_quaternion_errors", reset_quaternion_covariance)
+"""Attitude variances at alignment: tilt from `EKF2_ANGERR_INIT`, yaw from `yaw_noise` (rad, one sigma)."""
+
+
 @kernel
 def reset_gyro_bias_cov(ekf, params):
     """Gyro bias variances as at switch-on."""
-    reset_covariance_block(ekf, state.GYRO_BIAS, 3, params.EKF2_GBIAS_INIT**2)
+    reset_covariance_block(ekf, state.GYRO_BIAS, 3, (params.EKF2_GBIAS_INIT * bias_unit(ekf)) ** 2)
 
 
 @kernel
 def reset_gyro_bias_z_cov(ekf, params):
     """Variance of the gyro z bias as at switch-on, so that it converges anew."""
-    reset_covariance_block(ekf, state.GYRO_BIAS + 2, 1, params.EKF2_GBIAS_INIT**2)
+    reset_covariance_block(ekf, state.GYRO_BIAS + 2, 1, (params.EKF2_GBIAS_INIT * bias_unit(ekf)) ** 2)
 
 
 @kernel
 def reset_accel_bias_cov(ekf, params):
     """Accelerometer bias variances as at switch-on."""
-    reset_covariance_block(ekf, state.ACCEL_BIAS, 3, params.EKF2_ABIAS_INIT**2)
+    reset_covariance_block(ekf, state.ACCEL_BIAS, 3, (params.EKF2_ABIAS_INIT * bias_unit(ekf)) ** 2)
 
 
 @kernel
@@ -77,11 +67,26 @@ def reset_gyro_bias(ekf, params):
 
 
 @kernel
+def _keep_nothing(ekf):
+    """v1.16 zeroes gains of what it does not learn, and keeps no variance."""
+
+
+@kernel
+def _keep_new_variance(ekf):
+    for i in range(3):
+        ekf.quaternion.kept_accel_bias_var[i] = ekf.P[state.ACCEL_BIAS + i, state.ACCEL_BIAS + i]
+
+
+_keep_accel_bias_variance = by_release(_keep_nothing, "adds_quaternion_errors", _keep_new_variance)
+
+
+@kernel
 def reset_accel_bias(ekf, params):
     """Forget the accelerometer bias, as after a new accelerometer calibration."""
     for i in range(3):
         ekf.accel_bias[i] = 0.0
     reset_accel_bias_cov(ekf, params)
+    _keep_accel_bias_variance(ekf)
 
 
 @kernel
@@ -103,11 +108,8 @@ def reset_wind_cov(ekf):
 
 
 @kernel
-def initialise_covariance(ekf, params):
-    """Covariance after tilt alignment, or after a numerical fault.
-
-    The yaw starts without uncertainty: zero-velocity and fake-position fusion level finer that way.
-    """
+def _initialise_error_covariance(ekf, params):
+    """The yaw starts without uncertainty: zero-velocity and fake-position fusion level finer that way."""
     P = ekf.P
     for i in range(state.ERROR_STATE_SIZE):
         for j in range(state.ERROR_STATE_SIZE):
@@ -131,13 +133,25 @@ def initialise_covariance(ekf, params):
         reset_covariance_block(ekf, state.TERRAIN, 1, params.EKF2_MIN_RNG**2)
 
 
+initialise_covariance = by_release(
+    _initialise_error_covariance, "adds_quaternion_errors", initialise_quaternion_covariance
+)
+"""Covariance after tilt alignment, or after a numerical fault."""
+
+
 @kernel
-def tilt_variance(ekf):
-    """Sum of the variances (rad²) of the attitude error about north and east."""
+def _tilt_error_variance(ekf):
     return ekf.P[state.ATTITUDE, state.ATTITUDE] + ekf.P[state.ATTITUDE + 1, state.ATTITUDE + 1]
 
 
+tilt_variance = by_release(_tilt_error_variance, "adds_quaternion_errors", tilt_variance_of_quaternion)
+"""Sum of the variances (rad²) of the attitude error about north and east."""
+
+
 @kernel
-def yaw_variance(ekf):
-    """Variance (rad²) of the attitude error about down."""
+def _yaw_error_variance(ekf):
     return ekf.P[state.ATTITUDE + 2, state.ATTITUDE + 2]
+
+
+yaw_variance = by_release(_yaw_error_variance, "adds_quaternion_errors", yaw_variance_of_quaternion)
+"""Variance (rad²) of the attitude error about down."""

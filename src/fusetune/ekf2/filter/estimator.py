@@ -18,6 +18,7 @@ from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_M
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
+from fusetune.ekf2.filter.aid_sources.external_vision.vision_by_mask import VISION_STEPS
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import GNSS_ARRIVALS
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import (
     GNSS_MEMORY,
@@ -34,6 +35,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     initialise_mag_modes,
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
+from fusetune.ekf2.filter.aid_sources.optical_flow.integrated_flow import FLOW_INTEGRALS
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
@@ -56,6 +58,9 @@ from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
+from fusetune.ekf2.filter.quaternion_core.core_memory import QUATERNION_CORE, initialise_quaternion_core
+from fusetune.ekf2.filter.quaternion_core.quaternion_start import add_heading_uncertainty
+from fusetune.ekf2.filter.sample_start import start_by_angles_and_field
 from fusetune.ekf2.filter.terrain_filter.terrain_filter import run_terrain_filter, start_terrain_filter
 from fusetune.ekf2.filter.terrain_filter.terrain_memory import TERRAIN_FILTER
 from fusetune.ekf2.filter.wind import WIND_MEMORY
@@ -121,6 +126,8 @@ def ekf_record(release: str) -> np.dtype:
         memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
     if does.keeps_position_local:
         memories.append(("local", LOCAL_POSITION))
+    if does.adds_quaternion_errors:
+        memories.append(("quaternion", QUATERNION_CORE))
     if does.doubts_stuck_accel_bias:
         memories.append(("accel_bias_check", ACCEL_BIAS_CHECK))
     if does.keeps_yaw_bank_as_matrices:
@@ -129,6 +136,10 @@ def ekf_record(release: str) -> np.dtype:
         memories.append(("gnss_yaw_retries", GNSS_YAW_RETRIES))
     if does.checks_gnss_on_arrival:
         memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
+    if does.integrates_flow:
+        memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
+    if does.fuses_vision_by_mask:
+        memories.append(("vision_steps", VISION_STEPS))
     return marked(np.dtype(memories, align=True), release)
 
 
@@ -174,13 +185,15 @@ def initialise_estimator(ekf, params):
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)
     initialise_yaw_bank(ekf)
+    initialise_quaternion_core(ekf)
     # on the ground, the vehicle stands this far above it
     ekf.terrain = -ekf.gpos_alt + params.EKF2_MIN_RNG
 
 
 @kernel
-def _level_filter(ekf, params, specific_force):
+def _level_filter(ekf, params, levelling):
     """Start the filter: level it by the specific force (m/s², body), the attitude that it measures at rest."""
+    specific_force = levelling.accel
     quat_aligning_with_up(specific_force[0], specific_force[1], specific_force[2], ekf.q)
     quat_to_dcm(ekf.q, ekf.R_to_earth)
     initialise_covariance(ekf, params)
@@ -190,14 +203,33 @@ def _level_filter(ekf, params, specific_force):
 
 
 @kernel
-def _level_filter_and_remember(ekf, params, specific_force):
+def _level_filter_and_remember(ekf, params, levelling):
     """As v1.16, with the low-passed specific force kept."""
     for axis in range(3):
-        ekf.levelling.specific_force[axis] = specific_force[axis]
-    _level_filter(ekf, params, specific_force)
+        ekf.levelling.specific_force[axis] = levelling.accel[axis]
+    _level_filter(ekf, params, levelling)
 
 
-level_filter = by_release(_level_filter, "levels_at_the_horizon", _level_filter_and_remember)
+@kernel
+def _start_with_samples(ekf, params, levelling):
+    """Start with tilt, heading and the barometer's height."""
+    start_by_angles_and_field(ekf, params, levelling)
+    initialise_covariance(ekf, params)
+    add_heading_uncertainty(ekf, params)
+    start_terrain_filter(ekf, params)
+    ekf.time_last_hgt_fuse = ekf.time_delayed_us
+    ekf.time_last_hor_pos_fuse = ekf.time_delayed_us
+    ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+    align_output_predictor(ekf)
+    ekf.filter_initialised = True
+
+
+level_filter = by_release(
+    by_release(_level_filter, "levels_at_the_horizon", _level_filter_and_remember),
+    "starts_with_samples",
+    _start_with_samples,
+)
+"""Start the filter by what LEVELLING holds: the tilt by the specific force; in v1.13 also heading and height."""
 
 
 @kernel
@@ -218,10 +250,23 @@ def _update(ekf, params):
 
 
 @kernel
+def _update_after_state(ekf, params):
+    """As v1.16, with the state predicted first."""
+    predict_state(ekf, params)
+    update_imu_bias_inhibit(ekf, params)
+    predict_covariance(ekf, params)
+    control_fusion_modes(ekf, params)
+    run_terrain_filter(ekf, params)
+    correct_output(ekf, params)
+
+
+@kernel
 def _update_and_follow_force(ekf, params):
     """As v1.16, after the specific force at the horizon has been low-passed."""
     follow_specific_force(ekf)
     _update(ekf, params)
 
 
-update = by_release(_update, "levels_at_the_horizon", _update_and_follow_force)
+update = by_release(
+    by_release(_update, "levels_at_the_horizon", _update_and_follow_force), "predicts_state_first", _update_after_state
+)

@@ -25,6 +25,7 @@ from fusetune.ekf2.releases.by_release import by_release
 VERT_INNOV_TEST_LIM = 3.0
 VERT_INNOV_TEST_MIN = 1.0
 BADACC_PROBATION = 3_000_000
+OLD_BADACC_PROBATION = 10_000_000
 
 FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
 
@@ -77,7 +78,7 @@ def check_vertical_acceleration_health(ekf):
     """Detect accelerations that clipping or vibration bias towards free fall.
 
     Such a bias shows as vertical innovations that are all positive (prediction below the observation, in NED).
-    `fs.bad_acc_vertical` persists for 3 s after the last detection.
+    `fs.bad_acc_vertical` persists for 3 s after the last detection, until v1.15 for 10 s.
     """
     falling = estimate_inertial_nav_falling_likelihood(ekf)
     is_clipping_frequently = _count_clipping(ekf)
@@ -88,7 +89,7 @@ def check_vertical_acceleration_health(ekf):
     else:
         ekf.time_good_vert_accel = ekf.time_delayed_us
     if ekf.fs.bad_acc_vertical:
-        ekf.fs.bad_acc_vertical = is_recent(ekf, ekf.time_bad_vert_accel, BADACC_PROBATION)
+        ekf.fs.bad_acc_vertical = is_recent(ekf, ekf.time_bad_vert_accel, _bad_accel_probation(ekf))
     else:
         ekf.fs.bad_acc_vertical = bad_vert_accel
 
@@ -124,6 +125,19 @@ def _count_clipping_of_any(ekf):
 
 _count_clipping = by_release(_count_clipping_of_axes, "counts_clipping_of_any_axis", _count_clipping_of_any)
 """Count clipped samples up and clean ones down within a second's worth; return whether it is too frequent."""
+
+
+@kernel
+def _three_seconds(ekf):
+    return BADACC_PROBATION
+
+
+@kernel
+def _ten_seconds(ekf):
+    return OLD_BADACC_PROBATION
+
+
+_bad_accel_probation = by_release(_three_seconds, "doubts_vertical_acceleration_for_10_s", _ten_seconds)
 
 
 @kernel

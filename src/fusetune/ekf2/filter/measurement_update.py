@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.common.global_position import add_to_position, single_
 from fusetune.ekf2.filter.common.heading_observability import is_heading_held
 from fusetune.ekf2.filter.covariance import reset_covariance_block
 from fusetune.ekf2.filter.observation_gain import scale_kalman_gain
+from fusetune.ekf2.filter.quaternion_core.quaternion_update import update_by_gain, update_by_state
 from fusetune.ekf2.numerics.rotations import quat_to_dcm, rotate_by_earth_increment
 from fusetune.ekf2.releases.by_release import by_release
 
@@ -321,32 +322,32 @@ def fuse(ekf, params, innovation):
 
 
 @kernel
-def measurement_update(ekf, params, R, innovation):
-    """Fuse a scalar observation whose `PH` and `K` stand in `ekf.scratch`, as `compute_kalman_gain` left them.
-
-    Entries of K that were set to zero stay zero; those of states that are not estimated are zeroed here.
-
-    Parameters
-    ----------
-    R : observation variance
-    innovation : prediction less observation
-
-    Returns
-    -------
-    bool : True, as in v1.16 an update cannot fail
-    """
+def _update_in_joseph_form(ekf, params, R, innovation):
     _update_covariance(ekf, R)
     fuse(ekf, params, innovation)
     constrain_covariance(ekf, params)
     return True
 
 
-@kernel
-def fuse_direct_state(ekf, params, innovation, innovation_var, R, state_index):
-    """Fuse an observation of a single state: H is one at `state_index`.
+measurement_update = by_release(_update_in_joseph_form, "adds_quaternion_errors", update_by_gain)
+"""Fuse a scalar observation whose `PH` and `K` stand in `ekf.scratch`, as `compute_kalman_gain` left them.
 
-    `innovation_var` sets the gain; sources that clip or inflate it pass a value other than P + R.
-    """
+Entries of K that were set to zero stay zero; those of states that are not estimated are zeroed here. Takes `ekf`,
+`params`, the observation's variance and its innovation, prediction less observation. Returns whether it was fused; in
+v1.15 and since then an update cannot fail.
+"""
+
+
+@kernel
+def _fuse_state_in_joseph_form(ekf, params, innovation, innovation_var, R, state_index):
     _observe_state(ekf, state_index)
     scale_kalman_gain(ekf, innovation_var)
-    return measurement_update(ekf, params, R, innovation)
+    return _update_in_joseph_form(ekf, params, R, innovation)
+
+
+fuse_direct_state = by_release(_fuse_state_in_joseph_form, "adds_quaternion_errors", update_by_state)
+"""Fuse an observation of a single state: H is one at `state_index`.
+
+Takes `ekf`, `params`, `innovation`, `innovation_var`, `R`, `state_index`. `innovation_var` sets the gain; sources that
+clip or inflate it pass a value other than P + R.
+"""

@@ -6,6 +6,8 @@ PX4 has these products in its generated equations; here one kernel serves every 
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
+from fusetune.ekf2.filter.quaternion_core.quaternion_update import scale_gain
+from fusetune.ekf2.releases.by_release import by_release
 
 
 @kernel
@@ -52,12 +54,15 @@ def compute_kalman_gain(ekf, H, innovation_variance):
 
 
 @kernel
-def scale_kalman_gain(ekf, innovation_variance):
-    """Write the gain of the Jacobian that `ekf.scratch.PH` was last computed for into `ekf.scratch.K` (24,)."""
+def _scale_by_inverse(ekf, innovation_variance):
     K, PH = ekf.scratch.K, ekf.scratch.PH
     inverse = 1.0 / innovation_variance
     for i in range(ERROR_STATE_SIZE):
         K[i] = PH[i] * inverse
+
+
+scale_kalman_gain = by_release(_scale_by_inverse, "adds_quaternion_errors", scale_gain)
+"""Write the gain of the Jacobian that `ekf.scratch.PH` was last computed for into `ekf.scratch.K` (24,)."""
 
 
 @kernel

@@ -11,13 +11,18 @@ Mirrors `predictCovariance` of PX4 v1.16 `EKF/covariance.cpp` and `predictState`
 written out and not generated.
 """
 
+import math
+
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.earth_rate import update_earth_rate
 from fusetune.ekf2.filter.common.global_position import add_to_position, refresh_ellipsoid
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
+from fusetune.ekf2.filter.common.imu_rates import accel_bias, gyro_bias
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
 from fusetune.ekf2.filter.measurement_update import constrain_covariance
+from fusetune.ekf2.filter.quaternion_core.quaternion_limits import limit_states
+from fusetune.ekf2.filter.quaternion_core.quaternion_prediction import follow_turn, predict_quaternion_covariance
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.rotations import (
     component_in_body,
@@ -37,6 +42,7 @@ BAD_ACCEL_NOISE = 4.9
 WIND_NOISE_HEIGHT_RATE_SCALER = 0.5
 ACCEL_HORIZ_LPF_TIME_CONSTANT_S = 1.0
 HEIGHT_RATE_LPF_TIME_CONSTANT_S = 10.0
+OLD_GYRO_BIAS_LIMIT = math.radians(20.0)
 FLAT_EARTH_VELOCITY_LIMIT = 1000.0
 
 
@@ -47,8 +53,7 @@ def _unit_range(value):
 
 
 @kernel
-def predict_covariance(ekf, params):
-    """P ← F P Fᵀ + Q over `ekf.imu_delayed`, with PX4's rules of when bias, field, wind and terrain drift."""
+def _predict_error_covariance(ekf, params):
     imu = ekf.imu_delayed
     dt = 0.5 * (imu.delta_vel_dt + imu.delta_ang_dt)
     gyro_variance = _unit_range(params.EKF2_GYR_NOISE) ** 2
@@ -62,6 +67,10 @@ def predict_covariance(ekf, params):
     _add_imu_noise(ekf, dt, gyro_variance, ax, ay, az)
     _add_noise_of_others(ekf, params, dt, gyro_variance, ax, ay, az)
     constrain_covariance(ekf, params)
+
+
+predict_covariance = by_release(_predict_error_covariance, "adds_quaternion_errors", predict_quaternion_covariance)
+"""P ← F P Fᵀ + Q over `ekf.imu_delayed`, with PX4's rules of when bias, field, wind and terrain drift."""
 
 
 @kernel
@@ -255,6 +264,60 @@ _add_noise_of_others = by_release(_add_noise_below_limits, "adds_noise_to_estima
 
 
 @kernel
+def _gyro_bias_by_mean_interval(ekf, dt):
+    return gyro_bias(ekf)
+
+
+@kernel
+def _gyro_bias_of_this_interval(ekf, dt):
+    """The increment is taken off as it is, however long the interval."""
+    return ekf.gyro_bias[0] / dt, ekf.gyro_bias[1] / dt, ekf.gyro_bias[2] / dt
+
+
+_gyro_bias_over = by_release(_gyro_bias_by_mean_interval, "takes_bias_increments_off", _gyro_bias_of_this_interval)
+
+
+@kernel
+def _accel_bias_by_mean_interval(ekf, dt):
+    return accel_bias(ekf)
+
+
+@kernel
+def _accel_bias_of_this_interval(ekf, dt):
+    return ekf.accel_bias[0] / dt, ekf.accel_bias[1] / dt, ekf.accel_bias[2] / dt
+
+
+_accel_bias_over = by_release(_accel_bias_by_mean_interval, "takes_bias_increments_off", _accel_bias_of_this_interval)
+
+
+@kernel
+def _finish_nothing(ekf, params):
+    """v1.16 limits states as it fuses."""
+
+
+@kernel
+def _finish_by_params(ekf, params):
+    limit_states(ekf, params.EKF2_GYR_B_LIM, params.EKF2_ABL_LIM)
+    follow_turn(ekf)
+    ekf.quaternion.mean_dt = ekf.dt_ekf_avg
+
+
+@kernel
+def _finish_by_fixed_limit(ekf, params):
+    limit_states(ekf, OLD_GYRO_BIAS_LIMIT, params.EKF2_ABL_LIM)
+    follow_turn(ekf)
+    ekf.quaternion.mean_dt = ekf.dt_ekf_avg
+
+
+_finish_prediction = by_release(
+    _finish_nothing,
+    "adds_quaternion_errors",
+    by_release(_finish_by_params, "learns_gyro_bias_always", _finish_by_fixed_limit),
+)
+"""Limit the states, note how far the vehicle turned, and scale biases by the new mean interval."""
+
+
+@kernel
 def predict_state(ekf, params):
     """Integrate `ekf.imu_delayed` into attitude, velocity and position."""
     update_earth_rate(ekf)
@@ -263,21 +326,23 @@ def predict_state(ekf, params):
     earth_rate = ekf.earth_rate_ned
     dt = imu.delta_ang_dt
     rotation = ekf.scratch.quat_before
+    bias = _gyro_bias_over(ekf, dt)
     for i in range(3):
         earth = component_in_body(R, i, earth_rate[0], earth_rate[1], earth_rate[2])
-        rotation[i] = imu.delta_ang[i] - ekf.gyro_bias[i] * dt - earth * dt
+        rotation[i] = imu.delta_ang[i] - bias[i] * dt - earth * dt
     rotate_by_body_increment(ekf.q, rotation[0], rotation[1], rotation[2])
     quat_to_dcm(ekf.q, R)
     _integrate_velocity(ekf, params)
+    _finish_prediction(ekf, params)
 
 
 @kernel
 def _velocity_increment(ekf, dt):
     """Specific force times `dt` (m/s, NED)."""
-    imu = ekf.imu_delayed
-    bx = imu.delta_vel[0] - ekf.accel_bias[0] * dt
-    by = imu.delta_vel[1] - ekf.accel_bias[1] * dt
-    bz = imu.delta_vel[2] - ekf.accel_bias[2] * dt
+    imu, bias = ekf.imu_delayed, _accel_bias_over(ekf, dt)
+    bx = imu.delta_vel[0] - bias[0] * dt
+    by = imu.delta_vel[1] - bias[1] * dt
+    bz = imu.delta_vel[2] - bias[2] * dt
     return rotate_to_earth(ekf.R_to_earth, bx, by, bz)
 
 
@@ -332,10 +397,17 @@ def _filter_horizontal_acceleration(ekf, dvn, dve, dt):
 
 
 @kernel
-def filter_height_rate(ekf, dt):
-    """Low-pass the down velocity as releases until v1.15 do."""
+def _filter_new_height_rate(ekf, dt):
     alpha = dt / HEIGHT_RATE_LPF_TIME_CONSTANT_S
     ekf.height_rate_lpf = ekf.height_rate_lpf * (1.0 - alpha) + ekf.vel[2] * alpha
+
+
+@kernel
+def _leave_height_rate(ekf, dt):
+    """It is filtered where the covariance is predicted."""
+
+
+_filter_height_rate = by_release(_filter_new_height_rate, "adds_quaternion_errors", _leave_height_rate)
 
 
 @kernel
@@ -343,7 +415,7 @@ def _sum_up_motion(ekf, dvn, dve, dt):
     """The horizontal acceleration is in m/s: a sum of increments that decays with a time constant of 1 s."""
     ekf.accel_horiz_lpf[0] = ekf.accel_horiz_lpf[0] * (1.0 - dt) + dvn
     ekf.accel_horiz_lpf[1] = ekf.accel_horiz_lpf[1] * (1.0 - dt) + dve
-    filter_height_rate(ekf, dt)
+    _filter_height_rate(ekf, dt)
 
 
 _filter_motion = by_release(_filter_horizontal_acceleration, "filters_motion_plainly", _sum_up_motion)

@@ -15,6 +15,8 @@ from fusetune.ekf2.filter.observation_gain import compute_kalman_gain
 from fusetune.ekf2.numerics.rotations import rotate_to_body
 from fusetune.ekf2.releases.by_release import by_release
 
+AID_MASK_DRAG = 32
+
 WIND_MEMORY = np.dtype([("external_init", "?")], align=True)
 """Sub-record `ekf.wind`: whether the wind was given from outside and no source has used it yet."""
 
@@ -47,6 +49,20 @@ def reset_wind_to_zero(ekf):
 
 
 start_wind = by_release(_start_wind_as_it_is, "starts_wind_at_zero", reset_wind_to_zero)
+
+
+@kernel
+def _is_asked_for(ekf, params):
+    return int(params.EKF2_DRAG_CTRL) > 0
+
+
+@kernel
+def _is_asked_for_by_mask(ekf, params):
+    return (int(params.EKF2_AID_MASK) & AID_MASK_DRAG) != 0
+
+
+is_drag_enabled = by_release(_is_asked_for, "selects_sources_by_mask", _is_asked_for_by_mask)
+"""Whether the wind is to be estimated from drag."""
 
 
 @kernel
@@ -87,9 +103,9 @@ def fuse_into_wind(ekf, params, aid, H, update_wind_only):
     compute_kalman_gain(ekf, H, aid.innovation_variance[0])
     if update_wind_only:
         keep_only_wind_gains(K)
-    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
-    aid.fused = True
-    aid.time_last_fuse = ekf.time_delayed_us
+    aid.fused = measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
+    if aid.fused:
+        aid.time_last_fuse = ekf.time_delayed_us
 
 
 @kernel

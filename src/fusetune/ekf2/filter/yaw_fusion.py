@@ -14,18 +14,29 @@ from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_kalman_gain, multiply_covariance
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import attitude_variance, write_yaw_jacobian
+from fusetune.ekf2.releases.by_release import by_release
 
 LANDED_TIME_BEFORE_FORCED_YAW_US = 5_000_000
 FORCED_YAW_INTERVAL_US = 1_000_000
 
 
 @kernel
-def compute_yaw_innov_var_and_h(ekf, variance, H):
-    """Write H of a heading observation into `H` (24,) and return its innovation variance (rad²)."""
+def _compute_by_down_error(ekf, variance, H):
     for i in range(ERROR_STATE_SIZE):
         H[i] = 0.0
     H[ATTITUDE + 2] = 1.0
     return ekf.P[ATTITUDE + 2, ATTITUDE + 2] + variance
+
+
+@kernel
+def _compute_by_quaternion(ekf, variance, H):
+    write_yaw_jacobian(ekf, H)
+    return attitude_variance(ekf, H) + variance
+
+
+compute_yaw_innov_var_and_h = by_release(_compute_by_down_error, "adds_quaternion_errors", _compute_by_quaternion)
+"""Write H of a heading observation into `H` (24,) and return its innovation variance (rad²)."""
 
 
 @kernel
@@ -51,11 +62,13 @@ def fuse_yaw(ekf, params, aid, H_yaw):
         reset_gyro_bias_z_cov(ekf, params)
         multiply_covariance(ekf, H_yaw)
 
-    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
-    ekf.time_last_heading_fuse = ekf.time_delayed_us
-    aid.time_last_fuse = ekf.time_delayed_us
-    aid.fused = True
-    return True
+    fused = measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
+    aid.fused = fused
+    ekf.fs.bad_hdg = not fused
+    if fused:
+        ekf.time_last_heading_fuse = ekf.time_delayed_us
+        aid.time_last_fuse = ekf.time_delayed_us
+    return fused
 
 
 @kernel

@@ -292,6 +292,107 @@ class Behaviours:
         until="v1.15",
         source="velocity_fusion.cpp",
     )
+    adds_quaternion_errors: bool = _behaviour(
+        "Attitude errors are additive in the four elements of the quaternion. Updates have no Joseph form, and one "
+        "that would make a variance negative is refused; states are limited once per prediction; covariances of what "
+        "is not estimated are zero, and variances of biases that are not learnt are kept. v1.16's errors turn about "
+        "north, east and down.",
+        since="v1.13",
+        until="v1.14",
+        source="covariance.cpp, ekf_helper.cpp, vel_pos_fusion.cpp",
+    )
+    keeps_biases_as_increments: bool = _behaviour(
+        "Biases of gyro and accelerometer are increments of angle and velocity over the mean interval of the filter. "
+        "v1.16 keeps rates.",
+        since="v1.13",
+        until="v1.14",
+        source="ekf.h",
+    )
+    sizes_buffers_by_sources: bool = _behaviour(
+        "Buffers are as long as the longest delay of a source that is asked for, and the longest interval of "
+        "barometer and magnetometer. v1.16 has EKF2_DELAY_MAX.",
+        since="v1.13",
+        until="v1.14",
+        source="estimator_interface.cpp, ../EKF2.cpp",
+    )
+    observes_acceleration_of_gravity: bool = _behaviour(
+        "Gravity is fused in m/s², by the low-passed vector of the specific force, with a gate of one and gains that "
+        "all stem from before the first axis.",
+        since="v1.13",
+        until="v1.14",
+        source="gravity_fusion.cpp",
+    )
+    measures_no_gyro_bias: bool = _behaviour(
+        "The mean rate at rest is no observation of the gyro's bias.",
+        since="v1.13",
+        until="v1.14",
+        source="control.cpp",
+    )
+    yields_to_velocity_before_alignment: bool = _behaviour(
+        "Zero velocity is not fused beside a vertical velocity, whether or not the tilt is aligned.",
+        since="v1.13",
+        until="v1.14",
+        source="zero_velocity_update.cpp",
+    )
+    predicts_state_first: bool = _behaviour(
+        "The state is predicted before the covariance, which so belongs to the new one and to the new mean interval.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
+    takes_bias_increments_off: bool = _behaviour(
+        "The increments of the biases are taken off as they are, however long the interval of the sample.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
+    learns_gyro_bias_always: bool = _behaviour(
+        "The gyro's bias is learnt always, within 20°/s; the accelerometer's unless EKF2_AID_MASK, a manoeuvre, "
+        "clipping or a bad acceleration stops it.",
+        since="v1.13",
+        until="v1.13",
+        source="covariance.cpp, ekf_helper.cpp",
+    )
+    adds_wind_noise_by_update: bool = _behaviour(
+        "The wind's noise is EKF2_WIND_NOISE times the interval, whose square is added. v1.14 has a spectral density.",
+        since="v1.13",
+        until="v1.13",
+        source="covariance.cpp",
+    )
+    updates_by_jacobian: bool = _behaviour(
+        "An update takes the gain times the Jacobian times the covariance off, made symmetric, so states whose gain "
+        "was zeroed lose half of their covariances with others; the rotation matrix follows the quaternion only at the "
+        "next prediction.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.h, ekf_helper.cpp",
+    )
+    follows_flags_at_once: bool = _behaviour(
+        "What the vehicle's status and the land detector say acts as it arrives, each on its own, and not once the "
+        "horizon has come there; only the land detector tells of flying.",
+        since="v1.13",
+        until="v1.13",
+        source="../EKF2.cpp",
+    )
+    selects_sources_by_mask: bool = _behaviour(
+        "EKF2_AID_MASK and EKF2_HGT_MODE say which sources are asked for. v1.14 has a parameter for each.",
+        since="v1.13",
+        until="v1.13",
+        source="common.h",
+    )
+    starts_with_samples: bool = _behaviour(
+        "The filter starts once the buffers could have been filled with samples of the magnetometer, where a heading "
+        "is taken from it, and of the barometer; with the heading, and a height that the barometer tells at once.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
+    fuses_no_gravity: bool = _behaviour(
+        "Gravity is not fused.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp",
+    )
     knows_no_constant_position: bool = _behaviour(
         "Nothing can tell the filter that the position is constant.",
         since="v1.13",
@@ -362,6 +463,12 @@ class Behaviours:
         since="v1.14",
         until="v1.15",
         source="baro_height_control.cpp",
+    )
+    doubts_vertical_acceleration_for_10_s: bool = _behaviour(
+        "Vertical acceleration counts as bad for 10 s after it was last found so. v1.16 forgives it after 3 s.",
+        since="v1.13",
+        until="v1.15",
+        source="common.h, height_control.cpp",
     )
     fakes_one_kind_of_position: bool = _behaviour(
         "There is one fake position, which starts by dead reckoning, is fused like any position, and protected from "
@@ -592,11 +699,106 @@ class Behaviours:
         until="v1.15",
         source="drag_fusion.cpp",
     )
-    levers_by_measured_rate: bool = _behaviour(
-        "What turns a lever arm is the rate as the gyro measures it, with its bias.",
+    sees_terrain_in_air: bool = _behaviour(
+        "The range finder corrects the terrain in the air alone and starts with its distance; on the ground the "
+        "terrain is right below whatever is measured, so that nothing is to be reset at take-off.",
         since="v1.13",
-        until="v1.15",
-        source="gps_control.cpp, ekf_helper.cpp",
+        until="v1.14",
+        source="terrain_estimator.cpp",
+    )
+    keeps_terrain_known: bool = _behaviour(
+        "The terrain counts as known for 5 s after a sensor, or standing on the ground, has told of it, whether or not "
+        "that goes on; flow corrects it along each axis by itself.",
+        since="v1.13",
+        until="v1.13",
+        source="terrain_estimator.cpp",
+    )
+    leaves_terrain_at_height_resets: bool = _behaviour(
+        "A reset of the height does not move the terrain.",
+        since="v1.13",
+        until="v1.14",
+        source="ekf_helper.cpp",
+    )
+    integrates_flow: bool = _behaviour(
+        "Flow and its gyro are integrals, whose interval is held against the time in which the IMU was summed up; on "
+        "the ground bad flow counts as none and motion must be calm; without range for 10 s it waits. A start or a "
+        "reset of the velocity takes the last known position along.",
+        since="v1.13",
+        until="v1.14",
+        source="optical_flow_control.cpp, optflow_fusion.cpp",
+    )
+    takes_vision_rotation_unfiltered: bool = _behaviour(
+        "The rotation from the frame of vision to NED is that of the sample.",
+        since="v1.14",
+        until="v1.14",
+        source="ev_pos_control.cpp, ev_vel_control.cpp, ev_height_control.cpp",
+    )
+    follows_vision_height_by_sample: bool = _behaviour(
+        "The height bias of vision is predicted at its samples alone, over one update.",
+        since="v1.14",
+        until="v1.14",
+        source="ev_height_control.cpp",
+    )
+    gives_north_up_for_vision: bool = _behaviour(
+        "The yaw of vision in its own frame stops GNSS and magnetometer as it starts; GNSS that starts in its place "
+        "holds it back until it stops.",
+        since="v1.14",
+        until="v1.14",
+        source="ev_yaw_control.cpp, gps_control.cpp",
+    )
+    starts_airspeed_by_wind: bool = _behaviour(
+        "Airspeed that starts never sets the velocity, only a wind that is not known or whose variances add up to more "
+        "than 1 m²/s²; that is given those of a heading known to 10°.",
+        since="v1.13",
+        until="v1.14",
+        source="airspeed_fusion.cpp",
+    )
+    slips_at_speed: bool = _behaviour(
+        "Sideslip is fused above 7 m/s through the air.",
+        since="v1.13",
+        until="v1.14",
+        source="sideslip_fusion.cpp",
+    )
+    feels_drag_in_air: bool = _behaviour(
+        "Drag is judged in the air alone, and not told of.",
+        since="v1.13",
+        until="v1.14",
+        source="drag_fusion.cpp",
+    )
+    compares_range_in_slow_flight: bool = _behaviour(
+        "The range finder is held against the vertical velocity only where a multicopter does not move horizontally; "
+        "on the ground it says what it says, unless it leads.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp",
+    )
+    fuses_flow_at_once: bool = _behaviour(
+        "Flow is judged where it is fused, both axes from the covariance of before, and from its start on; the bias of "
+        "its gyro is put on the flow. It waits for a heading. The velocity is reset by the range finder's tilt.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp, optflow_fusion.cpp",
+    )
+    fuses_vision_by_mask: bool = _behaviour(
+        "EKF2_AID_MASK says what of vision is fused, and whether it is turned; beside GNSS steps of its position. "
+        "Nothing counts its resets or asks for its quality, and its velocity is as certain as it says.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp, ekf_helper.cpp",
+    )
+    judges_air_data_when_fused: bool = _behaviour(
+        "Airspeed and sideslip are judged only where they are fused: the one above 1 m/s, and started whatever it "
+        "says, the other above 7 m/s in all directions.",
+        since="v1.13",
+        until="v1.13",
+        source="airspeed_fusion.cpp, sideslip_fusion.cpp, control.cpp",
+    )
+    linearises_drag_by_force: bool = _behaviour(
+        "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
+        "force; it corrects the wind alone.",
+        since="v1.13",
+        until="v1.13",
+        source="drag_fusion.cpp",
     )
 
 

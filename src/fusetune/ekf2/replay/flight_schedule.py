@@ -19,11 +19,10 @@ from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, BIAS_RESETS, EstimatorInpu
 from fusetune.ekf2.feed.sample_arrival import NOTE, NOTED
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_ACCUMULATOR
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
 from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS
-from fusetune.ekf2.releases.by_release import marked
 from fusetune.ekf2.replay.loop import (
     COMMAND,
     EVENT,
@@ -35,10 +34,12 @@ from fusetune.ekf2.replay.loop import (
     find_updates,
 )
 from fusetune.ekf2.schedule.imu_intervals import IMU_INTERVAL
-from fusetune.ekf2.schedule.sensor_actions import ACTION, ARRIVED
+from fusetune.ekf2.schedule.longest_delay import longest_delay_ms
+from fusetune.ekf2.schedule.sensor_actions import ACTION, ARRIVED, DUE
+from fusetune.ekf2.schedule.starting_samples import looks_of_runs, low_passed, taken_at
 from fusetune.ekf2.schedule.taking_actions import DRAG, FLOW, SENSOR_NAMES
 from fusetune.ekf2.schedule.timeline import Steps, steps_of, timeline
-from fusetune.ekf2.schedule.updates import LEVELLING, NEVER, UPDATE
+from fusetune.ekf2.schedule.updates import NEVER, UPDATE, levelling_record
 from fusetune.px4.aid_sources import SENSORS
 from fusetune.px4.flight import ParameterChange
 
@@ -119,6 +120,24 @@ class FlightSchedule:
         return int(runs[place]) if place < len(times) else None
 
 
+class SampleStart(NamedTuple):
+    """By what a release starts that waits for samples: whether it needs a heading, and delays of the sensors."""
+
+    needs_heading: bool
+    mag_delay: Steps
+    baro_delay: Steps
+
+
+class Clock(NamedTuple):
+    """What updates follow from: interval, longest delay, when a state is given, release, and what its start needs."""
+
+    predict_us: Steps
+    delay_max_ms: float
+    start_us: int
+    release: str
+    start: SampleStart | None
+
+
 def flight_schedule(
     inputs: EstimatorInputs, params: np.void, changes: Changes, start_us: int | None = None, release: str = BASELINE
 ) -> FlightSchedule:
@@ -136,18 +155,36 @@ def flight_schedule(
         changed = [(run, taken_value(name, change.value, release)) for run, change in changes if change.name == name]
         return steps_of(float(params[name]), changed, meaning)
 
-    delay_max = [value for run, value in steps("EKF2_DELAY_MAX") if run == 0][-1]
-    clock = (steps("EKF2_PREDICT_US"), delay_max, NEVER if start_us is None else start_us, release)
+    def at_start(name: str) -> float:
+        return [value for run, value in steps(name) if run == 0][-1]
+
+    delay_max = longest_delay_ms(at_start, release)
+    start = None
+    if BEHAVIOURS[release].starts_with_samples:
+        needs_heading = int(at_start("EKF2_MAG_TYPE")) <= MAG_TYPE_3D
+        start = SampleStart(needs_heading, *(steps(SENSORS[name].delay_parameter or "") for name in ("mag", "baro")))
+    clock = Clock(steps("EKF2_PREDICT_US"), delay_max, NEVER if start_us is None else start_us, release, start)
     told = {}
     for sensor in SENSOR_NAMES:
         delay = SENSORS[sensor].delay_parameter if sensor in SENSORS else None
-        wanted = steps(*_WANTED[sensor]) if sensor in _WANTED else ((0, 1.0),)
+        wanted = steps(*_WANTED[sensor]) if _is_asked_by_parameter(sensor, release) else ((0, 1.0),)
         if sensor == "gnss" and _told_gnss_times(inputs, release) is not None:
             delay = None
         told[sensor] = (steps(delay) if delay else ((0, 0.0),), wanted)
     memo = inputs.memo
     key = ("schedule", clock, tuple(told.values()))
     return memo.get(key, lambda: _Builder(inputs, clock).schedule(told), lambda made: _bytes(made.tables))
+
+
+def _is_asked_by_parameter(sensor: str, release: str) -> bool:
+    """Flow over a terrain that is estimated apart is asked for always: it may tell of the terrain."""
+    return sensor in _WANTED and not (sensor == "flow" and BEHAVIOURS[release].flies_flow_over_terrain)
+
+
+def _flow_times(inputs: EstimatorInputs) -> Rows:
+    """When the intervals of the flow ended, (samples,) int64."""
+    timespan = inputs.arrays.flow_limits[:, 3].astype(np.int64)
+    return np.ascontiguousarray(inputs.arrays.flow["time_us"]) + timespan // 2
 
 
 def _told_gnss_times(inputs: EstimatorInputs, release: str) -> Rows | None:
@@ -176,9 +213,9 @@ def _bytes(arrays: Sequence[Rows]) -> int:
 class _Builder:
     """Builds the parts of schedules of one flight that share intervals and updates."""
 
-    def __init__(self, inputs: EstimatorInputs, clock: tuple[Steps, float, int, str]) -> None:
+    def __init__(self, inputs: EstimatorInputs, clock: Clock) -> None:
         self.inputs, self.imu, self.clock = inputs, inputs.arrays.imu, clock
-        predict_us = clock[0]
+        predict_us = clock.predict_us
         self.predict_us = timeline(predict_us)
         self.intervals = inputs.memo.get(("intervals", predict_us), self._intervals, _size)
         self.updates, self.lengths, self.levelling = inputs.memo.get(("updates", clock), self._updates, _bytes)
@@ -188,13 +225,44 @@ class _Builder:
         return _shortened(intervals, find_intervals(self.imu, self.predict_us, sampler, intervals))
 
     def _updates(self) -> tuple[Rows, Rows, Rows]:
-        _, delay_max, start_us, release = self.clock
-        updates, lengths = np.zeros(len(self.intervals), UPDATE), np.zeros(1, BUFFER_LENGTHS)
-        levelling = np.zeros(1, marked(LEVELLING, release))
-        count = find_updates(
-            self.intervals, self.imu, self.predict_us, delay_max, start_us, lengths, levelling, updates
-        )
-        return _shortened(updates, count), lengths, levelling
+        clock, lengths = self.clock, np.zeros(1, BUFFER_LENGTHS)
+        levelling = np.zeros(1, levelling_record(clock.release))
+        find = partial(find_updates, self.intervals, self.imu, self.predict_us, clock.delay_max_ms, clock.start_us)
+        if clock.start is None:
+            updates = np.zeros(len(self.intervals), UPDATE)
+            return _shortened(updates, find(lengths, levelling, updates)), lengths, levelling
+        return self._updates_with_samples(clock.start, find, lengths, levelling)
+
+    def _updates_with_samples(
+        self, start: SampleStart, find: Callable[[Rows, Rows, Rows], int], lengths: Rows, levelling: Rows
+    ) -> tuple[Rows, Rows, Rows]:
+        """Updates from when there are as many samples of magnetometer and barometer as their buffers hold."""
+        levelling["earliest_run"] = len(self.imu)
+        updates = np.zeros(len(self.intervals), UPDATE)
+        find(lengths, levelling, updates)
+        looks = looks_of_runs(self.intervals, len(self.imu), int(lengths["imu_length"][0]))
+        mag = taken_at(looks, self._find_actions("mag", start.mag_delay, lengths, looks))
+        baro = taken_at(looks, self._find_actions("baro", start.baro_delay, lengths, looks))
+        needed = int(lengths["observation_length"][0])
+        earliest = [one.run_of(needed) for one in ((mag, baro) if start.needs_heading else (baro,))]
+        levelling[0] = np.zeros(1, levelling.dtype)[0]
+        levelling["levelled_run"] = -1
+        known = [len(self.imu) if run is None else run for run in earliest]
+        levelling["earliest_run"] = max(known)
+        updates = np.zeros(len(self.intervals), UPDATE)
+        updates = _shortened(updates, find(lengths, levelling, updates))
+        run = int(levelling["levelled_run"][0])
+        if run < 0:
+            run = int(updates["run"][0]) if len(updates) else -1
+        mags, baros = mag.until(run), baro.until(run)
+        levelling["mag_count"], levelling["baro_count"] = mags, baros
+        if mags:
+            levelling["mag"] = low_passed(self.inputs.arrays.mag["mag"][mag.slots[:mags]])
+        if baros:
+            heights = self.inputs.arrays.baro["hgt"][baro.slots[:baros]]
+            levelling["baro_offset"], levelling["baro_height"] = low_passed(heights), heights[-1]
+            levelling["baro_time_us"] = baro.times_us[baros - 1]
+        return updates, lengths, levelling
 
     def schedule(self, told: dict[str, tuple[Steps, Steps]]) -> FlightSchedule:
         memo, drag = self.inputs.memo, np.zeros(0, DRAG_SAMPLE)
@@ -203,6 +271,10 @@ class _Builder:
             key = (name, self.clock, values)
             if number == DRAG:
                 drag, actions = memo.get(key, partial(self._drag, values[1]), _bytes)
+            elif name == "system_flags" and BEHAVIOURS[self.clock.release].follows_flags_at_once:
+                actions = memo.get(key, self._flags_at_once, _size)
+            elif name in ("mag", "baro") and self.clock.start is not None:
+                actions = memo.get(key, partial(self._actions_after_start, number, *values), _size)
             else:
                 actions = memo.get(key, partial(self._actions, number, *values), _size)
             parts.append(actions)
@@ -216,20 +288,48 @@ class _Builder:
         return FlightSchedule(tables)
 
     def _actions(self, number: int, delay_ms: Steps, wanted: Steps) -> Rows:
-        name = SENSOR_NAMES[number]
+        return self._find_actions(SENSOR_NAMES[number], delay_ms, self.lengths, self.updates, wanted)
+
+    def _find_actions(
+        self, name: str, delay_ms: Steps, lengths: Rows, updates: Rows, wanted: Steps = ((0, 1.0),)
+    ) -> Rows:
         arrived = _arrived(self.inputs, name)
         times = np.ascontiguousarray(getattr(self.inputs.arrays, name)["time_us"])
-        told = _told_gnss_times(self.inputs, self.clock[3]) if name == "gnss" else None
+        told = _told_gnss_times(self.inputs, self.clock.release) if name == "gnss" else None
+        number = SENSOR_NAMES.index(name)
         if told is not None:
             times = told
+        elif number == FLOW and BEHAVIOURS[self.clock.release].integrates_flow:
+            times = _flow_times(self.inputs)
         places = "imu_length" if number == FLOW else "observation_length"
         actions = np.zeros(2 * len(arrived), ACTION)
         count = find_actions(
-            arrived, times, timeline(delay_ms), timeline(wanted), self.imu, self.intervals, self.updates,
-            self.lengths, np.zeros(1, RING), int(self.lengths[places][0]), actions,
+            arrived, times, timeline(delay_ms), timeline(wanted), self.imu, self.intervals, updates,
+            lengths, np.zeros(1, RING), int(lengths[places][0]), actions,
         )  # fmt: skip
         actions["sensor"] = number
         return _shortened(actions, count)
+
+    def _actions_after_start(self, number: int, delay_ms: Steps, wanted: Steps) -> Rows:
+        """As `_actions`, without the samples that were taken for the start."""
+        run = int(self.levelling["levelled_run"][0])
+        looks = looks_of_runs(self.intervals, len(self.imu), int(self.lengths["imu_length"][0]))
+        looks = looks[looks["run"] <= run]
+        steps = np.concatenate([looks, self.updates])
+        actions = self._find_actions(SENSOR_NAMES[number], delay_ms, self.lengths, steps, wanted)
+        actions = actions[(actions["what"] != DUE) | (actions["update"] >= len(looks))]
+        actions["update"] = np.maximum(actions["update"] - len(looks), 0)
+        return actions
+
+    def _flags_at_once(self) -> Rows:
+        """Each acts at the first update that is not before its arrival."""
+        arrived = _arrived(self.inputs, "system_flags")
+        actions = np.zeros(len(arrived), ACTION)
+        actions["run"], actions["slot"] = arrived["run"], arrived["slot"]
+        actions["update"] = np.searchsorted(self.updates["run"], arrived["run"])
+        actions["time_us"] = self.imu["time_us"][arrived["run"]]
+        actions["sensor"], actions["what"] = SENSOR_NAMES.index("system_flags"), DUE
+        return actions[actions["update"] < len(self.updates)]
 
     def _drag(self, enabled: Steps) -> tuple[Rows, Rows]:
         # called where it finds nothing, too: what a replay at rest compiles is all that there is to compile

@@ -158,7 +158,7 @@ def _go_on(ekf, params, inputs, schedule, notes, views, recorder, room, number, 
         from_run = 0
         pretend_fused(ekf)
         if not ekf.filter_initialised:
-            level_filter(ekf, params, schedule.levelling[0].accel)
+            level_filter(ekf, params, schedule.levelling[0])
         update(ekf, params)
         save_declination(ekf, params)
         record_update(ekf, params, views, recorder, room, ekf.time_latest_us)

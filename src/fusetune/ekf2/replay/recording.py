@@ -24,6 +24,8 @@ from fusetune.ekf2.filter.common.conditions import (
 )
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES, FAULT_STATUS_NAMES, REJECTION_NAMES
 from fusetune.ekf2.filter.common.local_origin import altitude_at_origin
+from fusetune.ekf2.filter.quaternion_core.core_memory import Q3
+from fusetune.ekf2.filter.quaternion_core.quaternion_covariance import attitude_variance_about
 from fusetune.ekf2.numerics.geodesy import metres_per_radian, project_about
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
@@ -400,14 +402,41 @@ def _record_states(ekf, row, timestamp):
     states[S.PUBLISHED_WIND] = ekf.wind_vel[0]
     states[S.PUBLISHED_WIND + 1] = ekf.wind_vel[1]
     states[S.PUBLISHED_TERRAIN] = ekf.terrain
-    for i in range(S.ERROR_STATE_SIZE):
-        row.covariances[i] = ekf.P[i, i]
+    _record_variances(ekf, row.covariances)
     imu = ekf.imu_delayed
     for i in range(3):
         row.delta_angle[i] = imu.delta_ang[i]
         row.delta_velocity[i] = imu.delta_vel[i]
     row.delta_angle_dt = imu.delta_ang_dt
     row.delta_velocity_dt = imu.delta_vel_dt
+
+
+@kernel
+def _record_diagonal(ekf, variances):
+    for i in range(S.ERROR_STATE_SIZE):
+        variances[i] = ekf.P[i, i]
+
+
+@kernel
+def _record_quaternion_first(ekf, variances):
+    """The order of PX4 v1.14: all four of the quaternion, then the others."""
+    for i in range(S.VELOCITY):
+        variances[i] = ekf.P[i, i]
+    variances[S.VELOCITY] = ekf.P[Q3, Q3]
+    for i in range(S.VELOCITY, Q3):
+        variances[i + 1] = ekf.P[i, i]
+
+
+_record_variances = by_release(_record_diagonal, "adds_quaternion_errors", _record_quaternion_first)
+
+
+@kernel
+def _error_variance(ekf, axis):
+    return ekf.P[S.ATTITUDE + axis, S.ATTITUDE + axis]
+
+
+_attitude_variance = by_release(_error_variance, "adds_quaternion_errors", attitude_variance_about)
+"""Variance (rad²) of the attitude error about north, east or down."""
 
 
 @kernel
@@ -433,7 +462,7 @@ def _record_scored_states(ekf, row):
         row.quaternion[i] = ekf.q[i]
     for i in range(3):
         row.velocity[i] = ekf.vel[i]
-        row.attitude_variance[i] = ekf.P[S.ATTITUDE + i, S.ATTITUDE + i]
+        row.attitude_variance[i] = _attitude_variance(ekf, i)
         row.velocity_variance[i] = ekf.P[S.VELOCITY + i, S.VELOCITY + i]
         row.position_variance[i] = ekf.P[S.POSITION + i, S.POSITION + i]
 

@@ -10,6 +10,7 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import apply_antenna_yaw_offset, apply_vision_noise
 from fusetune.ekf2.feed.sensors import SENSOR_MEMORIES
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import look_at_arrived_gnss, recall_arrived_gnss
+from fusetune.ekf2.filter.common.conditions import follow_system_flags_at_once
 from fusetune.ekf2.releases.by_release import by_release
 from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.sensor_actions import BUFFERED, DUE
@@ -53,10 +54,26 @@ def take_actions(ekf, params, inputs, schedule, place, update, from_run, stop_ru
         if action.what == DUE:
             if with_due:
                 _take_due(ekf, inputs, schedule.drag, action, notes)
+                if action.sensor == FLOW:
+                    _note_interval(ekf, inputs, action)
         elif from_run <= action.run < stop_run:
             _arrive(ekf, params, inputs, schedule, action)
         place += 1
     return place
+
+
+@kernel
+def _need_no_interval(ekf, inputs, action):
+    """Since v1.15 flow is a rate."""
+
+
+@kernel
+def _note_flow_interval(ekf, inputs, action):
+    ekf.flow_interval = inputs.flow_limits[action.slot, 3] * 1e-6
+
+
+_note_interval = by_release(_need_no_interval, "integrates_flow", _note_flow_interval)
+"""Over what time (s) the flow was integrated."""
 
 
 @kernel
@@ -119,6 +136,23 @@ _gnss_arrives = by_release(_wait_until_due, "checks_gnss_on_arrival", _look_at_g
 
 
 @kernel
+def _apply_to_all(ekf, sample, note):
+    apply_vision_noise(sample, note)
+
+
+@kernel
+def _apply_but_to_velocity(ekf, sample, note):
+    """The variances that the sample tells of its velocity stay as they are."""
+    north, east, down = sample.velocity_var[0], sample.velocity_var[1], sample.velocity_var[2]
+    apply_vision_noise(sample, note)
+    if note.noise_mode == 0 and math.isfinite(north) and math.isfinite(east) and math.isfinite(down):
+        sample.velocity_var[0], sample.velocity_var[1], sample.velocity_var[2] = north, east, down
+
+
+_apply_noise_of_vision = by_release(_apply_to_all, "fuses_vision_by_mask", _apply_but_to_velocity)
+
+
+@kernel
 def _note_arrival(sensor, action):
     sensor.exists = True
     if action.what == BUFFERED:
@@ -142,7 +176,7 @@ def _take_due(ekf, inputs, drag, action, notes):
         _take(sensors.flow, inputs.flow, action)
     elif sensor == EV:
         _take(sensors.ev, inputs.ev, action)
-        apply_vision_noise(sensors.ev.sample, notes[place_at(notes, action.run)])
+        _apply_noise_of_vision(ekf, sensors.ev.sample, notes[place_at(notes, action.run)])
     elif sensor == AIRSPEED:
         _take(sensors.airspeed, inputs.airspeed, action)
     elif sensor == AUXVEL:
@@ -150,7 +184,20 @@ def _take_due(ekf, inputs, drag, action, notes):
     elif sensor == DRAG:
         _take(sensors.drag, drag, action)
     else:
-        _take(sensors.system_flags, inputs.system_flags, action)
+        _take_flags(ekf, inputs, action)
+
+
+@kernel
+def _keep_flags_for_control(ekf, inputs, action):
+    _take(ekf.sensors.system_flags, inputs.system_flags, action)
+
+
+@kernel
+def _follow_flags(ekf, inputs, action):
+    follow_system_flags_at_once(ekf, inputs.system_flags[action.slot])
+
+
+_take_flags = by_release(_keep_flags_for_control, "follows_flags_at_once", _follow_flags)
 
 
 @kernel

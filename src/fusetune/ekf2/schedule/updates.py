@@ -14,7 +14,8 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.filter.common.levelling import LPF_ALPHA
 from fusetune.ekf2.numerics.constants import ONE_G
-from fusetune.ekf2.releases.by_release import by_release
+from fusetune.ekf2.releases.behaviours import BEHAVIOURS
+from fusetune.ekf2.releases.by_release import by_release, marked
 from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.timeline import value_at
 
@@ -31,6 +32,42 @@ UPDATE = np.dtype([*fields("i4", "run", "delayed"), ("average_dt", "f8")], align
 
 LEVELLING = np.dtype([*fields("f8", "accel", "gyro", shape=(3,)), ("begun", "?"), ("started_run", "i8")], align=True)
 """Filtered specific force (m/s²) and rate (rad/s), body; the run from which a given state is the filter's, or -1."""
+
+STARTING_SAMPLES = np.dtype(
+    [
+        *fields("i8", "earliest_run", "levelled_run", "mag_count", "baro_count", "baro_time_us"),
+        ("mag", "f8", (3,)),
+        *fields("f8", "baro_offset", "baro_height"),
+    ],
+    align=True,
+)
+"""What else a release has in its LEVELLING that starts with samples: the first run at which there are enough, and the
+run at which it did start, or -1; how many there were of magnetometer and barometer, and their low-passed values (Gauss,
+body; m); time (µs) and height (m) of the barometer's last."""
+
+
+def levelling_record(release: str) -> np.dtype:
+    """LEVELLING of a release."""
+    own = STARTING_SAMPLES if BEHAVIOURS[release].starts_with_samples else np.dtype([])
+    places = [(name, dtype[name]) for dtype in (LEVELLING, own) for name in dtype.names or ()]
+    return marked(np.dtype(places, align=True), release)
+
+
+@kernel
+def _at_once(levelling, run):
+    return True
+
+
+@kernel
+def _with_samples(levelling, run):
+    if run < levelling.earliest_run:
+        return False
+    levelling.levelled_run = run
+    return True
+
+
+_may_start = by_release(_at_once, "starts_with_samples", _with_samples)
+"""Whether a filter that is level may start at a run."""
 
 
 @kernel
@@ -57,7 +94,7 @@ def _schedule_updates(intervals, imu, predict_us, imu_length, start_us, levellin
             is_waiting = True
         delayed = oldest_buffered(newest, imu_length)
         if not levelled and newest >= 0:
-            levelled = _is_level(intervals[newest], levelling)
+            levelled = _is_level(intervals[newest], levelling) and _may_start(levelling, run)
         if levelled and is_waiting:
             is_waiting = False
             average = averaged_interval(intervals[delayed], average, value_at(predict_us, run))

@@ -8,6 +8,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.state import GYRO_BIAS
 from fusetune.ekf2.filter.measurement_update import fuse_direct_state
+from fusetune.ekf2.releases.by_release import by_release
 
 ZERO_GYRO_MEMORY = np.dtype([("delta_ang", "f8", (3,)), ("delta_ang_dt", "f8")], align=True)
 
@@ -23,8 +24,7 @@ def reset_zero_gyro(ekf):
 
 
 @kernel
-def control_zero_gyro_update(ekf, params):
-    """While at rest, fuse the mean rate over 0.2 s as an observation of the gyro bias."""
+def _fuse_mean_rate(ekf, params):
     if not ekf.cs.vehicle_at_rest:
         reset_zero_gyro(ekf)
         return
@@ -41,3 +41,12 @@ def control_zero_gyro_update(ekf, params):
         innovation_variance = ekf.P[GYRO_BIAS + i, GYRO_BIAS + i] + variance
         fuse_direct_state(ekf, params, innovation, innovation_variance, variance, GYRO_BIAS + i)
     reset_zero_gyro(ekf)
+
+
+@kernel
+def _measure_no_bias(ekf, params):
+    """Before v1.15 the bias is told by the heading alone."""
+
+
+control_zero_gyro_update = by_release(_fuse_mean_rate, "measures_no_gyro_bias", _measure_no_bias)
+"""While at rest, fuse the mean rate over 0.2 s as an observation of the gyro bias."""

@@ -7,10 +7,13 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.conditions import is_vertical_velocity_aiding_active
 from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.measurement_update import fuse_direct_state
+from fusetune.ekf2.releases.by_release import does
 
 UPDATE_INTERVAL_US = 200_000
 VARIANCE_WHILE_LEVELLING = 0.001**2
 VARIANCE_AFTERWARDS = 0.2**2
+
+_yields_before_alignment = does("yields_to_velocity_before_alignment")
 
 
 @kernel
@@ -23,7 +26,7 @@ def control_zero_velocity_update(ekf, params):
         return
     if not (ekf.cs.vehicle_at_rest and ekf.cs_prev.vehicle_at_rest):
         return
-    if is_vertical_velocity_aiding_active(ekf) and ekf.cs.tilt_align:
+    if is_vertical_velocity_aiding_active(ekf) and (ekf.cs.tilt_align or _yields_before_alignment(ekf)):
         return
     variance = VARIANCE_AFTERWARDS if ekf.cs.tilt_align else VARIANCE_WHILE_LEVELLING
     innovation_variance = (

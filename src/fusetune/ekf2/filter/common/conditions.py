@@ -171,16 +171,33 @@ def _is_terrain_state_valid(ekf):
 
 
 @kernel
+def _is_on_ground(ekf):
+    return not ekf.cs.in_air
+
+
+@kernel
+def _never(ekf):
+    return False
+
+
+_counts_on_ground = by_release(_is_on_ground, "sees_terrain_in_air", _never)
+
+
+@kernel
 def _is_terrain_aided(ekf):
     """Whether the filter of the terrain was corrected within 5 s: by flow, or by range (on the ground, or started)."""
     terrain, aid = ekf.terrain_filter, ekf.aid
-    by_range = (terrain.uses_range or not ekf.cs.in_air) and is_recent(
+    by_range = (terrain.uses_range or _counts_on_ground(ekf)) and is_recent(
         ekf, aid.terrain_range_finder.time_last_fuse, TERRAIN_TIMEOUT
     )
     return by_range or (terrain.uses_flow and is_recent(ekf, aid.terrain_optical_flow.time_last_fuse, TERRAIN_TIMEOUT))
 
 
-is_terrain_estimate_valid = by_release(_is_terrain_state_valid, "filters_terrain_apart", _is_terrain_aided)
+is_terrain_estimate_valid = by_release(
+    by_release(_is_terrain_state_valid, "filters_terrain_apart", _is_terrain_aided),
+    "keeps_terrain_known",
+    _is_terrain_state_valid,
+)
 
 
 @kernel
@@ -212,3 +229,16 @@ def set_gnd_effect(ekf):
     """Note that rotor downwash near the ground may be raising the static pressure."""
     ekf.cs.gnd_effect = True
     ekf.time_last_gnd_effect_on = ekf.time_delayed_us
+
+
+@kernel
+def follow_system_flags_at_once(ekf, flags):
+    """Apply what arrived of the vehicle's status or of the land detector; times are noted as flying begins or ends."""
+    if flags.status_is_new:
+        ekf.cs.fixed_wing = flags.is_fixed_wing
+    if flags.land_is_new:
+        ekf.cs.vehicle_at_rest = flags.at_rest
+        if flags.gnd_effect:
+            set_gnd_effect(ekf)
+        if flags.in_air != ekf.cs.in_air:
+            set_in_air_status(ekf, flags.in_air)

@@ -17,6 +17,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.buffers import RING_CAPACITY
 from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.filter.common.imu_rates import accel_bias, gyro_bias
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon, lat_lon_difference
 from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
@@ -196,9 +197,10 @@ def correct_output(ekf, params):
         dt = min(max((ekf.time_delayed_us - output.time_last_correct_us) * 1e-6, MIN_DT_S), MAX_DT_S)
         output.dt_correct_avg = 0.8 * output.dt_correct_avg + 0.2 * dt
     output.time_last_correct_us = ekf.time_delayed_us
+    gyro, accel = gyro_bias(ekf), accel_bias(ekf)
     for axis in range(3):
-        output.gyro_bias[axis] = ekf.gyro_bias[axis]
-        output.accel_bias[axis] = ekf.accel_bias[axis]
+        output.gyro_bias[axis] = gyro[axis]
+        output.accel_bias[axis] = accel[axis]
     _store_newest(output)
     _correct_attitude(ekf)
     _correct_velocity_and_position(ekf, params)

@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.output_predictor.output_predictor import (
     apply_quaternion_reset,
     apply_velocity_reset,
 )
+from fusetune.ekf2.filter.quaternion_core.quaternion_covariance import add_yaw_variance, uncorrelate_quaternion
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import (
     dcm_to_quat,
@@ -276,6 +277,20 @@ def reset_horizontal_position_to_last_known(ekf, params):
 
 
 @kernel
+def _move_terrain_along(ekf, delta_d):
+    update_terrain_reset_status(ekf, delta_d)
+    ekf.terrain = single_precision(ekf.terrain + delta_d)
+
+
+@kernel
+def _leave_terrain(ekf, delta_d):
+    """Until v1.14 the terrain stays where it was, and its filter finds the new height."""
+
+
+_move_terrain = by_release(_move_terrain_along, "leaves_terrain_at_height_resets", _leave_terrain)
+
+
+@kernel
 def _shift_nothing(ekf, delta_d):
     """v1.16's range finder has no bias."""
 
@@ -304,8 +319,7 @@ def reset_altitude_to(ekf, params, altitude, var):
     if _is_bias_shifted(ekf, ekf.cs.gps_hgt):
         ekf.gps_hgt_b_est.bias += delta_d
     _shift_range_bias(ekf, delta_d)
-    update_terrain_reset_status(ekf, delta_d)
-    ekf.terrain = single_precision(ekf.terrain + delta_d)
+    _move_terrain(ekf, delta_d)
     ekf.time_last_hgt_fuse = ekf.time_delayed_us
 
 
@@ -317,10 +331,51 @@ def reset_height_to_last_known(ekf, params):
 
 
 @kernel
-def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
-    """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
+def _reset_yaw_error_variance(ekf, yaw_var):
     if math.isfinite(yaw_var) and yaw_var > FLT_EPSILON:
         reset_covariance_block(ekf, ATTITUDE + 2, 1, yaw_var)
+
+
+@kernel
+def _do_not_yet(ekf, yaw_var):
+    """The covariance of the quaternion follows once it has turned."""
+
+
+@kernel
+def _done_already(ekf, yaw_var):
+    """That of an error in the NED frame was set before the turn."""
+
+
+@kernel
+def _add_to_yaw_variance(ekf, yaw_var):
+    uncorrelate_quaternion(ekf)
+    if yaw_var > FLT_EPSILON:
+        add_yaw_variance(ekf, yaw_var)
+
+
+_set_yaw_variance = by_release(_reset_yaw_error_variance, "adds_quaternion_errors", _do_not_yet)
+_uncorrelate_attitude = by_release(_done_already, "adds_quaternion_errors", _add_to_yaw_variance)
+
+
+@kernel
+def _hold_no_yaw(ekf):
+    """The yaw at which the vehicle came to rest is held by v1.14 alone, v1.13 takes it anew."""
+
+
+@kernel
+def _hold_new_yaw(ekf):
+    ekf.mag_modes.static_yaw = math.nan
+
+
+_forget_static_yaw = by_release(
+    by_release(_hold_no_yaw, "fuses_heading_or_field", _hold_new_yaw), "clears_field_whenever_stopped", _hold_no_yaw
+)
+
+
+@kernel
+def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
+    """Set the yaw (rad) and its variance (rad², ignored unless positive), keeping the tilt."""
+    _set_yaw_variance(ekf, yaw_var)
     yaw_before = euler_yaw(ekf.R_to_earth)
     before, error = ekf.scratch.quat_before, ekf.scratch.quat_error
     for i in range(4):
@@ -328,10 +383,12 @@ def reset_quat_state_yaw(ekf, params, yaw, yaw_var):
     quat_to_dcm(ekf.q, ekf.scratch.R)
     update_yaw_in_rot_mat(yaw, ekf.scratch.R, ekf.R_to_earth)
     dcm_to_quat(ekf.R_to_earth, ekf.q)
+    _uncorrelate_attitude(ekf, yaw_var)
     quat_multiply_inverse(ekf.q, before, error)
     quat_normalise(error)
     _propagate_quat_reset(ekf, error)
     ekf.time_last_heading_fuse = ekf.time_delayed_us
+    _forget_static_yaw(ekf)
     _turn_velocity_along(ekf, params, wrap_pi(yaw - yaw_before))
 
 

@@ -43,27 +43,27 @@ def _use_healthy_sample(ekf, params):
         if not consistent:
             stop_terrain_by_range(ekf)
             return
-        _fuse(ekf)
-        if is_timed_out(ekf, aid.time_last_fuse, TERRAIN_RESET_TIMEOUT):
-            _recover(ekf, params, starting)
+        correct_terrain(ekf)
+        if is_timed_out(ekf, aid.time_last_fuse, TERRAIN_RESET_TIMEOUT) and not give_up_or_reset(ekf, params, starting):
+            stop_terrain_by_range(ekf)
     elif starting:
         terrain.uses_range = True
         if terrain.uses_flow and aid.test_ratio[0] < START_TEST_RATIO:
-            _fuse(ekf)
+            correct_terrain(ekf)
         else:
-            _reset(ekf, params)
+            reset_terrain_to_range(ekf, params)
 
 
 @kernel
-def _recover(ekf, params, starting):
-    """Take the distance over unless it is that of the sensor's own feet; then the sensor sees no ground."""
+def give_up_or_reset(ekf, params, starting):
+    """Take the distance over, and return whether; that of the sensor's own feet is no ground, if it is a good one."""
     if dist_bottom(ekf.range) > 2.0 * params.EKF2_MIN_RNG:
-        _reset(ekf, params)
-        return
+        reset_terrain_to_range(ekf, params)
+        return True
     if starting:
         ekf.cs.rng_fault = True
         ekf.terrain_filter.range_is_faulty = True
-    stop_terrain_by_range(ekf)
+    return False
 
 
 @kernel
@@ -83,7 +83,8 @@ def _judge(ekf, params):
 
 
 @kernel
-def _fuse(ekf):
+def correct_terrain(ekf):
+    """Fuse the judged distance unless it was rejected."""
     terrain, aid = ekf.terrain_filter, ekf.aid.terrain_range_finder
     ekf.reject.hagl = aid.innovation_rejected
     if aid.innovation_rejected:
@@ -96,7 +97,7 @@ def _fuse(ekf):
 
 
 @kernel
-def _reset(ekf, params):
+def reset_terrain_to_range(ekf, params):
     """Put the terrain where the range finder sees it."""
     ekf.terrain = dist_bottom(ekf.range) - ekf.gpos_alt
     ekf.terrain_filter.variance = range_variance(ekf, params)

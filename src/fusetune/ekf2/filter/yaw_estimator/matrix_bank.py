@@ -13,7 +13,7 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
-from fusetune.ekf2.filter.common.imu_rates import gyro_bias_rate
+from fusetune.ekf2.filter.common.imu_rates import gyro_bias
 from fusetune.ekf2.filter.yaw_estimator.attitude_filter import (
     ALIGNMENT_HIGH,
     ALIGNMENT_LOW,
@@ -310,7 +310,7 @@ def _start_or_fuse(ekf, vel_n, vel_e, vel_accuracy):
     if not gsf.vel_fuse_started:
         initialise_models(gsf, vel_n, vel_e, vel_accuracy)
         align_matrices(ekf)
-        bias = gyro_bias_rate(ekf)
+        bias = gyro_bias(ekf)
         for axis in range(3):
             gsf.gyro_bias[axis, :] = bias[axis]
         gsf.vel_fuse_started = True

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_fusion import fuse_airspeed, update_airspeed
+from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_fusion import fuse_airspeed, predict_airspeed, update_airspeed
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_resets import (
     reset_vel_using_airspeed,
     reset_wind_using_airspeed,
@@ -17,10 +17,12 @@ from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_stat
 from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.common.timing import is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY
+from fusetune.ekf2.filter.wind import is_drag_enabled
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import set_true_airspeed
 from fusetune.ekf2.releases.by_release import by_release
 
 WIND_TIMEOUT_US = 10_000_000
+LEAST_AIRSPEED = 1.0
 DATA_STOPPED_US = 1_000_000
 
 
@@ -30,7 +32,7 @@ def control_air_data_fusion(ekf, params):
     aid = ekf.aid.airspeed
     airspeed_timed_out = is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US)
     sideslip_timed_out = is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, WIND_TIMEOUT_US)
-    if ekf.cs.fake_pos or (airspeed_timed_out and sideslip_timed_out and int(params.EKF2_DRAG_CTRL) == 0):
+    if ekf.cs.fake_pos or (airspeed_timed_out and sideslip_timed_out and not is_drag_enabled(ekf, params)):
         ekf.cs.wind = False
     if ekf.cs.wind and ekf.wind.external_init:
         ekf.wind.external_init = False
@@ -39,7 +41,7 @@ def control_air_data_fusion(ekf, params):
     if params.EKF2_ARSP_THR <= 0.0:
         stop_airspeed_fusion(ekf)
     elif ekf.sensors.airspeed.data_ready:
-        _use_airspeed_sample(ekf, params)
+        _take_airspeed_sample(ekf, params)
     elif ekf.cs.fuse_aspd and not is_recent(ekf, ekf.sensors.airspeed.sample.time_us, DATA_STOPPED_US):
         stop_airspeed_fusion(ekf)
 
@@ -65,7 +67,7 @@ def _use_airspeed_sample(ekf, params):
     starting_conditions_passing = (
         continuing_conditions_passing
         and is_significant
-        and (is_consistent or not ekf.cs.wind or ekf.cs.inertial_dead_reckoning)
+        and (is_consistent or not ekf.cs.wind or _may_reset_velocity(ekf))
     )
     if ekf.cs.fuse_aspd:
         if not continuing_conditions_passing:
@@ -78,8 +80,30 @@ def _use_airspeed_sample(ekf, params):
             stop_airspeed_fusion(ekf)
     elif starting_conditions_passing:
         _start_airspeed(ekf, params, is_consistent)
-        ekf.cs.wind = True
         ekf.cs.fuse_aspd = True
+
+
+@kernel
+def _judge_where_fused(ekf, params):
+    """Judge the airspeed where it is fused, if the air is fast enough to have a direction."""
+    aid, sample = ekf.aid.airspeed, ekf.sensors.airspeed.sample
+    may_go_on = ekf.cs.in_air and ekf.cs.fixed_wing and not ekf.cs.fake_pos
+    is_significant = sample.true_airspeed > params.EKF2_ARSP_THR
+    if ekf.cs.fuse_aspd:
+        if may_go_on and is_significant and predict_airspeed(ekf) >= LEAST_AIRSPEED:
+            update_airspeed(ekf, params)
+            ekf.reject.airspeed = aid.innovation_rejected
+            fuse_airspeed(ekf, params)
+        if not may_go_on or is_timed_out(ekf, aid.time_last_fuse, WIND_TIMEOUT_US):
+            stop_airspeed_fusion(ekf)
+    elif may_go_on and is_significant:
+        if not ekf.cs.wind:
+            ekf.cs.wind = True
+            _reset_wind(ekf, params)
+        ekf.cs.fuse_aspd = True
+
+
+_take_airspeed_sample = by_release(_use_airspeed_sample, "judges_air_data_when_fused", _judge_where_fused)
 
 
 @kernel
@@ -98,6 +122,19 @@ _may_have_airspeed = by_release(
 
 
 @kernel
+def _where_lost(ekf):
+    return ekf.cs.inertial_dead_reckoning
+
+
+@kernel
+def _never(ekf):
+    return False
+
+
+_may_reset_velocity = by_release(_where_lost, "starts_airspeed_by_wind", _never)
+
+
+@kernel
 def _reset_to_airspeed(ekf, params, is_consistent):
     """Set the velocity when dead reckoning, else an unknown wind."""
     largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
@@ -106,6 +143,7 @@ def _reset_to_airspeed(ekf, params, is_consistent):
         reset_vel_using_airspeed(ekf, params)
     elif _is_wind_free(ekf, wind_unknown):
         _reset_wind(ekf, params)
+    ekf.cs.wind = True
 
 
 @kernel
@@ -120,9 +158,23 @@ def _reset_or_fuse_airspeed(ekf, params, is_consistent):
         _reset_wind(ekf, params)
     else:
         fuse_airspeed(ekf, params)
+    ekf.cs.wind = True
 
 
-_start_airspeed = by_release(_reset_to_airspeed, "keeps_airspeed_to_wings", _reset_or_fuse_airspeed)
+@kernel
+def _reset_uncertain_wind(ekf, params, is_consistent):
+    """Airspeed never sets the velocity; a wind that is not known, or not well, is set by it."""
+    largest = INITIAL_WIND_UNCERTAINTY * INITIAL_WIND_UNCERTAINTY
+    if not ekf.cs.wind or ekf.P[WIND, WIND] + ekf.P[WIND + 1, WIND + 1] > largest:
+        ekf.cs.wind = True
+        _reset_wind(ekf, params)
+
+
+_start_airspeed = by_release(
+    by_release(_reset_to_airspeed, "keeps_airspeed_to_wings", _reset_or_fuse_airspeed),
+    "starts_airspeed_by_wind",
+    _reset_uncertain_wind,
+)
 
 
 @kernel

@@ -12,16 +12,25 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.imu_rates import accel_bias
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, scale_kalman_gain
-from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, start_wind
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
+from fusetune.ekf2.filter.wind import (
+    air_velocity,
+    air_velocity_body,
+    is_drag_enabled,
+    keep_only_wind_gains,
+    start_wind,
+)
 from fusetune.ekf2.numerics.constants import AIR_DENSITY_SEA_LEVEL, FLT_EPSILON
 from fusetune.ekf2.releases.by_release import by_release
 
 MIN_AIR_DENSITY = 0.1
 MIN_OBSERVATION_VARIANCE = 0.5
 DRAG_GATE = 5.0
+LEAST_SLOPE = 0.1
 
 
 @kernel
@@ -76,22 +85,25 @@ def compute_drag_jacobian(ekf, axis, rho, inverse_bcoef, mcoef, H):
     H[VELOCITY + 2] = az + through_speed * z
     H[WIND] = -H[VELOCITY]
     H[WIND + 1] = -H[VELOCITY + 1]
+    # the air along the axis grows with the square of the quaternion's norm, and so does the speed
+    complete_attitude_jacobian(ekf, H, 2.0 * b[axis] * (own + bluff * speed))
 
 
 @kernel
-def control_drag_fusion(ekf, params):
-    """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
-    if int(params.EKF2_DRAG_CTRL) <= 0 or not ekf.sensors.drag.exists:
-        return
-    if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
-        ekf.cs.wind = True
-        start_wind(ekf)
-    if ekf.sensors.drag.data_ready:
-        _fuse_drag(ekf, params)
+def _at_any_time(ekf):
+    return True
 
 
 @kernel
-def _fuse_drag(ekf, params):
+def _while_flying(ekf):
+    return ekf.cs.in_air and not ekf.cs.fake_pos
+
+
+_is_drag_judged = by_release(_at_any_time, "feels_drag_in_air", _while_flying)
+
+
+@kernel
+def _fuse_by_model(ekf, params):
     aid, drag = ekf.aid.drag, ekf.drag
     using_mcoef = params.EKF2_MCOEF > 0.001
     using_bcoef = (params.EKF2_BCOEF_X > 1.0, params.EKF2_BCOEF_Y > 1.0)
@@ -110,7 +122,7 @@ def _fuse_drag(ekf, params):
         compute_drag_jacobian(ekf, axis, rho, inverse_bcoef[axis], mcoef, drag.H[axis])
     both_fused = True
     for axis in range(2):
-        measured = ekf.sensors.drag.sample.accel_xy[axis] - ekf.accel_bias[axis]
+        measured = ekf.sensors.drag.sample.accel_xy[axis] - accel_bias(ekf)[axis]
         innovation = predicted[axis] - measured
         innovation_variance = compute_innovation_variance(ekf, drag.H[axis], R_acc)
         set_axis(aid, axis, measured, R_acc, innovation, innovation_variance)
@@ -132,6 +144,52 @@ def _fuse_drag(ekf, params):
 
 
 @kernel
+def _drag_slope(ekf, rho, inverse_bcoef, mcoef, force):
+    """How the drag grows with the air speed (1/s), at the speed at which the model has the measured force (m/s²)."""
+    if inverse_bcoef > 0.0:
+        air = (math.sqrt(mcoef * mcoef + 2.0 * rho * inverse_bcoef * abs(force)) - mcoef) / (rho * inverse_bcoef)
+        return max(rho * inverse_bcoef * air + mcoef, LEAST_SLOPE)
+    return max(mcoef, LEAST_SLOPE)
+
+
+@kernel
+def _fuse_by_slope(ekf, params):
+    """Each axis by itself, linear in the air along it, into the wind alone."""
+    aid, H, rho = ekf.aid.drag, ekf.drag.H[0], max(ekf.air_density, MIN_AIR_DENSITY)
+    noise = max(params.EKF2_DRAG_NOISE, MIN_OBSERVATION_VARIANCE)
+    mcoef = 0.0
+    if params.EKF2_MCOEF > 0.001:
+        mcoef = params.EKF2_MCOEF * math.sqrt(rho / AIR_DENSITY_SEA_LEVEL)
+    air = air_velocity_body(ekf)
+    coefficients = (params.EKF2_BCOEF_X, params.EKF2_BCOEF_Y)
+    judged = False
+    for axis in range(2):
+        inverse_bcoef = 1.0 / coefficients[axis] if coefficients[axis] > 1.0 else 0.0
+        if inverse_bcoef == 0.0 and mcoef == 0.0:
+            continue
+        force = ekf.sensors.drag.sample.accel_xy[axis] - accel_bias(ekf)[axis]
+        slope = _drag_slope(ekf, rho, inverse_bcoef, mcoef, force)
+        compute_drag_jacobian(ekf, axis, rho, 0.0, slope, H)
+        innovation_variance = compute_innovation_variance(ekf, H, noise)
+        innovation = -0.5 * inverse_bcoef * rho * air[axis] * abs(air[axis]) - air[axis] * mcoef - force
+        set_axis(aid, axis, force, noise, innovation, innovation_variance)
+        if innovation_variance < noise:
+            return
+        judged = True
+        if innovation * innovation <= DRAG_GATE * DRAG_GATE * innovation_variance:
+            scale_kalman_gain(ekf, innovation_variance)
+            keep_only_wind_gains(ekf.scratch.K)
+            measurement_update(ekf, params, noise, innovation)
+    if judged:
+        update_aid_source_status(ekf, aid, 2, ekf.sensors.drag.sample.time_us, DRAG_GATE)
+        aid.fused = not aid.innovation_rejected
+        aid.time_last_fuse = ekf.time_delayed_us
+
+
+_fuse_drag = by_release(_fuse_by_model, "linearises_drag_by_force", _fuse_by_slope)
+
+
+@kernel
 def _always(ekf, both_fused):
     return True
 
@@ -142,3 +200,15 @@ def _where_both_were(ekf, both_fused):
 
 
 _counts_as_fused = by_release(_always, "fuses_both_drag_axes", _where_both_were)
+
+
+@kernel
+def control_drag_fusion(ekf, params):
+    """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
+    if not is_drag_enabled(ekf, params) or not ekf.sensors.drag.exists:
+        return
+    if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
+        ekf.cs.wind = True
+        start_wind(ekf)
+    if ekf.sensors.drag.data_ready and _is_drag_judged(ekf):
+        _fuse_drag(ekf, params)

@@ -90,6 +90,20 @@ variance_with_attitude = by_release(_larger_variance, "levers_vision_attitude", 
 
 
 @kernel
-def refresh_ev_rotation(ekf):
-    """Write the matrix of the filtered rotation into `ekf.ev.R_ev_to_ekf`."""
+def _refresh_filtered_rotation(ekf):
     quat_to_dcm(ekf.ev.q_error_filt, ekf.ev.R_ev_to_ekf)
+
+
+@kernel
+def _refresh_rotation_of_sample(ekf):
+    error, quat = ekf.scratch.quat_error, ekf.sensors.ev.sample.quat
+    error[0], error[1], error[2], error[3] = quat[0], -quat[1], -quat[2], -quat[3]
+    quat_multiply(ekf.q, error, error)
+    quat_normalise(error)
+    quat_to_dcm(error, ekf.ev.R_ev_to_ekf)
+
+
+refresh_ev_rotation = by_release(
+    _refresh_filtered_rotation, "takes_vision_rotation_unfiltered", _refresh_rotation_of_sample
+)
+"""Write the matrix of the rotation from the vision frame to NED into `ekf.ev.R_ev_to_ekf`."""

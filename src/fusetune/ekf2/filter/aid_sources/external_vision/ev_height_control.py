@@ -20,6 +20,7 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import (
 )
 from fusetune.ekf2.filter.bias_estimator.bias_estimator import reset_bias, set_bias
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
+    predict_height_bias,
     start_height_source,
     stop_height_source,
     update_height_bias,
@@ -49,7 +50,32 @@ def _where_frame_is_frd(ekf):
     return frd and not (ekf.cs.ev_yaw and ekf.cs.ev_pos)
 
 
-_is_height_turned = by_release(_unless_all_in_vision_frame, "levers_vision_attitude", _where_frame_is_frd)
+@kernel
+def _where_rotation_is_known(ekf):
+    quat = ekf.sensors.ev.sample.quat
+    known = math.isfinite(quat[0]) and math.isfinite(quat[1]) and math.isfinite(quat[2]) and math.isfinite(quat[3])
+    return known and _unless_all_in_vision_frame(ekf)
+
+
+_is_height_turned = by_release(
+    by_release(_unless_all_in_vision_frame, "levers_vision_attitude", _where_frame_is_frd),
+    "takes_vision_rotation_unfiltered",
+    _where_rotation_is_known,
+)
+
+
+@kernel
+def _predicted_before(ekf):
+    """The bias was predicted at every update."""
+
+
+@kernel
+def _predict_by_sample(ekf):
+    """PX4 predicts the bias over one update for every sample."""
+    predict_height_bias(ekf, ekf.ev_hgt_b_est, HEIGHT_REF_EV, ekf.dt_ekf_avg)
+
+
+_predict_bias_of_sample = by_release(_predicted_before, "follows_vision_height_by_sample", _predict_by_sample)
 
 
 @kernel
@@ -80,6 +106,7 @@ def _set_bias_to_difference(ekf, measurement):
 def control_ev_height_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the height of external vision for one sample."""
     bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
+    _predict_bias_of_sample(ekf)
     measurement, variance = _measured_height(ekf, params)
     measurement_valid = math.isfinite(measurement) and math.isfinite(variance)
     update_vertical_position_aid_status(

@@ -5,7 +5,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import EV_SAMPLE
-from fusetune.ekf2.filter.common.imu_rates import body_rate
+from fusetune.ekf2.filter.common.imu_rates import body_rate, measured_rate
 from fusetune.ekf2.numerics.lever_arm import position_relative_to_imu, velocity_of_offset
 from fusetune.ekf2.releases.by_release import by_release
 
@@ -48,14 +48,7 @@ def is_yaw_alignment_changed(ekf):
     return (not ekf.cs_prev.ev_yaw and ekf.cs.ev_yaw) or (ekf.cs_prev.yaw_align != ekf.cs.yaw_align)
 
 
-@kernel
-def _raw_rate(ekf):
-    imu = ekf.imu_delayed
-    dt = imu.delta_ang_dt
-    return imu.delta_ang[0] / dt, imu.delta_ang[1] / dt, imu.delta_ang[2] / dt
-
-
-_swing_rate = by_release(body_rate, "levers_by_measured_rate", _raw_rate)
+_swing_rate = by_release(body_rate, "levers_by_measured_rate", measured_rate)
 
 
 @kernel

@@ -27,16 +27,40 @@ RESTART_INTERVAL_US = 1_000_000
 
 
 @kernel
+def _clear_fault(ekf):
+    ekf.cs.ev_yaw_fault = False
+
+
+@kernel
+def _has_no_fault(ekf):
+    """Until v1.14 there is none."""
+
+
+@kernel
+def _is_at_fault(ekf):
+    return ekf.cs.ev_yaw_fault
+
+
+@kernel
+def _is_replaced_by_gnss(ekf):
+    return ekf.gnss_arrivals.inhibits_ev_yaw
+
+
+_forgive_yaw = by_release(_clear_fault, "gives_north_up_for_vision", _has_no_fault)
+_is_yaw_barred = by_release(_is_at_fault, "gives_north_up_for_vision", _is_replaced_by_gnss)
+
+
+@kernel
 def control_ev_yaw_fusion(ekf, params, common_starting_conditions_passing, ev_reset, quality_sufficient):
     """Start, continue, reset or stop the yaw of external vision for one sample."""
     sample, aid = ekf.sensors.ev.sample, ekf.aid.ev_yaw
     _update_ev_yaw(ekf, params)
     if ev_reset:
-        ekf.cs.ev_yaw_fault = False
+        _forgive_yaw(ekf)
     continuing_conditions_passing = (
         (int(params.EKF2_EV_CTRL) & EV_CTRL_YAW) != 0
         and ekf.cs.tilt_align
-        and not ekf.cs.ev_yaw_fault
+        and not _is_yaw_barred(ekf)
         and math.isfinite(aid.observation[0])
         and math.isfinite(aid.observation_variance[0])
     )

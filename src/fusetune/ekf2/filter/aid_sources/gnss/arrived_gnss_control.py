@@ -25,14 +25,13 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_velocity import (
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion, stop_gnss_yaw_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.gps_control import has_yaw_failed, should_reset_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import reset_yaw_to_ekf_gsf
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.conditions import is_other_source_of_horizontal_aiding_than
 from fusetune.ekf2.filter.common.timing import GNSS_MAX_INTERVAL, is_newest_sample_recent
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
 from fusetune.ekf2.filter.yaw_estimator.matrix_bank import run_matrix_bank_in_air, tell_matrix_bank_velocity
 
-MAG_TYPE_3D = 2
 LONGEST_SILENCE_US = 10_000_000
 LONGEST_SILENCE_WITH_OTHERS_US = 1_000_000
 
@@ -42,7 +41,7 @@ def control_arrived_gnss_fusion(ekf, params):
     """Run GNSS for one update, with the sample in `ekf.sensors.gnss.sample` if `ekf.sensors.gnss.data_ready`."""
     gnss = ekf.sensors.gnss
     if not gnss.exists or int(params.EKF2_GPS_CTRL) & (GPS_CTRL_HPOS | GPS_CTRL_VEL) == 0:
-        _stop(ekf)
+        stop_arrived_gnss(ekf)
         return
     ekf.gnss.intermittent = not is_newest_sample_recent(ekf, gnss.newest_time_us, 2 * GNSS_MAX_INTERVAL)
     if is_fusion_due(gnss):
@@ -63,7 +62,7 @@ def control_arrived_gnss_fusion(ekf, params):
             and is_other_source_of_horizontal_aiding_than(ekf, ekf.cs.gnss_pos)
         )
     ):
-        _stop(ekf)
+        stop_arrived_gnss(ekf)
 
 
 @kernel
@@ -86,7 +85,7 @@ def _control_with_sample(ekf, params):
         if mandatory and (not distrusted or not is_other_source_of_horizontal_aiding_than(ekf, cs.gnss_pos)):
             _fuse_or_reset(ekf, params)
         else:
-            _stop(ekf)
+            stop_arrived_gnss(ekf)
     elif mandatory and trusted and not distrusted:
         if cs.ev_yaw:
             stop_ev_yaw_fusion(ekf)
@@ -131,7 +130,7 @@ def _fuse_or_reset(ekf, params):
 
 
 @kernel
-def _stop(ekf):
+def stop_arrived_gnss(ekf):
     """Stop velocity, position and heading; vision may give the yaw again."""
     stop_gnss_vel_fusion(ekf)
     stop_gnss_pos_fusion(ekf)

@@ -11,10 +11,10 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
+from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
 from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import run_gnss_checks
-from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import is_rough_fix, place_origin
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import take_field_of_place
+from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import place_origin
+from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import look_field_up_by_fix
 from fusetune.ekf2.filter.common.earth_rate import set_earth_rate
 from fusetune.ekf2.filter.common.local_origin import project_to_local
 from fusetune.ekf2.filter.common.timing import is_timed_out
@@ -26,15 +26,16 @@ KEPT = 256
 GNSS_ARRIVALS = np.dtype(
     [
         ("positions", "f8", (KEPT, 2)),
+        ("sample", GNSS_SAMPLE),
         *fields("f8", "north", "east"),
-        *fields("?", "inhibits_ev_yaw", "asks_for_mag_yaw"),
+        ("inhibits_ev_yaw", "?"),
     ],
     align=True,
 )
-"""Sub-record `ekf.gnss_arrivals`: where samples that wait were, north and east (m) of the origin; and where the one was
-that is due; whether vision may not give the yaw since GNSS has started, and whether the magnetic heading is to be
-aligned anew."""
+"""Sub-record `ekf.gnss_arrivals`: where samples that wait were, north and east (m) of the origin; the one that arrives;
+where the one was that is due; whether vision may not give the yaw since GNSS has started."""
 
+DEGREE_PARTS = 1e7
 MIN_FIX_TYPE = 3
 TRUST_US = 5_000_000
 """How long no check may fail before GNSS is trusted, or none pass before it is not."""
@@ -46,32 +47,33 @@ def _wait_until_due(ekf, params, sample, slot):
 
 
 @kernel
-def _check_and_project(ekf, params, sample, slot):
+def round_to_message(sample):
+    """Give a sample the resolution of the message: 1e-7° and 1 mm, the latter in single precision."""
+    sample.lat_deg = np.rint(sample.lat_deg * DEGREE_PARTS) / DEGREE_PARTS
+    sample.lon_deg = np.rint(sample.lon_deg * DEGREE_PARTS) / DEGREE_PARTS
+    sample.alt = float(np.float32(1e-3) * np.float32(np.rint(sample.alt * 1e3)))
+
+
+@kernel
+def _check_and_project(ekf, params, given, slot):
+    ekf.gnss_arrivals.sample = given
+    sample = ekf.gnss_arrivals.sample
+    round_to_message(sample)
     run_gnss_checks(ekf, params, sample)
     ekf.gnss.checks_passed = is_timed_out(ekf, ekf.gnss.last_fail_us, int(params.EKF2_REQ_GPS_H * 1e6))
     if not ekf.origin.valid:
         if ekf.filter_initialised and ekf.gnss.checks_passed:
             place_origin(ekf, sample)
+            look_field_up_by_fix(ekf, sample, True)
             set_earth_rate(ekf, ekf.origin.lat_rad)
-            _take_field(ekf, params, sample)
-        elif is_rough_fix(sample):
+        elif look_field_up_by_fix(ekf, sample, True):
             set_earth_rate(ekf, math.radians(sample.lat_deg))
-            _take_field(ekf, params, sample)
 
     north, east = 0.0, 0.0
     if ekf.origin.valid and sample.fix_type >= MIN_FIX_TYPE:
         north, east = project_to_local(ekf, math.radians(sample.lat_deg), math.radians(sample.lon_deg))
     positions, place = ekf.gnss_arrivals.positions, slot % KEPT
     positions[place, 0], positions[place, 1] = north, east
-
-
-@kernel
-def _take_field(ekf, params, sample):
-    """Look the field up; when its direction is known for the first time, the magnetic heading is to be aligned anew."""
-    was_known = math.isfinite(ekf.mag.wmm_declination)
-    take_field_of_place(ekf, sample.lat_deg, sample.lon_deg)
-    if not was_known and math.isfinite(ekf.mag.wmm_declination) and int(params.EKF2_MAG_TYPE) != MAG_TYPE_NONE:
-        ekf.gnss_arrivals.asks_for_mag_yaw = True
 
 
 look_at_arrived_gnss = by_release(_wait_until_due, "checks_gnss_on_arrival", _check_and_project)
@@ -85,6 +87,10 @@ def _nothing_to_recall(ekf, slot):
 
 @kernel
 def _recall_position(ekf, slot):
+    sample = ekf.sensors.gnss.sample
+    round_to_message(sample)
+    if not math.isfinite(sample.yaw_offset):
+        sample.yaw_offset = 0.0
     positions, place = ekf.gnss_arrivals.positions, slot % KEPT
     ekf.gnss_arrivals.north, ekf.gnss_arrivals.east = positions[place, 0], positions[place, 1]
 

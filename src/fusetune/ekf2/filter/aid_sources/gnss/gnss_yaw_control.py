@@ -13,6 +13,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import is_gnss_distrusted, is_gnss_trusted
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW, have_checks_passed
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import stop_field, stop_heading
 from fusetune.ekf2.filter.common.aid_source_status import (
     forget_aid_source_status,
     reset_aid_source_status_zero_innovation,
@@ -29,14 +30,17 @@ from fusetune.ekf2.filter.common.timing import (
 )
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
-from fusetune.ekf2.filter.observation_gain import multiply_covariance
+from fusetune.ekf2.filter.observation_gain import multiply_covariance, scale_kalman_gain
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import attitude_variance, complete_attitude_jacobian
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.numerics.constants import FLT_EPSILON_IN_EIGHT_DIGITS
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
-from fusetune.ekf2.releases.by_release import by_release
+from fusetune.ekf2.releases.by_release import by_release, does
 
 HEADING_NOISE = 0.1
 """Least standard deviation (rad) of the observed heading."""
+
+_goes_on = does("retries_gnss_yaw")
 
 STEEP_BASELINE = math.cos(math.radians(30.0))
 WRONG_GYRO_BIAS_TEST_RATIO = 0.2
@@ -66,6 +70,19 @@ def gnss_yaw_innovation_variance(P, H, R):
         for j in range(3):
             variance += H[ATTITUDE + i] * P[ATTITUDE + i, ATTITUDE + j] * H[ATTITUDE + j]
     return variance
+
+
+@kernel
+def _variance_of_errors(ekf, H, R):
+    return gnss_yaw_innovation_variance(ekf.P, H, R)
+
+
+@kernel
+def _variance_of_quaternion(ekf, H, R):
+    return attitude_variance(ekf, H) + R
+
+
+_innovation_variance = by_release(_variance_of_errors, "adds_quaternion_errors", _variance_of_quaternion)
 
 
 @kernel
@@ -188,8 +205,8 @@ def _leave_mag(ekf, params):
 @kernel
 def _stop_mag(ekf, params):
     ekf.cs.mag_dec = False
-    ekf.cs.mag_hdg = False
-    ekf.cs.mag_3d = False
+    stop_heading(ekf)
+    stop_field(ekf)
 
 
 _make_room_for_gnss_yaw = by_release(_leave_mag, "checks_gnss_on_arrival", _stop_mag)
@@ -220,13 +237,14 @@ def update_gnss_yaw(ekf, params, sample):
     variance = max(accuracy, HEADING_NOISE) ** 2
     H = ekf.scratch.H
     predicted = predict_gnss_yaw(ekf.R_to_earth, sample.yaw_offset, H)
+    complete_attitude_jacobian(ekf, H, 0.0)
     set_axis(
         aid,
         0,
         measured,
         variance,
         wrap_pi(predicted - measured),
-        gnss_yaw_innovation_variance(ekf.P, H, variance),
+        _innovation_variance(ekf, H, variance),
     )
     update_aid_source_status(ekf, aid, 1, sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
 
@@ -239,14 +257,16 @@ def fuse_gnss_yaw(ekf, params, yaw_offset):
         ekf.reject.yaw = True
         return
     offset = yaw_offset if np.isfinite(yaw_offset) else 0.0
-    H, K = ekf.scratch.H, ekf.scratch.K
+    H = ekf.scratch.H
     predict_gnss_yaw(ekf.R_to_earth, offset, H)
+    complete_attitude_jacobian(ekf, H, 0.0)
     variance = aid.innovation_variance[0]
     if variance < aid.observation_variance[0]:
         # the state covariance is no longer positive: start it anew
         ekf.fs.bad_hdg = True
         initialise_covariance(ekf, params)
-        stop_gnss_yaw_fusion(ekf)
+        if not _goes_on(ekf):
+            stop_gnss_yaw_fusion(ekf)
         return
     ekf.reject.yaw = False
 
@@ -259,13 +279,21 @@ def fuse_gnss_yaw(ekf, params, yaw_offset):
         reset_gyro_bias_z_cov(ekf, params)
 
     multiply_covariance(ekf, H)
+    _scale_gain(ekf, variance)
+    aid.fused = measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
+    ekf.fs.bad_hdg = not aid.fused
+    if aid.fused:
+        aid.time_last_fuse = ekf.time_delayed_us
+        ekf.time_last_heading_fuse = ekf.time_delayed_us
+
+
+@kernel
+def _divide_by_variance(ekf, variance):
     for i in range(ERROR_STATE_SIZE):
-        K[i] = ekf.scratch.PH[i] / variance
-    measurement_update(ekf, params, aid.observation_variance[0], aid.innovation[0])
-    ekf.fs.bad_hdg = False
-    aid.fused = True
-    aid.time_last_fuse = ekf.time_delayed_us
-    ekf.time_last_heading_fuse = ekf.time_delayed_us
+        ekf.scratch.K[i] = ekf.scratch.PH[i] / variance
+
+
+_scale_gain = by_release(_divide_by_variance, "adds_quaternion_errors", scale_kalman_gain)
 
 
 @kernel

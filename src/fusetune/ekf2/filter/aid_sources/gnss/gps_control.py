@@ -34,6 +34,7 @@ from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import (
     is_yaw_failure,
     try_yaw_emergency_reset,
 )
+from fusetune.ekf2.filter.common.imu_rates import gyro_bias
 from fusetune.ekf2.filter.common.timing import (
     GNSS_MAX_INTERVAL,
     RESET_TIMEOUT_MAX,
@@ -91,7 +92,7 @@ def _uses_gnss(ekf):
 def _run_yaw_estimator(ekf):
     inhibited = ekf.gyro_bias_inhibit[0] or ekf.gyro_bias_inhibit[1] or ekf.gyro_bias_inhibit[2]
     if not inhibited:
-        set_gyro_bias(ekf.gsf, ekf.gyro_bias, ekf.cs.vehicle_at_rest)
+        set_gyro_bias(ekf.gsf, gyro_bias(ekf), ekf.cs.vehicle_at_rest)
     predict_yaw_bank(ekf, ekf.imu_delayed, ekf.cs.in_air and not ekf.cs.vehicle_at_rest)
 
 

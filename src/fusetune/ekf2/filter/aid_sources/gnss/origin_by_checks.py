@@ -17,8 +17,6 @@ from fusetune.ekf2.filter.common.local_origin import (
 )
 from fusetune.ekf2.releases.by_release import by_release
 
-ROUGH_FIX_TYPE, ROUGH_FIX_ACCURACY = 2, 1000.0
-
 
 @kernel
 def _leave_to_resets(ekf, sample):
@@ -49,9 +47,3 @@ def place_origin(ekf, sample):
     if not math.isfinite(ekf.origin.alt):
         set_origin_altitude(ekf, sample.alt - ekf.gpos_alt)
     ekf.events.gps_checks_passed = True
-
-
-@kernel
-def is_rough_fix(sample):
-    """Whether a fix, of two dimensions at least, tells where on Earth the vehicle is."""
-    return sample.fix_type >= ROUGH_FIX_TYPE and sample.hacc < ROUGH_FIX_ACCURACY

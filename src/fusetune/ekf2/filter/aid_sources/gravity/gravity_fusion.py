@@ -15,10 +15,16 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GRAVITY_VECTOR, is_horizontal_aiding_active
 from fusetune.ekf2.filter.common.imu_rates import specific_force
-from fusetune.ekf2.filter.common.state import ATTITUDE
+from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
 from fusetune.ekf2.filter.measurement_update import measurement_update
-from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_kalman_gain
-from fusetune.ekf2.numerics.constants import ONE_G
+from fusetune.ekf2.filter.observation_gain import (
+    clear_jacobian,
+    compute_innovation_variance,
+    compute_kalman_gain,
+    scale_kalman_gain,
+)
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
+from fusetune.ekf2.numerics.constants import FLT_EPSILON, ONE_G
 from fusetune.ekf2.releases.by_release import by_release
 
 GRAVITY_MEMORY = np.dtype([("jacobian", "f8", (3, 2))], align=True)
@@ -27,6 +33,7 @@ GRAVITY_MEMORY = np.dtype([("jacobian", "f8", (3, 2))], align=True)
 ACCEL_LIMIT_LOW = 0.9 * ONE_G
 ACCEL_LIMIT_HIGH = 1.1 * ONE_G
 GRAVITY_GATE = 0.25
+GATE_OF_ACCELERATION = 1.0
 MIN_NOISE = 0.01
 
 
@@ -132,4 +139,65 @@ def _control_steady_gravity(ekf, params):
         aid.time_last_fuse = ekf.imu_delayed.time_us
 
 
-control_gravity_fusion = by_release(_control_gravity_fusion, "levels_by_steady_gravity", _control_steady_gravity)
+@kernel
+def _control_acceleration_of_gravity(ekf, params):
+    """As v1.16's, but gravity is observed in m/s²; by the mean force, with gains that are all of before the first."""
+    aid, force = ekf.aid.gravity, ekf.quaternion.mean_force
+    norm = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    ekf.cs.gravity_vector = (
+        (int(params.EKF2_IMU_CTRL) & IMU_CTRL_GRAVITY_VECTOR) != 0
+        and (ACCEL_LIMIT_LOW <= norm <= ACCEL_LIMIT_HIGH or ekf.cs.vehicle_at_rest)
+        and not is_horizontal_aiding_active(ekf)
+    )
+    _update_acceleration_of_gravity(ekf, params)
+    if ekf.cs.gravity_vector and not aid.innovation_rejected and _fuse_by_kept_gains(ekf, params):
+        aid.fused = True
+        aid.time_last_fuse = ekf.imu_delayed.time_us
+
+
+@kernel
+def _update_acceleration_of_gravity(ekf, params):
+    """Judge the specific force as R^T (0, 0, -g); leave the gain of each axis in `ekf.quaternion.gains`."""
+    imu, aid, jacobian, H = ekf.imu_delayed, ekf.aid.gravity, ekf.gravity.jacobian, ekf.scratch.H
+    measured = specific_force(ekf)
+    x, y, z = measured
+    scale = ONE_G / math.sqrt(x * x + y * y + z * z + FLT_EPSILON * FLT_EPSILON)
+    variance = params.EKF2_GRAV_NOISE * params.EKF2_GRAV_NOISE
+    compute_gravity_jacobian(ekf, jacobian)
+    for axis in range(3):
+        predicted = -ONE_G * ekf.R_to_earth[2, axis]
+        clear_jacobian(H)
+        H[ATTITUDE] = ONE_G * jacobian[axis, 0]
+        H[ATTITUDE + 1] = ONE_G * jacobian[axis, 1]
+        complete_attitude_jacobian(ekf, H, 2.0 * predicted)
+        innovation_variance = compute_innovation_variance(ekf, H, variance)
+        scale_kalman_gain(ekf, innovation_variance)
+        for i in range(ERROR_STATE_SIZE):
+            ekf.quaternion.gains[axis, i] = ekf.scratch.K[i]
+        set_axis(aid, axis, measured[axis], variance, predicted - scale * measured[axis], innovation_variance)
+    update_aid_source_status(ekf, aid, 3, imu.time_us, GATE_OF_ACCELERATION)
+
+
+@kernel
+def _fuse_by_kept_gains(ekf, params):
+    """Fuse one axis after the other; return whether all were."""
+    aid, core, K = ekf.aid.gravity, ekf.quaternion, ekf.scratch.K
+    for axis in range(3):
+        for i in range(ERROR_STATE_SIZE):
+            K[i] = core.gains[axis, i]
+        core.innovation_variance = aid.innovation_variance[axis]
+        if not measurement_update(ekf, params, aid.observation_variance[axis], aid.innovation[axis]):
+            return False
+    return True
+
+
+@kernel
+def _fuse_no_gravity(ekf, params):
+    """v1.13 does not know it."""
+
+
+control_gravity_fusion = by_release(
+    by_release(_control_gravity_fusion, "levels_by_steady_gravity", _control_steady_gravity),
+    "observes_acceleration_of_gravity",
+    by_release(_control_acceleration_of_gravity, "fuses_no_gravity", _fuse_no_gravity),
+)

@@ -5,8 +5,8 @@ Mirrors `resetMagCov`, `clearMagCov`, `saveMagCovData` and `loadMagCovData` of P
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
-from fusetune.ekf2.filter.covariance import reset_covariance_block, reset_mag_bias_cov, reset_mag_earth_cov
+from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
+from fusetune.ekf2.filter.quaternion_core.field_covariance import save_field_covariance, zero_field_covariance
 from fusetune.ekf2.releases.by_release import by_release
 
 
@@ -40,38 +40,7 @@ reset_field_covariance = by_release(
 
 
 @kernel
-def zero_field_covariance(ekf):
-    """The field states are not estimated."""
-    reset_covariance_block(ekf, MAG_EARTH, 6, 0.0)
-
-
-@kernel
 def clear_field_covariance(ekf):
     """The field states are not estimated, and their declination is not known when they will be."""
     zero_field_covariance(ekf)
     ekf.field_history.declination_fused = False
-
-
-@kernel
-def save_field_covariance(ekf):
-    """Keep the variances, and the covariance of the horizontal earth field, for when the field is fused again."""
-    P, modes = ekf.P, ekf.mag_modes
-    for i in range(3):
-        modes.saved_body_variance[i] = P[MAG_BODY + i, MAG_BODY + i]
-    for i in range(2):
-        for j in range(2):
-            modes.saved_horizontal_covariance[i, j] = P[MAG_EARTH + i, MAG_EARTH + j]
-    modes.saved_down_variance = P[MAG_EARTH + 2, MAG_EARTH + 2]
-
-
-@kernel
-def restore_field_covariance(ekf):
-    """The field states have the variances again that were kept."""
-    zero_field_covariance(ekf)
-    P, modes = ekf.P, ekf.mag_modes
-    for i in range(3):
-        P[MAG_BODY + i, MAG_BODY + i] = modes.saved_body_variance[i]
-    for i in range(2):
-        for j in range(2):
-            P[MAG_EARTH + i, MAG_EARTH + j] = modes.saved_horizontal_covariance[i, j]
-    P[MAG_EARTH + 2, MAG_EARTH + 2] = modes.saved_down_variance

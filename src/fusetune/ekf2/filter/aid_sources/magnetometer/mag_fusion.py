@@ -13,10 +13,11 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_limits import limit_field
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
-from fusetune.ekf2.filter.common.state import ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
+from fusetune.ekf2.filter.common.state import ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.covariance import reset_quat_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, scale_kalman_gain
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import component_in_body, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
@@ -48,33 +49,12 @@ def _compute_mag_h(ekf, axis, H):
 
 @kernel
 def _compute_mag_h_by_quaternion(ekf, axis, H):
-    """As v1.16's, by the elements w and u of the quaternion: Rᵀm = (w² - |u|²) m + 2 u (u·m) - 2 w u × m."""
-    R, field, q = ekf.R_to_earth, ekf.mag_I, ekf.q
-    along = q[1] * field[0] + q[2] * field[1] + q[3] * field[2]
-    after, last = (axis + 1) % 3, (axis + 2) % 3
-    crossed = q[1 + after] * field[last] - q[1 + last] * field[after]
-    H[:] = 0.0
-    _set_quaternion_derivative(H, 0, 2.0 * (q[0] * field[axis] - crossed))
-    _set_quaternion_derivative(H, 1 + axis, 2.0 * along)
-    _set_quaternion_derivative(
-        H, 1 + after, 2.0 * (q[1 + axis] * field[after] - q[1 + after] * field[axis] - q[0] * field[last])
-    )
-    _set_quaternion_derivative(
-        H, 1 + last, 2.0 * (q[1 + axis] * field[last] - q[1 + last] * field[axis] + q[0] * field[after])
-    )
-    H[MAG_EARTH] = R[0, axis]
-    H[MAG_EARTH + 1] = R[1, axis]
-    H[MAG_EARTH + 2] = R[2, axis]
-    H[MAG_BODY + axis] = 1.0
+    """As v1.16's; the earth field in the body frame, without the body field, grows with the square of the norm."""
+    _compute_mag_h(ekf, axis, H)
+    complete_attitude_jacobian(ekf, H, 2.0 * (predict_mag(ekf, axis) - ekf.mag_B[axis]))
 
 
-@kernel
-def _set_quaternion_derivative(H, element, value):
-    """Of the four elements of the quaternion, the last stands where v1.16 has the terrain."""
-    H[TERRAIN if element == 3 else ATTITUDE + element] = value
-
-
-compute_mag_h = by_release(_compute_mag_h, "fuses_heading_or_field", _compute_mag_h_by_quaternion)
+compute_mag_h = by_release(_compute_mag_h, "adds_quaternion_errors", _compute_mag_h_by_quaternion)
 """Write the observation Jacobian of one body axis into H (24,)."""
 
 

@@ -11,6 +11,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import get_mag_declination
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.global_position import single_precision
 from fusetune.ekf2.filter.common.state import MAG_BODY
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.numerics.rotations import euler_yaw, rotate_to_earth, wrap_pi
@@ -21,12 +22,26 @@ YAW_VARIANCE_MIN = 0.01**2
 
 
 @kernel
+def _is_at_most(ekf, variance, limit):
+    return variance <= limit
+
+
+@kernel
+def _is_at_most_in_single_precision(ekf, variance, limit):
+    """After a reset the variance is the limit, and stays so while the noise is below the resolution of PX4's."""
+    return single_precision(variance) <= single_precision(limit)
+
+
+_is_no_more = by_release(_is_at_most, "puts_body_field_by_yaw_estimator", _is_at_most_in_single_precision)
+
+
+@kernel
 def is_mag_bias_good(ekf, params):
     """Whether every body-field variance is positive and no larger than the measurement noise allows."""
     P = ekf.P
     var_x, var_y, var_z = P[MAG_BODY, MAG_BODY], P[MAG_BODY + 1, MAG_BODY + 1], P[MAG_BODY + 2, MAG_BODY + 2]
     variance_limit = params.EKF2_MAG_NOISE * params.EKF2_MAG_NOISE
-    return min(var_x, var_y, var_z) > 0.0 and max(var_x, var_y, var_z) <= variance_limit
+    return min(var_x, var_y, var_z) > 0.0 and _is_no_more(ekf, max(var_x, var_y, var_z), variance_limit)
 
 
 @kernel

@@ -33,6 +33,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import check_hagl_
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known, synthesise_z
 from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status, set_axis
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.global_position import single_precision
 from fusetune.ekf2.filter.common.state import MAG_BODY
 from fusetune.ekf2.filter.common.timing import MAG_MAX_INTERVAL, is_newest_sample_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov
@@ -44,7 +45,7 @@ MAG_LPF_ALPHA = 0.1
 LEVELLING_INTERVAL_US = 100_000
 LEAST_CHANGE_WHILE_LEVELLING = np.radians(1.0)
 INHIBITED_FOR_US = 5_000_000
-BODY_FIELD_KNOWN_VARIANCE = 0.02**2
+BODY_FIELD_KNOWN_VARIANCE = float(np.float32(0.02) * np.float32(0.02))
 
 
 @kernel
@@ -173,10 +174,17 @@ def _is_inhibited(ekf, params):
 
 @kernel
 def _is_body_field_known(ekf):
-    """Whether the field may correct more than its own states: aligned in flight, its body part known to 0.02 Gauss."""
+    """Whether the field may correct more than its own states: aligned in flight, its body part known to 0.02 Gauss.
+
+    In single precision, as PX4 compares: a noise of 0.02 Gauss is what the variance begins with.
+    """
     P = ekf.P
     a, b, c = P[MAG_BODY, MAG_BODY], P[MAG_BODY + 1, MAG_BODY + 1], P[MAG_BODY + 2, MAG_BODY + 2]
-    return ekf.cs.mag_aligned_in_flight and min(a, b, c) > 0.0 and max(a, b, c) < BODY_FIELD_KNOWN_VARIANCE
+    return (
+        ekf.cs.mag_aligned_in_flight
+        and min(a, b, c) > 0.0
+        and single_precision(max(a, b, c)) < BODY_FIELD_KNOWN_VARIANCE
+    )
 
 
 @kernel

@@ -7,11 +7,7 @@ Mirrors the starts and stops of PX4 v1.14 `EKF/mag_control.cpp`.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import (
-    clear_field_covariance,
-    restore_field_covariance,
-    save_field_covariance,
-)
+from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import clear_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import update_yaw_observability
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     DECLINATION_FUSED,
@@ -21,18 +17,19 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     clear_mag_faults,
 )
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.quaternion_core.field_covariance import restore_field_covariance, save_field_covariance
 from fusetune.ekf2.releases.by_release import does
 
 SUITABLE_FOR_US = 2_000_000
 SUSTAINED_SHARE = 0.5
-TURN_RATE_LPF_ALPHA = 0.05
 
 
 _leaves_declination_mode = does("clears_field_whenever_stopped")
 
 
 @kernel
-def _stop_field(ekf):
+def stop_field(ekf):
+    """Fuse the field no more; what is known of its covariance is saved."""
     if not ekf.cs.mag_3d:
         return
     save_field_covariance(ekf)
@@ -44,7 +41,8 @@ def _stop_field(ekf):
 
 
 @kernel
-def _stop_heading(ekf):
+def stop_heading(ekf):
+    """Fuse the heading no more."""
     if ekf.cs.mag_hdg:
         ekf.cs.mag_hdg = False
         ekf.fs.bad_hdg = False
@@ -53,8 +51,8 @@ def _stop_heading(ekf):
 @kernel
 def clear_heading_and_field(ekf, params):
     """Fuse neither; no field is known from now on."""
-    _stop_field(ekf)
-    _stop_heading(ekf)
+    stop_field(ekf)
+    stop_heading(ekf)
     clear_field_covariance(ekf)
 
 
@@ -68,14 +66,14 @@ def stop_heading_and_field(ekf, params):
 @kernel
 def _start_heading(ekf):
     if not ekf.cs.mag_hdg:
-        _stop_field(ekf)
+        stop_field(ekf)
         ekf.cs.mag_hdg = True
 
 
 @kernel
 def _start_field(ekf):
     if not ekf.cs.mag_3d:
-        _stop_heading(ekf)
+        stop_heading(ekf)
         restore_field_covariance(ekf)
         ekf.cs.mag_3d = True
 
@@ -115,14 +113,6 @@ def _update_bias_observability(ekf, params):
         modes.bias_observable = abs(modes.turn) > SUSTAINED_SHARE * limit * duration
     modes.turn = 0.0
     modes.time_turn_started = ekf.time_delayed_us
-
-
-@kernel
-def follow_turn(ekf, turn, dt):
-    """Note how much the vehicle turned about down (rad) in an interval `dt` (s)."""
-    modes = ekf.mag_modes
-    modes.turn += turn
-    modes.turn_rate_lpf += TURN_RATE_LPF_ALPHA * (turn / dt - modes.turn_rate_lpf)
 
 
 @kernel

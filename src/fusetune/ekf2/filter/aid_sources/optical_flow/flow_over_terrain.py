@@ -11,6 +11,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_fusion import (
     calc_opt_flow_meas_var,
+    flow_sensor_offset_body,
     predict_flow,
     predict_flow_range,
     set_flow_rejection,
@@ -31,8 +32,11 @@ from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, RESET_TIMEOUT
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, compute_kalman_gain
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.filter.resets.state_resets import reset_horizontal_velocity_to, reset_local_horizontal_position_to
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
+from fusetune.ekf2.numerics.lever_arm import velocity_of_offset
+from fusetune.ekf2.numerics.rotations import rotate_to_body
 
 COS_MAX_TILT = 0.7071
 RESTART_INTERVAL_US = 2_000_000
@@ -108,6 +112,16 @@ def predict_flow_of_sample(ekf, params):
 
 
 @kernel
+def predict_flow_velocity(ekf, params):
+    """Velocity (m/s) of the flow sensor along body X and Y, for the sample at hand."""
+    rate, bias = ekf.sensors.flow.sample.gyro_rate, ekf.flow.gyro_bias
+    px, py, pz = flow_sensor_offset_body(params)
+    offset_x, offset_y, _ = velocity_of_offset(bias[0] - rate[0], bias[1] - rate[1], bias[2] - rate[2], px, py, pz)
+    forward, right, _ = rotate_to_body(ekf.R_to_earth, ekf.vel[0], ekf.vel[1], ekf.vel[2])
+    return forward + offset_x, right + offset_y
+
+
+@kernel
 def compute_flow_jacobian_at(ekf, axis, distance, H):
     """Write the derivative of the predicted rate about body axis 0 or 1, at a distance (m), into `H` (24,)."""
     R, v = ekf.R_to_earth, ekf.vel
@@ -123,6 +137,7 @@ def compute_flow_jacobian_at(ekf, axis, distance, H):
     H[VELOCITY] = scale * bx
     H[VELOCITY + 1] = scale * by
     H[VELOCITY + 2] = scale * bz
+    complete_attitude_jacobian(ekf, H, 2.0 * scale * (bx * v[0] + by * v[1] + bz * v[2]))
 
 
 @kernel

@@ -21,6 +21,7 @@ from fusetune.ekf2.numerics.rotations import component_in_earth, rotate_to_body
 from fusetune.ekf2.releases.by_release import by_release
 
 MIN_HAGL = 1e-2
+MIN_CLEARANCE = 0.1
 HAGL_EPSILON = 1e-3
 MIN_FLOW_NOISE = 0.05
 BEST_QUALITY = 255.0
@@ -51,7 +52,17 @@ def _flow_hagl_beyond_clearance(ekf, params):
     return max(_flow_hagl(ekf, params), params.EKF2_MIN_RNG, MIN_HAGL)
 
 
-predict_flow_hagl = by_release(_flow_hagl_of_any_sign, "flies_flow_over_terrain", _flow_hagl_beyond_clearance)
+@kernel
+def _flow_hagl_beyond_decimetre(ekf, params):
+    """The height above the terrain estimate, never less than the vehicle has on the ground, nor 10 cm."""
+    return max(_flow_hagl(ekf, params), params.EKF2_MIN_RNG, MIN_CLEARANCE)
+
+
+predict_flow_hagl = by_release(
+    by_release(_flow_hagl_of_any_sign, "flies_flow_over_terrain", _flow_hagl_beyond_clearance),
+    "fuses_flow_at_once",
+    _flow_hagl_beyond_decimetre,
+)
 
 
 @kernel

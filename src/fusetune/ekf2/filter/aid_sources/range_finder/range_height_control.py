@@ -119,7 +119,14 @@ def _is_at_rest_on_ground(ekf):
     return not ekf.cs.in_air and ekf.cs.vehicle_at_rest
 
 
-_may_stand = by_release(_is_on_ground, "skips_unhealthy_range", _is_at_rest_on_ground)
+@kernel
+def _never(ekf):
+    return False
+
+
+_may_stand = by_release(
+    by_release(_is_on_ground, "skips_unhealthy_range", _is_at_rest_on_ground), "compares_range_in_slow_flight", _never
+)
 
 
 @kernel
@@ -166,7 +173,20 @@ def _compare_and_judge_in_climb(ekf, params):
         rng.kin_time_last_inconsistent = since
 
 
-_check_consistency = by_release(_compare_with_velocity, "judges_range_in_climb", _compare_and_judge_in_climb)
+@kernel
+def _compare_in_slow_flight(ekf, params):
+    """A multicopter that does not move horizontally; else the distances are not compared at all."""
+    speed_squared = ekf.vel[0] * ekf.vel[0] + ekf.vel[1] * ekf.vel[1]
+    speed_variance = ekf.P[VELOCITY, VELOCITY] + ekf.P[VELOCITY + 1, VELOCITY + 1]
+    if not ekf.cs.fixed_wing and speed_squared < max(speed_variance, 0.1):
+        _compare_with_velocity(ekf, params)
+
+
+_check_consistency = by_release(
+    by_release(_compare_with_velocity, "judges_range_in_climb", _compare_and_judge_in_climb),
+    "compares_range_in_slow_flight",
+    _compare_in_slow_flight,
+)
 
 
 @kernel

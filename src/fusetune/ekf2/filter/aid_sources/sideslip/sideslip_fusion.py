@@ -14,12 +14,14 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_wind_cov
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
 from fusetune.ekf2.filter.wind import air_velocity, air_velocity_body, fuse_into_wind, reset_wind_to_zero
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.releases.by_release import by_release
 
 FUSION_INTERVAL_US = 150_000
 FORWARD_SPEED_EPSILON = 1e-3
+LEAST_AIR_SPEED = 7.0
 MIN_NOISE = 0.01
 
 
@@ -105,6 +107,7 @@ def compute_sideslip_jacobian(ekf, H):
     H[VELOCITY + 2] = ez
     H[WIND] = -ex
     H[WIND + 1] = -ey
+    complete_attitude_jacobian(ekf, H, 0.0)
 
 
 @kernel
@@ -121,23 +124,25 @@ _may_have_sideslip = by_release(_flies_like_a_wing, "asks_airspeed_for_wings", _
 
 
 @kernel
-def control_beta_fusion(ekf, params):
-    """Fuse a sideslip of zero at regular intervals while a fixed wing, or a vehicle with airspeed, flies."""
-    ekf.cs.fuse_beta = (
-        int(params.EKF2_FUSE_BETA) != 0 and _may_have_sideslip(ekf) and ekf.cs.in_air and not ekf.cs.fake_pos
-    )
-    if ekf.cs.fuse_beta and is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
-        _update_sideslip(ekf, params)
-        ekf.reject.sideslip = ekf.aid.sideslip.innovation_rejected
-        _use_sideslip(ekf, params)
-
-
-@kernel
 def _fuse_or_start_wind(ekf, params):
     if _fuse_sideslip(ekf, params):
         ekf.cs.wind = True
     elif not ekf.wind.external_init and not ekf.cs.wind:
         reset_wind_cov(ekf)
+
+
+@kernel
+def _at_any_speed(ekf):
+    return True
+
+
+@kernel
+def _above_least_speed(ekf):
+    north, east, _ = air_velocity(ekf)
+    return math.hypot(north, east) > LEAST_AIR_SPEED
+
+
+_is_fast_enough = by_release(_at_any_speed, "slips_at_speed", _above_least_speed)
 
 
 @kernel
@@ -147,7 +152,8 @@ def _start_wind_and_fuse(ekf, params):
         ekf.cs.wind = True
         ekf.aid.sideslip.time_last_fuse = ekf.time_delayed_us
         reset_wind_to_zero(ekf)
-    _fuse_sideslip(ekf, params)
+    if _is_fast_enough(ekf):
+        _fuse_sideslip(ekf, params)
 
 
 _use_sideslip = by_release(_fuse_or_start_wind, "starts_wind_at_zero", _start_wind_and_fuse)
@@ -194,3 +200,37 @@ def _fuse_sideslip(ekf, params):
     ekf.fs.bad_sideslip = False
     fuse_into_wind(ekf, params, aid, ekf.scratch.H, update_wind_only)
     return True
+
+
+@kernel
+def _control_by_flag(ekf, params):
+    """As v1.16's; the flag says what is configured, and what is judged is fused: above 7 m/s."""
+    ekf.cs.fuse_beta = int(params.EKF2_FUSE_BETA) == 1 and ekf.cs.fixed_wing
+    if not ekf.cs.fuse_beta or not ekf.cs.in_air or ekf.cs.fake_pos:
+        return
+    if not is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
+        return
+    if not ekf.cs.wind:
+        ekf.cs.wind = True
+        ekf.aid.sideslip.time_last_fuse = ekf.time_delayed_us
+        reset_wind_to_zero(ekf)
+    x, y, z = air_velocity(ekf)
+    if math.sqrt(x * x + y * y + z * z) > LEAST_AIR_SPEED:
+        _update_sideslip(ekf, params)
+        ekf.reject.sideslip = ekf.aid.sideslip.innovation_rejected
+        _fuse_sideslip(ekf, params)
+
+
+@kernel
+def _control_at_intervals(ekf, params):
+    """Fuse a sideslip of zero at regular intervals while a fixed wing, or a vehicle with airspeed, flies."""
+    ekf.cs.fuse_beta = (
+        int(params.EKF2_FUSE_BETA) != 0 and _may_have_sideslip(ekf) and ekf.cs.in_air and not ekf.cs.fake_pos
+    )
+    if ekf.cs.fuse_beta and is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
+        _update_sideslip(ekf, params)
+        ekf.reject.sideslip = ekf.aid.sideslip.innovation_rejected
+        _use_sideslip(ekf, params)
+
+
+control_beta_fusion = by_release(_control_at_intervals, "judges_air_data_when_fused", _control_by_flag)
