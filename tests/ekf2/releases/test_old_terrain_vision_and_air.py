@@ -22,7 +22,6 @@ from fusetune.ekf2.filter.aid_sources.external_vision import (
     ev_control,
     ev_vel_control,
     ev_yaw_control,
-    vision_height_by_mode,
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow import (
     flow_over_terrain,
@@ -30,7 +29,7 @@ from fusetune.ekf2.filter.aid_sources.optical_flow import (
     integrated_flow_at_once,
     optical_flow_fusion,
 )
-from fusetune.ekf2.filter.aid_sources.range_finder import range_by_mode, range_for_height, range_height_control
+from fusetune.ekf2.filter.aid_sources.range_finder import range_for_height, range_height_control
 from fusetune.ekf2.filter.aid_sources.sideslip import sideslip_fusion
 from fusetune.ekf2.filter.common import aid_source_status
 from fusetune.ekf2.filter.common.conditions import get_hagl, is_terrain_estimate_valid
@@ -726,62 +725,6 @@ def test_distances_are_compared_with_the_climb_in_slow_flight(release, slow_only
             assert len(compared) == expected
     it.ekf["cs"]["in_air"], it.ekf["cs"]["vehicle_at_rest"] = False, True
     assert bool(asked(range_height_control._may_stand, it)) != slow_only
-
-
-def test_range_of_v1_13_gives_the_height_low_and_slow():
-    it = flying(V113, EKF2_RNG_A_HMAX=20.0, EKF2_RNG_A_VMAX=4.0, EKF2_RNG_A_IGATE=2.0, EKF2_RNG_NOISE=0.2)
-    it.params["EKF2_RNG_AID"], it.params["EKF2_RNG_SFE"] = 1.0, 0.0
-    distance(it, 10.5)
-    aid = it.ekf["aid"]["terrain_range_finder"]
-    it.ekf["terrain_filter"]["uses_range"], aid["time_last_fuse"] = True, START_US
-    it.ekf["terrain_valid"] = True
-    # the ratio 0.1²/(2²·0.5) = 0.005 starts, 0.4²/(2²·0.5) = 0.08 does not but goes on
-    aid["innovation"][0], aid["innovation_variance"][0] = 0.4, 0.5
-    assert not range_by_mode.may_range_aid(it.ekf, it.params)
-    aid["innovation"][0] = 0.1
-    assert range_by_mode.may_range_aid(it.ekf, it.params)
-    aid["innovation"][0] = 0.4
-    assert range_by_mode.may_range_aid(it.ekf, it.params)
-    it.params["EKF2_RNG_AID"] = 0.0
-    assert not range_by_mode.may_range_aid(it.ekf, it.params)
-    it.ekf["terrain"] = 15.0
-    assert not range_by_mode.may_range_aid(it.ekf, it.params)
-    assert not it.ekf["range_by_mode"]["is_suitable"]
-
-
-def test_range_of_v1_13_is_a_height_above_its_offset():
-    it = flying(V113, EKF2_RNG_NOISE=0.2, EKF2_RNG_SFE=0.0, EKF2_RNG_GATE=5.0, EKF2_MIN_RNG=0.1)
-    distance(it, 10.5)
-    it.ekf["range_by_mode"]["offset"] = 0.3
-    range_by_mode.fuse_range_height(it.ekf, it.params)
-    aid = it.ekf["aid"]["rng_hgt"]
-    assert aid["observation"][0] == pytest.approx(0.3 - 10.5)
-    assert aid["observation_variance"][0] == pytest.approx(0.04)
-    assert aid["innovation"][0] == pytest.approx(-10.0 + 10.2)
-    assert aid["fused"]
-    range_by_mode.reset_height_to_range(it.ekf, it.params)
-    assert it.ekf["gpos_alt"] == pytest.approx(10.2)
-    it.ekf["cs"]["in_air"] = False
-    range_by_mode.reset_height_to_range(it.ekf, it.params)
-    assert it.ekf["gpos_alt"] == pytest.approx(0.1 - 0.3)
-    it.ekf["range"]["is_sample_valid"] = False
-    range_by_mode.assume_range_on_ground(it.ekf, it.params)
-    assert it.ekf["range"]["sample"]["range"] == pytest.approx(0.1)
-    assert it.ekf["range"]["is_sample_valid"]
-
-
-def test_vision_of_v1_13_is_a_height_as_it_is():
-    it = flying(V113, EKF2_EVP_GATE=5.0)
-    vision = it.ekf["sensors"]["ev"]["sample"]
-    vision["pos"], vision["position_var"], vision["time_us"] = (1.0, 2.0, -10.1), (0.1, 0.2, 1e-6), START_US
-    vision_height_by_mode.fuse_vision_height(it.ekf, it.params)
-    aid = it.ekf["aid"]["ev_hgt"]
-    assert aid["innovation"][0] == pytest.approx(0.1)
-    assert aid["observation_variance"][0] == pytest.approx(1e-4)
-    vision_height_by_mode.reset_height_to_vision(it.ekf, it.params)
-    assert it.ekf["gpos_alt"] == pytest.approx(10.1)
-    it.ekf["sensors"]["ev"]["newest_time_us"] = it.ekf["time_latest_us"]
-    assert vision_height_by_mode.has_recent_vision(it.ekf)
 
 
 def seen(mask: float, **overrides: float) -> Flying:
