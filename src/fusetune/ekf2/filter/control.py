@@ -13,7 +13,6 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_fusion import control_gnss
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_control import control_flow_fusion
-from fusetune.ekf2.filter.aid_sources.range_finder.range_by_mode import look_at_range_first
 from fusetune.ekf2.filter.aid_sources.sideslip.sideslip_fusion import control_beta_fusion
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import control_zero_gyro_update
 from fusetune.ekf2.filter.aid_sources.zero_innovation_heading_update import control_zero_innovation_heading_update
@@ -41,7 +40,6 @@ def control_fusion_modes(ekf, params):
     if not ekf.cs.tilt_align:
         ekf.cs.tilt_align = tilt_variance(ekf) < TILT_ALIGNED_VARIANCE
 
-    look_at_range_first(ekf, params)
     control_mag_fusion(ekf, params)
     control_flow_fusion(ekf, params)
     control_gnss(ekf, params)

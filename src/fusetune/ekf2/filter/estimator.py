@@ -36,7 +36,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_memory import FLOW_MEMORY, FLOW_RATES, initialise_flow_memory
 from fusetune.ekf2.filter.aid_sources.optical_flow.integrated_flow import FLOW_INTEGRALS
-from fusetune.ekf2.filter.aid_sources.range_finder.range_by_mode import RANGE_BY_MODE
 from fusetune.ekf2.filter.aid_sources.range_finder.range_memory import RANGE_MEMORY, initialise_range_memory
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import ZERO_GYRO_MEMORY
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import (
@@ -139,8 +138,6 @@ def ekf_record(release: str) -> np.dtype:
         memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
     if does.integrates_flow:
         memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
-    if does.looks_at_range_first:
-        memories.append(("range_by_mode", RANGE_BY_MODE))
     if does.fuses_vision_by_mask:
         memories.append(("vision_steps", VISION_STEPS))
     return marked(np.dtype(memories, align=True), release)

@@ -778,13 +778,6 @@ class Behaviours:
         until="v1.14",
         source="drag_fusion.cpp",
     )
-    looks_at_range_first: bool = _behaviour(
-        "The range finder is looked at before any source acts. It gives the height where EKF2_HGT_MODE asks for it, or "
-        "EKF2_RNG_AID low and slow, when an offset and no bias keeps the height.",
-        since="v1.13",
-        until="v1.13",
-        source="control.cpp, height_fusion.cpp",
-    )
     compares_range_in_slow_flight: bool = _behaviour(
         "The range finder is held against the vertical velocity only where a multicopter does not move horizontally; "
         "on the ground it says what it says, unless it leads.",
