@@ -766,10 +766,17 @@ class Behaviours:
         source="sideslip_fusion.cpp",
     )
     feels_drag_in_air: bool = _behaviour(
-        "Drag is judged in the air alone, and not told of.",
+        "Drag is judged in the air alone, the first time from a sample that came on the ground. It corrects the wind "
+        "alone, and is not told of.",
         since="v1.13",
         until="v1.14",
         source="drag_fusion.cpp",
+    )
+    averages_clipped_drag: bool = _behaviour(
+        "Clipped acceleration is averaged into that of drag.",
+        since="v1.13",
+        until="v1.14",
+        source="estimator_interface.cpp",
     )
     compares_range_in_slow_flight: bool = _behaviour(
         "The range finder is held against the vertical velocity only where a multicopter does not move horizontally; "
@@ -801,7 +808,7 @@ class Behaviours:
     )
     linearises_drag_by_force: bool = _behaviour(
         "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
-        "force; it corrects the wind alone.",
+        "force.",
         since="v1.13",
         until="v1.13",
         source="drag_fusion.cpp",
