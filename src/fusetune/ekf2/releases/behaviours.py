@@ -406,6 +406,13 @@ class Behaviours:
         source="control.cpp",
     )
 
+    finds_zero_velocity_first: bool = _behaviour(
+        "At rest the velocity of all three axes is found before the first is fused.",
+        since="v1.13",
+        until="v1.14",
+        source="zero_velocity_update.cpp",
+    )
+
     # Older releases: GNSS, height, fake aiding and the yaw estimator.
 
     keeps_yaw_bank_as_matrices: bool = _behaviour(
