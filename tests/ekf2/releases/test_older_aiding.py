@@ -14,7 +14,7 @@ from tests.ekf2.releases.test_named_behaviours import Flying, asked, checks, fly
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
 from fusetune.ekf2.filter import height_control
-from fusetune.ekf2.filter.aid_sources import fake_pos_until_v1_15
+from fusetune.ekf2.filter.aid_sources import fake_pos_until_v1_15, zero_velocity_update
 from fusetune.ekf2.filter.aid_sources.barometer import baro_height_control
 from fusetune.ekf2.filter.aid_sources.gnss import (
     arrived_gnss_control,
@@ -722,3 +722,18 @@ def test_the_fake_position_of_v1_14_needs_no_reason(noise, sigma):
     fake_pos_until_v1_15.control_fake_position(it.ekf, it.params)
     assert it.ekf["cs"]["fake_pos"]
     assert math.isclose(it.ekf["aid"]["fake_pos"]["observation_variance"][0], sigma**2)
+
+
+@pytest.mark.parametrize(("release", "at_first"), [("v1.13", True), ("v1.14", True), (V115, False), (NEW, False)])
+def test_zero_velocity_is_found_for_all_axes_before_one_is_fused_until_v1_14(release, at_first, monkeypatch):
+    it = flying(release)
+    it.ekf["vel"][:] = 0.3, 0.2, 0.1
+    innovations = []
+
+    def fuse(ekf, params, innovation, *others):
+        innovations.append(float(innovation))
+        ekf["vel"][:] = 0.0
+
+    monkeypatch.setattr(zero_velocity_update, "fuse_direct_state", fuse)
+    asked(zero_velocity_update._fuse_zero, it, it.params, (1.0, 1.0, 1.0), 0.04)
+    assert innovations == pytest.approx([0.3, 0.2, 0.1] if at_first else [0.3, 0.0, 0.0])

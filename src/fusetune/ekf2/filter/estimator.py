@@ -142,6 +142,8 @@ def ekf_record(release: str) -> np.dtype:
         memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
     if does.integrates_flow:
         memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
+    if does.feels_drag_in_air:
+        memories.append(("drag_waits", np.dtype("?")))
     if does.fuses_vision_by_mask:
         memories.append(("vision_steps", VISION_STEPS))
     if does.aids_gnss_by_mask:

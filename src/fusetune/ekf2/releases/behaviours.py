@@ -309,11 +309,17 @@ class Behaviours:
         source="ekf.h",
     )
     sizes_buffers_by_sources: bool = _behaviour(
-        "Buffers are as long as the longest delay of a source that is asked for, and the longest interval of "
-        "barometer and magnetometer. v1.16 has EKF2_DELAY_MAX.",
+        "Buffers are as long as the longest delay of a source that is asked for. v1.16 has EKF2_DELAY_MAX.",
         since="v1.13",
         until="v1.14",
-        source="estimator_interface.cpp, ../EKF2.cpp",
+        source="estimator_interface.cpp",
+    )
+    waits_for_averaged_sensors: bool = _behaviour(
+        "Buffers are as long as the longest interval of barometer and magnetometer, too. v1.14 has the same lines, but "
+        "where GNSS is not asked for its outputs show the shorter buffers.",
+        since="v1.13",
+        until="v1.13",
+        source="../EKF2.cpp",
     )
     observes_acceleration_of_gravity: bool = _behaviour(
         "Gravity is fused in m/s², by the low-passed vector of the specific force, with a gate of one and gains that "
@@ -398,6 +404,13 @@ class Behaviours:
         since="v1.13",
         until="v1.15",
         source="control.cpp",
+    )
+
+    finds_zero_velocity_first: bool = _behaviour(
+        "At rest the velocity of all three axes is found before the first is fused.",
+        since="v1.13",
+        until="v1.14",
+        source="zero_velocity_update.cpp",
     )
 
     # Older releases: GNSS, height, fake aiding and the yaw estimator.
@@ -790,10 +803,17 @@ class Behaviours:
         source="sideslip_fusion.cpp",
     )
     feels_drag_in_air: bool = _behaviour(
-        "Drag is judged in the air alone, and not told of.",
+        "Drag is judged in the air alone, the first time from a sample that came on the ground. It corrects the wind "
+        "alone, and is not told of.",
         since="v1.13",
         until="v1.14",
         source="drag_fusion.cpp",
+    )
+    averages_clipped_drag: bool = _behaviour(
+        "Clipped acceleration is averaged into that of drag.",
+        since="v1.13",
+        until="v1.14",
+        source="estimator_interface.cpp",
     )
     compares_range_in_slow_flight: bool = _behaviour(
         "The range finder is held against the vertical velocity only where a multicopter does not move horizontally; "
@@ -825,7 +845,7 @@ class Behaviours:
     )
     linearises_drag_by_force: bool = _behaviour(
         "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
-        "force; it corrects the wind alone.",
+        "force.",
         since="v1.13",
         until="v1.13",
         source="drag_fusion.cpp",
