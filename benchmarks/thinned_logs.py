@@ -91,7 +91,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("logs", type=Path)
     parser.add_argument("--reference", type=Path)
+    parser.add_argument("--default-profile", action="store_true", help="only the logs of PX4's default profile")
     options = parser.parse_args()
+    if options.default_profile:
+        _print_vehicle(options.logs)
+        return
     full_rate = list(_full_rate_flights(options.logs))
     _print_differences(full_rate)
     _print_vehicle(options.logs)
@@ -239,7 +243,7 @@ def _print_vehicle(logs: Path) -> None:
     for stem in DEFAULT_PROFILE:
         for log in sorted(logs.glob(f"{stem}*.ulg")):
             flight = canonical(read_ulog(log))
-            grade = grade_flight(prepare(flight, IN_USE.reconstruction, IN_USE.start))
+            grade = grade_flight(prepare(flight, IN_USE.reconstruction, IN_USE.start, release=IN_USE.release))
             sizes = [grade.repaired.innovation_ratio.get(name, float("nan")) for name in groups]
             height = (grade.repaired.height_m, grade.repaired.vertical_velocity_m_s)
             sizes += [float("nan") if value is None else value for value in height]

@@ -149,12 +149,9 @@ def test_tilt_heading_and_field_at_the_start():
     it = flying(V113, EKF2_MAG_TYPE=0.0, EKF2_MAG_DECL=3.0, EKF2_DECL_TYPE=0.0)
     roll, pitch = 0.1, -0.2
     levelling = np.zeros(1, levelling_record(V113))
-    levelling["accel"] = -9.8 * np.array(
-        [-math.sin(pitch), math.sin(roll) * math.cos(pitch), math.cos(roll) * math.cos(pitch)]
-    )
-    level = np.array([[math.cos(pitch), math.sin(roll) * math.sin(pitch), math.cos(roll) * math.sin(pitch)],
-                      [0.0, math.cos(roll), -math.sin(roll)],
-                      [-math.sin(pitch), math.sin(roll) * math.cos(pitch), math.cos(roll) * math.cos(pitch)]])  # fmt: skip
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    level = np.array([[cp, sr * sp, cr * sp], [0.0, cr, -sr], [-sp, sr * cp, cr * cp]])
+    levelling["accel"] = level.T @ [0.0, 0.0, -9.8]
     levelling["mag"] = level.T @ [0.2, -0.1, 0.4]
     levelling["mag_count"], levelling["baro_count"] = 5, 6
     levelling["baro_offset"], levelling["baro_height"], levelling["baro_time_us"] = 488.0, 488.2, 77

@@ -17,8 +17,18 @@ from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, E
 from fusetune.ekf2.filter import wind
 from fusetune.ekf2.filter.aid_sources.airspeed import airspeed_control, airspeed_fusion, airspeed_resets
 from fusetune.ekf2.filter.aid_sources.drag import drag_fusion
-from fusetune.ekf2.filter.aid_sources.external_vision import ev_attitude_error, ev_vel_control, ev_yaw_control
-from fusetune.ekf2.filter.aid_sources.optical_flow import flow_over_terrain, integrated_flow, optical_flow_fusion
+from fusetune.ekf2.filter.aid_sources.external_vision import (
+    ev_attitude_error,
+    ev_control,
+    ev_vel_control,
+    ev_yaw_control,
+)
+from fusetune.ekf2.filter.aid_sources.optical_flow import (
+    flow_over_terrain,
+    integrated_flow,
+    integrated_flow_at_once,
+    optical_flow_fusion,
+)
 from fusetune.ekf2.filter.aid_sources.range_finder import range_for_height, range_height_control
 from fusetune.ekf2.filter.aid_sources.sideslip import sideslip_fusion
 from fusetune.ekf2.filter.common import aid_source_status
@@ -26,15 +36,23 @@ from fusetune.ekf2.filter.common.conditions import get_hagl, is_terrain_estimate
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, TERRAIN, VELOCITY, WIND
 from fusetune.ekf2.filter.resets import state_resets
-from fusetune.ekf2.filter.terrain_filter import terrain_by_flow, terrain_by_range, terrain_filter, terrain_in_air
+from fusetune.ekf2.filter.terrain_filter import (
+    terrain_by_flow,
+    terrain_by_flow_axes,
+    terrain_by_range,
+    terrain_filter,
+    terrain_in_air,
+)
 from fusetune.ekf2.numerics.rotations import quat_to_dcm
 from fusetune.ekf2.replay import flight_schedule
 from fusetune.ekf2.replay.recording import views_of
 
 V115 = "v1.15"
 V114 = "v1.14"
+V113 = "v1.13"
 UNTIL_V115 = [(V115, True), (V116, False)]
 UNTIL_V114 = [(V114, True), (V115, False)]
+UNTIL_V113 = [(V113, True), (V114, False)]
 
 
 def over_terrain(release: str = V115, **overrides: float) -> Flying:
@@ -656,3 +674,240 @@ def test_flow_is_asked_for_whatever_the_main_filter_uses_until_v1_15():
     assert not flight_schedule._is_asked_by_parameter("flow", V115)
     assert flight_schedule._is_asked_by_parameter("flow", V116)
     assert flight_schedule._is_asked_by_parameter("airspeed", V115)
+
+
+@pytest.mark.parametrize(("release", "keeps_north"), [(V115, True), (V114, False)])
+def test_vision_that_knows_no_north_leaves_no_other_yaw_beside_it_until_v1_15(release, keeps_north):
+    it = flying(release)
+    it.ekf["sensors"]["ev"]["sample"]["pos_frame"] = EV_FRAME_FRD
+    for flag in ("ev_yaw", "mag_hdg", "gnss_yaw", "gnss_pos", "gnss_vel"):
+        it.ekf["cs"][flag] = True
+    asked(ev_control._give_north_up, it, it.params, True)
+    assert it.ekf["cs"]["gnss_pos"]
+    asked(ev_control._give_north_up, it, it.params, False)
+    for flag in ("mag_hdg", "gnss_yaw", "gnss_pos", "gnss_vel"):
+        assert it.ekf["cs"][flag] == keeps_north
+
+
+def test_flow_of_v1_13_corrects_the_terrain_axis_by_axis():
+    it = over_terrain(V113, EKF2_OF_GATE=3.0, EKF2_OF_N_MIN=0.1, EKF2_OF_N_MAX=0.1)
+    it.ekf["cs"]["gnss_pos"] = it.ekf["cs"]["gnss_vel"] = True
+    it.params["EKF2_TERR_MASK"] = 3.0
+    flow_of(it, 0.0, 0.0)
+    it.ekf["terrain_filter"]["flow_is_good"] = True
+    # 4 m/s to the right over 10 m turn the image by 0.4 rad/s; the other axis is off by more than the gate
+    it.ekf["flow"]["rate_compensated"] = 0.38, 0.7
+    terrain_by_flow_axes.control_terrain_by_flow_axes(it.ekf, it.params)
+    by_terrain = 4.0 / 10.0**2
+    variance = 0.25 * by_terrain**2 + 0.01
+    aid = it.ekf["aid"]["terrain_optical_flow"]
+    assert aid["innovation"][:2] == pytest.approx((0.02, -0.3 - 0.7))
+    assert aid["innovation_variance"][0] == pytest.approx(variance)
+    assert it.ekf["terrain"] == pytest.approx(0.25 * by_terrain / variance * 0.02)
+    assert it.ekf["terrain_filter"]["variance"] == pytest.approx(0.25 * (1.0 - 0.25 * by_terrain**2 / variance))
+    assert it.ekf["terrain_filter"]["uses_flow"]
+    it.ekf["aid"]["terrain_range_finder"]["time_last_fuse"] = START_US
+    it.ekf["terrain_filter"]["flow_is_good"] = True
+    terrain_by_flow_axes.control_terrain_by_flow_axes(it.ekf, it.params)
+    assert not it.ekf["terrain_filter"]["uses_flow"]
+
+
+@pytest.mark.parametrize(("release", "slow_only"), UNTIL_V113)
+def test_distances_are_compared_with_the_climb_in_slow_flight(release, slow_only, monkeypatch):
+    it, compared = flying(release), []
+    monkeypatch.setattr(range_height_control, "_compare_with_velocity", lambda *_: compared.append(True))
+    monkeypatch.setattr(range_height_control, "_compare_and_judge_in_climb", lambda *_: compared.append(True))
+    if slow_only:
+        for speed, wings, expected in ((0.2, False, 1), (0.4, False, 0), (0.2, True, 0)):
+            compared.clear()
+            it.ekf["vel"], it.ekf["cs"]["fixed_wing"] = (speed, 0.0, 0.0), wings
+            range_height_control._compare_in_slow_flight.py_func(it.ekf, it.params)
+            assert len(compared) == expected
+    it.ekf["cs"]["in_air"], it.ekf["cs"]["vehicle_at_rest"] = False, True
+    assert bool(asked(range_height_control._may_stand, it)) != slow_only
+
+
+def seen(mask: float, **overrides: float) -> Flying:
+    """Vision of v1.13, at (2, 1) m with a velocity of (1, 2, 3) m/s and turned 90° to the left of the estimate."""
+    it = flying(V113, EKF2_EVP_GATE=100.0, EKF2_EVV_GATE=100.0, **overrides)
+    it.params["EKF2_AID_MASK"] = mask
+    it.ekf["vel"] = 1.0, 2.0, 3.0
+    sample = it.ekf["sensors"]["ev"]["sample"]
+    sample["pos"], sample["position_var"] = (2.0, 1.0, -10.0), (0.3, 0.4, 0.5)
+    sample["quat"] = math.sqrt(0.5), 0.0, 0.0, -math.sqrt(0.5)
+    sample["orientation_var"] = 0.01, 0.01, 1e-6
+    vision_of(it, EV_FRAME_FRD, (1.0, 2.0, 3.0))
+    it.ekf["sensors"]["ev"]["data_ready"] = True
+    it.ekf["sensors"]["ev"]["newest_time_us"] = it.ekf["time_latest_us"]
+    it.ekf["cs"]["tilt_align"] = it.ekf["cs"]["yaw_align"] = True
+    it.ekf["time_last_hor_pos_fuse"] = it.ekf["time_last_hor_vel_fuse"] = START_US
+    return it
+
+
+def test_the_mask_says_what_of_vision_is_fused():
+    it = seen(8.0)
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    flags = ("ev_pos", "ev_vel", "ev_yaw")
+    assert [bool(it.ekf["cs"][name]) for name in flags] == [True, False, False]
+    # it starts with a reset, and is fused then
+    assert it.ekf["state_reset"]["pos_ne_counter"] == 1
+    aid = it.ekf["aid"]["ev_pos"]
+    assert aid["innovation"][:2] == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert aid["observation_variance"][:2] == pytest.approx((0.3, 0.4))
+    assert aid["fused"]
+    it = seen(8.0 + 64.0)
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    # the estimate is turned to the right of vision: (x, y) of it are (-y, x)
+    assert it.ekf["aid"]["ev_pos"]["observation_variance"][:2] == pytest.approx((0.4, 0.3))
+    assert it.ekf["aid"]["ev_pos"]["observation"][:2] == pytest.approx((-1.0, 2.0))
+
+
+def test_beside_gnss_steps_of_vision_are_fused():
+    it = seen(8.0 + 1.0)
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    it.ekf["sensors"]["ev"]["sample"]["pos"] = 2.5, 1.1, -10.0
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    aid = it.ekf["aid"]["ev_pos"]
+    assert aid["innovation"][:2] == pytest.approx((-0.5, -0.1))
+    assert aid["observation_variance"][:2] == pytest.approx((0.3, 0.4))
+    it.ekf["sensors"]["ev"]["sample"]["position_var"] = 0.01
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    assert aid["observation_variance"][:2] == pytest.approx((0.25, 0.25))
+
+
+def test_velocity_and_yaw_of_vision_are_as_certain_as_they_say_but_for_a_floor():
+    it = seen(256.0)
+    it.ekf["sensors"]["ev"]["sample"]["velocity_var"] = 0.01, 0.04, 1e-6
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    assert it.ekf["state_reset"]["vel_ne_counter"] == 1
+    assert it.ekf["aid"]["ev_vel"]["observation_variance"] == pytest.approx((0.01, 0.04, 0.0025))
+    it = seen(16.0)
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    assert it.ekf["cs"]["ev_yaw"]
+    assert it.ekf["state_reset"]["quat_counter"] == 1
+    aid = it.ekf["aid"]["ev_yaw"]
+    assert aid["observation"][0] == pytest.approx(-math.pi / 2)
+    assert aid["observation_variance"][0] == pytest.approx(1e-4)
+    set_time(it.ekf, START_US + 7_100_000)
+    it.ekf["time_latest_us"] = START_US + 7_100_000
+    it.ekf["sensors"]["ev"]["data_ready"] = False
+    it.ekf["sensors"]["ev"]["newest_time_us"] = START_US
+    asked(ev_control.control_external_vision_fusion, it, it.params)
+    assert not it.ekf["cs"]["ev_yaw"]
+
+
+@pytest.mark.parametrize(("release", "where_fused"), UNTIL_V113)
+def test_airspeed_is_judged_where_it_is_fused(release, where_fused, monkeypatch):
+    it, judged = flying(release, EKF2_ARSP_THR=8.0), []
+    if where_fused:
+        monkeypatch.setattr(airspeed_control, "fuse_airspeed", lambda *_: None)
+        monkeypatch.setattr(airspeed_control, "_reset_wind", lambda *_: None)
+    monkeypatch.setattr(airspeed_control, "update_airspeed", lambda *_: judged.append(True))
+    it.ekf["cs"]["fixed_wing"] = True
+    it.ekf["sensors"]["airspeed"]["sample"]["true_airspeed"] = 12.0
+    it.ekf["aid"]["airspeed"]["innovation_rejected"] = True
+    it.ekf["vel"] = 0.5, 0.0, 0.0
+    asked(airspeed_control._take_airspeed_sample, it, it.params)
+    assert it.ekf["cs"]["fuse_aspd"]
+    assert bool(judged) != where_fused
+    if where_fused:
+        it.ekf["aid"]["airspeed"]["time_last_fuse"] = START_US
+        asked(airspeed_control._take_airspeed_sample, it, it.params)
+        assert not judged
+        it.ekf["vel"] = 1.5, 0.0, 0.0
+        asked(airspeed_control._take_airspeed_sample, it, it.params)
+        assert judged
+
+
+def test_sideslip_of_v1_13_is_asked_for_by_its_parameter_and_judged_at_speed(monkeypatch):
+    it, judged = flying(V113, EKF2_FUSE_BETA=1.0), []
+    monkeypatch.setattr(sideslip_fusion, "_update_sideslip", lambda *_: judged.append(True))
+    monkeypatch.setattr(sideslip_fusion, "_fuse_sideslip", lambda *_: True)
+    it.ekf["cs"]["fixed_wing"], it.ekf["cs"]["in_air"] = True, False
+    asked(sideslip_fusion.control_beta_fusion, it, it.params)
+    assert it.ekf["cs"]["fuse_beta"]
+    assert not it.ekf["cs"]["wind"]
+    it.ekf["cs"]["in_air"] = True
+    it.ekf["vel"] = 4.0, 3.0, 4.8
+    asked(sideslip_fusion.control_beta_fusion, it, it.params)
+    assert it.ekf["cs"]["wind"]
+    assert not judged
+    set_time(it.ekf, START_US + 200_000)
+    it.ekf["vel"] = 4.0, 3.0, 5.0
+    asked(sideslip_fusion.control_beta_fusion, it, it.params)
+    assert judged
+
+
+def test_drag_of_v1_13_is_as_steep_as_at_the_measured_force():
+    # ½·1.2/50·v² + 0.1·v = 2 m/s² at 8.08 m/s, where it grows by 1.2/50·v + 0.1
+    air = (math.sqrt(0.01 + 2.0 * 1.2 / 50.0 * 2.0) - 0.1) / (1.2 / 50.0)
+    assert 0.5 * 1.2 / 50.0 * air**2 + 0.1 * air == pytest.approx(2.0)
+    slope = drag_fusion._drag_slope.py_func
+    assert slope(None, 1.2, 1.0 / 50.0, 0.1, -2.0) == pytest.approx(1.2 / 50.0 * air + 0.1)
+    assert slope(None, 1.2, 0.0, 0.3, 2.0) == pytest.approx(0.3)
+    assert slope(None, 1.2, 0.0, 0.05, 2.0) == pytest.approx(0.1)
+
+
+def test_drag_of_v1_13_moves_the_wind_alone():
+    it = flying(V113, EKF2_BCOEF_X=50.0, EKF2_BCOEF_Y=50.0, EKF2_MCOEF=0.0, EKF2_DRAG_NOISE=2.5)
+    known = np.arange(24)
+    it.ekf["P"][:] = np.diag(np.isin(known, (VELOCITY, VELOCITY + 1, WIND, WIND + 1)).astype(float))
+    it.ekf["vel"] = 8.0, 0.0, 0.0
+    it.ekf["air_density"] = 1.2
+    it.ekf["sensors"]["drag"]["sample"]["accel_xy"] = -0.5 * 1.2 / 50.0 * 10.0**2, 0.0
+    drag_fusion._fuse_by_slope.py_func(it.ekf, it.params)
+    aid = it.ekf["aid"]["drag"]
+    assert aid["innovation"][:2] == pytest.approx((0.5 * 1.2 / 50.0 * (100.0 - 64.0), 0.0))
+    # the slope at the 10 m/s of the force, by the velocity and the wind, each with 1 m²/s²
+    assert aid["innovation_variance"][0] == pytest.approx(2.0 * (1.2 / 50.0 * 10.0) ** 2 + 2.5)
+    assert it.ekf["wind_vel"][0] < 0.0
+    assert it.ekf["vel"].tolist() == [8.0, 0.0, 0.0]
+
+
+def flow_at_once(**overrides: float) -> Flying:
+    it = over_terrain(V113, EKF2_OF_QMIN=10.0, EKF2_OF_N_MIN=0.2, EKF2_OF_N_MAX=0.2, **overrides)
+    it.params["EKF2_AID_MASK"] = 2.0
+    it.ekf["flow"]["max_rate"] = 5.0
+    it.ekf["flow_interval"] = 0.02
+    flow_of(it, 0.5, -0.25)
+    it.ekf["sensors"]["flow"]["sample"]["gyro_rate"] = 0.05, 0.0, 0.0
+    integrated_flow.integrate_sample.py_func(it.ekf)
+    it.ekf["flow_integrals"]["imu_time"] = 0.02
+    it.ekf["flow_integrals"]["imu_angle"] = 0.0008, 0.0, 0.0
+    it.ekf["terrain_filter"]["flow_is_good"] = True
+    return it
+
+
+def test_the_bias_of_the_gyro_of_flow_is_put_on_the_flow_in_v1_13():
+    it = flow_at_once()
+    integrated_flow_at_once._prepare_sample.py_func(it.ekf, it.params)
+    # 0.05 rad/s of its gyro less 0.04 rad/s of the IMU, by a hundredth
+    assert it.ekf["flow_integrals"]["gyro_bias"][0] == pytest.approx(0.0001)
+    assert it.ekf["flow"]["rate_compensated"] == pytest.approx((0.5 - 0.05 + 0.0001, -0.25))
+    it = flow_at_once()
+    it.ekf["sensors"]["flow"]["sample"]["quality"] = 0
+    integrated_flow_at_once._prepare_sample.py_func(it.ekf, it.params)
+    assert it.ekf["flow"]["rate_compensated"] == pytest.approx((0.0001, 0.0))
+    assert not it.ekf["terrain_filter"]["flow_is_good"]
+
+
+def test_flow_of_v1_13_starts_with_its_velocity_once_there_is_a_heading(monkeypatch):
+    it, fused = flow_at_once(), []
+    monkeypatch.setattr(integrated_flow_at_once, "_fuse", lambda *_: fused.append(True))
+    monkeypatch.setattr(integrated_flow_at_once, "is_flow_inhibited", lambda *_: False)
+    monkeypatch.setattr(integrated_flow_at_once, "is_other_source_of_horizontal_aiding_than", lambda *_: False)
+    it.ekf["range"]["cos_tilt"] = 1.0
+    it.ekf["flow"]["rate_compensated"] = 0.4, -0.3
+    it.ekf["cs"]["yaw_align"] = False
+    integrated_flow_at_once._use_flow.py_func(it.ekf, it.params)
+    assert not it.ekf["cs"]["opt_flow"]
+    it.ekf["cs"]["yaw_align"] = True
+    it.ekf["aid"]["terrain_range_finder"]["time_last_fuse"] = START_US
+    integrated_flow_at_once._use_flow.py_func(it.ekf, it.params)
+    # 10 m above the ground: (-10·-0.3, 10·0.4) m/s, to 10²·0.2² m²/s²
+    assert it.ekf["vel"][:2] == pytest.approx((3.0, 4.0))
+    assert it.ekf["P"][VELOCITY, VELOCITY] == pytest.approx(4.0)
+    assert fused
+    it.ekf["terrain"] = -9.8
+    integrated_flow_at_once._reset_to_flow.py_func(it.ekf, it.params)
+    assert it.ekf["vel"][:2].tolist() == [0.0, 0.0]

@@ -368,7 +368,8 @@ def test_buffers_are_as_long_as_the_sources_that_are_asked_for():
     }  # fmt: skip
     assert longest_delay_ms(values.__getitem__, V115) == 200.0
     assert longest_delay_ms(values.__getitem__, V114) == 110.0
-    # 1000 ms / 15 Hz
-    assert longest_delay_ms((values | {"EKF2_GPS_CTRL": 0.0}).__getitem__, V114) == 67.0
+    # the estimator's own 10 ms; in v1.13 1000 ms / 15 Hz
+    assert longest_delay_ms((values | {"EKF2_GPS_CTRL": 0.0}).__getitem__, V114) == 10.0
     by_mask = values | {"EKF2_AID_MASK": 24.0, "EKF2_HGT_MODE": 1.0, "EKF2_RNG_AID": 0.0}
     assert longest_delay_ms(by_mask.__getitem__, V113) == 175.0
+    assert longest_delay_ms((by_mask | {"EKF2_AID_MASK": 0.0}).__getitem__, V113) == 67.0

@@ -5,8 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from fusetune.ekf2.compiled.compilation import ensure_compiled
 from fusetune.ekf2.feed.inputs import build_inputs
 from fusetune.ekf2.filter.common.parameters import complete
+from fusetune.ekf2.releases.behaviours import BASELINE
 from fusetune.ekf2.replay.replay import replay
 from fusetune.ekf2.replay.warm_start import rotation_matrix
 from fusetune.px4.flight import Flight, select_rows
@@ -68,9 +70,11 @@ def cut(flight, whole):
     return dataclasses.replace(flight, topics=topics), state_at(whole, begin + 1_000_000)
 
 
-def test_warm_start_in_mid_air_stays_close_to_the_uncut_replay(cut, whole):
+@pytest.mark.parametrize("release", [BASELINE, "v1.13", "v1.14", "v1.15"])
+def test_warm_start_in_mid_air_stays_close_to_the_uncut_replay(cut, whole, release):
     flight, state = cut
-    warm = run(flight, start=state)
+    ensure_compiled(release)
+    warm = run(flight, start=state, release=release)
     assert warm.warm_start_us is not None
     assert 0 <= warm.warm_start_us - state.time_us < 20_000
     np.testing.assert_allclose(warm.origin, whole.origin, atol=1e-9)

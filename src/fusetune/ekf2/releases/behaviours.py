@@ -309,11 +309,17 @@ class Behaviours:
         source="ekf.h",
     )
     sizes_buffers_by_sources: bool = _behaviour(
-        "Buffers are as long as the longest delay of a source that is asked for, and the longest interval of "
-        "barometer and magnetometer. v1.16 has EKF2_DELAY_MAX.",
+        "Buffers are as long as the longest delay of a source that is asked for. v1.16 has EKF2_DELAY_MAX.",
         since="v1.13",
         until="v1.14",
-        source="estimator_interface.cpp, ../EKF2.cpp",
+        source="estimator_interface.cpp",
+    )
+    waits_for_averaged_sensors: bool = _behaviour(
+        "Buffers are as long as the longest interval of barometer and magnetometer, too. v1.14 has the same lines, but "
+        "where GNSS is not asked for its outputs show the shorter buffers.",
+        since="v1.13",
+        until="v1.13",
+        source="../EKF2.cpp",
     )
     observes_acceleration_of_gravity: bool = _behaviour(
         "Gravity is fused in m/s², by the low-passed vector of the specific force, with a gate of one and gains that "

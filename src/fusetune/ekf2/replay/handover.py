@@ -13,6 +13,7 @@ import numpy as np
 
 from fusetune.ekf2.feed.inputs import BIAS_RESETS, EstimatorInputs, without_arrivals
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, GYRO_BIAS, MAG_BODY, MAG_EARTH
+from fusetune.ekf2.replay.older_start import bias_unit
 from fusetune.ekf2.replay.warm_start import MIN_VARIANCES, knows_field
 from fusetune.px4.layouts.logged_state import Handover, LoggedState
 
@@ -52,12 +53,14 @@ def take_sensor_states(ekf: np.void, state: LoggedState) -> None:
     """
     if not ekf["filter_initialised"]:
         return
-    blocks = {"gyro_bias": (GYRO_BIAS, state.gyro_bias), "accel_bias": (ACCEL_BIAS, state.accel_bias)}
-    if ekf["cs"]["mag"] and knows_field(state):
+    unit, estimates_field = bias_unit(ekf), ekf["cs"]["mag"] or ekf["cs"]["mag_3d"]
+    blocks = {"gyro_bias": (GYRO_BIAS, unit * state.gyro_bias), "accel_bias": (ACCEL_BIAS, unit * state.accel_bias)}
+    if estimates_field and knows_field(state):
         blocks |= {"mag_I": (MAG_EARTH, state.mag_earth), "mag_B": (MAG_BODY, state.mag_body)}
     for name, (first, value) in blocks.items():
         ekf[name] = value
         rows = np.arange(first, first + 3)
         ekf["P"][rows, :] = 0.0
         ekf["P"][:, rows] = 0.0
-        ekf["P"][rows, rows] = np.maximum(state.variances[rows], MIN_VARIANCES.get(name, 0.0))
+        variances = np.maximum(state.variances[rows], MIN_VARIANCES.get(name, 0.0))
+        ekf["P"][rows, rows] = variances if name.startswith("mag") else unit * unit * variances

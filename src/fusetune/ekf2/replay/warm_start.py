@@ -22,6 +22,14 @@ from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MA
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import reproject
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
+from fusetune.ekf2.replay.older_start import (
+    bias_unit,
+    is_local,
+    place_of,
+    position_of_output,
+    put_local_position,
+    settle_core,
+)
 from fusetune.px4.layouts.logged_state import LoggedState
 from fusetune.quaternions import conjugate, rotation_matrix
 
@@ -86,6 +94,7 @@ def take_over(ekf: np.ndarray, fresh: np.ndarray, params: np.void, inputs: Estim
     _set_gnss(e)
     _set_baro(e, inputs)
     _set_mag(e, inputs, state)
+    settle_core(e, params)
     _align_output(e)
 
 
@@ -132,11 +141,13 @@ def _set_state(e: np.void, params: np.void, inputs: EstimatorInputs, state: Logg
     e["gpos_alt"] = float(np.float32(base - position[2]))
     for known, here in (("last_known_lat", "gpos_lat"), ("last_known_lon", "gpos_lon"), ("last_known_alt", "gpos_alt")):
         e[known] = e[here]
+    put_local_position(e, position)
     e["gyro_bias"], e["accel_bias"] = state.gyro_bias, state.accel_bias
     e["wind_vel"] = state.wind
     e["height_rate_lpf"] = velocity[2]
     # in the air the ground is taken to be level with the origin, which lies where the vehicle was switched on
-    ground = -e["gpos_alt"] if "in_air" not in state.flags else -base
+    level = 0.0 if is_local(e) else -base
+    ground = -e["gpos_alt"] if "in_air" not in state.flags else level
     e["terrain"] = float(np.float32(ground + params["EKF2_MIN_RNG"]))
     e["last_on_ground_pos_d"] = ground
 
@@ -279,7 +290,7 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
     now = int(e["time_delayed_us"])
     mag = e["mag"]
     if e["origin"]["lat_lon_valid"] and knows_field(state):
-        place = math.degrees(e["gpos_lat"]), math.degrees(e["gpos_lon"])
+        place = place_of(e)
         declination, inclination, strength = inputs.memo.get(("field at", place), lambda: field_at(*place))
         mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = declination, inclination, strength
         earth_field_vector.py_func(declination, inclination, strength, mag["wmm_earth_field"])
@@ -308,12 +319,13 @@ def _align_output(e: np.void) -> None:
     samples["q"] = quaternion_product(turn, samples["q"])
     samples["vel"] = start + np.matmul(matrix, (samples["vel"] - start)[..., None])[..., 0]
     output["vel_offset"] = e["vel"] - start
-    output["pos_offset"] = -oldest["pos"]
+    output["pos_offset"] = position_of_output(e) - oldest["pos"]
     output["ref_lat"], output["ref_lon"], output["ref_alt"] = e["gpos_lat"], e["gpos_lon"], e["gpos_alt"]
     newest = output["history"][int(output["head"])]
     output["newest"]["q"] = newest["q"]
     output["newest"]["vel"] = newest["vel"] + output["vel_offset"]
     output["newest"]["pos"] = newest["pos"] + output["pos_offset"]
-    output["gyro_bias"], output["accel_bias"] = e["gyro_bias"], e["accel_bias"]
+    unit = bias_unit(e)
+    output["gyro_bias"], output["accel_bias"] = e["gyro_bias"] / unit, e["accel_bias"] / unit
     for name in ("vel_err_integ", "pos_err_integ", "delta_angle_corr"):
         output[name] = 0.0

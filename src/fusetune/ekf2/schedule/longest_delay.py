@@ -28,7 +28,10 @@ def longest_delay_ms(values: Values, release: str) -> float:
         return values("EKF2_DELAY_MAX")
     wanted = _wanted_by_mask(values) if does.selects_sources_by_mask else _wanted_by_control(values)
     delays = [values(SENSORS[sensor].delay_parameter or "") for sensor, is_wanted in wanted.items() if is_wanted]
-    return max(*delays, values("EKF2_AVEL_DELAY"), _longest_interval_ms(values, wanted))
+    longest_interval = LONGEST_SENSOR_INTERVAL_MS
+    if does.waits_for_averaged_sensors:
+        longest_interval = _longest_interval_ms(values, wanted)
+    return max(*delays, values("EKF2_AVEL_DELAY"), longest_interval)
 
 
 def _wanted_by_control(values: Values) -> dict[str, bool]:

@@ -19,11 +19,9 @@ from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import (
     clear_jacobian,
-    compute_innovation_variance,
     compute_kalman_gain,
-    scale_kalman_gain,
 )
-from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
+from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import attitude_variance, complete_attitude_jacobian
 from fusetune.ekf2.numerics.constants import FLT_EPSILON, ONE_G
 from fusetune.ekf2.releases.by_release import by_release
 
@@ -157,31 +155,38 @@ def _control_acceleration_of_gravity(ekf, params):
 
 @kernel
 def _update_acceleration_of_gravity(ekf, params):
-    """Judge the specific force as R^T (0, 0, -g); leave the gain of each axis in `ekf.quaternion.gains`."""
-    imu, aid, jacobian, H = ekf.imu_delayed, ekf.aid.gravity, ekf.gravity.jacobian, ekf.scratch.H
+    """Judge the specific force as Rᵀ (0, 0, -g)."""
+    imu, aid, H = ekf.imu_delayed, ekf.aid.gravity, ekf.scratch.H
     measured = specific_force(ekf)
     x, y, z = measured
     scale = ONE_G / math.sqrt(x * x + y * y + z * z + FLT_EPSILON * FLT_EPSILON)
     variance = params.EKF2_GRAV_NOISE * params.EKF2_GRAV_NOISE
-    compute_gravity_jacobian(ekf, jacobian)
+    clear_jacobian(H)
     for axis in range(3):
-        predicted = -ONE_G * ekf.R_to_earth[2, axis]
-        clear_jacobian(H)
-        H[ATTITUDE] = ONE_G * jacobian[axis, 0]
-        H[ATTITUDE + 1] = ONE_G * jacobian[axis, 1]
-        complete_attitude_jacobian(ekf, H, 2.0 * predicted)
-        innovation_variance = compute_innovation_variance(ekf, H, variance)
-        scale_kalman_gain(ekf, innovation_variance)
-        for i in range(ERROR_STATE_SIZE):
-            ekf.quaternion.gains[axis, i] = ekf.scratch.K[i]
-        set_axis(aid, axis, measured[axis], variance, predicted - scale * measured[axis], innovation_variance)
+        _write_jacobian_of_acceleration(ekf, axis, H)
+        innovation = -ONE_G * ekf.R_to_earth[2, axis] - scale * measured[axis]
+        set_axis(aid, axis, measured[axis], variance, innovation, attitude_variance(ekf, H) + variance)
     update_aid_source_status(ekf, aid, 3, imu.time_us, GATE_OF_ACCELERATION)
 
 
 @kernel
+def _write_jacobian_of_acceleration(ekf, axis, H):
+    """Write the derivative of -g R₂ᵢ by the quaternion into its places in `H` (24,)."""
+    R = ekf.R_to_earth
+    H[ATTITUDE], H[ATTITUDE + 1], H[ATTITUDE + 2] = -ONE_G * R[1, axis], ONE_G * R[0, axis], 0.0
+    complete_attitude_jacobian(ekf, H, -2.0 * ONE_G * R[2, axis])
+
+
+@kernel
 def _fuse_by_kept_gains(ekf, params):
-    """Fuse one axis after the other; return whether all were."""
-    aid, core, K = ekf.aid.gravity, ekf.quaternion, ekf.scratch.K
+    """Fuse one axis after the other, with gains that are all of before the first; return whether all were."""
+    aid, core, H, K = ekf.aid.gravity, ekf.quaternion, ekf.scratch.H, ekf.scratch.K
+    clear_jacobian(H)
+    for axis in range(3):
+        _write_jacobian_of_acceleration(ekf, axis, H)
+        compute_kalman_gain(ekf, H, aid.innovation_variance[axis])
+        for i in range(ERROR_STATE_SIZE):
+            core.gains[axis, i] = K[i]
     for axis in range(3):
         for i in range(ERROR_STATE_SIZE):
             K[i] = core.gains[axis, i]

@@ -1,0 +1,86 @@
+"""What a state that the vehicle logged is in the memory of releases until v1.15.
+
+Up to v1.15 position is local, up to v1.14 attitude errors are those of the quaternion and biases increments; the logged
+state is told as v1.16's.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
+from fusetune.ekf2.numerics.geodesy import earth_rate_ned
+
+QUATERNION = (ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, TERRAIN)
+"""Places of the quaternion's elements in the error state."""
+
+
+def is_local(e: np.void) -> bool:
+    """Whether the release keeps its position local."""
+    return "local" in (e.dtype.names or ())
+
+
+def put_local_position(e: np.void, position: np.ndarray) -> None:
+    """Put the vehicle at a place (m, NED) of the local frame, where the release has one; the Earth turns as there."""
+    if not is_local(e):
+        return
+    local = e["local"]
+    local["north"] = local["last_known_north"] = float(np.float32(position[0]))
+    local["east"] = local["last_known_east"] = float(np.float32(position[1]))
+    e["gpos_lat"] = e["gpos_lon"] = e["last_known_lat"] = e["last_known_lon"] = 0.0
+    e["gpos_alt"] = e["last_known_alt"] = float(np.float32(-position[2]))
+    if e["origin"]["lat_lon_valid"]:
+        e["earth_rate_ned"] = earth_rate_ned.py_func(float(e["origin"]["lat_rad"]))
+
+
+def place_of(e: np.void) -> tuple[float, float]:
+    """Latitude and longitude (deg) of the vehicle, of releases with a local position those of the origin."""
+    lat, lon = (e["origin"]["lat_rad"], e["origin"]["lon_rad"]) if is_local(e) else (e["gpos_lat"], e["gpos_lon"])
+    return math.degrees(lat), math.degrees(lon)
+
+
+def position_of_output(e: np.void) -> np.ndarray:
+    """The filter's position (m, NED) as the output predictor counts it: of the origin, or of where it is now."""
+    if not is_local(e):
+        return np.zeros(3)
+    return np.array([e["local"]["north"], e["local"]["east"], -e["gpos_alt"]])
+
+
+def bias_unit(e: np.void) -> float:
+    """What a bias of 1 rad/s, or 1 m/s², is in the unit of the record's."""
+    return float(e["quaternion"]["mean_dt"]) if "quaternion" in (e.dtype.names or ()) else 1.0
+
+
+def settle_core(e: np.void, params: np.void) -> None:
+    """Take terrain, biases, field and attitude out of v1.16's error state where the release has them elsewhere.
+
+    Call it when state, variances and flags are set; without correlations, `P` is diagonal.
+    """
+    names, P = e.dtype.names or (), e["P"]
+    if "terrain_filter" in names:
+        P[TERRAIN, TERRAIN] = 0.0
+        e["terrain_filter"]["variance"] = params["EKF2_MIN_RNG"] ** 2
+    if "quaternion" not in names:
+        return
+    core, modes = e["quaternion"], e["mag_modes"]
+    core["mean_dt"] = unit = float(e["dt_ekf_avg"])
+    for name, first in (("gyro_bias", GYRO_BIAS), ("accel_bias", ACCEL_BIAS)):
+        rows = np.arange(first, first + 3)
+        e[name] *= unit
+        P[rows, rows] *= unit * unit
+        core[f"kept_{name}_var"] = P[rows, rows]
+    modes["saved_body_variance"] = np.diag(P)[MAG_BODY : MAG_BODY + 3]
+    modes["saved_horizontal_covariance"] = P[MAG_EARTH : MAG_EARTH + 2, MAG_EARTH : MAG_EARTH + 2]
+    modes["saved_down_variance"] = P[MAG_EARTH + 2, MAG_EARTH + 2]
+    P[MAG_EARTH : MAG_BODY + 3] = 0.0
+    turns = 0.5 * turns_of(e["q"])
+    attitude = turns @ np.diag(np.diag(P)[ATTITUDE : ATTITUDE + 3]) @ turns.T
+    P[np.ix_(QUATERNION, QUATERNION)] = attitude
+
+
+def turns_of(q: np.ndarray) -> np.ndarray:
+    """(0, eᵢ) ⊗ q for north, east and down, the columns of a (4, 3) matrix: twice what an attitude error adds to q."""
+    w, x, y, z = q
+    return np.array([[-x, -y, -z], [w, z, -y], [-z, w, x], [y, -x, w]])
