@@ -634,6 +634,12 @@ class Behaviours:
         until="v1.13",
         source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
     )
+    forces_every_yaw: bool = _behaviour(
+        "A heading that is rejected on the ground is fused all the same every time. v1.14 does so once a second.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_fusion.cpp",
+    )
     observes_yaw_by_vision: bool = _behaviour(
         "The position of vision, too, lets accelerations tell the heading, and needs a yaw indoors.",
         since="v1.13",
