@@ -838,6 +838,18 @@ def test_sideslip_of_v1_13_is_asked_for_by_its_parameter_and_judged_at_speed(mon
     assert judged
 
 
+@pytest.mark.parametrize(
+    ("release", "wind_alone"), [("v1.13", True), ("v1.14", True), ("v1.15", False), ("v1.16", False)]
+)
+def test_drag_corrects_the_wind_alone_until_v1_14(release, wind_alone):
+    it = flying(release)
+    it.ekf["scratch"]["K"][:] = 1.0
+    drag_fusion._keep_gains_of_drag(it.ekf)
+    expected = np.zeros(24) if wind_alone else np.ones(24)
+    expected[WIND : WIND + 2] = 1.0
+    np.testing.assert_array_equal(it.ekf["scratch"]["K"], expected)
+
+
 def test_drag_of_v1_13_is_as_steep_as_at_the_measured_force():
     # ½·1.2/50·v² + 0.1·v = 2 m/s² at 8.08 m/s, where it grows by 1.2/50·v + 0.1
     air = (math.sqrt(0.01 + 2.0 * 1.2 / 50.0 * 2.0) - 0.1) / (1.2 / 50.0)

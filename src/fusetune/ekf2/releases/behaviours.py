@@ -812,6 +812,12 @@ class Behaviours:
         until="v1.13",
         source="airspeed_fusion.cpp, sideslip_fusion.cpp, control.cpp",
     )
+    corrects_wind_alone_by_drag: bool = _behaviour(
+        "The drag corrects the wind and nothing else.",
+        since="v1.13",
+        until="v1.14",
+        source="drag_fusion.cpp",
+    )
     linearises_drag_by_force: bool = _behaviour(
         "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
         "force; it corrects the wind alone.",

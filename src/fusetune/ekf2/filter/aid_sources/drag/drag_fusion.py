@@ -103,6 +103,19 @@ _is_drag_judged = by_release(_at_any_time, "feels_drag_in_air", _while_flying)
 
 
 @kernel
+def _keep_all_gains(ekf):
+    """v1.16 lets the drag correct every state."""
+
+
+@kernel
+def _keep_gains_of_wind(ekf):
+    keep_only_wind_gains(ekf.scratch.K)
+
+
+_keep_gains_of_drag = by_release(_keep_all_gains, "corrects_wind_alone_by_drag", _keep_gains_of_wind)
+
+
+@kernel
 def _fuse_by_model(ekf, params):
     aid, drag = ekf.aid.drag, ekf.drag
     using_mcoef = params.EKF2_MCOEF > 0.001
@@ -134,6 +147,7 @@ def _fuse_by_model(ekf, params):
         test_ratio = innovation * innovation / (DRAG_GATE * DRAG_GATE * innovation_variance)
         if ekf.cs.in_air and ekf.cs.wind and not ekf.cs.fake_pos and test_ratio < 1.0:
             scale_kalman_gain(ekf, innovation_variance)
+            _keep_gains_of_drag(ekf)
             both_fused = measurement_update(ekf, params, R_acc, innovation) and both_fused
         else:
             both_fused = False
