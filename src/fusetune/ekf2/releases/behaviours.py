@@ -399,6 +399,19 @@ class Behaviours:
         until="v1.13",
         source="control.cpp",
     )
+    resets_to_given_position: bool = _behaviour(
+        "A position given from outside while dead reckoning is a reset; a given origin looks the magnetic model up. "
+        "v1.16 fuses what agrees, and takes one on the ground, too; v1.14 takes none.",
+        since="v1.15",
+        until="v1.15",
+        source="ekf.cpp, ekf_helper.cpp",
+    )
+    moves_origin_on_ground_alone: bool = _behaviour(
+        "A given origin is taken on the ground alone; without aiding the local position stays what it is.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf_helper.cpp, ../EKF2.cpp",
+    )
     knows_no_constant_position: bool = _behaviour(
         "Nothing can tell the filter that the position is constant.",
         since="v1.13",
