@@ -24,6 +24,7 @@ from fusetune.ekf2.filter.aid_sources.external_vision import (
     ev_control,
     ev_vel_control,
     ev_yaw_control,
+    vision_by_mask,
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow import (
     flow_over_terrain,
@@ -954,3 +955,17 @@ def test_a_clipped_sample_is_averaged_into_drag(release, averaged):
         made = accumulate_drag(drag, imu, 10, 10)
     assert bool(made) == averaged
     assert drag["sample_count"] == (0 if averaged else 2)
+
+
+def test_yaw_of_vision_is_by_the_sequence_of_the_estimate_in_v1_13(monkeypatch):
+    it = seen(16.0)
+    monkeypatch.setattr(vision_by_mask, "fuse_yaw", lambda *_: True)
+    sample = it.ekf["sensors"]["ev"]["sample"]
+    sample["quat"] = np.array((1.0, 0.05, 0.1, 0.3)) / math.sqrt(1.0 + 0.05**2 + 0.1**2 + 0.3**2)
+    R = np.zeros((3, 3))
+    quat_to_dcm(sample["quat"], R)
+    for roll, pitch, yaw in ((0.2, 0.0, (R[1, 0], R[0, 0])), (0.0, 0.2, (-R[0, 1], R[1, 1]))):
+        it.ekf["q"] = math.cos(0.1), math.sin(roll / 2), math.sin(pitch / 2), 0.0
+        quat_to_dcm(it.ekf["q"], it.ekf["R_to_earth"])
+        vision_by_mask._control_yaw.py_func(it.ekf, it.params, False)
+        assert it.ekf["aid"]["ev_yaw"]["innovation"][0] == pytest.approx(-math.atan2(*yaw))

@@ -11,7 +11,7 @@ from tests.ekf2.releases.test_named_behaviours import flying
 
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
 from fusetune.ekf2.filter.quaternion_core.quaternion_covariance import attitude_variance_about
-from fusetune.ekf2.replay.older_start import place_of, position_of_output, put_local_position, settle_core
+from fusetune.ekf2.replay.older_start import place_of, position_of_output, put_local_position, settle_core, settle_field
 
 
 def test_a_position_is_put_into_the_local_frame():
@@ -54,3 +54,16 @@ def test_the_terrain_of_v1_15_is_uncertain_apart():
     settle_core(it.ekf, it.params)
     assert it.ekf["P"][TERRAIN, TERRAIN] == 0.0
     assert it.ekf["terrain_filter"]["variance"] == it.params["EKF2_MIN_RNG"] ** 2
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_a_field_that_is_fused_goes_on_being_fused(fused):
+    ekf = flying("v1.15").ekf
+    ekf["cs"]["mag"], ekf["mag"]["wmm_declination"] = fused, 0.1
+    settle_field(ekf)
+    history = ekf["field_history"]
+    assert history["declination_fused"] == fused
+    # older than any fusion, so that it resets nothing; but known
+    assert history["wmm_time_last_set"] == 1
+    assert history["resets_available"] == 2
+    settle_field(flying("v1.16").ekf)

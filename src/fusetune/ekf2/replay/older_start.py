@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_3d_control import RESETS_AFTER_START
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
 from fusetune.ekf2.numerics.geodesy import earth_rate_ned
 
@@ -78,6 +79,21 @@ def settle_core(e: np.void, params: np.void) -> None:
     turns = 0.5 * turns_of(e["q"])
     attitude = turns @ np.diag(np.diag(P)[ATTITUDE : ATTITUDE + 3]) @ turns.T
     P[np.ix_(QUATERNION, QUATERNION)] = attitude
+
+
+def settle_field(e: np.void) -> None:
+    """Say of a field that is fused that its declination is known, and of the magnetic model that it is not new.
+
+    Else the first sample would reset the field, as after a change of covariance or model. Call it when the field and
+    its flags are set.
+    """
+    if "field_history" not in (e.dtype.names or ()):
+        return
+    history = e["field_history"]
+    history["declination_fused"] = bool(e["cs"]["mag"])
+    history["resets_available"] = RESETS_AFTER_START
+    if np.isfinite(e["mag"]["wmm_declination"]):
+        history["wmm_time_last_set"] = 1
 
 
 def turns_of(q: np.ndarray) -> np.ndarray:

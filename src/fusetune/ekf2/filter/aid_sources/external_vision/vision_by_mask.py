@@ -35,6 +35,7 @@ from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_ya
 from fusetune.ekf2.numerics.rotations import (
     component_in_earth,
     euler_yaw,
+    euler_yaw_as,
     quat_multiply,
     quat_normalise,
     quat_to_dcm,
@@ -125,15 +126,15 @@ def _start(ekf, params, mask):
 
 
 @kernel
-def _measured_yaw(ekf):
+def _measured_attitude(ekf):
     quat_to_dcm(ekf.sensors.ev.sample.quat, ekf.scratch.R)
-    return euler_yaw(ekf.scratch.R)
+    return ekf.scratch.R
 
 
 @kernel
 def _reset_yaw(ekf, params):
     variance = max(ekf.sensors.ev.sample.orientation_var[2], LEAST_YAW_VARIANCE)
-    reset_quat_state_yaw(ekf, params, _measured_yaw(ekf), variance)
+    reset_quat_state_yaw(ekf, params, euler_yaw(_measured_attitude(ekf)), variance)
     _do_not_turn(ekf)
 
 
@@ -305,10 +306,12 @@ def _fuse_velocity(ekf, params, innovation, variance):
 
 @kernel
 def _control_yaw(ekf, params, jumped):
+    """Fuse the yaw, which of vision and estimate is by the sequence that suits the estimate's tilt."""
     if jumped and ekf.cs_prev.ev_yaw:
         _reset_yaw(ekf, params)
     aid, sample = ekf.aid.ev_yaw, ekf.sensors.ev.sample
-    measured, variance = _measured_yaw(ekf), max(sample.orientation_var[2], LEAST_YAW_VARIANCE)
+    measured = euler_yaw_as(_measured_attitude(ekf), ekf.R_to_earth)
+    variance = max(sample.orientation_var[2], LEAST_YAW_VARIANCE)
     innovation_variance = compute_yaw_innov_var_and_h(ekf, variance, ekf.scratch.H)
     set_axis(aid, 0, measured, variance, wrap_pi(euler_yaw(ekf.R_to_earth) - measured), innovation_variance)
     update_aid_source_status(ekf, aid, 1, sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
