@@ -84,9 +84,17 @@ def older_field_at(edition, latitude_deg, longitude_deg):
     return declination, inclination, strength
 
 
-def field_at(latitude_deg: float, longitude_deg: float) -> tuple[float, float, float]:
-    """Declination, inclination (rad) and strength (Gauss) at a place, for callers outside compiled code."""
+def field_at(latitude_deg: float, longitude_deg: float, release: str = "") -> tuple[float, float, float]:
+    """Declination, inclination (rad) and strength (Gauss) at a place, for callers outside compiled code.
+
+    A release before v1.16 has a table of its own.
+    """
     look_up = _interpolate.py_func
+    if release in OLDER_EPOCHS:
+        declination, inclination, strength = (
+            look_up(latitude_deg, longitude_deg, table) for table in _OLDER[list(OLDER_EPOCHS).index(release)]
+        )
+        return declination * _RADIANS_PER_UNIT, inclination * _RADIANS_PER_UNIT, strength * _GAUSS_PER_UNIT
     declination = look_up(latitude_deg, longitude_deg, _DECLINATION) * _DECLINATION_SCALE
     inclination = look_up(latitude_deg, longitude_deg, _INCLINATION) * _INCLINATION_SCALE
     strength = look_up(latitude_deg, longitude_deg, _STRENGTH) * _STRENGTH_SCALE * _GAUSS_PER_NANOTESLA
