@@ -15,19 +15,25 @@ from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
+from fusetune.ekf2.filter import yaw_fusion
+from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
     field_checks,
     field_limits,
     mag_fusion,
     mag_heading,
+    mag_inhibition_control,
+    mag_mode_control,
     mag_modes,
     mag_resets,
     world_field,
+    yaw_by_course,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH, TERRAIN
 from fusetune.ekf2.filter.quaternion_core import quaternion_prediction
 from fusetune.ekf2.numerics import world_magnetic_model_table as table
+from fusetune.ekf2.numerics.world_magnetic_model import field_at
 
 V113, V114, V115, V116 = "v1.13", "v1.14", "v1.15", "v1.16"
 FIELD = np.array([0.22, 0.03, 0.40])
@@ -56,6 +62,7 @@ def test_each_release_has_the_model_of_its_date(release, zurich, sao_paulo):
     declination, inclination, _ = world_field.field_of_model(ekf, -23.6, -46.6)
     assert math.degrees(declination) == pytest.approx(sao_paulo, abs=6e-4)
     assert math.degrees(inclination) == pytest.approx(-39.4, abs=0.5)
+    assert field_at(-23.6, -46.6, release)[:2] == pytest.approx((declination, inclination), rel=1e-12)
 
 
 def fix(latitude_deg: float, longitude_deg: float, accuracy: float = 900.0, fix_type: int = 2) -> np.void:
@@ -418,3 +425,147 @@ def test_a_body_field_is_known_to_its_noise_right_after_a_reset_of_v1_15(release
     assert bool(mag_heading.is_mag_bias_good(it.ekf, it.params)) == (release == V115)
     it.ekf["P"][MAG_BODY, MAG_BODY] += 1e-9
     assert not mag_heading.is_mag_bias_good(it.ekf, it.params)
+
+
+def resting(release: str, **overrides: float) -> Flying:
+    """On the ground, levelled and aligned to north, without GNSS."""
+    it = flying(release, EKF2_HEAD_NOISE=0.3, **overrides)
+    for flags in (it.ekf["cs"], it.ekf["cs_prev"]):
+        flags["in_air"], flags["vehicle_at_rest"], flags["yaw_align"] = False, True, True
+    return it
+
+
+def fused_yaws(it: Flying, module: object, monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
+    """Innovation and variance of each heading that will be fused."""
+    fused: list[tuple[float, float]] = []
+
+    def fuse(ekf, params, aid, H):
+        fused.append((float(aid["innovation"][0]), float(aid["observation_variance"][0])))
+        ekf["time_last_heading_fuse"] = ekf["time_delayed_us"]
+        return True
+
+    monkeypatch.setattr(module, "fuse_yaw", fuse)
+    return fused
+
+
+def test_v1_14_holds_the_yaw_at_which_the_vehicle_came_to_rest(monkeypatch):
+    it = resting(V114)
+    module = zero_innovation_heading_update
+    fused = fused_yaws(it, module, monkeypatch)
+    monkeypatch.setattr(module, "_fuse_yaw_difference", module._fuse_yaw_difference.py_func)
+    hold = module.control_zero_innovation_heading_update.of(V114).py_func
+    for seconds, yaw in ((0.0, 0.5), (0.21, 0.52), (0.3, 0.53), (0.42, 0.54)):
+        set_time(it.ekf, START_US + round(seconds * 1e6))
+        set_attitude(it.ekf, 0.0, 0.0, yaw)
+        hold(it.ekf, it.params)
+    # at rest every 0.2 s, against the first yaw
+    assert fused == [(pytest.approx(0.02), 0.01), (pytest.approx(0.04), 0.01)]
+
+    # in motion a zero where the yaw is uncertain by more than 0.3 rad, and then the yaw is forgotten
+    it.ekf["cs"]["vehicle_at_rest"] = False
+    set_time(it.ekf, START_US + 700_000)
+    hold(it.ekf, it.params)
+    assert len(fused) == 2
+    it.ekf["P"][[0, 1, 2, 23], [0, 1, 2, 23]] = 0.1
+    hold(it.ekf, it.params)
+    assert fused[2] == (0.0, 0.25)
+    assert math.isnan(it.ekf["mag_modes"]["static_yaw"])
+
+    # while levelling always, tighter at rest
+    it.ekf["cs"]["tilt_align"] = False
+    hold(it.ekf, it.params)
+    it.ekf["cs"]["vehicle_at_rest"] = True
+    hold(it.ekf, it.params)
+    assert fused[3:] == [(0.0, 0.1), (0.0, 0.001)]
+    assert it.ekf["time_last_heading_fuse"] == 0
+
+
+def test_v1_13_holds_a_yaw_in_every_update_without_a_magnetometer(monkeypatch):
+    it = resting(V113, EKF2_MAG_TYPE=5.0)
+    fused = fused_yaws(it, mag_inhibition_control, monkeypatch)
+    for name in ("_fuse_held_yaw", "_fuse_or_hold_yaw"):
+        monkeypatch.setattr(mag_inhibition_control, name, getattr(mag_inhibition_control, name).py_func)
+    control = control_mag_fusion.of(V113).py_func
+    it.ekf["sensors"]["mag"]["data_ready"] = False
+    for yaw in (0.5, 0.52, 0.53):
+        set_attitude(it.ekf, 0.0, 0.0, yaw)
+        control(it.ekf, it.params)
+    assert fused == [(0.0, 0.01), (pytest.approx(0.02), 0.01), (pytest.approx(0.03), 0.01)]
+    # in motion the present one, looser once the quaternion is uncertain
+    it.ekf["cs"]["vehicle_at_rest"] = False
+    it.ekf["P"][[0, 1, 2, 23], [0, 1, 2, 23]] = 1e-5
+    control(it.ekf, it.params)
+    it.ekf["P"][0, 0] = 1e-3
+    control(it.ekf, it.params)
+    assert fused[3:] == [(0.0, 0.01), (0.0, 0.25)]
+    # another yaw makes that needless
+    it.ekf["cs"]["ev_yaw"] = True
+    control(it.ekf, it.params)
+    assert len(fused) == 5
+
+
+@pytest.mark.parametrize(
+    ("speed", "error", "rejected", "aligned", "to_course"),
+    [
+        (10.0, 0.6, True, True, True),
+        (10.0, 0.4, True, True, False),
+        (10.0, 0.6, False, True, False),
+        (10.0, 0.0, False, False, True),
+        (4.0, 0.6, True, True, False),
+    ],
+)
+def test_v1_13_turns_a_fixed_wing_to_its_course(speed, error, rejected, aligned, to_course, monkeypatch):
+    """Where courses differ by over 0.5 rad and the velocity is rejected, or the yaw was never aligned, by 5 m/s."""
+    it = flying(V113)
+    cs = it.ekf["cs"]
+    cs["gnss_pos"] = cs["gnss_vel"] = cs["fixed_wing"] = True
+    cs["yaw_align"] = aligned
+    set_attitude(it.ekf, 0.0, 0.0, 0.3)
+    it.ekf["vel"][:] = 10.0 * math.cos(0.2), 10.0 * math.sin(0.2), 0.0
+    it.ekf["sensors"]["gnss"]["sample"]["vel"][:2] = speed * math.cos(0.2 + error), speed * math.sin(0.2 + error)
+    it.ekf["sensors"]["gnss"]["sample"]["sacc"] = 0.5
+    it.ekf["aid"]["gnss_vel"]["test_ratio"][0] = 1.5 if rejected else 0.5
+    resets = []
+    for name in ("reset_velocity_to_gnss", "reset_horizontal_position_to_gnss", "reset_yaw_to_field"):
+        monkeypatch.setattr(yaw_by_course, name, lambda *_, name=name: resets.append(name) or True)
+    monkeypatch.setattr(yaw_by_course, "_reset_yaw_to_course", yaw_by_course._reset_yaw_to_course.py_func)
+    assert yaw_by_course.realign_yaw_by_course.py_func(it.ekf, it.params)
+    R = it.ekf["R_to_earth"]
+    yaw = math.atan2(R[1, 0], R[0, 0])
+    assert yaw == pytest.approx(0.3 + error if to_course else 0.3)
+    moved = to_course and rejected
+    assert resets == (
+        ["reset_yaw_to_field"]
+        if speed < 5.0
+        else ["reset_velocity_to_gnss", "reset_horizontal_position_to_gnss"]
+        if moved
+        else []
+    )
+    assert it.ekf["mag_modes"]["bad_yaw_events"] == int(moved)
+
+
+@pytest.mark.parametrize(("release", "forced"), [(V113, True), (V114, False)])
+def test_a_heading_rejected_on_the_ground_is_forced_every_time_in_v1_13(release, forced):
+    it = resting(release)
+    it.ekf["time_last_in_air"] = START_US - 6_000_000
+    aid = it.ekf["aid"]["mag_heading"]
+    aid["time_last_fuse"] = START_US - 500_000
+    assert bool(yaw_fusion._may_force_yaw.py_func(it.ekf, aid)) == forced
+
+
+@pytest.mark.parametrize(("release", "told"), [(V113, 0.22), (V114, 0.12), (V115, 0.12)])
+def test_the_body_field_is_taken_off_what_is_told_in_v1_14_and_v1_15(release, told):
+    it = flying(release)
+    it.ekf["mag_B"][:] = 0.1, 0.0, 0.0
+    mag_fusion.judge_mag(it.ekf, it.params, FIELD, 0.0025)
+    assert it.ekf["aid"]["mag"]["observation"][0] == pytest.approx(told)
+    assert it.ekf["aid"]["mag"]["innovation"][0] == pytest.approx(0.1 - FIELD[0])
+
+
+def test_a_noise_of_0_02_gauss_does_not_make_the_body_field_known():
+    it = flying(V114, EKF2_MAG_NOISE=0.02)
+    it.ekf["cs"]["mag_aligned_in_flight"] = True
+    block = it.ekf["P"][MAG_BODY : MAG_BODY + 3, MAG_BODY : MAG_BODY + 3]
+    for variance, known in ((it.params["EKF2_MAG_NOISE"] ** 2, False), (0.0199**2, True), (0.0, False)):
+        block[...] = np.eye(3) * variance
+        assert bool(mag_mode_control._is_body_field_known(it.ekf)) == known

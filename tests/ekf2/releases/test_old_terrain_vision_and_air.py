@@ -13,15 +13,18 @@ from tests.ekf2.filter.aiding_estimator import INTERVAL_US, START_US, set_time
 from tests.ekf2.releases.test_named_behaviours import OLD as V116
 from tests.ekf2.releases.test_named_behaviours import Flying, asked, flying
 
-from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_NED
+from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_NED, IMU_SAMPLE
 from fusetune.ekf2.filter import wind
 from fusetune.ekf2.filter.aid_sources.airspeed import airspeed_control, airspeed_fusion, airspeed_resets
 from fusetune.ekf2.filter.aid_sources.drag import drag_fusion
+from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag
+from fusetune.ekf2.filter.aid_sources.drag.drag_memory import drag_accumulator
 from fusetune.ekf2.filter.aid_sources.external_vision import (
     ev_attitude_error,
     ev_control,
     ev_vel_control,
     ev_yaw_control,
+    vision_by_mask,
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow import (
     flow_over_terrain,
@@ -671,9 +674,15 @@ def test_drag_is_judged_in_the_air(release, in_air_only):
 
 
 def test_flow_is_asked_for_whatever_the_main_filter_uses_until_v1_15():
-    assert not flight_schedule._is_asked_by_parameter("flow", V115)
-    assert flight_schedule._is_asked_by_parameter("flow", V116)
-    assert flight_schedule._is_asked_by_parameter("airspeed", V115)
+    asking = flight_schedule._asking_parameter
+    assert asking("flow", V115) is None
+    assert asking("flow", V116)[0] == "EKF2_OF_CTRL"
+    assert asking("airspeed", V115)[0] == "EKF2_ARSP_THR"
+    assert asking("gnss", V114)[0] == "EKF2_GPS_CTRL"
+    assert asking("gnss", V113) is None
+    name, asks = asking("drag", V113)
+    assert name == "EKF2_AID_MASK"
+    assert (asks(32.0), asks(31.0)) == (1.0, 0.0)
 
 
 @pytest.mark.parametrize(("release", "keeps_north"), [(V115, True), (V114, False)])
@@ -911,3 +920,52 @@ def test_flow_of_v1_13_starts_with_its_velocity_once_there_is_a_heading(monkeypa
     it.ekf["terrain"] = -9.8
     integrated_flow_at_once._reset_to_flow.py_func(it.ekf, it.params)
     assert it.ekf["vel"][:2].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(("release", "wind_alone"), UNTIL_V114)
+def test_drag_corrects_the_wind_alone_until_v1_15(release, wind_alone):
+    it = flying(release)
+    it.ekf["scratch"]["K"] = 1.0
+    asked(drag_fusion._choose_gains, it)
+    assert np.flatnonzero(it.ekf["scratch"]["K"]).tolist() == ([WIND, WIND + 1] if wind_alone else [*range(24)])
+
+
+def test_the_first_drag_in_the_air_is_one_that_came_on_the_ground():
+    it = flying(V114)
+    it.ekf["cs"]["in_air"] = False
+    it.ekf["sensors"]["drag"]["data_ready"], it.ekf["sensors"]["drag"]["sample"]["time_us"] = True, START_US
+    assert asked(drag_fusion._is_sample_at_hand, it)
+    it.ekf["sensors"]["drag"]["data_ready"] = False
+    set_time(it.ekf, START_US + 90_000)
+    it.ekf["cs"]["in_air"] = True
+    assert asked(drag_fusion._is_sample_at_hand, it)
+    assert not asked(drag_fusion._is_sample_at_hand, it)
+    it.ekf["drag_waits"] = True
+    set_time(it.ekf, START_US + 110_000)
+    assert not asked(drag_fusion._is_sample_at_hand, it)
+
+
+@pytest.mark.parametrize(("release", "averaged"), UNTIL_V114)
+def test_a_clipped_sample_is_averaged_into_drag(release, averaged):
+    drag = np.zeros(1, drag_accumulator(release))[0]
+    imu = np.zeros(1, IMU_SAMPLE)[0]
+    imu["delta_vel"], imu["delta_vel_dt"] = (0.1, 0.2, 0.0), 0.01
+    for clipped in (0, 0, 1, 0, 0):
+        imu["delta_vel_clipping"] = clipped
+        made = accumulate_drag(drag, imu, 10, 10)
+    assert bool(made) == averaged
+    assert drag["sample_count"] == (0 if averaged else 2)
+
+
+def test_yaw_of_vision_is_by_the_sequence_of_the_estimate_in_v1_13(monkeypatch):
+    it = seen(16.0)
+    monkeypatch.setattr(vision_by_mask, "fuse_yaw", lambda *_: True)
+    sample = it.ekf["sensors"]["ev"]["sample"]
+    sample["quat"] = np.array((1.0, 0.05, 0.1, 0.3)) / math.sqrt(1.0 + 0.05**2 + 0.1**2 + 0.3**2)
+    R = np.zeros((3, 3))
+    quat_to_dcm(sample["quat"], R)
+    for roll, pitch, yaw in ((0.2, 0.0, (R[1, 0], R[0, 0])), (0.0, 0.2, (-R[0, 1], R[1, 1]))):
+        it.ekf["q"] = math.cos(0.1), math.sin(roll / 2), math.sin(pitch / 2), 0.0
+        quat_to_dcm(it.ekf["q"], it.ekf["R_to_earth"])
+        vision_by_mask._control_yaw.py_func(it.ekf, it.params, False)
+        assert it.ekf["aid"]["ev_yaw"]["innovation"][0] == pytest.approx(-math.atan2(*yaw))

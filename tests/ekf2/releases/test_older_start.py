@@ -101,3 +101,17 @@ def test_the_heading_is_measured_less_the_body_field_that_the_vehicle_knew():
     ekf["mag"]["lpf"], ekf["R_to_earth"] = [0.1, 0.2, 0.3], np.eye(3)
     settle_field(ekf, "v1.14", SimpleNamespace(mag_earth=np.zeros(3), mag_body=np.zeros(3), flags=()), is_known=False)
     assert np.allclose(ekf["mag_I"], [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("is_known", [False, True])
+def test_a_field_that_is_fused_goes_on_being_fused(is_known):
+    ekf = flying("v1.15").ekf
+    ekf["origin"]["lat_lon_valid"] = True
+    state = SimpleNamespace(mag_earth=np.zeros(3), mag_body=np.zeros(3), flags=())
+    settle_field(ekf, "v1.15", state, is_known=is_known)
+    history = ekf["field_history"]
+    assert history["declination_fused"] == is_known
+    # older than any fusion, so that it resets nothing; but known
+    assert history["wmm_time_last_set"] == 1
+    assert history["resets_available"] == 2
+    settle_field(flying("v1.16").ekf, "v1.16", state, is_known=is_known)

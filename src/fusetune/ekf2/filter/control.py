@@ -21,7 +21,7 @@ from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GYRO_BIAS, set_gnd_e
 from fusetune.ekf2.filter.common.dead_reckoning import update_dead_reckoning_status
 from fusetune.ekf2.filter.common.heading_observability import update_heading_observability
 from fusetune.ekf2.filter.covariance import tilt_variance
-from fusetune.ekf2.filter.height_control import control_height_fusion
+from fusetune.ekf2.filter.height_control import control_height_fusion, watch_height_first
 from fusetune.ekf2.filter.resets.state_resets import remember_reset_counters
 from fusetune.ekf2.filter.terrain_control import control_terrain_fake_fusion, update_terrain_validity
 from fusetune.ekf2.releases.by_release import does
@@ -40,6 +40,7 @@ def control_fusion_modes(ekf, params):
     if not ekf.cs.tilt_align:
         ekf.cs.tilt_align = tilt_variance(ekf) < TILT_ALIGNED_VARIANCE
 
+    watch_height_first(ekf, params)
     control_mag_fusion(ekf, params)
     control_flow_fusion(ekf, params)
     control_gnss(ekf, params)

@@ -16,6 +16,7 @@ from fusetune.ekf2.feed.sensors import SENSORS
 from fusetune.ekf2.filter.accel_bias_check import ACCEL_BIAS_CHECK
 from fusetune.ekf2.filter.aid_sources.airspeed.airspeed_memory import AIRSPEED_MEMORY
 from fusetune.ekf2.filter.aid_sources.barometer.baro_memory import BARO_MEMORY
+from fusetune.ekf2.filter.aid_sources.barometer.baro_offset_bias import initialise_baro_bias
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_MEMORY
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_MEMORY, initialise_ev_memory
 from fusetune.ekf2.filter.aid_sources.external_vision.vision_by_mask import VISION_STEPS
@@ -26,6 +27,7 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import (
     GNSS_YAW_RETRIES,
     initialise_gnss_memory,
 )
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_taken import GNSS_TAKEN
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import GRAVITY_MEMORY
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
     FIELD_HISTORY,
@@ -56,6 +58,7 @@ from fusetune.ekf2.filter.common.local_origin import LOCAL_ORIGIN, initialise_lo
 from fusetune.ekf2.filter.common.local_position import LOCAL_POSITION
 from fusetune.ekf2.filter.control import control_fusion_modes
 from fusetune.ekf2.filter.covariance import initialise_covariance
+from fusetune.ekf2.filter.one_height_source import HEIGHTS
 from fusetune.ekf2.filter.output_predictor.output_predictor import OUTPUT_MEMORY, align_output_predictor, correct_output
 from fusetune.ekf2.filter.prediction import predict_covariance, predict_state
 from fusetune.ekf2.filter.quaternion_core.core_memory import QUATERNION_CORE, initialise_quaternion_core
@@ -63,6 +66,7 @@ from fusetune.ekf2.filter.quaternion_core.quaternion_start import add_heading_un
 from fusetune.ekf2.filter.sample_start import start_by_angles_and_field
 from fusetune.ekf2.filter.terrain_filter.terrain_filter import run_terrain_filter, start_terrain_filter
 from fusetune.ekf2.filter.terrain_filter.terrain_memory import TERRAIN_FILTER
+from fusetune.ekf2.filter.vertical_innovations import VERTICAL_INNOVATIONS
 from fusetune.ekf2.filter.wind import WIND_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import GSF_MEMORY
 from fusetune.ekf2.filter.yaw_estimator.matrix_bank import MATRIX_BANK, YAW_VELOCITY
@@ -138,8 +142,14 @@ def ekf_record(release: str) -> np.dtype:
         memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
     if does.integrates_flow:
         memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
+    if does.feels_drag_in_air:
+        memories.append(("drag_waits", np.dtype("?")))
     if does.fuses_vision_by_mask:
         memories.append(("vision_steps", VISION_STEPS))
+    if does.aids_gnss_by_mask:
+        memories += [("gnss_taken", GNSS_TAKEN), ("vertical", VERTICAL_INNOVATIONS)]
+    if does.has_one_height_source:
+        memories.append(("heights", HEIGHTS))
     return marked(np.dtype(memories, align=True), release)
 
 
@@ -149,10 +159,21 @@ def _initialise_nothing(ekf):
 
 
 @kernel
+def _have_no_heights(ekf):
+    """Since v1.14 each source has a bias."""
+
+
+@kernel
 def _initialise_bias_of_range(ekf):
     initialise_height_bias_estimator(ekf.rng_hgt_b_est)
 
 
+@kernel
+def _initialise_bias_of_baro(ekf):
+    initialise_baro_bias(ekf.heights.baro_bias)
+
+
+_initialise_heights = by_release(_have_no_heights, "has_one_height_source", _initialise_bias_of_baro)
 _initialise_range_bias = by_release(_initialise_nothing, "takes_range_for_height", _initialise_bias_of_range)
 
 
@@ -184,6 +205,7 @@ def initialise_estimator(ekf, params):
     initialise_range_memory(ekf.range)
     initialise_ev_memory(ekf.ev)
     initialise_flow_memory(ekf.flow)
+    _initialise_heights(ekf)
     initialise_yaw_bank(ekf)
     initialise_quaternion_core(ekf)
     # on the ground, the vehicle stands this far above it

@@ -10,6 +10,7 @@ from fusetune.ekf2.filter.accel_bias_check import check_vertical_accel_bias
 from fusetune.ekf2.filter.aid_sources.barometer.baro_height_control import control_baro_height_fusion
 from fusetune.ekf2.filter.aid_sources.barometer.ground_effect import update_ground_effect
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_height_control import control_gnss_height_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_taken import take_gnss_sample
 from fusetune.ekf2.filter.aid_sources.range_finder.range_control import control_range_fusion
 from fusetune.ekf2.filter.common.height_reference import (
     HEIGHT_REF_BARO,
@@ -19,6 +20,8 @@ from fusetune.ekf2.filter.common.height_reference import (
     HEIGHT_REF_UNKNOWN,
 )
 from fusetune.ekf2.filter.common.timing import is_recent
+from fusetune.ekf2.filter.one_height_source import control_one_height, replace_lost_height, watch_range_and_baro
+from fusetune.ekf2.filter.yaw_estimator.told_velocity import run_told_matrix_bank
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.releases.by_release import by_release
 
@@ -26,12 +29,13 @@ VERT_INNOV_TEST_LIM = 3.0
 VERT_INNOV_TEST_MIN = 1.0
 BADACC_PROBATION = 3_000_000
 OLD_BADACC_PROBATION = 10_000_000
+INNOVATION_AGE_US = 1_000_000
 
 FALLING_UNLIKELY, FALLING_POSSIBLE, FALLING_LIKELY = 0, 1, 2
 
 
 @kernel
-def control_height_fusion(ekf, params):
+def _control_heights(ekf, params):
     """Check the vertical acceleration, fuse every height source, and replace a lost height reference."""
     check_vertical_accel_bias(ekf, params)
     check_vertical_acceleration_health(ekf)
@@ -40,6 +44,28 @@ def control_height_fusion(ekf, params):
     control_gnss_height_fusion(ekf, params)
     control_range_fusion(ekf, params)
     check_height_sensor_ref_fallback(ekf, params)
+
+
+control_height_fusion = by_release(_control_heights, "has_one_height_source", control_one_height)
+"""Fuse what gives the height."""
+
+
+@kernel
+def _watch_later(ekf, params):
+    """Since v1.14 the height is watched where it is fused."""
+
+
+@kernel
+def _watch_before_fusion(ekf, params):
+    watch_range_and_baro(ekf, params)
+    take_gnss_sample(ekf, params)
+    run_told_matrix_bank(ekf, params)
+    check_vertical_acceleration_health(ekf)
+    replace_lost_height(ekf, params)
+
+
+watch_height_first = by_release(_watch_later, "has_one_height_source", _watch_before_fusion)
+"""What of GNSS, height and yaw estimator comes before the magnetometer."""
 
 
 @kernel
@@ -80,7 +106,7 @@ def check_vertical_acceleration_health(ekf):
     Such a bias shows as vertical innovations that are all positive (prediction below the observation, in NED).
     `fs.bad_acc_vertical` persists for 3 s after the last detection, until v1.15 for 10 s.
     """
-    falling = estimate_inertial_nav_falling_likelihood(ekf)
+    falling = _falling_likelihood(ekf)
     is_clipping_frequently = _count_clipping(ekf)
     bad_vert_accel = falling == FALLING_LIKELY or (is_clipping_frequently and falling == FALLING_POSSIBLE)
 
@@ -202,3 +228,26 @@ def estimate_inertial_nav_falling_likelihood(ekf):
     failed_min = int(pressure > VERT_INNOV_TEST_MIN) + int(gnss > VERT_INNOV_TEST_MIN)
     failed_min += int(ground > VERT_INNOV_TEST_MIN)
     return FALLING_LIKELY if failed_min > 1 else FALLING_POSSIBLE
+
+
+@kernel
+def _likelihood_by_last_innovations(ekf):
+    """As v1.16's, of the last vertical position and velocity, whatever their sources.
+
+    Both within 1 s must agree; it is likely where they are of two sensors.
+    """
+    vertical, cs = ekf.vertical, ekf.cs
+    if not is_recent(ekf, vertical.position_us, INNOVATION_AGE_US):
+        return FALLING_UNLIKELY
+    if not is_recent(ekf, vertical.velocity_us, INNOVATION_AGE_US):
+        return FALLING_POSSIBLE if vertical.position > VERT_INNOV_TEST_LIM else FALLING_UNLIKELY
+    larger, smaller = max(vertical.position, vertical.velocity), min(vertical.position, vertical.velocity)
+    if not (larger > VERT_INNOV_TEST_LIM and smaller > VERT_INNOV_TEST_MIN):
+        return FALLING_UNLIKELY
+    of_one_sensor = (cs.gps_hgt and cs.gnss_pos) or (cs.ev_hgt and cs.ev_vel)
+    return FALLING_POSSIBLE if of_one_sensor else FALLING_LIKELY
+
+
+_falling_likelihood = by_release(
+    estimate_inertial_nav_falling_likelihood, "has_one_height_source", _likelihood_by_last_innovations
+)

@@ -20,6 +20,7 @@ def start_by_angles_and_field(ekf, params, levelling):
     ekf.baro.lpf, ekf.baro.counter = levelling.baro_offset, levelling.baro_count
     ekf.sensors.baro.sample.time_us = levelling.baro_time_us
     ekf.sensors.baro.sample.hgt = levelling.baro_height
+    ekf.heights.baro_time_us = levelling.baro_time_us
     ekf.mag.counter = levelling.mag_count
     for axis in range(3):
         ekf.mag.lpf[axis] = levelling.mag[axis]

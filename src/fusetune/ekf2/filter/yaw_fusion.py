@@ -76,5 +76,18 @@ def _may_force_yaw(ekf, aid):
     return (
         not ekf.cs.in_air
         and is_timed_out(ekf, ekf.time_last_in_air, LANDED_TIME_BEFORE_FORCED_YAW_US)
-        and is_timed_out(ekf, aid.time_last_fuse, FORCED_YAW_INTERVAL_US)
+        and _is_force_due(ekf, aid)
     )
+
+
+@kernel
+def _once_per_second(ekf, aid):
+    return is_timed_out(ekf, aid.time_last_fuse, FORCED_YAW_INTERVAL_US)
+
+
+@kernel
+def _always(ekf, aid):
+    return True
+
+
+_is_force_due = by_release(_once_per_second, "forces_every_yaw", _always)

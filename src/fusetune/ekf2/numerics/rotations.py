@@ -235,7 +235,13 @@ def should_use_321_rotation_sequence(R):
 @kernel
 def euler_yaw(R):
     """Yaw (rad) of the rotation matrix `R`, by the sequence suited to its tilt."""
-    if should_use_321_rotation_sequence(R):
+    return euler_yaw_as(R, R)
+
+
+@kernel
+def euler_yaw_as(R, tilted):
+    """Yaw (rad) of the rotation matrix `R`, by the sequence suited to the tilt of another one."""
+    if should_use_321_rotation_sequence(tilted):
         return math.atan2(R[1, 0], R[0, 0])
     return math.atan2(-R[0, 1], R[1, 1])
 

@@ -399,6 +399,19 @@ class Behaviours:
         until="v1.13",
         source="control.cpp",
     )
+    resets_to_given_position: bool = _behaviour(
+        "A position given from outside while dead reckoning is a reset; a given origin looks the magnetic model up. "
+        "v1.16 fuses what agrees, and takes one on the ground, too; v1.14 takes none.",
+        since="v1.15",
+        until="v1.15",
+        source="ekf.cpp, ekf_helper.cpp",
+    )
+    moves_origin_on_ground_alone: bool = _behaviour(
+        "A given origin is taken on the ground alone; without aiding the local position stays what it is.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf_helper.cpp, ../EKF2.cpp",
+    )
     knows_no_constant_position: bool = _behaviour(
         "Nothing can tell the filter that the position is constant.",
         since="v1.13",
@@ -527,6 +540,36 @@ class Behaviours:
         until="v1.14",
         source="EKFGSF_yaw.cpp",
     )
+    aids_gnss_by_mask: bool = _behaviour(
+        "EKF2_AID_MASK asks for GNSS and its heading. Horizontal velocity, vertical velocity and position are gated "
+        "apart, and judged only where they are fused; soon after take-off 1 s without velocity resets both, a yaw that "
+        "is off three times at most. The checks go by the newest IMU sample.",
+        since="v1.13",
+        until="v1.13",
+        source="gps_control.cpp, gps_fusion.cpp, vel_pos_fusion.cpp",
+    )
+    has_one_height_source: bool = _behaviour(
+        "One source at a time gives the height: that of EKF2_HGT_MODE, range in its place where EKF2_RNG_AID lets it, "
+        "or what replaces one that was lost. The barometer has an offset that follows the others, and a bias by GNSS. "
+        "The vertical acceleration is judged by the last height and vertical velocity.",
+        since="v1.13",
+        until="v1.13",
+        source="control.cpp, height_fusion.cpp, baro_bias_estimator.cpp",
+    )
+    tells_yaw_estimator_height_accuracy: bool = _behaviour(
+        "The yaw estimator takes the accuracy of the height for that of the velocity, and for airspeed what was "
+        "measured, or EKF2_GSF_TAS without a sample for 1 s; a velocity is fused one update late.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf_helper.cpp",
+    )
+    fakes_position_at_once: bool = _behaviour(
+        "The fake position starts as soon as nothing aids, is told of only where it is fused, and its axes are "
+        "protected together.",
+        since="v1.13",
+        until="v1.13",
+        source="fake_pos_control.cpp",
+    )
 
     # Older releases: magnetometer and heading.
     knows_field_of_early_2024: bool = _behaviour(
@@ -603,6 +646,12 @@ class Behaviours:
         since="v1.13",
         until="v1.13",
         source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
+    )
+    forces_every_yaw: bool = _behaviour(
+        "A heading that is rejected on the ground is fused all the same every time. v1.14 does so once a second.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_fusion.cpp",
     )
     observes_yaw_by_vision: bool = _behaviour(
         "The position of vision, too, lets accelerations tell the heading, and needs a yaw indoors.",
@@ -773,10 +822,17 @@ class Behaviours:
         source="sideslip_fusion.cpp",
     )
     feels_drag_in_air: bool = _behaviour(
-        "Drag is judged in the air alone, and not told of.",
+        "Drag is judged in the air alone, the first time from a sample that came on the ground. It corrects the wind "
+        "alone, and is not told of.",
         since="v1.13",
         until="v1.14",
         source="drag_fusion.cpp",
+    )
+    averages_clipped_drag: bool = _behaviour(
+        "Clipped acceleration is averaged into that of drag.",
+        since="v1.13",
+        until="v1.14",
+        source="estimator_interface.cpp",
     )
     compares_range_in_slow_flight: bool = _behaviour(
         "The range finder is held against the vertical velocity only where a multicopter does not move horizontally; "
@@ -808,7 +864,7 @@ class Behaviours:
     )
     linearises_drag_by_force: bool = _behaviour(
         "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
-        "force; it corrects the wind alone.",
+        "force.",
         since="v1.13",
         until="v1.13",
         source="drag_fusion.cpp",

@@ -21,6 +21,7 @@ from fusetune.ekf2.filter.resets.state_resets import (
 from fusetune.ekf2.filter.wind import reset_wind_to_external_observation
 from fusetune.ekf2.numerics.geodesy import add_to_lat_lon, lat_lon_difference
 from fusetune.ekf2.releases.by_release import by_release
+from fusetune.ekf2.replay.older_commands import move_local_origin, take_given_position
 
 SET_GPS_GLOBAL_ORIGIN = 100000
 EXTERNAL_POSITION_ESTIMATE = 43003
@@ -34,8 +35,7 @@ MIN_EXTERNAL_VARIANCE = 0.01**2
 
 
 @kernel
-def handle_command(ekf, params, message):
-    """Carry out one command; others than the three above do nothing."""
+def _handle_globally(ekf, params, message):
     p = message.param
     if message.command == SET_GPS_GLOBAL_ORIGIN:
         set_ekf_global_origin(ekf, params, math.radians(p[4]), math.radians(p[5]), p[6], math.nan, math.nan)
@@ -52,6 +52,19 @@ def handle_command(ekf, params, message):
     elif message.command == EXTERNAL_WIND_ESTIMATE:
         blows_to = math.radians(p[2]) + math.pi
         reset_wind_to_external_observation(ekf, p[0], blows_to, p[1], math.radians(p[3]))
+
+
+@kernel
+def _handle_locally(ekf, params, message):
+    p = message.param
+    if message.command == SET_GPS_GLOBAL_ORIGIN:
+        move_local_origin(ekf, params, math.radians(p[4]), math.radians(p[5]), p[6])
+    elif message.command == EXTERNAL_POSITION_ESTIMATE:
+        take_given_position(ekf, params, message)
+
+
+handle_command = by_release(_handle_globally, "keeps_position_local", _handle_locally)
+"""Carry out one command; others than the three above do nothing."""
 
 
 @kernel

@@ -18,10 +18,11 @@ from fusetune.ekf2.feed.buffers import BUFFER_LENGTHS, RING
 from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, BIAS_RESETS, EstimatorInputs
 from fusetune.ekf2.feed.sample_arrival import NOTE, NOTED
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
-from fusetune.ekf2.filter.aid_sources.drag.drag_memory import DRAG_ACCUMULATOR
+from fusetune.ekf2.filter.aid_sources.drag.drag_memory import drag_accumulator
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
+from fusetune.ekf2.filter.wind import AID_MASK_DRAG
 from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS
 from fusetune.ekf2.replay.loop import (
     COMMAND,
@@ -167,7 +168,8 @@ def flight_schedule(
     told = {}
     for sensor in SENSOR_NAMES:
         delay = SENSORS[sensor].delay_parameter if sensor in SENSORS else None
-        wanted = steps(*_WANTED[sensor]) if _is_asked_by_parameter(sensor, release) else ((0, 1.0),)
+        asks = _asking_parameter(sensor, release)
+        wanted = steps(*asks) if asks else ((0, 1.0),)
         if sensor == "gnss" and _told_gnss_times(inputs, release) is not None:
             delay = None
         told[sensor] = (steps(delay) if delay else ((0, 0.0),), wanted)
@@ -176,9 +178,15 @@ def flight_schedule(
     return memo.get(key, lambda: _Builder(inputs, clock).schedule(told), lambda made: _bytes(made.tables))
 
 
-def _is_asked_by_parameter(sensor: str, release: str) -> bool:
-    """Flow over a terrain that is estimated apart is asked for always: it may tell of the terrain."""
-    return sensor in _WANTED and not (sensor == "flow" and BEHAVIOURS[release].flies_flow_over_terrain)
+def _asking_parameter(sensor: str, release: str) -> tuple[str, Callable[[float], float]] | None:
+    """By which parameter a release asks for a sensor; None for always, as for flow that may tell of a terrain apart.
+
+    EKF2_AID_MASK says whether GNSS is used, and not whether its samples are taken.
+    """
+    does = BEHAVIOURS[release]
+    if does.selects_sources_by_mask and sensor in ("drag", "gnss"):
+        return ("EKF2_AID_MASK", lambda value: float(int(value) & AID_MASK_DRAG != 0)) if sensor == "drag" else None
+    return None if sensor == "flow" and does.flies_flow_over_terrain else _WANTED.get(sensor)
 
 
 def _flow_times(inputs: EstimatorInputs) -> Rows:
@@ -336,9 +344,10 @@ class _Builder:
         imu = self.imu if any(value for _, value in enabled) else self.imu[:0]
         samples, arrived = np.zeros(len(imu), DRAG_SAMPLE), np.zeros(len(imu), ARRIVED)
         actions = np.zeros(len(imu) + 1, ACTION)
+        sums = np.zeros(1, drag_accumulator(self.clock.release))
         made, count = find_drag(
-            timeline(enabled), imu, self.intervals, self.updates, self.lengths, np.zeros(1, DRAG_ACCUMULATOR),
-            np.zeros(1, RING), arrived, samples, actions,
+            timeline(enabled), imu, self.intervals, self.updates, self.lengths, sums, np.zeros(1, RING), arrived,
+            samples, actions,
         )  # fmt: skip
         actions["sensor"] = DRAG
         return _shortened(samples, made), _shortened(actions, count)

@@ -12,6 +12,7 @@ import numpy as np
 
 from fusetune.ekf2.feed.inputs import EstimatorInputs
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import DEGREE_PARTS, MIN_FIX_TYPE
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_3d_control import RESETS_AFTER_START
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import earth_field_vector
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
 from fusetune.ekf2.numerics.geodesy import earth_rate_ned, project
@@ -93,8 +94,11 @@ def settle_field(e: np.void, release: str, state: LoggedState, *, is_known: bool
         field = field_at(*place_of(e), release)
         mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = field
         earth_field_vector.py_func(*field, mag["wmm_earth_field"])
-        mag["wmm_time_last_checked"] = e["field_history"]["wmm_time_last_set"] = now
+        mag["wmm_time_last_checked"] = now
+        # older than any fusion, so that it resets nothing
+        e["field_history"]["wmm_time_last_set"] = 1
     e["field_history"]["declination_fused"] = is_known
+    e["field_history"]["resets_available"] = RESETS_AFTER_START
     if "mag_modes" not in names:
         return
     e["cs"]["mag"] = e["cs_prev"]["mag"] = False

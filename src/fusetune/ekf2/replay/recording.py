@@ -26,6 +26,7 @@ from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES, FAU
 from fusetune.ekf2.filter.common.local_origin import altitude_at_origin
 from fusetune.ekf2.filter.quaternion_core.core_memory import Q3
 from fusetune.ekf2.filter.quaternion_core.quaternion_covariance import attitude_variance_about
+from fusetune.ekf2.filter.vertical_innovations import GNSS_VELOCITY, VISION_VELOCITY
 from fusetune.ekf2.numerics.geodesy import metres_per_radian, project_about
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
@@ -324,6 +325,7 @@ def record_update(ekf, params, views, recorder, records, timestamp):
             recorder.last_sample[source] = aids[source].timestamp_sample
             if (recorder.sources >> source) & 1:
                 _record_innovations(aids[source], source, views.axes[source], recorder, records.innovations)
+                _tell_vertical_apart(ekf, source, recorder, records.innovations)
     if recorder.mode == IS_GAP:
         if recorder.updates == 0:
             _note_published(ekf, params, recorder.published[0], timestamp)
@@ -383,6 +385,24 @@ def _record_innovations(aid, source, axes, recorder, rows):
         row.innovation_rejected = aid.innovation_rejected
         row.fused = aid.fused
         recorder.innovation_rows += 1
+
+
+@kernel
+def _judged_together(ekf, source, recorder, rows):
+    """Since v1.14 all axes of a source are fused, or none."""
+
+
+@kernel
+def _judged_apart(ekf, source, recorder, rows):
+    """The last axis of a velocity, just recorded, was judged by itself."""
+    row, vertical = rows[recorder.innovation_rows - 1], ekf.vertical
+    if source == GNSS_VELOCITY:
+        row.innovation_rejected, row.fused = vertical.gnss_rejected, vertical.gnss_fused
+    elif source == VISION_VELOCITY:
+        row.innovation_rejected, row.fused = vertical.ev_rejected, vertical.ev_fused
+
+
+_tell_vertical_apart = by_release(_judged_together, "aids_gnss_by_mask", _judged_apart)
 
 
 @kernel

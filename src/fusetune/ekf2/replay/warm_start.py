@@ -296,7 +296,10 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
     mag = e["mag"]
     if e["origin"]["lat_lon_valid"] and knows_field(state):
         place = place_of(e)
-        declination, inclination, strength = inputs.memo.get(("field at", place), lambda: field_at(*place))
+        release = release_of_fields(e.dtype.names or ())
+        declination, inclination, strength = inputs.memo.get(
+            ("field at", place, release), lambda: field_at(*place, release)
+        )
         mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = declination, inclination, strength
         earth_field_vector.py_func(declination, inclination, strength, mag["wmm_earth_field"])
         mag["wmm_time_last_checked"] = now

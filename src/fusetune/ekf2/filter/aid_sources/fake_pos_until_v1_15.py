@@ -109,5 +109,29 @@ def stop_fake_pos_fusion(ekf):
         forget_aid_source_status(ekf, ekf.aid.fake_pos, 2)
 
 
-control_fake_position = by_release(control_fake_pos_fusion, "fakes_one_kind_of_position", _control_one_kind)
+@kernel
+def _control_at_once(ekf, params):
+    """As v1.14's, but every 0.2 s, from the first update on that nothing aids in, and judged where it is fused."""
+    aid = ekf.aid.fake_pos
+    if not is_timed_out(ekf, aid.time_last_fuse, UPDATE_INTERVAL_US):
+        return
+    if is_horizontal_aiding_active(ekf):
+        ekf.cs.fake_pos = False
+    elif not ekf.cs.fake_pos:
+        ekf.cs.fake_pos = True
+        reset_fake_pos_fusion(ekf, params)
+    else:
+        judge_last_known_position(ekf, params)
+        aid.innovation_rejected = max(aid.test_ratio[0], aid.test_ratio[1]) > EXTREME_TEST_RATIO
+        if fuse_horizontal_position(ekf, params, aid):
+            ekf.reject.hor_pos = False
+        if is_timed_out(ekf, aid.time_last_fuse, FAILURE_TIMEOUT_US):
+            reset_fake_pos_fusion(ekf, params)
+
+
+control_fake_position = by_release(
+    by_release(control_fake_pos_fusion, "fakes_one_kind_of_position", _control_one_kind),
+    "fakes_position_at_once",
+    _control_at_once,
+)
 """The fake position of the release at hand."""

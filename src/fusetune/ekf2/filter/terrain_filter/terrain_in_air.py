@@ -83,11 +83,11 @@ def _never(ekf):
 
 
 @kernel
-def _now(ekf):
-    return ekf.time_delayed_us
+def _measured(ekf):
+    return ekf.range.sample.time_us
 
 
-_time_of_row = by_release(_never, "keeps_terrain_known", _now)
+_time_of_row = by_release(_never, "keeps_terrain_known", _measured)
 """PX4 v1.14 publishes nothing of the range finder; of v1.13 the figures are those of its fusion."""
 
 

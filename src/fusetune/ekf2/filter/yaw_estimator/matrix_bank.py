@@ -149,6 +149,20 @@ def level_matrices(ekf, imu):
 
 
 @kernel
+def _ten_degrees(ekf):
+    return BIAS_LEARNING_SPIN_LIMIT
+
+
+@kernel
+def _rounded_limit(ekf):
+    return 0.175
+
+
+_spin_limit = by_release(_ten_degrees, "tells_yaw_estimator_height_accuracy", _rounded_limit)
+"""Rate (rad/s) up to which the gyro biases are learnt."""
+
+
+@kernel
 def turn_matrices(ekf, imu, gain):
     """Learn the gyro biases and turn the attitudes by the sample's rotation; `gain` (1/s) is that of the tilt."""
     gsf, R = ekf.gsf, ekf.yaw_matrices.R
@@ -158,6 +172,7 @@ def turn_matrices(ekf, imu, gain):
     force_x, force_y, force_z = gsf.accel_lpf[0], gsf.accel_lpf[1], gsf.accel_lpf[2]
     scale = gain / length_of(gsf.accel_lpf) if gain > 0.0 else 0.0
     airspeed = gsf.true_airspeed if knows_airspeed(gsf) else 0.0
+    spin_limit = _spin_limit(ekf)
     for model in range(LANES):
         bias_x, bias_y, bias_z = gsf.gyro_bias[0, model], gsf.gyro_bias[1, model], gsf.gyro_bias[2, model]
         rate_x, rate_y, rate_z = turn_x / rate_dt - bias_x, turn_y / rate_dt - bias_y, turn_z / rate_dt - bias_z
@@ -168,7 +183,7 @@ def turn_matrices(ekf, imu, gain):
         tilt_y = (down_z * force_x - down_x * along) * scale
         tilt_z = (down_x * side - down_y * force_x) * scale
 
-        learns = rate_x * rate_x + rate_y * rate_y + rate_z * rate_z < BIAS_LEARNING_SPIN_LIMIT**2
+        learns = rate_x * rate_x + rate_y * rate_y + rate_z * rate_z < spin_limit * spin_limit
         bias_x = limited_bias(bias_x - tilt_x * GYRO_BIAS_GAIN * dt) if learns else bias_x
         bias_y = limited_bias(bias_y - tilt_y * GYRO_BIAS_GAIN * dt) if learns else bias_y
         bias_z = limited_bias(bias_z - tilt_z * GYRO_BIAS_GAIN * dt) if learns else bias_z

@@ -5,6 +5,7 @@ EKF2_DRAG_CTRL asks for it.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.releases.by_release import by_release
 
 MIN_SAMPLES_PER_MEAN = 5
 
@@ -19,12 +20,25 @@ def _restart(drag):
 
 
 @kernel
+def _is_clipped(drag, imu):
+    return imu.delta_vel_clipping[0] or imu.delta_vel_clipping[1] or imu.delta_vel_clipping[2]
+
+
+@kernel
+def _never(drag, imu):
+    return False
+
+
+_is_spoilt = by_release(_is_clipped, "averages_clipped_drag", _never)
+
+
+@kernel
 def accumulate_drag(drag, imu, imu_buffer_length, obs_buffer_length):
     """Take in one raw IMU sample; return whether `drag.produced` holds a new mean to be buffered.
 
-    A clipped sample discards what had been summed up. The mean carries the mean time of its samples (µs).
+    A clipped sample discards what had been summed up, since v1.15. The mean carries the mean time of its samples (µs).
     """
-    if imu.delta_vel_clipping[0] or imu.delta_vel_clipping[1] or imu.delta_vel_clipping[2]:
+    if _is_spoilt(drag, imu):
         _restart(drag)
         return False
     drag.sample_count += 1

@@ -11,6 +11,7 @@ fused; the measurement follows the accelerometer bias. The status counts as fuse
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.feed.buffers import MAX_SAMPLE_AGE_US
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.imu_rates import accel_bias
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
@@ -103,6 +104,19 @@ _is_drag_judged = by_release(_at_any_time, "feels_drag_in_air", _while_flying)
 
 
 @kernel
+def _move_every_state(ekf):
+    """Since v1.15 what is observed of the air corrects the motion, too."""
+
+
+@kernel
+def _move_wind_alone(ekf):
+    keep_only_wind_gains(ekf.scratch.K)
+
+
+_choose_gains = by_release(_move_every_state, "feels_drag_in_air", _move_wind_alone)
+
+
+@kernel
 def _fuse_by_model(ekf, params):
     aid, drag = ekf.aid.drag, ekf.drag
     using_mcoef = params.EKF2_MCOEF > 0.001
@@ -134,6 +148,7 @@ def _fuse_by_model(ekf, params):
         test_ratio = innovation * innovation / (DRAG_GATE * DRAG_GATE * innovation_variance)
         if ekf.cs.in_air and ekf.cs.wind and not ekf.cs.fake_pos and test_ratio < 1.0:
             scale_kalman_gain(ekf, innovation_variance)
+            _choose_gains(ekf)
             both_fused = measurement_update(ekf, params, R_acc, innovation) and both_fused
         else:
             both_fused = False
@@ -203,6 +218,23 @@ _counts_as_fused = by_release(_always, "fuses_both_drag_axes", _where_both_were)
 
 
 @kernel
+def _is_due(ekf):
+    return ekf.sensors.drag.data_ready
+
+
+@kernel
+def _is_due_or_waits(ekf):
+    """What comes due on the ground is taken once in the air, unless it is too old."""
+    waits = ekf.drag_waits and ekf.time_delayed_us < ekf.sensors.drag.sample.time_us + MAX_SAMPLE_AGE_US
+    at_hand = ekf.sensors.drag.data_ready or waits
+    ekf.drag_waits = at_hand and not _while_flying(ekf)
+    return at_hand
+
+
+_is_sample_at_hand = by_release(_is_due, "feels_drag_in_air", _is_due_or_waits)
+
+
+@kernel
 def control_drag_fusion(ekf, params):
     """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
     if not is_drag_enabled(ekf, params) or not ekf.sensors.drag.exists:
@@ -210,5 +242,5 @@ def control_drag_fusion(ekf, params):
     if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
         ekf.cs.wind = True
         start_wind(ekf)
-    if ekf.sensors.drag.data_ready and _is_drag_judged(ekf):
+    if _is_sample_at_hand(ekf) and _is_drag_judged(ekf):
         _fuse_drag(ekf, params)

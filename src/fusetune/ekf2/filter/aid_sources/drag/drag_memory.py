@@ -4,6 +4,7 @@ import numpy as np
 
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
+from fusetune.ekf2.releases.by_release import marked
 
 DRAG_MEMORY = np.dtype([("H", "f8", (2, ERROR_STATE_SIZE))], align=True)
 """Sub-record `ekf.drag`: work space."""
@@ -19,3 +20,8 @@ DRAG_ACCUMULATOR = np.dtype(
     align=True,
 )
 """Sums of the IMU samples since the last mean, and that mean. Zero at start."""
+
+
+def drag_accumulator(release: str) -> np.dtype:
+    """DRAG_ACCUMULATOR of a release."""
+    return marked(DRAG_ACCUMULATOR, release)

@@ -7,8 +7,6 @@ resets the state.
 Mirrors `controlExternalVisionFusion` of PX4 v1.13 `EKF/control.cpp`, and its helpers in `EKF/ekf_helper.cpp`.
 """
 
-import math
-
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
@@ -32,10 +30,12 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_quat_state_yaw,
     reset_velocity_to,
 )
+from fusetune.ekf2.filter.vertical_innovations import fuse_vertical_velocity_apart
 from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw
 from fusetune.ekf2.numerics.rotations import (
     component_in_earth,
     euler_yaw,
+    euler_yaw_as,
     quat_multiply,
     quat_normalise,
     quat_to_dcm,
@@ -111,7 +111,7 @@ def _start(ekf, params, mask):
         if (mask & MASK_POSITION) != 0 and not cs.ev_pos:
             cs.ev_pos = True
             ekf.events.starting_vision_pos_fusion = True
-            _reset_position(ekf, params, mask)
+            reset_position_to_vision(ekf, params, mask)
         if (mask & MASK_VELOCITY) != 0 and not cs.ev_vel:
             cs.ev_vel = True
             ekf.events.starting_vision_vel_fusion = True
@@ -126,15 +126,15 @@ def _start(ekf, params, mask):
 
 
 @kernel
-def _measured_yaw(ekf):
+def _measured_attitude(ekf):
     quat_to_dcm(ekf.sensors.ev.sample.quat, ekf.scratch.R)
-    return euler_yaw(ekf.scratch.R)
+    return ekf.scratch.R
 
 
 @kernel
 def _reset_yaw(ekf, params):
     variance = max(ekf.sensors.ev.sample.orientation_var[2], LEAST_YAW_VARIANCE)
-    reset_quat_state_yaw(ekf, params, _measured_yaw(ekf), variance)
+    reset_quat_state_yaw(ekf, params, euler_yaw(_measured_attitude(ekf)), variance)
     _do_not_turn(ekf)
 
 
@@ -148,7 +148,8 @@ def _turned_position(ekf, mask):
 
 
 @kernel
-def _reset_position(ekf, params, mask):
+def reset_position_to_vision(ekf, params, mask):
+    """Set the horizontal position to the sample's."""
     ekf.events.reset_pos_to_vision = True
     north, east = _turned_position(ekf, mask)
     variance = ekf.sensors.ev.sample.position_var
@@ -160,7 +161,7 @@ def _reset_position(ekf, params, mask):
 def _control_position(ekf, params, mask, jumped):
     steps, aid, sample = ekf.vision_steps, ekf.aid.ev_pos, ekf.sensors.ev.sample
     if jumped and ekf.cs_prev.ev_pos and not steps.is_used:
-        _reset_position(ekf, params, mask)
+        reset_position_to_vision(ekf, params, mask)
     px, py, pz = sensor_offset_body(params)
     for i in range(3):
         sample.pos[i] -= component_in_earth(ekf.R_to_earth, i, px, py, pz)
@@ -209,7 +210,7 @@ def _recover_position(ekf, params, mask):
     flow_lost = is_timed_out(ekf, ekf.aid.optical_flow.time_last_fuse, NO_AID_TIMEOUT_MAX)
     if flow_lost and is_timed_out(ekf, ekf.time_last_hor_vel_fuse, NO_AID_TIMEOUT_MAX) and ekf.cs.ev_vel:
         _reset_velocity(ekf, params, mask)
-    _reset_position(ekf, params, mask)
+    reset_position_to_vision(ekf, params, mask)
 
 
 @kernel
@@ -293,29 +294,24 @@ def _fuse_velocity(ekf, params, innovation, variance):
         if passing:
             one = fuse_direct_state(ekf, params, innovation[i], aid.innovation_variance[i], variance[i], VELOCITY + i)
             fused = one and fused
-    down = VELOCITY + 2
-    innovation_variance = ekf.P[down, down] + variance[2]
-    limit, vertical = gate * math.sqrt(innovation_variance), innovation[2]
-    vertical_passing = abs(vertical) <= limit
-    if ekf.fs.bad_acc_vertical and not vertical_passing:
-        vertical, vertical_passing = min(max(vertical, -limit), limit), True
-    set_axis(aid, 2, ekf.ev.vel_measurement[2], variance[2], innovation[2], innovation_variance)
+    rejected_down, fused_down = fuse_vertical_velocity_apart(
+        ekf, params, aid, gate, ekf.ev.vel_measurement[2], variance[2], innovation[2], True
+    )
     update_aid_source_status(ekf, aid, 3, ekf.sensors.ev.sample.time_us, gate)
-    ekf.reject.ver_vel = not vertical_passing
-    if vertical_passing:
-        fused = fuse_direct_state(ekf, params, vertical, innovation_variance, variance[2], down) and fused
-    aid.innovation_rejected = not passing or not vertical_passing
-    aid.fused = fused and passing and vertical_passing
+    ekf.vertical.ev_rejected, ekf.vertical.ev_fused = rejected_down, fused_down
+    aid.innovation_rejected, aid.fused = not passing, passing and fused
     if aid.fused:
         aid.time_last_fuse = ekf.time_delayed_us
 
 
 @kernel
 def _control_yaw(ekf, params, jumped):
+    """Fuse the yaw, which of vision and estimate is by the sequence that suits the estimate's tilt."""
     if jumped and ekf.cs_prev.ev_yaw:
         _reset_yaw(ekf, params)
     aid, sample = ekf.aid.ev_yaw, ekf.sensors.ev.sample
-    measured, variance = _measured_yaw(ekf), max(sample.orientation_var[2], LEAST_YAW_VARIANCE)
+    measured = euler_yaw_as(_measured_attitude(ekf), ekf.R_to_earth)
+    variance = max(sample.orientation_var[2], LEAST_YAW_VARIANCE)
     innovation_variance = compute_yaw_innov_var_and_h(ekf, variance, ekf.scratch.H)
     set_axis(aid, 0, measured, variance, wrap_pi(euler_yaw(ekf.R_to_earth) - measured), innovation_variance)
     update_aid_source_status(ekf, aid, 1, sample.time_us, max(params.EKF2_HDG_GATE, 1.0))

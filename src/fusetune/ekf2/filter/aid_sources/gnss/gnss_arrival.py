@@ -12,12 +12,11 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
-from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import run_gnss_checks
+from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import clock_of_checks, run_gnss_checks
 from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import place_origin
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import look_field_up_by_fix
 from fusetune.ekf2.filter.common.earth_rate import set_earth_rate
 from fusetune.ekf2.filter.common.local_origin import project_to_local
-from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.releases.by_release import by_release
 
 KEPT = 256
@@ -55,12 +54,18 @@ def round_to_message(sample):
 
 
 @kernel
+def _is_past(ekf, since_us, duration_us):
+    """Whether it is longer ago than that since a check had a result."""
+    return since_us == 0 or since_us + duration_us < clock_of_checks(ekf)
+
+
+@kernel
 def _check_and_project(ekf, params, given, slot):
     ekf.gnss_arrivals.sample = given
     sample = ekf.gnss_arrivals.sample
     round_to_message(sample)
     run_gnss_checks(ekf, params, sample)
-    ekf.gnss.checks_passed = is_timed_out(ekf, ekf.gnss.last_fail_us, int(params.EKF2_REQ_GPS_H * 1e6))
+    ekf.gnss.checks_passed = _is_past(ekf, ekf.gnss.last_fail_us, int(params.EKF2_REQ_GPS_H * 1e6))
     if not ekf.origin.valid:
         if ekf.filter_initialised and ekf.gnss.checks_passed:
             place_origin(ekf, sample)
@@ -102,10 +107,10 @@ recall_arrived_gnss = by_release(_nothing_to_recall, "checks_gnss_on_arrival", _
 @kernel
 def is_gnss_trusted(ekf):
     """Whether no check has failed for 5 s."""
-    return is_timed_out(ekf, ekf.gnss.last_fail_us, TRUST_US)
+    return _is_past(ekf, ekf.gnss.last_fail_us, TRUST_US)
 
 
 @kernel
 def is_gnss_distrusted(ekf):
     """Whether checks have failed for 5 s."""
-    return is_timed_out(ekf, ekf.gnss.last_pass_us, TRUST_US)
+    return _is_past(ekf, ekf.gnss.last_pass_us, TRUST_US)

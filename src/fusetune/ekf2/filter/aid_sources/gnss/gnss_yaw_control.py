@@ -163,8 +163,14 @@ def _fuse_or_stop_gnss_yaw(ekf, params, sample, may_start):
 @kernel
 def _fuse_or_retry_gnss_yaw(ekf, params, sample, may_start):
     """Fuse; once it has failed for long the yaw is reset, in flight a single time, before the heading is given up."""
-    retries = ekf.gnss_yaw_retries
     fuse_gnss_yaw(ekf, params, sample.yaw_offset)
+    retry_gnss_yaw(ekf, params, sample, may_start)
+
+
+@kernel
+def retry_gnss_yaw(ekf, params, sample, may_start):
+    """Reset the yaw, or give the heading up, if it has failed for long."""
+    retries = ekf.gnss_yaw_retries
     if not is_timed_out(ekf, ekf.aid.gnss_yaw.time_last_fuse, RESET_TIMEOUT_MAX):
         return
     if retries.resets_left > 0:
@@ -189,7 +195,8 @@ def _reset_and_forget_ratio(ekf, params, sample):
 
 
 @kernel
-def _start_with_reset(ekf, params, sample):
+def start_gnss_yaw_with_reset(ekf, params, sample):
+    """Start the heading with a reset of the yaw, unless the baseline is too steep."""
     if _reset_and_forget_ratio(ekf, params, sample):
         _make_room_for_gnss_yaw(ekf, params)
         ekf.cs.gnss_yaw = True
@@ -225,7 +232,22 @@ def _start_in_agreement(ekf, params, sample):
         fuse_gnss_yaw(ekf, params, sample.yaw_offset)
 
 
-_start_gnss_yaw = by_release(_start_in_agreement, "retries_gnss_yaw", _start_with_reset)
+_start_gnss_yaw = by_release(_start_in_agreement, "retries_gnss_yaw", start_gnss_yaw_with_reset)
+
+
+@kernel
+def _told_variance(ekf, sample):
+    accuracy = sample.yaw_acc if np.isfinite(sample.yaw_acc) else 0.0
+    return max(accuracy, HEADING_NOISE) ** 2
+
+
+@kernel
+def _fixed_variance(ekf, sample):
+    return HEADING_NOISE * HEADING_NOISE
+
+
+_heading_variance = by_release(_told_variance, "aids_gnss_by_mask", _fixed_variance)
+"""Variance (rad²) of a heading."""
 
 
 @kernel
@@ -233,8 +255,7 @@ def update_gnss_yaw(ekf, params, sample):
     """Judge the heading of a sample; the observation is the yaw of the antenna baseline."""
     aid = ekf.aid.gnss_yaw
     measured = wrap_pi(sample.yaw + sample.yaw_offset)
-    accuracy = sample.yaw_acc if np.isfinite(sample.yaw_acc) else 0.0
-    variance = max(accuracy, HEADING_NOISE) ** 2
+    variance = _heading_variance(ekf, sample)
     H = ekf.scratch.H
     predicted = predict_gnss_yaw(ekf.R_to_earth, sample.yaw_offset, H)
     complete_attitude_jacobian(ekf, H, 0.0)
@@ -247,6 +268,20 @@ def update_gnss_yaw(ekf, params, sample):
         _innovation_variance(ekf, H, variance),
     )
     update_aid_source_status(ekf, aid, 1, sample.time_us, max(params.EKF2_HDG_GATE, 1.0))
+
+
+@kernel
+def _was_not_just_fused(ekf):
+    return is_timed_out(ekf, ekf.aid.gnss_yaw.time_last_fuse, GYRO_BIAS_RESET_INTERVAL)
+
+
+@kernel
+def _always(ekf):
+    """v1.13 asks for no time in between."""
+    return True
+
+
+_may_reset_gyro_bias = by_release(_was_not_just_fused, "aids_gnss_by_mask", _always)
 
 
 @kernel
@@ -270,11 +305,7 @@ def fuse_gnss_yaw(ekf, params, yaw_offset):
         return
     ekf.reject.yaw = False
 
-    if (
-        abs(_signed_test_ratio(ekf)) > WRONG_GYRO_BIAS_TEST_RATIO
-        and not ekf.cs.in_air
-        and is_timed_out(ekf, aid.time_last_fuse, GYRO_BIAS_RESET_INTERVAL)
-    ):
+    if abs(_signed_test_ratio(ekf)) > WRONG_GYRO_BIAS_TEST_RATIO and not ekf.cs.in_air and _may_reset_gyro_bias(ekf):
         # innovations that stay on one side tell of a wrong yaw gyro bias: let it be learnt faster
         reset_gyro_bias_z_cov(ekf, params)
 
@@ -314,10 +345,16 @@ _signed_test_ratio = by_release(_ratio_of_status, "retries_gnss_yaw", _ratio_of_
 
 
 @kernel
+def is_baseline_steep(ekf, yaw_offset):
+    """Whether the antenna baseline is within 30° of the vertical."""
+    _, _, v_d = rotate_to_earth(ekf.R_to_earth, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
+    return abs(v_d) > STEEP_BASELINE
+
+
+@kernel
 def reset_yaw_to_gnss(ekf, params, yaw, yaw_offset):
     """Set the yaw to the receiver's heading, unless the antenna baseline is within 30° of the vertical."""
-    _, _, v_d = rotate_to_earth(ekf.R_to_earth, math.cos(yaw_offset), math.sin(yaw_offset), 0.0)
-    if abs(v_d) > STEEP_BASELINE:
+    if is_baseline_steep(ekf, yaw_offset):
         return False
     reset_quat_state_yaw(ekf, params, yaw, HEADING_NOISE * HEADING_NOISE)
     return True

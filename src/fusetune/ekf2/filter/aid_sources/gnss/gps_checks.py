@@ -94,7 +94,7 @@ def _check_gnss_sample_simply(ekf, params, sample):
         gnss.last_pass_us = ekf.time_delayed_us
     else:
         gnss.last_fail_us = ekf.time_delayed_us
-    _remember_fix(gnss, sample)
+    _remember_fix(gnss, sample, sample.time_us)
     ekf.gnss_trust.passed = passed
     return passed
 
@@ -146,27 +146,55 @@ check_gnss_sample = by_release(_check_gnss_sample, "simplifies_gnss_checks", _ch
 
 
 @kernel
+def _now_at_horizon(ekf):
+    return ekf.time_delayed_us
+
+
+@kernel
+def _now_at_newest(ekf):
+    return ekf.time_latest_us
+
+
+clock_of_checks = by_release(_now_at_horizon, "aids_gnss_by_mask", _now_at_newest)
+"""The time (µs) that results of checks are noted at, and compared with."""
+
+
+@kernel
+def _time_of_sample(ekf, sample):
+    return sample.time_us
+
+
+@kernel
+def _time_of_newest(ekf, sample):
+    return ekf.time_latest_us
+
+
+_time_of_fix = by_release(_time_of_sample, "aids_gnss_by_mask", _time_of_newest)
+"""The time (µs) of a fix, as its drift is told of it."""
+
+
+@kernel
 def run_gnss_checks(ekf, params, sample):
     """Judge one sample by the enabled checks and note the time of success or failure."""
-    gnss = ekf.gnss
+    gnss, now = ekf.gnss, clock_of_checks(ekf)
     _check_reported_quality(gnss.fail, params, sample)
     _check_motion(ekf, params, sample)
-    _remember_fix(gnss, sample)
+    _remember_fix(gnss, sample, _time_of_fix(ekf, sample))
     if gnss.last_fail_us == 0:
-        gnss.last_fail_us = ekf.time_delayed_us
+        gnss.last_fail_us = now
     if _any_enabled_check_fails(gnss.fail, int(params.EKF2_GPS_CHECK)):
-        gnss.last_fail_us = ekf.time_delayed_us
+        gnss.last_fail_us = now
         return False
-    gnss.last_pass_us = ekf.time_delayed_us
+    gnss.last_pass_us = now
     return True
 
 
 @kernel
-def _remember_fix(gnss, sample):
+def _remember_fix(gnss, sample, time_us):
     gnss.prev_lat = math.radians(sample.lat_deg)
     gnss.prev_lon = math.radians(sample.lon_deg)
     gnss.prev_alt = sample.alt
-    gnss.prev_time_us = sample.time_us
+    gnss.prev_time_us = time_us
 
 
 @kernel
@@ -185,7 +213,7 @@ def _check_drift(ekf, params, sample):
     """Drift is known at rest on the ground only; it counts as passed in the air, and keeps its result in between."""
     gnss = ekf.gnss
     if not ekf.cs.in_air and ekf.cs.vehicle_at_rest:
-        _filter_drift(gnss, params, sample)
+        _filter_drift(gnss, params, sample, _interval(gnss, _time_of_fix(ekf, sample)))
         return
     if ekf.cs.in_air:
         gnss.fail.hdrift = False
@@ -196,14 +224,13 @@ def _check_drift(ekf, params, sample):
 
 
 @kernel
-def _interval(gnss, sample):
+def _interval(gnss, time_us):
     """Time (s) since the last fix."""
-    return min(max((sample.time_us - gnss.prev_time_us) * 1e-6, MIN_DT_S), DRIFT_TIME_CONSTANT_S)
+    return min(max((time_us - gnss.prev_time_us) * 1e-6, MIN_DT_S), DRIFT_TIME_CONSTANT_S)
 
 
 @kernel
-def _filter_drift(gnss, params, sample):
-    dt = _interval(gnss, sample)
+def _filter_drift(gnss, params, sample, dt):
     coefficient = dt / DRIFT_TIME_CONSTANT_S
     hdrift, vdrift = params.EKF2_REQ_HDRIFT, params.EKF2_REQ_VDRIFT
     h_limit, v_limit = DRIFT_LIMIT_FACTOR * hdrift, DRIFT_LIMIT_FACTOR * vdrift
@@ -251,7 +278,7 @@ def _check_drift_and_climb(ekf, params, sample):
     """Drift as v1.16; the vertical speed is compared with the filter's, whether or not the vehicle moves."""
     gnss = ekf.gnss
     gnss.fail.spoofed = False
-    coefficient = _interval(gnss, sample) / DRIFT_TIME_CONSTANT_S
+    coefficient = _interval(gnss, _time_of_fix(ekf, sample)) / DRIFT_TIME_CONSTANT_S
     limit = DRIFT_LIMIT_FACTOR * params.EKF2_REQ_VDRIFT
     difference = _low_pass(gnss.vel_d_filt, _limited(sample.vel[2] - ekf.vel[2], limit), coefficient)
     _check_drift(ekf, params, sample)

@@ -59,10 +59,25 @@ compute_mag_h = by_release(_compute_mag_h, "adds_quaternion_errors", _compute_ma
 
 
 @kernel
+def _earth_part(ekf, sample, axis):
+    return sample[axis] - ekf.mag_B[axis]
+
+
+@kernel
+def _measurement(ekf, sample, axis):
+    return sample[axis]
+
+
+_told_field = by_release(_earth_part, "clears_field_whenever_stopped", _measurement)
+"""What is told as observed along a body axis (Gauss)."""
+
+
+@kernel
 def judge_mag(ekf, params, sample, R_mag):
     """Innovations and variances of all axes, and their verdict, as releases before v1.16 tell them of a fused field.
 
-    What is observed is told less the body field. The time of the sample is that which the status has already.
+    What is observed is told less the body field, in v1.13 as it is. The time of the sample is that which the status has
+    already.
 
     Returns
     -------
@@ -76,7 +91,7 @@ def judge_mag(ekf, params, sample, R_mag):
         innovation = predict_mag(ekf, axis) - sample[axis]
         if axis == 2 and ekf.cs.synthetic_mag_z:
             innovation = 0.0
-        set_axis(aid, axis, sample[axis] - ekf.mag_B[axis], R_mag, innovation, variance)
+        set_axis(aid, axis, _told_field(ekf, sample, axis), R_mag, innovation, variance)
         sound = sound and variance >= R_mag
     update_aid_source_status(ekf, aid, 3, aid.timestamp_sample, max(params.EKF2_MAG_GATE, 1.0))
     clear_mag_faults(ekf)

@@ -195,5 +195,8 @@ def _fuse_or_hold_yaw(ekf, params, aid, heading, variance):
             uncertainty += P[i, i]
         if uncertainty > QUATERNION_VARIANCE_MAX:
             heading, variance = yaw, HELD_YAW_VARIANCE_MOVING
+    last = aid.innovation[0]
     judge_angle(ekf, params, aid, heading, wrap_pi(yaw - heading), max(variance, ANGLE_VARIANCE_MIN))
-    fuse_yaw(ekf, params, aid, ekf.scratch.H)
+    if not fuse_yaw(ekf, params, aid, ekf.scratch.H) and aid.innovation_rejected:
+        # PX4 tells the innovation of the last heading that it fused
+        aid.innovation[0] = last
