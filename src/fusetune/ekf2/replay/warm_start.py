@@ -31,6 +31,7 @@ from fusetune.ekf2.replay.older_start import (
     put_local_position,
     settle_core,
     settle_field,
+    settle_samples,
 )
 from fusetune.px4.layouts.logged_state import LoggedState
 from fusetune.quaternions import conjugate, rotation_matrix
@@ -96,6 +97,8 @@ def take_over(ekf: np.ndarray, fresh: np.ndarray, params: np.void, inputs: Estim
     _set_gnss(e)
     _set_baro(e, inputs)
     _set_mag(e, inputs, state)
+    settle_field(e, release_of_fields(e.dtype.names or ()), state, is_known=knows_field(state))
+    settle_samples(e, inputs)
     settle_core(e, params)
     _align_output(e)
 
@@ -309,7 +312,6 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
             lambda: [np.interp(now, samples["time_us"], samples["mag"][:, axis]) for axis in range(3)],
         )
         mag["counter"] = MAG_SAMPLES_SEEN
-    settle_field(e)
     mag["flt_mag_align_start_time"] = now
     mag["time_last_check_failing"] = max(now - MAG_HEALTHY_US, 1)
 
