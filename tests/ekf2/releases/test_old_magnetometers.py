@@ -33,6 +33,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_ma
 from fusetune.ekf2.filter.common.state import ATTITUDE, MAG_BODY, MAG_EARTH, TERRAIN
 from fusetune.ekf2.filter.quaternion_core import quaternion_prediction
 from fusetune.ekf2.numerics import world_magnetic_model_table as table
+from fusetune.ekf2.numerics.world_magnetic_model import field_at
 
 V113, V114, V115, V116 = "v1.13", "v1.14", "v1.15", "v1.16"
 FIELD = np.array([0.22, 0.03, 0.40])
@@ -61,6 +62,7 @@ def test_each_release_has_the_model_of_its_date(release, zurich, sao_paulo):
     declination, inclination, _ = world_field.field_of_model(ekf, -23.6, -46.6)
     assert math.degrees(declination) == pytest.approx(sao_paulo, abs=6e-4)
     assert math.degrees(inclination) == pytest.approx(-39.4, abs=0.5)
+    assert field_at(-23.6, -46.6, release)[:2] == pytest.approx((declination, inclination), rel=1e-12)
 
 
 def fix(latitude_deg: float, longitude_deg: float, accuracy: float = 900.0, fix_type: int = 2) -> np.void:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fusetune.analyze.reconstruction.reconstructed_flight import ReconstructedFlight
-from fusetune.px4.aid_sources import AID_SOURCES, REPLAYED_SOURCES, SENSORS
+from fusetune.px4.aid_sources import AID_SOURCES, RECORDED_SOURCES, SENSORS
 from fusetune.px4.sample_times import measurement_time
 
 
@@ -26,7 +26,7 @@ def measured_rows(
     interval_us : update interval of the replay
     """
     measured = np.ones(len(innovations), np.bool_)
-    for source in map(AID_SOURCES.__getitem__, REPLAYED_SOURCES):
+    for number, source in enumerate(map(AID_SOURCES.__getitem__, RECORDED_SOURCES)):
         if not source.sensor:
             continue
         sensor = SENSORS[source.sensor]
@@ -34,7 +34,7 @@ def measured_rows(
         mask = reconstructed.measured.get(topic)
         if mask is None:
             continue
-        rows = np.flatnonzero(innovations["source"] == source.code)
+        rows = np.flatnonzero(innovations["source"] == number)
         time = measurement_time(topic, reconstructed.flight.topics[topic, 0])
         order = np.argsort(time, kind="stable")
         wanted = innovations["timestamp_sample"][rows] + parameters[sensor.delay_parameter] * 1e3 + 0.5 * interval_us

@@ -115,7 +115,7 @@ def compared_rows(onboard: Mapping[SourceAxis, AxisSamples]) -> Callable[[Record
     keys = {key for keys in GROUPS.values() for key in keys if key in onboard}
     wanted = {source for source, _ in keys} | {*HORIZONTAL_AIDING} & {*AID_SOURCE_NAMES}
     by_heading = "mag_heading" in wanted
-    wanted = wanted - {"mag_heading"} | ({"mag"} if by_heading else set())
+    wanted |= {"mag"} if by_heading else set()
     sources = [AID_SOURCE_NAMES.index(name) for name in sorted(wanted)]
 
     def keep(rows: RecordArrays) -> RecordArrays:

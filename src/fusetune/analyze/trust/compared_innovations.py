@@ -61,9 +61,9 @@ def replayed_innovations(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times and innovations of measured samples from the first that was fused on, for before it they mean nothing.
 
-    `mag_heading` is made from the magnetometer's.
+    `mag_heading` is made from the magnetometer's where the replay fuses no heading (since v1.15).
     """
-    if source == "mag_heading":
+    if source == "mag_heading" and not _fuses_heading(result):
         return _heading_innovations(result, measured)
     rows = result.innovations[
         (result.innovations["source"] == AID_SOURCE_NAMES.index(source))
@@ -73,6 +73,11 @@ def replayed_innovations(
     rows = rows[rows["innovation_variance"] > 0]
     rows = rows[int(np.argmax(rows["fused"])) :] if rows["fused"].any() else rows[:0]
     return rows["timestamp_sample"], rows["innovation"].astype(np.float64)
+
+
+def _fuses_heading(result: ReplayResult) -> bool:
+    rows = result.innovations
+    return bool(np.any(rows["fused"][rows["source"] == AID_SOURCE_NAMES.index("mag_heading")]))
 
 
 def _heading_innovations(result: ReplayResult, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -239,9 +239,9 @@ def _start_with_samples(ekf, params, levelling):
     initialise_covariance(ekf, params)
     add_heading_uncertainty(ekf, params)
     start_terrain_filter(ekf, params)
-    ekf.time_last_hgt_fuse = ekf.time_delayed_us
-    ekf.time_last_hor_pos_fuse = ekf.time_delayed_us
-    ekf.time_last_hor_vel_fuse = ekf.time_delayed_us
+    ekf.time_last_hgt_fuse = ekf.time_latest_us
+    ekf.time_last_hor_pos_fuse = ekf.time_latest_us
+    ekf.time_last_hor_vel_fuse = ekf.time_latest_us
     align_output_predictor(ekf)
     ekf.filter_initialised = True
 
@@ -273,12 +273,14 @@ def _update(ekf, params):
 
 @kernel
 def _update_after_state(ekf, params):
-    """As v1.16, with the state predicted first."""
+    """As v1.16, with the state predicted first, and what is noted and asked for by the time of the newest sample."""
     predict_state(ekf, params)
     update_imu_bias_inhibit(ekf, params)
     predict_covariance(ekf, params)
+    ekf.time_delayed_us = ekf.time_latest_us
     control_fusion_modes(ekf, params)
     run_terrain_filter(ekf, params)
+    ekf.time_delayed_us = ekf.imu_delayed.time_us
     correct_output(ekf, params)
 
 

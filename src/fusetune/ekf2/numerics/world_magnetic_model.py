@@ -84,9 +84,17 @@ def older_field_at(edition, latitude_deg, longitude_deg):
     return declination, inclination, strength
 
 
-def field_at(latitude_deg: float, longitude_deg: float) -> tuple[float, float, float]:
-    """Declination, inclination (rad) and strength (Gauss) at a place, for callers outside compiled code."""
+def field_at(latitude_deg: float, longitude_deg: float, release: str | None = None) -> tuple[float, float, float]:
+    """Declination, inclination (rad) and strength (Gauss) at a place, for callers outside compiled code.
+
+    That of v1.16, or of a `release` that has an older model.
+    """
     look_up = _interpolate.py_func
+    if release in OLDER_EPOCHS:
+        tables = _OLDER[list(OLDER_EPOCHS).index(release)]
+        units = (_RADIANS_PER_UNIT, _RADIANS_PER_UNIT, _GAUSS_PER_UNIT)
+        found = [look_up(latitude_deg, longitude_deg, one) * unit for one, unit in zip(tables, units, strict=True)]
+        return found[0], found[1], found[2]
     declination = look_up(latitude_deg, longitude_deg, _DECLINATION) * _DECLINATION_SCALE
     inclination = look_up(latitude_deg, longitude_deg, _INCLINATION) * _INCLINATION_SCALE
     strength = look_up(latitude_deg, longitude_deg, _STRENGTH) * _STRENGTH_SCALE * _GAUSS_PER_NANOTESLA

@@ -548,6 +548,13 @@ class Behaviours:
         until="v1.13",
         source="gps_control.cpp, gps_fusion.cpp, vel_pos_fusion.cpp",
     )
+    tells_time_by_newest_imu: bool = _behaviour(
+        "What happened when is noted, and asked for, by the time of the newest IMU sample. v1.14 goes by that of the "
+        "horizon.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.h",
+    )
     has_one_height_source: bool = _behaviour(
         "One source at a time gives the height: that of EKF2_HGT_MODE, range in its place where EKF2_RNG_AID lets it, "
         "or what replaces one that was lost. The barometer has an offset that follows the others, and a bias by GNSS. "

@@ -10,8 +10,18 @@ import math
 
 import numpy as np
 
+from fusetune.ekf2.feed.inputs import EstimatorInputs
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import DEGREE_PARTS, MIN_FIX_TYPE
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_3d_control import RESETS_AFTER_START
+from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import earth_field_vector
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
-from fusetune.ekf2.numerics.geodesy import earth_rate_ned
+from fusetune.ekf2.numerics.geodesy import earth_rate_ned, project
+from fusetune.ekf2.numerics.world_magnetic_model import field_at
+from fusetune.px4.layouts.logged_state import LoggedState
+
+PLACE = ("lat_deg", "lon_deg")
+NEAR_US = 1_000_000
+"""Samples that are so near to the buffered ones are placed along with them; what arrives is placed then anew."""
 
 QUATERNION = (ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, TERRAIN)
 """Places of the quaternion's elements in the error state."""
@@ -51,6 +61,54 @@ def position_of_output(e: np.void) -> np.ndarray:
 def bias_unit(e: np.void) -> float:
     """What a bias of 1 rad/s, or 1 m/s², is in the unit of the record's."""
     return float(e["quaternion"]["mean_dt"]) if "quaternion" in (e.dtype.names or ()) else 1.0
+
+
+def settle_samples(e: np.void, inputs: EstimatorInputs) -> None:
+    """Place GNSS samples that wait where releases do so on arrival; v1.13 knows the barometer by its offset alone."""
+    names = e.dtype.names or ()
+    if "gnss_arrivals" in names and e["origin"]["lat_lon_valid"]:
+        positions, gnss = e["gnss_arrivals"]["positions"], inputs.arrays.gnss
+        since, until = int(e["time_delayed_us"]) - NEAR_US, int(e["time_latest_us"]) + NEAR_US
+        for slot in np.flatnonzero((gnss["time_us"] >= since) & (gnss["time_us"] <= until)):
+            lat, lon = (math.radians(round(float(gnss[name][slot]) * DEGREE_PARTS) / DEGREE_PARTS) for name in PLACE)
+            origin = float(e["origin"]["lat_rad"]), float(e["origin"]["lon_rad"])
+            fixed = gnss["fix_type"][slot] >= MIN_FIX_TYPE
+            positions[slot % len(positions)] = project.py_func(*origin, lat, lon) if fixed else 0.0
+    if "heights" in names:
+        e["baro"]["lpf"] = e["baro_b_est"]["bias"]
+
+
+def settle_field(e: np.void, release: str, state: LoggedState, *, is_known: bool) -> None:
+    """What releases until v1.15 remember of the field: the model's at the origin, and how it is fused.
+
+    Until v1.14 the heading is measured less the body field, whether that is estimated or not.
+
+    Parameters
+    ----------
+    is_known : whether the vehicle estimated the field, which `state` then tells with its variances
+    """
+    names, mag, now = e.dtype.names or (), e["mag"], int(e["time_delayed_us"])
+    if "field_history" not in names:
+        return
+    if e["origin"]["lat_lon_valid"]:
+        field = field_at(*place_of(e), release)
+        mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = field
+        earth_field_vector.py_func(*field, mag["wmm_earth_field"])
+        mag["wmm_time_last_checked"] = now
+        # older than any fusion, so that it resets nothing
+        e["field_history"]["wmm_time_last_set"] = 1
+    e["field_history"]["declination_fused"] = is_known
+    e["field_history"]["resets_available"] = RESETS_AFTER_START
+    if "mag_modes" not in names:
+        return
+    e["cs"]["mag"] = e["cs_prev"]["mag"] = False
+    if np.any(state.mag_earth):
+        e["mag_I"], e["mag_B"] = state.mag_earth, state.mag_body
+    else:
+        e["mag_I"] = e["R_to_earth"] @ mag["lpf"]
+    e["mag_modes"]["time_last_used"] = now
+    if "mag_3d" in state.flags:
+        e["mag_modes"]["time_last_suitable"] = now
 
 
 def settle_core(e: np.void, params: np.void) -> None:

@@ -22,6 +22,7 @@ from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MA
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import reproject
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
+from fusetune.ekf2.releases.by_release import release_of_fields
 from fusetune.ekf2.replay.older_start import (
     bias_unit,
     is_local,
@@ -29,6 +30,8 @@ from fusetune.ekf2.replay.older_start import (
     position_of_output,
     put_local_position,
     settle_core,
+    settle_field,
+    settle_samples,
 )
 from fusetune.px4.layouts.logged_state import LoggedState
 from fusetune.quaternions import conjugate, rotation_matrix
@@ -94,6 +97,8 @@ def take_over(ekf: np.ndarray, fresh: np.ndarray, params: np.void, inputs: Estim
     _set_gnss(e)
     _set_baro(e, inputs)
     _set_mag(e, inputs, state)
+    settle_field(e, release_of_fields(e.dtype.names or ()), state, is_known=knows_field(state))
+    settle_samples(e, inputs)
     settle_core(e, params)
     _align_output(e)
 
@@ -291,7 +296,10 @@ def _set_mag(e: np.void, inputs: EstimatorInputs, state: LoggedState) -> None:
     mag = e["mag"]
     if e["origin"]["lat_lon_valid"] and knows_field(state):
         place = place_of(e)
-        declination, inclination, strength = inputs.memo.get(("field at", place), lambda: field_at(*place))
+        release = release_of_fields(e.dtype.names or ())
+        declination, inclination, strength = inputs.memo.get(
+            ("field at", place, release), lambda: field_at(*place, release)
+        )
         mag["wmm_declination"], mag["wmm_inclination"], mag["wmm_strength"] = declination, inclination, strength
         earth_field_vector.py_func(declination, inclination, strength, mag["wmm_earth_field"])
         mag["wmm_time_last_checked"] = now

@@ -194,7 +194,10 @@ def _keep_flags_for_control(ekf, inputs, action):
 
 @kernel
 def _follow_flags(ekf, inputs, action):
+    before_us = ekf.time_delayed_us
+    ekf.time_delayed_us = inputs.imu[action.run].time_us
     follow_system_flags_at_once(ekf, inputs.system_flags[action.slot])
+    ekf.time_delayed_us = before_us
 
 
 _take_flags = by_release(_keep_flags_for_control, "follows_flags_at_once", _follow_flags)

@@ -18,7 +18,7 @@ from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_stat
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_GRAVITY_VECTOR, is_horizontal_aiding_active
 from fusetune.ekf2.filter.common.local_origin import get_local_horizontal_position, offset_from_last_known
 from fusetune.ekf2.filter.common.state import POSITION
-from fusetune.ekf2.filter.common.timing import is_timed_out
+from fusetune.ekf2.filter.common.timing import horizon_us, is_timed_out
 from fusetune.ekf2.filter.covariance import tilt_variance
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
 from fusetune.ekf2.releases.by_release import by_release
@@ -98,7 +98,7 @@ def judge_last_known_position(ekf, params):
     at_n, at_e = get_local_horizontal_position(ekf)
     set_axis(aid, 0, at_n - off_n, variance, off_n, ekf.P[POSITION, POSITION] + variance)
     set_axis(aid, 1, at_e - off_e, variance, off_e, ekf.P[POSITION + 1, POSITION + 1] + variance)
-    update_aid_source_status(ekf, aid, 2, ekf.time_delayed_us, INNOVATION_GATE)
+    update_aid_source_status(ekf, aid, 2, horizon_us(ekf), INNOVATION_GATE)
 
 
 @kernel

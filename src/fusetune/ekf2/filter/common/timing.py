@@ -1,6 +1,7 @@
 """Time conditions at the fusion time horizon, and the intervals that PX4 v1.16 compares them with (µs)."""
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.releases.by_release import by_release
 
 BARO_MAX_INTERVAL = 200_000
 EV_MAX_INTERVAL = 200_000
@@ -13,6 +14,20 @@ RESET_TIMEOUT_MAX = 7_000_000
 NO_AID_TIMEOUT_MAX = 1_000_000
 HGT_FUSION_TIMEOUT_MAX = 5_000_000
 BAD_ACC_RESET_DELAY = 500_000
+
+
+@kernel
+def _same_time(ekf):
+    return ekf.time_delayed_us
+
+
+@kernel
+def _time_of_imu(ekf):
+    return ekf.imu_delayed.time_us
+
+
+horizon_us = by_release(_same_time, "tells_time_by_newest_imu", _time_of_imu)
+"""The time (µs) of the fusion time horizon, also where `ekf.time_delayed_us` is put ahead for an update."""
 
 
 @kernel

@@ -27,42 +27,50 @@ MAG_EARTH_LIMIT, MAG_BIAS_LIMIT, WIND_LIMIT = 1.0, 0.5, 100.0
 
 
 @kernel
-def _clip(P, index, low, high):
-    P[index, index] = min(max(P[index, index], low), high)
+def _clip(ekf, index, low, high):
+    """Written only where it is beyond: the usual case costs two comparisons."""
+    variance = ekf.P[index, index]
+    if variance < low:
+        ekf.P[index, index] = low
+    elif variance > high:
+        ekf.P[index, index] = high
+
+
+@kernel
+def _clip_three(ekf, index, low, high):
+    _clip(ekf, index, low, high)
+    _clip(ekf, index + 1, low, high)
+    _clip(ekf, index + 2, low, high)
 
 
 @kernel
 def limit_covariance(ekf, params):
     """Keep variances within their limits, and those of what is not estimated at zero."""
-    P = ekf.P
-    for i in range(3):
-        _clip(P, i, 0.0, VARIANCE_MAX)
-        _clip(P, state.VELOCITY + i, MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX)
-        _clip(P, state.POSITION + i, MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX)
-        _clip(P, state.GYRO_BIAS + i, 0.0, VARIANCE_MAX)
-    _clip(P, Q3, 0.0, VARIANCE_MAX)
+    _clip_three(ekf, state.ATTITUDE, 0.0, VARIANCE_MAX)
+    _clip(ekf, Q3, 0.0, VARIANCE_MAX)
+    _clip_three(ekf, state.VELOCITY, MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX)
+    _clip_three(ekf, state.POSITION, MOTION_VARIANCE_MIN, MOTION_VARIANCE_MAX)
+    _clip_three(ekf, state.GYRO_BIAS, 0.0, VARIANCE_MAX)
     inhibit = ekf.accel_bias_inhibit
     if not (inhibit[0] and inhibit[1] and inhibit[2]):
         _limit_accel_bias(ekf)
         _check_accel_bias(ekf, params)
     if ekf.cs.mag_3d:
-        for i in range(state.MAG_EARTH, state.MAG_BODY + 3):
-            _clip(P, i, 0.0, VARIANCE_MAX)
-    elif _is_any_left(P, state.MAG_EARTH, 6):
+        _clip_three(ekf, state.MAG_EARTH, 0.0, VARIANCE_MAX)
+        _clip_three(ekf, state.MAG_BODY, 0.0, VARIANCE_MAX)
+    elif _is_any_left(ekf, state.MAG_EARTH) or _is_any_left(ekf, state.MAG_BODY):
         zero_covariance_block(ekf, state.MAG_EARTH, 6)
     if ekf.cs.wind:
-        _clip(P, state.WIND, 0.0, MOTION_VARIANCE_MAX)
-        _clip(P, state.WIND + 1, 0.0, MOTION_VARIANCE_MAX)
-    elif _is_any_left(P, state.WIND, 2):
+        _clip(ekf, state.WIND, 0.0, MOTION_VARIANCE_MAX)
+        _clip(ekf, state.WIND + 1, 0.0, MOTION_VARIANCE_MAX)
+    elif ekf.P[state.WIND, state.WIND] != 0.0 or ekf.P[state.WIND + 1, state.WIND + 1] != 0.0:
         zero_covariance_block(ekf, state.WIND, 2)
 
 
 @kernel
-def _is_any_left(P, index, dof):
-    left = 0.0
-    for i in range(index, index + dof):
-        left += P[i, i]
-    return left != 0.0
+def _is_any_left(ekf, index):
+    P = ekf.P
+    return P[index, index] != 0.0 or P[index + 1, index + 1] != 0.0 or P[index + 2, index + 2] != 0.0
 
 
 @kernel
@@ -81,7 +89,7 @@ def _limit_accel_bias(ekf):
     deviation = ACCEL_BIAS_UNCERTAINTY_MAX * ekf.quaternion.mean_dt
     for i in range(3):
         if not inhibit[i]:
-            _clip(P, state.ACCEL_BIAS + i, low, deviation * deviation)
+            _clip(ekf, state.ACCEL_BIAS + i, low, deviation * deviation)
     if is_unsafe:
         uncorrelate_block(ekf, state.ACCEL_BIAS, 3)
 

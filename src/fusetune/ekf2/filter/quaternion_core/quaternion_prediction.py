@@ -12,7 +12,7 @@ Mirrors `predictCovariance` of PX4 v1.14 `EKF/covariance.cpp`; the products are 
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
-from fusetune.ekf2.filter.quaternion_core.core_memory import Q3, quaternion_place
+from fusetune.ekf2.filter.quaternion_core.core_memory import Q3
 from fusetune.ekf2.filter.quaternion_core.quaternion_limits import limit_covariance
 from fusetune.ekf2.releases.by_release import by_release
 
@@ -127,7 +127,7 @@ _wind_noise_in = by_release(_wind_noise_by_density, "adds_wind_noise_by_update",
 @kernel
 def _propagate(ekf, dt):
     """P ← F P Fᵀ in place: F from the left takes every column by itself, Fᵀ from the right every row."""
-    imu, q, R = ekf.imu_delayed, ekf.q, ekf.R_to_earth
+    imu, q = ekf.imu_delayed, ekf.q
     h = (
         0.5 * (imu.delta_ang[0] - ekf.gyro_bias[0]),
         0.5 * (imu.delta_ang[1] - ekf.gyro_bias[1]),
@@ -146,14 +146,15 @@ def _propagate(ekf, dt):
         (q1 * y - q2 * x, q3 * x + q0 * y - 2.0 * q1 * z, q3 * y - q0 * x - 2.0 * q2 * z, q1 * x + q2 * y),
     )
     half_q = (0.5 * q0, 0.5 * q1, 0.5 * q2, 0.5 * q3)
-    _multiply_from_left(ekf.P, R, dt, h, half_q, D)
-    _mirror_cross_covariances(ekf.P)
-    _multiply_from_right(ekf.P, R, dt, h, half_q, D)
+    _multiply_from_left(ekf, dt, h, half_q, D)
+    _mirror_cross_covariances(ekf)
+    _multiply_from_right(ekf, dt, h, half_q, D)
 
 
 @kernel
-def _multiply_from_left(P, R, dt, h, half_q, D):
+def _multiply_from_left(ekf, dt, h, half_q, D):
     """P ← F P: the rows of quaternion, velocity and position."""
+    P, R = ekf.P, ekf.R_to_earth
     hx, hy, hz = h
     w, x, y, z = half_q
     (dn0, dn1, dn2, dn3), (de0, de1, de2, de3), (dd0, dd1, dd2, dd3) = D
@@ -178,8 +179,9 @@ def _multiply_from_left(P, R, dt, h, half_q, D):
 
 
 @kernel
-def _mirror_cross_covariances(P):
+def _mirror_cross_covariances(ekf):
     """Copy the covariances of states that have dynamics with those that have none."""
+    P = ekf.P
     for j in range(GB, Q3):
         for i in range(GB):
             P[j, i] = P[i, j]
@@ -187,20 +189,21 @@ def _mirror_cross_covariances(P):
 
 
 @kernel
-def _multiply_from_right(P, R, dt, h, half_q, D):
+def _multiply_from_right(ekf, dt, h, half_q, D):
     """The block of quaternion, velocity and position times Fᵀ, each of these before those that it is made of.
 
     Exact in rows of the quaternion, then of the velocity up to the diagonal; the others mirror them.
     """
+    P = ekf.P
     for i in range(GB):
-        _position_from_right(P, i, dt)
-    _position_from_right(P, Q3, dt)
+        _position_from_right(ekf, i, dt)
+    _position_from_right(ekf, Q3, dt)
     for i in range(POS):
-        _velocity_from_right(P, i, R, D)
-    _velocity_from_right(P, Q3, R, D)
+        _velocity_from_right(ekf, i, D)
+    _velocity_from_right(ekf, Q3, D)
     for i in range(3):
-        _quaternion_from_right(P, i, h, half_q)
-    _quaternion_from_right(P, Q3, h, half_q)
+        _quaternion_from_right(ekf, i, h, half_q)
+    _quaternion_from_right(ekf, Q3, h, half_q)
     P[1, 0], P[2, 0], P[2, 1] = P[0, 1], P[0, 2], P[1, 2]
     for i in range(3):
         P[Q3, i] = P[i, Q3]
@@ -214,14 +217,16 @@ def _multiply_from_right(P, R, dt, h, half_q, D):
 
 
 @kernel
-def _position_from_right(P, i, dt):
+def _position_from_right(ekf, i, dt):
+    P = ekf.P
     P[i, POS] += dt * P[i, VEL]
     P[i, POS + 1] += dt * P[i, VEL + 1]
     P[i, POS + 2] += dt * P[i, VEL + 2]
 
 
 @kernel
-def _velocity_from_right(P, i, R, D):
+def _velocity_from_right(ekf, i, D):
+    P, R = ekf.P, ekf.R_to_earth
     p0, p1, p2, p3 = P[i, 0], P[i, 1], P[i, 2], P[i, Q3]
     ax, ay, az = P[i, AB], P[i, AB + 1], P[i, AB + 2]
     for k in range(3):
@@ -231,7 +236,8 @@ def _velocity_from_right(P, i, R, D):
 
 
 @kernel
-def _quaternion_from_right(P, i, h, half_q):
+def _quaternion_from_right(ekf, i, h, half_q):
+    P = ekf.P
     hx, hy, hz = h
     w, x, y, z = half_q
     p0, p1, p2, p3 = P[i, 0], P[i, 1], P[i, 2], P[i, Q3]
@@ -247,11 +253,14 @@ def _add_imu_noise(ekf, params, dt):
     """Noise of the increments: of the gyro on the quaternion, of the accelerometer, rotated, on the velocity."""
     P, R, q = ekf.P, ekf.R_to_earth, ekf.q
     angle_variance = (dt * _unit_range(params.EKF2_GYR_NOISE)) ** 2
-    for i in range(4):
-        a = quaternion_place(i)
-        P[a, a] += 0.25 * angle_variance
-        for j in range(4):
-            P[a, quaternion_place(j)] -= 0.25 * angle_variance * (q[i] * q[j])
+    share = 0.25 * angle_variance
+    for i in range(3):
+        P[i, i] += share
+        for j in range(3):
+            P[i, j] -= share * (q[i] * q[j])
+        P[i, Q3] -= share * (q[i] * q[3])
+        P[Q3, i] -= share * (q[i] * q[3])
+    P[Q3, Q3] += share * (1.0 - q[3] * q[3])
     normal, bad = (dt * _unit_range(params.EKF2_ACC_NOISE)) ** 2, (dt * BAD_ACCEL_NOISE) ** 2
     clipping, is_bad = ekf.imu_delayed.delta_vel_clipping, ekf.fs.bad_acc_vertical
     ax = bad if is_bad or clipping[0] else normal

@@ -8,7 +8,7 @@ from fusetune.ekf2.filter.aid_sources.optical_flow.flow_over_terrain import pred
 from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_fusion import calc_opt_flow_meas_var
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.conditions import TERRAIN_TIMEOUT, get_hagl
-from fusetune.ekf2.filter.common.timing import is_timed_out
+from fusetune.ekf2.filter.common.timing import horizon_us, is_timed_out
 from fusetune.ekf2.filter.terrain_filter.terrain_by_flow import DATA_STOPPED_US, TERR_MASK_FLOW
 
 
@@ -25,7 +25,7 @@ def control_terrain_by_flow_axes(ekf, params):
         if terrain.uses_flow:
             _fuse_axes(ekf, params)
             terrain.flow_is_good = False
-    elif terrain.uses_flow and ekf.time_delayed_us > ekf.sensors.flow.sample.time_us + DATA_STOPPED_US:
+    elif terrain.uses_flow and horizon_us(ekf) > ekf.sensors.flow.sample.time_us + DATA_STOPPED_US:
         terrain.uses_flow = False
 
 

@@ -11,7 +11,7 @@ from fusetune.ekf2.filter.common.aid_source_status import (
     update_aid_source_status,
 )
 from fusetune.ekf2.filter.common.conditions import get_hagl
-from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_timed_out
+from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, horizon_us, is_timed_out
 
 TERR_MASK_RANGE = 1
 TERRAIN_RESET_TIMEOUT = 10_000_000
@@ -79,7 +79,7 @@ def _judge(ekf, params):
     aid = ekf.aid.terrain_range_finder
     innovation_variance = max(ekf.terrain_filter.variance + variance, variance)
     set_axis(aid, 0, measured, variance, get_hagl(ekf) - measured, innovation_variance)
-    update_aid_source_status(ekf, aid, 1, ekf.time_delayed_us, max(params.EKF2_RNG_GATE, 1.0))
+    update_aid_source_status(ekf, aid, 1, horizon_us(ekf), max(params.EKF2_RNG_GATE, 1.0))
 
 
 @kernel

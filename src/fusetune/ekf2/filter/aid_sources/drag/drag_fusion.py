@@ -15,6 +15,7 @@ from fusetune.ekf2.feed.buffers import MAX_SAMPLE_AGE_US
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.imu_rates import accel_bias
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
+from fusetune.ekf2.filter.common.timing import horizon_us
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance, scale_kalman_gain
 from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
@@ -225,7 +226,7 @@ def _is_due(ekf):
 @kernel
 def _is_due_or_waits(ekf):
     """What comes due on the ground is taken once in the air, unless it is too old."""
-    waits = ekf.drag_waits and ekf.time_delayed_us < ekf.sensors.drag.sample.time_us + MAX_SAMPLE_AGE_US
+    waits = ekf.drag_waits and horizon_us(ekf) < ekf.sensors.drag.sample.time_us + MAX_SAMPLE_AGE_US
     at_hand = ekf.sensors.drag.data_ready or waits
     ekf.drag_waits = at_hand and not _while_flying(ekf)
     return at_hand

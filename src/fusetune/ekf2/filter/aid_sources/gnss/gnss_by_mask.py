@@ -21,7 +21,7 @@ from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_s
 from fusetune.ekf2.filter.common.conditions import is_other_source_of_horizontal_aiding_than
 from fusetune.ekf2.filter.common.local_origin import get_local_horizontal_position
 from fusetune.ekf2.filter.common.state import POSITION, VELOCITY
-from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_recent, is_timed_out
+from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, horizon_us, is_recent, is_timed_out
 from fusetune.ekf2.filter.measurement_update import fuse_direct_state
 from fusetune.ekf2.filter.one_height_source import start_baro_height
 from fusetune.ekf2.filter.resets.state_resets import (
@@ -56,7 +56,7 @@ def control_gnss_by_mask(ekf, params):
         elif cs.gnss_pos:
             _fuse_each(ekf, params, False)
         return
-    silence_us = ekf.time_delayed_us - ekf.gnss_taken.time_us
+    silence_us = horizon_us(ekf) - ekf.gnss_taken.time_us
     if cs.gnss_pos and (
         silence_us > LONGEST_SILENCE_US
         or (silence_us > LONGEST_SILENCE_WITH_OTHERS_US and is_other_source_of_horizontal_aiding_than(ekf, cs.gnss_pos))

@@ -30,7 +30,7 @@ from fusetune.ekf2.filter.common.conditions import get_hagl, is_other_source_of_
 from fusetune.ekf2.filter.common.imu_rates import body_rate
 from fusetune.ekf2.filter.common.local_origin import remember_horizontal_position
 from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE, POSITION, TERRAIN
-from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, is_recent, is_timed_out
+from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, horizon_us, is_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_kalman_gain, multiply_covariance, scale_kalman_gain
@@ -63,7 +63,7 @@ def control_flow_at_once(ekf, params):
         publish_rates(ekf, memory)
     if terrain.flow_is_good:
         _use_flow(ekf, params)
-    elif ekf.cs.opt_flow and ekf.time_delayed_us > ekf.sensors.flow.sample.time_us + DATA_STOPPED_US:
+    elif ekf.cs.opt_flow and horizon_us(ekf) > ekf.sensors.flow.sample.time_us + DATA_STOPPED_US:
         ekf.cs.opt_flow = False
 
 

@@ -35,6 +35,7 @@ from fusetune.ekf2.filter.common.state import VELOCITY
 from fusetune.ekf2.filter.common.timing import (
     HGT_FUSION_TIMEOUT_MAX,
     RNG_MAX_INTERVAL,
+    horizon_us,
     is_newest_sample_recent,
     is_timed_out,
 )
@@ -100,7 +101,7 @@ def _check_with_fog(ekf, params):
 def _check_unless_faulty(ekf, params):
     """As v1.16's, but no fog is looked for, and a sensor once found faulty stays out."""
     rng = ekf.range
-    run_range_sensor_checks(rng, ekf.time_delayed_us, params.EKF2_RNG_QLTY_T, 0.0)
+    run_range_sensor_checks(rng, horizon_us(ekf), params.EKF2_RNG_QLTY_T, 0.0)
     if ekf.terrain_filter.range_is_faulty:
         rng.is_sample_valid = False
         rng.is_regularly_sending_data = False

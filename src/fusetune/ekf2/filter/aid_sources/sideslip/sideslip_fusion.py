@@ -11,7 +11,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.state import ATTITUDE, VELOCITY, WIND
-from fusetune.ekf2.filter.common.timing import is_timed_out
+from fusetune.ekf2.filter.common.timing import horizon_us, is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_wind_cov
 from fusetune.ekf2.filter.observation_gain import clear_jacobian, compute_innovation_variance
 from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
@@ -179,7 +179,7 @@ def _update_sideslip(ekf, params):
     compute_sideslip_jacobian(ekf, H)
     innovation_variance = compute_innovation_variance(ekf, H, variance)
     set_axis(ekf.aid.sideslip, 0, 0.0, variance, predict_sideslip(ekf), innovation_variance)
-    update_aid_source_status(ekf, ekf.aid.sideslip, 1, ekf.time_delayed_us, max(params.EKF2_BETA_GATE, 1.0))
+    update_aid_source_status(ekf, ekf.aid.sideslip, 1, horizon_us(ekf), max(params.EKF2_BETA_GATE, 1.0))
 
 
 @kernel
