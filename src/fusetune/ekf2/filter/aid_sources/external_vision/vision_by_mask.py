@@ -126,15 +126,10 @@ def _start(ekf, params, mask):
 
 
 @kernel
-def _measured_attitude(ekf):
-    quat_to_dcm(ekf.sensors.ev.sample.quat, ekf.scratch.R)
-    return ekf.scratch.R
-
-
-@kernel
 def _reset_yaw(ekf, params):
     variance = max(ekf.sensors.ev.sample.orientation_var[2], LEAST_YAW_VARIANCE)
-    reset_quat_state_yaw(ekf, params, euler_yaw(_measured_attitude(ekf)), variance)
+    quat_to_dcm(ekf.sensors.ev.sample.quat, ekf.scratch.R)
+    reset_quat_state_yaw(ekf, params, euler_yaw(ekf.scratch.R), variance)
     _do_not_turn(ekf)
 
 
@@ -310,7 +305,8 @@ def _control_yaw(ekf, params, jumped):
     if jumped and ekf.cs_prev.ev_yaw:
         _reset_yaw(ekf, params)
     aid, sample = ekf.aid.ev_yaw, ekf.sensors.ev.sample
-    measured = euler_yaw_as(_measured_attitude(ekf), ekf.R_to_earth)
+    quat_to_dcm(sample.quat, ekf.scratch.R)
+    measured = euler_yaw_as(ekf.scratch.R, ekf.R_to_earth)
     variance = max(sample.orientation_var[2], LEAST_YAW_VARIANCE)
     innovation_variance = compute_yaw_innov_var_and_h(ekf, variance, ekf.scratch.H)
     set_axis(aid, 0, measured, variance, wrap_pi(euler_yaw(ekf.R_to_earth) - measured), innovation_variance)
