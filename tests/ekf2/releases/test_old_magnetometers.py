@@ -14,7 +14,7 @@ from tests.ekf2.filter.aiding_estimator import START_US, set_time
 from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
-from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
+from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE, IMU_SAMPLE
 from fusetune.ekf2.filter import yaw_fusion
 from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
@@ -352,6 +352,18 @@ def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covarian
         modes["turn_rate_lpf"] = rate
         mag_modes.select_mode(it.ekf, it.params)
         assert bool(it.ekf["cs"]["mag_3d"]) == fused
+
+
+def test_the_turn_of_v1_13_is_that_of_the_newest_samples_but_the_last():
+    it = flying("v1.13")
+    modes, output = it.ekf["mag_modes"], it.ekf["output"]
+    output["gyro_bias"], output["delta_angle_corr"], output["R_to_earth"] = (0.0, 0.0, 0.1), 0.0, np.eye(3)
+    imu = np.zeros(1, IMU_SAMPLE)[0]
+    imu["delta_ang"], imu["delta_ang_dt"] = (0.0, 0.0, 0.0015), 0.005
+    for turned in (0.0, 0.001, 0.002):
+        quaternion_prediction._follow_newest_turn(it.ekf, imu)
+        assert modes["turn"] == pytest.approx(turned)  # 0.3 rad/s, less a bias of 0.1, for 5 ms each
+    assert modes["turn_rate_lpf"] == pytest.approx(0.2 * (1.0 - 0.95**2))
 
 
 @pytest.mark.parametrize(("wanted", "gnss", "fused"), [(0, False, True), (0, True, False), (4, True, True)])
