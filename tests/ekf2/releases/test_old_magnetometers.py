@@ -14,7 +14,7 @@ from tests.ekf2.filter.aiding_estimator import START_US, set_time
 from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
-from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
+from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE, IMU_SAMPLE
 from fusetune.ekf2.filter import yaw_fusion
 from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
@@ -26,6 +26,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer import (
     mag_mode_control,
     mag_modes,
     mag_resets,
+    turn_of_output,
     world_field,
     yaw_by_course,
 )
@@ -569,3 +570,37 @@ def test_a_noise_of_0_02_gauss_does_not_make_the_body_field_known():
     for variance, known in ((it.params["EKF2_MAG_NOISE"] ** 2, False), (0.0199**2, True), (0.0, False)):
         block[...] = np.eye(3) * variance
         assert bool(mag_mode_control._is_body_field_known(it.ekf)) == known
+
+
+@pytest.mark.parametrize(("release", "at_first"), [(V113, True), (V114, False), (V116, False)])
+def test_v1_13_finds_all_axes_of_the_field_before_one_is_fused(release, at_first, monkeypatch):
+    """After the first axis the field is said to be larger by 0.1 Gauss."""
+    it = flying(release)
+    aid, innovations = it.ekf["aid"]["mag"], []
+    aid["innovation"][:], aid["innovation_variance"][:], aid["observation_variance"][:] = FIELD, 1.0, 0.0025
+
+    def update(ekf, params, R, innovation):
+        innovations.append(float(innovation))
+        ekf["mag_B"][:] = 0.1
+        return True
+
+    monkeypatch.setattr(mag_fusion, "measurement_update", update)
+    monkeypatch.setattr(mag_fusion, "scale_kalman_gain", lambda *_: None)
+    mag_fusion.fuse_mag.py_func(it.ekf, it.params, np.zeros(3), 0.0025, True, True)
+    assert innovations == pytest.approx(FIELD if at_first else [FIELD[0], 0.1, 0.1])
+
+
+@pytest.mark.parametrize(("release", "followed"), [(V113, True), (V114, False)])
+def test_v1_13_follows_the_turn_of_the_newest_samples_but_for_the_last(release, followed):
+    it = flying(release)
+    it.ekf["filter_initialised"] = True
+    it.ekf["output"]["R_to_earth"] = np.eye(3)
+    it.ekf["output"]["gyro_bias"][2], it.ekf["output"]["delta_angle_corr"][2] = 0.1, 0.0002
+    imu = np.zeros(1, IMU_SAMPLE)[0]
+    imu["delta_ang"][2], imu["delta_ang_dt"] = 0.0013, 0.005
+    for _ in range(3):
+        turn_of_output.follow_turn_of_output(it.ekf, imu)
+    # two of them, of 0.0013 - 0.1 · 0.005 + 0.0002 rad in 5 ms
+    modes = it.ekf["mag_modes"]
+    assert modes["turn"] == pytest.approx(0.002 if followed else 0.0)
+    assert modes["turn_rate_lpf"] == pytest.approx(0.2 * (1.0 - 0.95**2) if followed else 0.0)

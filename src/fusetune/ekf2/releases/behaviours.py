@@ -649,10 +649,18 @@ class Behaviours:
     )
     clears_field_whenever_stopped: bool = _behaviour(
         "A magnetometer that may not be used is passed over and a yaw held in its place in every update, not stopped; "
-        "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course.",
+        "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course. "
+        "Turns are told by the newest IMU samples.",
         since="v1.13",
         until="v1.13",
         source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
+    )
+    finds_field_first: bool = _behaviour(
+        "The innovations of all three axes of the field are found before the first is fused; each is linearised at the "
+        "state that the axes before it left.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_fusion.cpp",
     )
     forces_every_yaw: bool = _behaviour(
         "A heading that is rejected on the ground is fused all the same every time. v1.14 does so once a second.",
