@@ -13,11 +13,17 @@ from tests.ekf2.filter.aiding_estimator import INTERVAL_US, START_US, set_time
 from tests.ekf2.releases.test_named_behaviours import OLD as V116
 from tests.ekf2.releases.test_named_behaviours import Flying, asked, flying
 
-from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_NED, IMU_SAMPLE
+from fusetune.ekf2.feed.sensor_samples import (
+    EV_FRAME_BODY_FRD,
+    EV_FRAME_FRD,
+    EV_FRAME_NED,
+    IMU_SAMPLE,
+    SYSTEM_FLAGS_SAMPLE,
+)
 from fusetune.ekf2.filter import wind
 from fusetune.ekf2.filter.aid_sources.airspeed import airspeed_control, airspeed_fusion, airspeed_resets
 from fusetune.ekf2.filter.aid_sources.drag import drag_fusion
-from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag
+from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag, may_average
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import drag_accumulator
 from fusetune.ekf2.filter.aid_sources.external_vision import (
     ev_attitude_error,
@@ -35,7 +41,7 @@ from fusetune.ekf2.filter.aid_sources.optical_flow import (
 from fusetune.ekf2.filter.aid_sources.range_finder import range_for_height, range_height_control
 from fusetune.ekf2.filter.aid_sources.sideslip import sideslip_fusion
 from fusetune.ekf2.filter.common import aid_source_status
-from fusetune.ekf2.filter.common.conditions import get_hagl, is_terrain_estimate_valid
+from fusetune.ekf2.filter.common.conditions import follow_system_flags_at_once, get_hagl, is_terrain_estimate_valid
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_RANGE
 from fusetune.ekf2.filter.common.state import ATTITUDE, POSITION, TERRAIN, VELOCITY, WIND
 from fusetune.ekf2.filter.resets import state_resets
@@ -828,15 +834,16 @@ def test_airspeed_is_judged_where_it_is_fused(release, where_fused, monkeypatch)
         assert judged
 
 
-def test_sideslip_of_v1_13_is_asked_for_by_its_parameter_and_judged_at_speed(monkeypatch):
+def test_sideslip_of_v1_13_is_asked_for_by_the_status_in_the_air_and_judged_at_speed(monkeypatch):
     it, judged = flying(V113, EKF2_FUSE_BETA=1.0), []
     monkeypatch.setattr(sideslip_fusion, "_update_sideslip", lambda *_: judged.append(True))
     monkeypatch.setattr(sideslip_fusion, "_fuse_sideslip", lambda *_: True)
-    it.ekf["cs"]["fixed_wing"], it.ekf["cs"]["in_air"] = True, False
-    asked(sideslip_fusion.control_beta_fusion, it, it.params)
-    assert it.ekf["cs"]["fuse_beta"]
-    assert not it.ekf["cs"]["wind"]
-    it.ekf["cs"]["in_air"] = True
+    status = np.zeros(1, SYSTEM_FLAGS_SAMPLE)[0]
+    status["status_is_new"], status["is_fixed_wing"] = True, True
+    for in_air in (False, True):
+        it.ekf["cs"]["in_air"] = in_air
+        follow_system_flags_at_once(it.ekf, status)
+        assert it.ekf["cs"]["fuse_beta"] == in_air
     it.ekf["vel"] = 4.0, 3.0, 4.8
     asked(sideslip_fusion.control_beta_fusion, it, it.params)
     assert it.ekf["cs"]["wind"]
@@ -845,6 +852,16 @@ def test_sideslip_of_v1_13_is_asked_for_by_its_parameter_and_judged_at_speed(mon
     it.ekf["vel"] = 4.0, 3.0, 5.0
     asked(sideslip_fusion.control_beta_fusion, it, it.params)
     assert judged
+    it.params["EKF2_FUSE_BETA"] = 0.0
+    asked(sideslip_fusion.control_beta_fusion, it, it.params)
+    assert not it.ekf["cs"]["fuse_beta"]
+
+
+@pytest.mark.parametrize(("release", "last_only"), UNTIL_V113)
+def test_drag_is_averaged_over_the_last_sample_of_an_interval_in_v1_13(release, last_only):
+    drag = np.zeros(1, drag_accumulator(release))[0]
+    assert bool(may_average.of(release).py_func(drag, False)) != last_only
+    assert may_average.of(release).py_func(drag, True)
 
 
 def test_drag_of_v1_13_is_as_steep_as_at_the_measured_force():

@@ -872,10 +872,16 @@ class Behaviours:
     )
     judges_air_data_when_fused: bool = _behaviour(
         "Airspeed and sideslip are judged only where they are fused: the one above 1 m/s, and started whatever it "
-        "says, the other above 7 m/s in all directions.",
+        "says, the other above 7 m/s in all directions, from the first status of the vehicle in the air on.",
         since="v1.13",
         until="v1.13",
         source="airspeed_fusion.cpp, sideslip_fusion.cpp, control.cpp",
+    )
+    averages_last_drag: bool = _behaviour(
+        "Drag is averaged over the last raw sample of each interval of the filter, and not over all.",
+        since="v1.13",
+        until="v1.13",
+        source="estimator_interface.cpp",
     )
     linearises_drag_by_force: bool = _behaviour(
         "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "

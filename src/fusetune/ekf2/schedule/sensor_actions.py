@@ -10,7 +10,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.buffers import find_newest_due, may_be_due, newest_time_us, offer, push, reset_ring, take
 from fusetune.ekf2.feed.record_fields import fields
-from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag
+from fusetune.ekf2.filter.aid_sources.drag.drag_accumulator import accumulate_drag, may_average
 from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.timeline import value_at
 from fusetune.ekf2.schedule.updates import INITIAL_INTERVAL_S
@@ -81,14 +81,17 @@ def schedule_drag(enabled, imu, intervals, updates, lengths, accumulator, ring, 
     `arrived` is work space, as long as `samples`. Returns how many samples and how many actions there are.
     """
     reset_ring(ring, lengths.observation_length)
-    made, count, update, exists = 0, 0, 0, False
+    made, count, update, interval, exists = 0, 0, 0, 0, False
     for run in range(len(imu)):
         while update < len(updates) and updates[update].run < run:
             count = _take_due(ring, arrived, enabled, intervals, updates, update, actions, count)
             update += 1
         if update == len(updates):
             return made, count
-        if value_at(enabled, run) == 0.0:
+        while interval < len(intervals) and intervals[interval].run < run:
+            interval += 1
+        ends_interval = interval < len(intervals) and intervals[interval].run == run
+        if value_at(enabled, run) == 0.0 or not may_average(accumulator, ends_interval):
             continue
         if not exists:
             exists = True

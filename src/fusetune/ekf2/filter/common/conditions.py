@@ -233,9 +233,13 @@ def set_gnd_effect(ekf):
 
 @kernel
 def follow_system_flags_at_once(ekf, flags):
-    """Apply what arrived of the vehicle's status or of the land detector; times are noted as flying begins or ends."""
+    """Apply what arrived of the vehicle's status or of the land detector; times are noted as flying begins or ends.
+
+    Sideslip is that of a vehicle that was known to fly as its status arrived.
+    """
     if flags.status_is_new:
         ekf.cs.fixed_wing = flags.is_fixed_wing
+        ekf.cs.fuse_beta = flags.is_fixed_wing and ekf.cs.in_air
     if flags.land_is_new:
         ekf.cs.vehicle_at_rest = flags.at_rest
         if flags.gnd_effect:

@@ -180,9 +180,18 @@ def _multiply_from_left(ekf, dt, h, half_q, D):
 
 @kernel
 def _mirror_cross_covariances(ekf):
-    """Copy the covariances of states that have dynamics with those that have none."""
+    """Copy the covariances of states that have dynamics with those that have none, of what is estimated."""
+    _mirror(ekf, GB, state.MAG_EARTH)
+    if ekf.cs.mag_3d:
+        _mirror(ekf, state.MAG_EARTH, state.WIND)
+    if ekf.cs.wind:
+        _mirror(ekf, state.WIND, Q3)
+
+
+@kernel
+def _mirror(ekf, first, last):
     P = ekf.P
-    for j in range(GB, Q3):
+    for j in range(first, last):
         for i in range(GB):
             P[j, i] = P[i, j]
         P[j, Q3] = P[Q3, j]

@@ -20,6 +20,21 @@ def _restart(drag):
 
 
 @kernel
+def _take_every_sample(drag, ends_interval):
+    return True
+
+
+@kernel
+def _take_last_samples(drag, ends_interval):
+    """Only the last raw sample of each that the filter runs by."""
+    return ends_interval
+
+
+may_average = by_release(_take_every_sample, "averages_last_drag", _take_last_samples)
+"""Whether a raw sample, which ends an interval of the filter or does not, counts for drag."""
+
+
+@kernel
 def _is_clipped(drag, imu):
     return imu.delta_vel_clipping[0] or imu.delta_vel_clipping[1] or imu.delta_vel_clipping[2]
 

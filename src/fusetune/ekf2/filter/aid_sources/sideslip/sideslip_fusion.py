@@ -204,8 +204,9 @@ def _fuse_sideslip(ekf, params):
 
 @kernel
 def _control_by_flag(ekf, params):
-    """As v1.16's; the flag says what is configured, and what is judged is fused: above 7 m/s."""
-    ekf.cs.fuse_beta = int(params.EKF2_FUSE_BETA) == 1 and ekf.cs.fixed_wing
+    """As v1.16's; the vehicle's status sets the flag, and what is judged is fused: above 7 m/s."""
+    if int(params.EKF2_FUSE_BETA) != 1:
+        ekf.cs.fuse_beta = False
     if not ekf.cs.fuse_beta or not ekf.cs.in_air or ekf.cs.fake_pos:
         return
     if not is_timed_out(ekf, ekf.aid.sideslip.time_last_fuse, FUSION_INTERVAL_US):
