@@ -14,7 +14,7 @@ from tests.ekf2.filter.aiding_estimator import START_US, set_time
 from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
-from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE, IMU_SAMPLE
+from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
 from fusetune.ekf2.filter import yaw_fusion
 from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
@@ -26,7 +26,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer import (
     mag_mode_control,
     mag_modes,
     mag_resets,
-    turn_of_output,
     world_field,
     yaw_by_course,
 )
@@ -355,6 +354,18 @@ def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covarian
         assert bool(it.ekf["cs"]["mag_3d"]) == fused
 
 
+def test_the_turn_of_v1_13_is_that_of_the_newest_samples_but_the_last():
+    it = flying("v1.13")
+    modes, output = it.ekf["mag_modes"], it.ekf["output"]
+    output["gyro_bias"], output["delta_angle_corr"], output["R_to_earth"] = (0.0, 0.0, 0.1), 0.0, np.eye(3)
+    imu = np.zeros(1, IMU_SAMPLE)[0]
+    imu["delta_ang"], imu["delta_ang_dt"] = (0.0, 0.0, 0.0015), 0.005
+    for turned in (0.0, 0.001, 0.002):
+        quaternion_prediction._follow_newest_turn(it.ekf, imu)
+        assert modes["turn"] == pytest.approx(turned)  # 0.3 rad/s, less a bias of 0.1, for 5 ms each
+    assert modes["turn_rate_lpf"] == pytest.approx(0.2 * (1.0 - 0.95**2))
+
+
 @pytest.mark.parametrize(("wanted", "gnss", "fused"), [(0, False, True), (0, True, False), (4, True, True)])
 def test_the_declination_is_fused_with_the_field_where_gnss_does_not_tell_north(wanted, gnss, fused):
     it = flying(V114, EKF2_DECL_TYPE=float(wanted))
@@ -588,19 +599,3 @@ def test_v1_13_finds_all_axes_of_the_field_before_one_is_fused(release, at_first
     monkeypatch.setattr(mag_fusion, "scale_kalman_gain", lambda *_: None)
     mag_fusion.fuse_mag.py_func(it.ekf, it.params, np.zeros(3), 0.0025, True, True)
     assert innovations == pytest.approx(FIELD if at_first else [FIELD[0], 0.1, 0.1])
-
-
-@pytest.mark.parametrize(("release", "followed"), [(V113, True), (V114, False)])
-def test_v1_13_follows_the_turn_of_the_newest_samples_but_for_the_last(release, followed):
-    it = flying(release)
-    it.ekf["filter_initialised"] = True
-    it.ekf["output"]["R_to_earth"] = np.eye(3)
-    it.ekf["output"]["gyro_bias"][2], it.ekf["output"]["delta_angle_corr"][2] = 0.1, 0.0002
-    imu = np.zeros(1, IMU_SAMPLE)[0]
-    imu["delta_ang"][2], imu["delta_ang_dt"] = 0.0013, 0.005
-    for _ in range(3):
-        turn_of_output.follow_turn_of_output(it.ekf, imu)
-    # two of them, of 0.0013 - 0.1 · 0.005 + 0.0002 rad in 5 ms
-    modes = it.ekf["mag_modes"]
-    assert modes["turn"] == pytest.approx(0.002 if followed else 0.0)
-    assert modes["turn_rate_lpf"] == pytest.approx(0.2 * (1.0 - 0.95**2) if followed else 0.0)

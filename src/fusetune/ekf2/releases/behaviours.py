@@ -633,6 +633,13 @@ class Behaviours:
         until="v1.15",
         source="mag_control.cpp, mag_3d_control.cpp, mag_fusion.cpp",
     )
+    follows_newest_turn: bool = _behaviour(
+        "How fast the vehicle turns, by which the field is fused or not, is that of the newest IMU samples and not of "
+        "those at the horizon.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
     fuses_heading_or_field: bool = _behaviour(
         "The magnetometer fuses the heading, or, once it is aligned in flight and the vehicle accelerates or turns "
         "(EKF2_MAG_YAWLIM), the field, whose states have a covariance only then. The strength alone is checked, within "
@@ -649,8 +656,7 @@ class Behaviours:
     )
     clears_field_whenever_stopped: bool = _behaviour(
         "A magnetometer that may not be used is passed over and a yaw held in its place in every update, not stopped; "
-        "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course. "
-        "Turns are told by the newest IMU samples.",
+        "the field corrects all states 5 s after it was aligned in flight. A fixed wing's yaw is reset to its course.",
         since="v1.13",
         until="v1.13",
         source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
