@@ -14,7 +14,7 @@ from tests.ekf2.filter.aiding_estimator import START_US, set_time
 from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
-from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
+from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE, IMU_SAMPLE
 from fusetune.ekf2.filter import yaw_fusion
 from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
