@@ -581,3 +581,21 @@ def test_a_noise_of_0_02_gauss_does_not_make_the_body_field_known():
     for variance, known in ((it.params["EKF2_MAG_NOISE"] ** 2, False), (0.0199**2, True), (0.0, False)):
         block[...] = np.eye(3) * variance
         assert bool(mag_mode_control._is_body_field_known(it.ekf)) == known
+
+
+@pytest.mark.parametrize(("release", "at_first"), [(V113, True), (V114, False), (V116, False)])
+def test_v1_13_finds_all_axes_of_the_field_before_one_is_fused(release, at_first, monkeypatch):
+    """After the first axis the field is said to be larger by 0.1 Gauss."""
+    it = flying(release)
+    aid, innovations = it.ekf["aid"]["mag"], []
+    aid["innovation"][:], aid["innovation_variance"][:], aid["observation_variance"][:] = FIELD, 1.0, 0.0025
+
+    def update(ekf, params, R, innovation):
+        innovations.append(float(innovation))
+        ekf["mag_B"][:] = 0.1
+        return True
+
+    monkeypatch.setattr(mag_fusion, "measurement_update", update)
+    monkeypatch.setattr(mag_fusion, "scale_kalman_gain", lambda *_: None)
+    mag_fusion.fuse_mag.py_func(it.ekf, it.params, np.zeros(3), 0.0025, True, True)
+    assert innovations == pytest.approx(FIELD if at_first else [FIELD[0], 0.1, 0.1])

@@ -661,6 +661,13 @@ class Behaviours:
         until="v1.13",
         source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
     )
+    finds_field_first: bool = _behaviour(
+        "The innovations of all three axes of the field are found before the first is fused; each is linearised at the "
+        "state that the axes before it left.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_fusion.cpp",
+    )
     forces_every_yaw: bool = _behaviour(
         "A heading that is rejected on the ground is fused all the same every time. v1.14 does so once a second.",
         since="v1.13",
