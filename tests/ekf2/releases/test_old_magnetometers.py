@@ -14,7 +14,7 @@ from tests.ekf2.filter.aiding_estimator import START_US, set_time
 from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
-from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
+from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE, IMU_SAMPLE
 from fusetune.ekf2.filter import yaw_fusion
 from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
@@ -354,6 +354,18 @@ def test_the_field_is_fused_while_acceleration_or_turn_tells_it_and_its_covarian
         assert bool(it.ekf["cs"]["mag_3d"]) == fused
 
 
+def test_the_turn_of_v1_13_is_that_of_the_newest_samples_but_the_last():
+    it = flying("v1.13")
+    modes, output = it.ekf["mag_modes"], it.ekf["output"]
+    output["gyro_bias"], output["delta_angle_corr"], output["R_to_earth"] = (0.0, 0.0, 0.1), 0.0, np.eye(3)
+    imu = np.zeros(1, IMU_SAMPLE)[0]
+    imu["delta_ang"], imu["delta_ang_dt"] = (0.0, 0.0, 0.0015), 0.005
+    for turned in (0.0, 0.001, 0.002):
+        quaternion_prediction._follow_newest_turn(it.ekf, imu)
+        assert modes["turn"] == pytest.approx(turned)  # 0.3 rad/s, less a bias of 0.1, for 5 ms each
+    assert modes["turn_rate_lpf"] == pytest.approx(0.2 * (1.0 - 0.95**2))
+
+
 @pytest.mark.parametrize(("wanted", "gnss", "fused"), [(0, False, True), (0, True, False), (4, True, True)])
 def test_the_declination_is_fused_with_the_field_where_gnss_does_not_tell_north(wanted, gnss, fused):
     it = flying(V114, EKF2_DECL_TYPE=float(wanted))
@@ -569,3 +581,21 @@ def test_a_noise_of_0_02_gauss_does_not_make_the_body_field_known():
     for variance, known in ((it.params["EKF2_MAG_NOISE"] ** 2, False), (0.0199**2, True), (0.0, False)):
         block[...] = np.eye(3) * variance
         assert bool(mag_mode_control._is_body_field_known(it.ekf)) == known
+
+
+@pytest.mark.parametrize(("release", "at_first"), [(V113, True), (V114, False), (V116, False)])
+def test_v1_13_finds_all_axes_of_the_field_before_one_is_fused(release, at_first, monkeypatch):
+    """After the first axis the field is said to be larger by 0.1 Gauss."""
+    it = flying(release)
+    aid, innovations = it.ekf["aid"]["mag"], []
+    aid["innovation"][:], aid["innovation_variance"][:], aid["observation_variance"][:] = FIELD, 1.0, 0.0025
+
+    def update(ekf, params, R, innovation):
+        innovations.append(float(innovation))
+        ekf["mag_B"][:] = 0.1
+        return True
+
+    monkeypatch.setattr(mag_fusion, "measurement_update", update)
+    monkeypatch.setattr(mag_fusion, "scale_kalman_gain", lambda *_: None)
+    mag_fusion.fuse_mag.py_func(it.ekf, it.params, np.zeros(3), 0.0025, True, True)
+    assert innovations == pytest.approx(FIELD if at_first else [FIELD[0], 0.1, 0.1])

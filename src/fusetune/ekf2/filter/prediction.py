@@ -305,7 +305,6 @@ def _finish_by_params(ekf, params):
 @kernel
 def _finish_by_fixed_limit(ekf, params):
     limit_states(ekf, OLD_GYRO_BIAS_LIMIT, params.EKF2_ABL_LIM)
-    follow_turn(ekf)
     ekf.quaternion.mean_dt = ekf.dt_ekf_avg
 
 

@@ -633,6 +633,13 @@ class Behaviours:
         until="v1.15",
         source="mag_control.cpp, mag_3d_control.cpp, mag_fusion.cpp",
     )
+    follows_newest_turn: bool = _behaviour(
+        "How fast the vehicle turns, by which the field is fused or not, is that of the newest IMU samples and not of "
+        "those at the horizon.",
+        since="v1.13",
+        until="v1.13",
+        source="ekf.cpp",
+    )
     fuses_heading_or_field: bool = _behaviour(
         "The magnetometer fuses the heading, or, once it is aligned in flight and the vehicle accelerates or turns "
         "(EKF2_MAG_YAWLIM), the field, whose states have a covariance only then. The strength alone is checked, within "
@@ -653,6 +660,13 @@ class Behaviours:
         since="v1.13",
         until="v1.13",
         source="mag_control.cpp, mag_fusion.cpp, ekf_helper.cpp",
+    )
+    finds_field_first: bool = _behaviour(
+        "The innovations of all three axes of the field are found before the first is fused; each is linearised at the "
+        "state that the axes before it left.",
+        since="v1.13",
+        until="v1.13",
+        source="mag_fusion.cpp",
     )
     forces_every_yaw: bool = _behaviour(
         "A heading that is rejected on the ground is fused all the same every time. v1.14 does so once a second.",

@@ -21,6 +21,7 @@ from fusetune.ekf2.filter.output_predictor.output_predictor import (
     initialise_output_predictor,
     predict_output,
 )
+from fusetune.ekf2.filter.quaternion_core.quaternion_prediction import follow_newest_turn
 from fusetune.ekf2.replay.commands import handle_command
 from fusetune.ekf2.replay.recording import EstimatorViews, begin_gap_recording, finish_recording, record_update
 from fusetune.ekf2.replay.withholding import pretend_fused
@@ -220,6 +221,7 @@ def _predict_output_until(ekf, params, imu, sample, stop):
     """Integrate the IMU samples from index `sample` to before `stop` at the full rate; return where it is now."""
     has_offset = has_imu_offset(ekf.output, params)
     while sample < stop:
+        follow_newest_turn(ekf, imu[sample])
         predict_output(ekf.output, params, imu[sample], has_offset)
         sample += 1
     return sample

@@ -15,7 +15,7 @@ from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.filter.common.levelling import LPF_ALPHA
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.releases.behaviours import BEHAVIOURS
-from fusetune.ekf2.releases.by_release import by_release, marked
+from fusetune.ekf2.releases.by_release import by_release, does, marked
 from fusetune.ekf2.schedule.imu_intervals import oldest_buffered
 from fusetune.ekf2.schedule.timeline import value_at
 
@@ -70,6 +70,10 @@ _may_start = by_release(_at_once, "starts_with_samples", _with_samples)
 """Whether a filter that is level may start at a run."""
 
 
+_starts_at_any_run = does("starts_with_samples")
+"""Whether the filter may start at a run that ends no interval; the first update is then that of the next interval."""
+
+
 @kernel
 def _schedule_updates(intervals, imu, predict_us, imu_length, start_us, levelling, updates):
     """Fill `updates`; return how many there are.
@@ -95,6 +99,8 @@ def _schedule_updates(intervals, imu, predict_us, imu_length, start_us, levellin
         delayed = oldest_buffered(newest, imu_length)
         if not levelled and newest >= 0:
             levelled = _is_level(intervals[newest], levelling) and _may_start(levelling, run)
+            if levelled and _starts_at_any_run(levelling):
+                is_waiting = intervals[newest].run == run
         if levelled and is_waiting:
             is_waiting = False
             average = averaged_interval(intervals[delayed], average, value_at(predict_us, run))

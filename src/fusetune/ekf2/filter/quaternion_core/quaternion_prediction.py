@@ -62,12 +62,42 @@ def _filter_height_rate(ekf, dt):
 
 
 @kernel
+def _add_turn(modes, about_down, dt):
+    modes.turn += about_down
+    modes.turn_rate_lpf += TURN_RATE_LPF_ALPHA * (about_down / dt - modes.turn_rate_lpf)
+
+
+@kernel
 def follow_turn(ekf):
     """Sum and low-pass the turn about the vertical, of `ekf.scratch.quat_before` (rad, body), after the state moved."""
-    R, turn, modes = ekf.R_to_earth, ekf.scratch.quat_before, ekf.mag_modes
+    R, turn = ekf.R_to_earth, ekf.scratch.quat_before
     about_down = turn[0] * R[2, 0] + turn[1] * R[2, 1] + turn[2] * R[2, 2]
-    modes.turn += about_down
-    modes.turn_rate_lpf += TURN_RATE_LPF_ALPHA * (about_down / ekf.imu_delayed.delta_ang_dt - modes.turn_rate_lpf)
+    _add_turn(ekf.mag_modes, about_down, ekf.imu_delayed.delta_ang_dt)
+
+
+@kernel
+def _leave_newest_turn(ekf, imu):
+    """The turn is that of the horizon, or of no use."""
+
+
+@kernel
+def _follow_newest_turn(ekf, imu):
+    """Add the sample before, which an update between the two has not seen yet."""
+    modes, output = ekf.mag_modes, ekf.output
+    if modes.newest_dt > 0.0:
+        about_down = 0.0
+        for i in range(3):
+            turn = modes.newest_turn[i] - output.gyro_bias[i] * modes.newest_dt + output.delta_angle_corr[i]
+            about_down += turn * modes.newest_down[i]
+        _add_turn(modes, about_down, modes.newest_dt)
+    modes.newest_dt = imu.delta_ang_dt
+    for i in range(3):
+        modes.newest_turn[i] = imu.delta_ang[i]
+        modes.newest_down[i] = output.R_to_earth[2, i]
+
+
+follow_newest_turn = by_release(_leave_newest_turn, "follows_newest_turn", _follow_newest_turn)
+"""Sum and low-pass the turn about the vertical by the newest IMU samples, each before the output predictor has it."""
 
 
 @kernel

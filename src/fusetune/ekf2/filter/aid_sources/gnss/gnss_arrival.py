@@ -14,6 +14,7 @@ from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
 from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import clock_of_checks, run_gnss_checks
 from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import place_origin
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
 from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import look_field_up_by_fix
 from fusetune.ekf2.filter.common.earth_rate import set_earth_rate
 from fusetune.ekf2.filter.common.local_origin import project_to_local
@@ -66,6 +67,7 @@ def _check_and_project(ekf, params, given, slot):
     round_to_message(sample)
     run_gnss_checks(ekf, params, sample)
     ekf.gnss.checks_passed = _is_past(ekf, ekf.gnss.last_fail_us, int(params.EKF2_REQ_GPS_H * 1e6))
+    requested = ekf.mag_modes.yaw_reset_requested
     if not ekf.origin.valid:
         if ekf.filter_initialised and ekf.gnss.checks_passed:
             place_origin(ekf, sample)
@@ -73,6 +75,9 @@ def _check_and_project(ekf, params, given, slot):
             set_earth_rate(ekf, ekf.origin.lat_rad)
         elif look_field_up_by_fix(ekf, sample, True):
             set_earth_rate(ekf, math.radians(sample.lat_deg))
+    if int(params.EKF2_MAG_TYPE) == MAG_TYPE_NONE:
+        # no magnetometer could reset the yaw
+        ekf.mag_modes.yaw_reset_requested = requested
 
     north, east = 0.0, 0.0
     if ekf.origin.valid and sample.fix_type >= MIN_FIX_TYPE:

@@ -154,6 +154,27 @@ _note_heading_by_field = by_release(_note_heading, "fuses_heading_or_field", _no
 
 
 @kernel
+def _keep_jacobian(ekf, axis, H):
+    """All axes are linearised at the first state."""
+
+
+_renew_jacobian = by_release(_keep_jacobian, "finds_field_first", compute_mag_h)
+
+
+@kernel
+def _find_innovation(ekf, axis, mag):
+    ekf.aid.mag.innovation[axis] = predict_mag(ekf, axis) - mag[axis]
+
+
+@kernel
+def _keep_innovation(ekf, axis, mag):
+    """It stays the one that was found before the first axis was fused."""
+
+
+_renew_innovation = by_release(_find_innovation, "finds_field_first", _keep_innovation)
+
+
+@kernel
 def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
     """Fuse the axes one after the other, all linearised at the first state; return whether all were fused.
 
@@ -174,10 +195,11 @@ def fuse_mag(ekf, params, mag, R_mag, update_all_states, update_tilt):
         if axis == 2 and ekf.cs.synthetic_mag_z:
             continue
         H = jacobians[axis]
+        _renew_jacobian(ekf, axis, H)
         variance = compute_innovation_variance(ekf, H, R_mag)
         if axis > 0:
             aid.innovation_variance[axis] = variance
-            aid.innovation[axis] = predict_mag(ekf, axis) - mag[axis]
+            _renew_innovation(ekf, axis, mag)
         if aid.innovation_variance[axis] < R_mag:
             recover_from_bad_mag_covariance(ekf, params, update_all_states)
             return False

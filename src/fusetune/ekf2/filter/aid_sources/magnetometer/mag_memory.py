@@ -52,6 +52,8 @@ MAG_MODES = np.dtype(
         *fields("i8", "time_last_suitable", "time_last_used", "time_turn_started", "bad_yaw_events"),
         *fields("f8", "turn", "turn_rate_lpf", "saved_down_variance", "static_yaw"),
         ("saved_body_variance", "f8", (3,)),
+        *fields("f8", "newest_turn", "newest_down", shape=(3,)),
+        ("newest_dt", "f8"),
         ("saved_horizontal_covariance", "f8", (2, 2)),
         ("held_yaw", AID_SOURCE),
     ],
@@ -62,8 +64,9 @@ MAG_MODES = np.dtype(
 Whether the yaw is to be reset; whether the vehicle turns enough to tell the body field, and when it last moved enough
 to tell it or the heading (µs); when the magnetometer was last used (µs), and whether it may not be used, or could not
 for long; whether the yaw came from elsewhere; the turn about down since `time_turn_started` (rad) and its filtered rate
-(rad/s); variances of the field states while they are not estimated; the yaw at which the vehicle came to rest (rad, NaN
-if it did not), and what becomes of fusing that.
+(rad/s), in v1.13 without the newest IMU sample, whose turn (rad, body), interval (s) and direction of down (body) wait
+for the next; variances of the field states while they are not estimated; the yaw at which the vehicle came to rest
+(rad, NaN if it did not), and what becomes of fusing that.
 """
 
 MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_3D, MAG_TYPE_INDOOR, MAG_TYPE_NONE, MAG_TYPE_INIT = 0, 1, 2, 4, 5, 6
