@@ -288,8 +288,13 @@ class _Builder:
             parts.append(actions)
         end = np.zeros(1, ACTION)
         end["update"] = _NONE_FOLLOWS
-        actions = np.concatenate([*parts, end])
-        actions = actions[np.argsort(np.ascontiguousarray(actions["update"]), kind="stable")]
+        if BEHAVIOURS[self.clock.release].follows_flags_at_once:
+            # what arrives is judged by the flags of then, which are read first
+            actions = np.concatenate([*reversed(parts), end])
+            actions = actions[np.lexsort((actions["run"], actions["update"]))]
+        else:
+            actions = np.concatenate([*parts, end])
+            actions = actions[np.argsort(np.ascontiguousarray(actions["update"]), kind="stable")]
         tables = ScheduleTables(
             self.intervals, self.updates, actions, drag, self._events(), self.lengths, self.levelling
         )
