@@ -599,3 +599,13 @@ def test_v1_13_finds_all_axes_of_the_field_before_one_is_fused(release, at_first
     monkeypatch.setattr(mag_fusion, "scale_kalman_gain", lambda *_: None)
     mag_fusion.fuse_mag.py_func(it.ekf, it.params, np.zeros(3), 0.0025, True, True)
     assert innovations == pytest.approx(FIELD if at_first else [FIELD[0], 0.1, 0.1])
+
+
+@pytest.mark.parametrize(("release", "kept"), [(V113, False), (V114, True), (V116, True)])
+def test_a_heading_of_v1_13_leaves_the_field_alone(release, kept):
+    ekf = flying(release).ekf
+    ekf["scratch"]["K"][:] = 1.0
+    yaw_fusion._keep_gains_of_yaw(ekf)
+    expected = np.ones(24)
+    expected[MAG_EARTH : MAG_BODY + 3] = kept
+    np.testing.assert_array_equal(ekf["scratch"]["K"], expected)
