@@ -55,6 +55,8 @@ from fusetune.ekf2.filter.terrain_filter import (
 from fusetune.ekf2.numerics.rotations import quat_to_dcm
 from fusetune.ekf2.replay import flight_schedule
 from fusetune.ekf2.replay.recording import views_of
+from fusetune.ekf2.schedule.sensor_actions import ACTION, BUFFERED, DUE
+from fusetune.ekf2.schedule.taking_actions import BARO, GNSS, SYSTEM_FLAGS
 
 V115 = "v1.15"
 V114 = "v1.14"
@@ -986,3 +988,14 @@ def test_yaw_of_vision_is_by_the_sequence_of_the_estimate_in_v1_13(monkeypatch):
         quat_to_dcm(it.ekf["q"], it.ekf["R_to_earth"])
         vision_by_mask._control_yaw.py_func(it.ekf, it.params, False)
         assert it.ekf["aid"]["ev_yaw"]["innovation"][0] == pytest.approx(-math.atan2(*yaw))
+
+
+@pytest.mark.parametrize(("mixed", "expected"), [(False, [0, 1, 2, 3, 4]), (True, [3, 0, 2, 1, 4])])
+def test_flags_that_act_at_once_come_before_what_arrives_then(mixed, expected):
+    actions = np.zeros(5, ACTION)
+    # GNSS arrives at run 4 and is taken, the barometer arrives at run 6, flags at run 4, all before update 2
+    actions["sensor"] = GNSS, GNSS, BARO, SYSTEM_FLAGS, GNSS
+    actions["what"] = BUFFERED, DUE, BUFFERED, DUE, BUFFERED
+    actions["run"] = 4, 1, 6, 4, 5
+    actions["update"] = 2, 2, 2, 2, 3
+    assert flight_schedule._order(actions, mixed).tolist() == expected

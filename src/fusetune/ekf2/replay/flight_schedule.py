@@ -19,7 +19,7 @@ from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, BIAS_RESETS, EstimatorInpu
 from fusetune.ekf2.feed.sample_arrival import NOTE, NOTED
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import drag_accumulator
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_NONE
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
 from fusetune.ekf2.filter.wind import AID_MASK_DRAG
@@ -38,7 +38,7 @@ from fusetune.ekf2.schedule.imu_intervals import IMU_INTERVAL
 from fusetune.ekf2.schedule.longest_delay import longest_delay_ms
 from fusetune.ekf2.schedule.sensor_actions import ACTION, ARRIVED, DUE
 from fusetune.ekf2.schedule.starting_samples import looks_of_runs, low_passed, taken_at
-from fusetune.ekf2.schedule.taking_actions import DRAG, FLOW, SENSOR_NAMES
+from fusetune.ekf2.schedule.taking_actions import DRAG, FLOW, SENSOR_NAMES, SYSTEM_FLAGS
 from fusetune.ekf2.schedule.timeline import Steps, steps_of, timeline
 from fusetune.ekf2.schedule.updates import NEVER, UPDATE, levelling_record
 from fusetune.px4.aid_sources import SENSORS
@@ -210,6 +210,20 @@ def notes_of(params: np.void, changes: Changes) -> Rows:
     return np.array(rows, NOTE)
 
 
+def _order(actions: Rows, mixed: bool) -> Rows:
+    """Places of actions in the order in which they are carried out: by update, then by sensor.
+
+    Where arrivals are `mixed`, those of all sensors are by run, flags first, and then follows what is taken: what is
+    known of the vehicle matters to a sample that is looked at as it arrives.
+    """
+    updates = np.ascontiguousarray(actions["update"])
+    if not mixed:
+        return np.argsort(updates, kind="stable")
+    are_flags = actions["sensor"] == SYSTEM_FLAGS
+    are_taken = (actions["what"] == DUE) & ~are_flags
+    return np.lexsort((~are_flags, actions["run"], are_taken, updates))
+
+
 def _size(rows: Rows) -> int:
     return rows.nbytes
 
@@ -289,7 +303,7 @@ class _Builder:
         end = np.zeros(1, ACTION)
         end["update"] = _NONE_FOLLOWS
         actions = np.concatenate([*parts, end])
-        actions = actions[np.argsort(np.ascontiguousarray(actions["update"]), kind="stable")]
+        actions = actions[_order(actions, BEHAVIOURS[self.clock.release].follows_flags_at_once)]
         tables = ScheduleTables(
             self.intervals, self.updates, actions, drag, self._events(), self.lengths, self.levelling
         )
