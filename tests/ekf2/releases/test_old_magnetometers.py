@@ -15,7 +15,7 @@ from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE, IMU_SAMPLE
-from fusetune.ekf2.filter import yaw_fusion
+from fusetune.ekf2.filter import world_field, yaw_fusion
 from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
     field_checks,
@@ -26,7 +26,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer import (
     mag_mode_control,
     mag_modes,
     mag_resets,
-    world_field,
     yaw_by_course,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
