@@ -669,7 +669,8 @@ class Behaviours:
         source="mag_fusion.cpp",
     )
     forces_every_yaw: bool = _behaviour(
-        "A heading that is rejected on the ground is fused all the same every time. v1.14 does so once a second.",
+        "A heading leaves the field states alone, and one that is rejected on the ground is fused all the same every "
+        "time. v1.14 does so once a second.",
         since="v1.13",
         until="v1.13",
         source="mag_fusion.cpp",
