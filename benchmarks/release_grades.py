@@ -4,13 +4,14 @@
     python -m benchmarks.release_grades LOGS_DIR docs/releases.md      # puts it there
     python -m benchmarks.release_grades LOGS_DIR --start warm          # started from the vehicle's own state
 
-LOGS_DIR holds ULog files. Of those that can be replayed the log is repaired and started as the pipeline does it, once
-with v1.16's estimator and once with that of `release: auto`; the figures are those of docs/any_log.md, v1.16 → own.
+LOGS_DIR holds ULog files. Those that can be replayed are repaired and started as the pipeline does it, once with
+v1.16's estimator and once with that of `release: auto`; the figures are those of docs/any_log.md, v1.16 → own.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -88,9 +89,13 @@ def rows(logs: Sequence[Path], start: StartSettings, count: Callable[[str, str],
         except UserError as error:
             answer = error.reason
         if isinstance(answer, str):
-            yield (log.stem, f"not replayed: {answer[:60]}", *["–"] * (len(HEADER) - 2))
+            yield (log.stem, f"not replayed: {answer.partition(':')[0]}", *["–"] * (len(HEADER) - 2))
             continue
         flew, (before, after) = answer
+        if math.isnan(after.distance):
+            told = (log.stem, flew, after.release, after.start, "– (nothing to compare)")
+            yield (*told, *["–"] * (len(HEADER) - len(told)))
+            continue
         count(before.grade, after.grade)
         yield (
             log.stem, flew, after.release, after.start, _both(before.grade, after.grade),

@@ -15,8 +15,8 @@ from tests.ekf2.releases.test_older_aiding import arrives, give_gnss, place, una
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
 from fusetune.ekf2.filter import height_control, one_height_source, vertical_innovations
-from fusetune.ekf2.filter.aid_sources import fake_pos_until_v1_15
 from fusetune.ekf2.filter.aid_sources.barometer import baro_offset_bias
+from fusetune.ekf2.filter.aid_sources.fake_position import one_fake_position as fake_pos_until_v1_15
 from fusetune.ekf2.filter.aid_sources.gnss import (
     gnss_arrival,
     gnss_by_mask,

@@ -9,6 +9,7 @@ Mirrors PX4 v1.16 `EKF/yaw_fusion.cpp`, whose resets stand in `resets/`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
@@ -91,3 +92,11 @@ def _always(ekf, aid):
 
 
 _is_force_due = by_release(_once_per_second, "forces_every_yaw", _always)
+
+
+@kernel
+def judge_angle(ekf, params, aid, observation, innovation, R):
+    """Judge an angle (rad) that is observed for the yaw with variance R (rad²); its H is left in `ekf.scratch.H`."""
+    variance = compute_yaw_innov_var_and_h(ekf, R, ekf.scratch.H)
+    set_axis(aid, 0, observation, R, innovation, variance)
+    update_aid_source_status(ekf, aid, 1, aid.timestamp_sample, max(params.EKF2_HDG_GATE, 1.0))

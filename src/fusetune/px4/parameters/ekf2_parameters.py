@@ -20,6 +20,7 @@ from fusetune.px4.parameters.parameter_migration import OLDER_NAMES, SENSOR_PARA
 from fusetune.px4.releases import (
     BASELINE,
     CONTROL_BY_SOURCE,
+    FIRST,
     MAG_TYPES_GIVEN_UP,
     SENSOR_RATES_UNREAD,
     Release,
@@ -297,8 +298,8 @@ def _sensor_rate(name: str, default: float) -> ParameterMetadata:
         name=name,
         type="FLOAT",
         kind="float",
-        default_history=(((1, 13), default),),
-        first_release=(1, 13),
+        default_history=((FIRST, default),),
+        first_release=FIRST,
         last_release=(1, 14),
         minimum=1.0,
         maximum=200.0,

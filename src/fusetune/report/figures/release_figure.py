@@ -27,7 +27,9 @@ def draw_releases(found: ReleaseComparison) -> Figure:
     for number, replay in enumerate(found.replays):
         look = {"color": colours[replay.release], "marker": _MARKERS[number % len(_MARKERS)], "linestyle": "none"}
         axes_of = [replay.axis(*key) for key in keys]
-        changes = [np.nan if one is None else 100.0 * (one.rms_change or 0.0) for one in axes_of]
+        # what the release compared with has no samples of has nothing to be held against
+        own = 0.0 if replay.release == found.base else np.nan
+        changes = [own if one is None or one.rms_change is None else 100.0 * one.rms_change for one in axes_of]
         shares = [np.nan if one is None else 100.0 * one.rejected for one in axes_of]
         places = np.arange(len(keys)) + _aside(number, len(found.replays))
         sizes.plot(changes, places, label=replay.release, markersize=4.0, **look)

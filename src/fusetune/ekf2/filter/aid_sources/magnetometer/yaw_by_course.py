@@ -8,14 +8,14 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_position import reset_horizontal_position_to_gnss
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_velocity import reset_velocity_to_gnss
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import (
     is_heading_wanted,
     reset_yaw_to_filtered_field,
 )
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_INDOOR
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_INDOOR
 from fusetune.ekf2.filter.common.state import VELOCITY
+from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.numerics.rotations import euler_yaw, rotate_to_earth, wrap_pi
 
