@@ -892,7 +892,7 @@ class Behaviours:
     )
     linearises_drag_by_force: bool = _behaviour(
         "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
-        "force.",
+        "force. It waits while the magnetometer could not be used for so long that the yaw is to be reset.",
         since="v1.13",
         until="v1.13",
         source="drag_fusion.cpp",
