@@ -49,7 +49,7 @@ def _reset_yaw_and_blame(ekf, params):
     if not is_yaw_emergency_estimate_available(ekf):
         return False
     reset_quat_state_yaw(ekf, params, ekf.gsf.yaw, ekf.gsf.yaw_variance)
-    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
     ekf.cs.yaw_align = True
     if ekf.cs.mag_hdg or ekf.cs.mag_3d:
         ekf.cs.mag_fault = True

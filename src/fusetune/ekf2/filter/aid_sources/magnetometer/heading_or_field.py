@@ -90,4 +90,4 @@ def reset_yaw_to_filtered_field(ekf, params):
     reset_quat_state_yaw(ekf, params, yaw, max(params.EKF2_HEAD_NOISE, HEADING_DEVIATION_MIN) ** 2)
     take_filtered_field(ekf)
     reset_field_covariance(ekf, params)
-    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us

@@ -119,7 +119,7 @@ def _control_with_sample(ekf, params):
     _update_inhibition(ekf, params)
     if ekf.cs.mag_3d:
         ekf.aid.mag.timestamp_sample = ekf.sensors.mag.sample.time_us
-        stable = ekf.time_delayed_us - ekf.mag.flt_mag_align_start_time > STABILISING_US
+        stable = ekf.imu_delayed.time_us - ekf.mag.flt_mag_align_start_time > STABILISING_US
         fuse_field(ekf, params, sample, stable)
     else:
         ekf.aid.mag_heading.timestamp_sample = ekf.sensors.mag.sample.time_us
@@ -154,8 +154,8 @@ def _update_inhibition(ekf, params):
     is_needed = is_north_east_aiding_active(ekf) or cs.ev_pos or cs.ev_vel
     modes.inhibited = cs.mag_field_disturbed or (int(params.EKF2_MAG_TYPE) == MAG_TYPE_INDOOR and not is_needed)
     if not modes.inhibited:
-        modes.time_last_used = ekf.time_delayed_us
-    elif ekf.time_delayed_us - modes.time_last_used > INHIBITED_FOR_US:
+        modes.time_last_used = ekf.imu_delayed.time_us
+    elif ekf.imu_delayed.time_us - modes.time_last_used > INHIBITED_FOR_US:
         modes.inhibited_for_long = True
 
 

@@ -187,7 +187,7 @@ def _is_body_field_known(ekf):
 @kernel
 def _reset_yaw(ekf, params):
     """Reset the yaw, to the yaw estimator with GNSS, else to the field; once per update. Return whether it was."""
-    is_repeated = ekf.mag.flt_mag_align_start_time == ekf.time_delayed_us
+    is_repeated = ekf.mag.flt_mag_align_start_time == ekf.imu_delayed.time_us
     if is_repeated or ekf.cs_prev.yaw_align != ekf.cs.yaw_align or ekf.mag.counter <= 1:
         return False
     if is_north_east_aiding_active(ekf) and is_yaw_emergency_estimate_available(ekf):
@@ -199,7 +199,7 @@ def _reset_yaw(ekf, params):
     ekf.cs.yaw_align = True
     if ekf.cs.in_air:
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
     return True
 
 

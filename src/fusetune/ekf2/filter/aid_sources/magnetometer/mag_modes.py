@@ -56,8 +56,8 @@ def _may_fuse_field(ekf, params):
     _update_bias_observability(ekf, params)
     modes = ekf.mag_modes
     if modes.bias_observable or ekf.field_history.yaw_observable:
-        modes.time_last_suitable = ekf.time_delayed_us
-    return ekf.cs.mag_aligned_in_flight and ekf.time_delayed_us - modes.time_last_suitable < SUITABLE_FOR_US
+        modes.time_last_suitable = ekf.imu_delayed.time_us
+    return ekf.cs.mag_aligned_in_flight and ekf.imu_delayed.time_us - modes.time_last_suitable < SUITABLE_FOR_US
 
 
 @kernel
@@ -68,10 +68,10 @@ def _update_bias_observability(ekf, params):
     if not modes.bias_observable:
         modes.bias_observable = abs(modes.turn_rate_lpf) > limit
     else:
-        duration = (ekf.time_delayed_us - modes.time_turn_started) * 1e-6
+        duration = (ekf.imu_delayed.time_us - modes.time_turn_started) * 1e-6
         modes.bias_observable = abs(modes.turn) > SUSTAINED_SHARE * limit * duration
     modes.turn = 0.0
-    modes.time_turn_started = ekf.time_delayed_us
+    modes.time_turn_started = ekf.imu_delayed.time_us
 
 
 @kernel

@@ -80,7 +80,7 @@ def _reset_mag_states(ekf, params, mag, reset_heading):
         reset_mag_states_to_measurement(ekf, params, mag, reset_heading)
     if ekf.cs.in_air and _aligns_field(ekf, reset_heading):
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
 
 
 @kernel
@@ -116,7 +116,7 @@ def _reset_mag_states_by_yaw_estimator(ekf, params, mag, reset_heading):
         ekf.mag_I[0], ekf.mag_I[1], ekf.mag_I[2] = rotate_to_earth(ekf.R_to_earth, mag[0], mag[1], mag[2])
     if ekf.cs.in_air:
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
 
 
 reset_mag_states = by_release(_reset_mag_states, "puts_body_field_by_yaw_estimator", _reset_mag_states_by_yaw_estimator)

@@ -31,7 +31,7 @@ def reset_yaw_to_field(ekf, params):
 
     Indoors, without anything that needs the yaw, it counts as aligned as it is.
     """
-    if ekf.time_delayed_us == ekf.mag.flt_mag_align_start_time:
+    if ekf.imu_delayed.time_us == ekf.mag.flt_mag_align_start_time:
         return True
     if ekf.mag.counter == 0:
         return False
@@ -61,7 +61,7 @@ def realign_yaw_by_course(ekf, params):
     sample = ekf.sensors.mag.sample.mag
     ekf.mag_I[0], ekf.mag_I[1], ekf.mag_I[2] = rotate_to_earth(ekf.R_to_earth, sample[0], sample[1], sample[2])
     reset_field_covariance(ekf, params)
-    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
     if is_yaw_bad:
         reset_velocity_to_gnss(ekf, params)
         reset_horizontal_position_to_gnss(ekf, params)
