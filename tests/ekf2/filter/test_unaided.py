@@ -7,7 +7,7 @@ import pytest
 from tests.ekf2.filter.height_and_field_records import at_time, make_estimator, make_parameters, set_attitude
 
 from fusetune.ekf2.filter.aid_sources.fake_height_control import control_fake_hgt_fusion
-from fusetune.ekf2.filter.aid_sources.fake_pos_control import control_fake_pos_fusion
+from fusetune.ekf2.filter.aid_sources.fake_position.fake_pos_control import control_fake_pos_fusion
 from fusetune.ekf2.filter.aid_sources.zero_gyro_update import control_zero_gyro_update
 from fusetune.ekf2.filter.aid_sources.zero_innovation_heading_update import control_zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.zero_velocity_update import control_zero_velocity_update

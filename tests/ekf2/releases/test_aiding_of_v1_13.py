@@ -12,11 +12,13 @@ import pytest
 from tests.ekf2.filter.aiding_estimator import START_US, set_time
 from tests.ekf2.releases.test_named_behaviours import Flying, asked, flying
 from tests.ekf2.releases.test_older_aiding import arrives, give_gnss, place, unaided
+from tests.ekf2.replay.test_flight_schedule import Arrival, inputs_of
 
+from fusetune.ekf2.compiled.compilation import ensure_compiled
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
-from fusetune.ekf2.filter import height_control, one_height_source, vertical_innovations
-from fusetune.ekf2.filter.aid_sources import fake_pos_until_v1_15
+from fusetune.ekf2.filter import estimator, height_control, one_height_source, vertical_innovations
 from fusetune.ekf2.filter.aid_sources.barometer import baro_offset_bias
+from fusetune.ekf2.filter.aid_sources.fake_position import one_fake_position as fake_pos_until_v1_15
 from fusetune.ekf2.filter.aid_sources.gnss import (
     gnss_arrival,
     gnss_by_mask,
@@ -25,9 +27,15 @@ from fusetune.ekf2.filter.aid_sources.gnss import (
     gnss_yaw_by_mask,
     gnss_yaw_control,
 )
+from fusetune.ekf2.filter.common import timing
+from fusetune.ekf2.filter.common.parameters import complete, parameter_record
 from fusetune.ekf2.filter.yaw_estimator import matrix_bank, told_velocity
 from fusetune.ekf2.numerics.rotations import euler_yaw
 from fusetune.ekf2.replay import recording
+from fusetune.ekf2.replay.flight_schedule import flight_schedule
+from fusetune.ekf2.schedule.taking_actions import GNSS as GNSS_DATA
+from fusetune.ekf2.schedule.taking_actions import SYSTEM_FLAGS
+from fusetune.px4 import releases
 
 V113, V114 = "v1.13", "v1.14"
 OLD_AND_NEW = [(V113, True), (V114, False)]
@@ -452,3 +460,48 @@ def test_the_fake_position_ends_with_its_interval_in_v1_13():
         set_time(one.ekf, START_US + 110_000 * number)
         asked(fake_pos_until_v1_15.control_fake_position, one, one.params)
         assert one.ekf["cs"]["fake_pos"] == (number == 0)
+
+
+# time
+
+
+@pytest.mark.parametrize(("release", "old"), OLD_AND_NEW)
+def test_what_happens_is_noted_by_the_newest_imu_sample_in_v1_13(release, old):
+    one = flying(release)
+    one.ekf["time_delayed_us"] = START_US + 90_000
+    assert asked(timing.horizon_us, one) == START_US + (0 if old else 90_000)
+
+
+def test_the_time_is_put_ahead_for_an_update(it, monkeypatch):
+    seen = []
+    for name in ("predict_state", "update_imu_bias_inhibit", "predict_covariance", "run_terrain_filter"):
+        monkeypatch.setattr(estimator, name, lambda *_: None)
+    monkeypatch.setattr(estimator, "control_fusion_modes", lambda ekf, _: seen.append(int(ekf["time_delayed_us"])))
+    monkeypatch.setattr(estimator, "correct_output", lambda ekf, _: seen.append(int(ekf["time_delayed_us"])))
+    it.ekf["time_latest_us"] = START_US + 90_000
+    asked(estimator.update, it, it.params)
+    assert seen == [START_US + 90_000, START_US]
+
+
+@pytest.mark.parametrize(("mag_type", "requested"), [(0.0, True), (5.0, False)])
+def test_a_first_fix_resets_the_yaw_where_there_is_a_magnetometer(sample, mag_type, requested):
+    one = flying(V113)
+    one.params["EKF2_MAG_TYPE"] = mag_type
+    arrives(one, sample)
+    assert one.ekf["mag_modes"]["yaw_reset_requested"] == requested
+
+
+def test_flags_are_read_before_gnss_of_the_same_run_and_the_first_update_ends_an_interval():
+    ensure_compiled(V113)
+    mags, baros = [Arrival(run, 0) for run in range(5, 600, 20)], [Arrival(run, 0) for run in range(3, 600, 10)]
+    fixes, flags = [Arrival(20, 0), Arrival(60, 0)], [Arrival(20, 0), Arrival(61, 0)]
+    inputs = inputs_of({"mag": mags, "baro": baros, "gnss": fixes, "system_flags": flags}, [5_000] * 600)
+    wanted = {"EKF2_AID_MASK": 1.0, "SENS_BARO_RATE": 100.0, "SENS_MAG_RATE": 100.0, "EKF2_MAG_TYPE": 0.0}
+    values = complete({}, {}, releases.number_of_name(V113)) | wanted
+    tables = flight_schedule(inputs, parameter_record(values, V113)[0], (), release=V113).tables
+    assert tables.updates["run"][0] in tables.intervals["run"]
+    early = [
+        (int(one["run"]), int(one["sensor"])) for one in tables.actions if one["sensor"] in (GNSS_DATA, SYSTEM_FLAGS)
+    ]
+    seen = list(dict.fromkeys(one for one in early if one[0] in (20, 60, 61)))
+    assert seen == [(20, SYSTEM_FLAGS), (20, GNSS_DATA), (60, GNSS_DATA), (61, SYSTEM_FLAGS)]

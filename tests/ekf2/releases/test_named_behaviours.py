@@ -16,9 +16,9 @@ from tests.ekf2.filter.aiding_estimator import START_US, hovering, set_time
 from fusetune.ekf2.feed.message_samples import gnss_measurement_times
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_FRD, EV_FRAME_NED, GNSS_SAMPLE
 from fusetune.ekf2.filter import bias_inhibition, measurement_update
-from fusetune.ekf2.filter.aid_sources import fake_pos_control
 from fusetune.ekf2.filter.aid_sources.airspeed import airspeed_control
 from fusetune.ekf2.filter.aid_sources.external_vision import ev_attitude_error, ev_height_control, ev_vel_control
+from fusetune.ekf2.filter.aid_sources.fake_position import fake_pos_control
 from fusetune.ekf2.filter.aid_sources.gnss import (
     gnss_height_control,
     gnss_resets,

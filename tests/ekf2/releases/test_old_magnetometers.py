@@ -15,7 +15,7 @@ from tests.ekf2.filter.height_and_field_records import put_sample, set_attitude
 from tests.ekf2.releases.test_named_behaviours import Flying, flying
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE, IMU_SAMPLE
-from fusetune.ekf2.filter import yaw_fusion
+from fusetune.ekf2.filter import world_field, yaw_fusion
 from fusetune.ekf2.filter.aid_sources import zero_innovation_heading_update
 from fusetune.ekf2.filter.aid_sources.magnetometer import (
     field_checks,
@@ -26,7 +26,6 @@ from fusetune.ekf2.filter.aid_sources.magnetometer import (
     mag_mode_control,
     mag_modes,
     mag_resets,
-    world_field,
     yaw_by_course,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
@@ -599,3 +598,13 @@ def test_v1_13_finds_all_axes_of_the_field_before_one_is_fused(release, at_first
     monkeypatch.setattr(mag_fusion, "scale_kalman_gain", lambda *_: None)
     mag_fusion.fuse_mag.py_func(it.ekf, it.params, np.zeros(3), 0.0025, True, True)
     assert innovations == pytest.approx(FIELD if at_first else [FIELD[0], 0.1, 0.1])
+
+
+@pytest.mark.parametrize(("release", "kept"), [(V113, False), (V114, True), (V116, True)])
+def test_a_heading_of_v1_13_leaves_the_field_alone(release, kept):
+    ekf = flying(release).ekf
+    ekf["scratch"]["K"][:] = 1.0
+    yaw_fusion._keep_gains_of_yaw(ekf)
+    expected = np.ones(24)
+    expected[MAG_EARTH : MAG_BODY + 3] = kept
+    np.testing.assert_array_equal(ekf["scratch"]["K"], expected)

@@ -999,3 +999,10 @@ def test_flags_that_act_at_once_come_before_what_arrives_then(mixed, expected):
     actions["run"] = 4, 1, 6, 4, 5
     actions["update"] = 2, 2, 2, 2, 3
     assert flight_schedule._order(actions, mixed).tolist() == expected
+
+
+@pytest.mark.parametrize(("release", "asks"), UNTIL_V113)
+def test_drag_of_v1_13_waits_for_a_yaw_that_the_field_is_to_reset(release, asks):
+    it = flying(release)
+    it.ekf["mag_modes"]["inhibited_for_long"] = True
+    assert bool(asked(drag_fusion._is_heading_good, it)) != asks

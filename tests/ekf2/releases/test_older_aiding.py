@@ -14,8 +14,9 @@ from tests.ekf2.releases.test_named_behaviours import Flying, asked, checks, fly
 
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
 from fusetune.ekf2.filter import height_control
-from fusetune.ekf2.filter.aid_sources import fake_pos_until_v1_15, zero_velocity_update
+from fusetune.ekf2.filter.aid_sources import zero_velocity_update
 from fusetune.ekf2.filter.aid_sources.barometer import baro_height_control
+from fusetune.ekf2.filter.aid_sources.fake_position import one_fake_position as fake_pos_until_v1_15
 from fusetune.ekf2.filter.aid_sources.gnss import (
     arrived_gnss_control,
     gnss_arrival,

@@ -8,7 +8,7 @@ from fusetune.ekf2.filter.aid_sources.auxvel.auxvel_fusion import control_aux_ve
 from fusetune.ekf2.filter.aid_sources.drag.drag_fusion import control_drag_fusion
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_control import control_external_vision_fusion
 from fusetune.ekf2.filter.aid_sources.fake_height_control import control_fake_hgt_fusion
-from fusetune.ekf2.filter.aid_sources.fake_pos_until_v1_15 import control_fake_position
+from fusetune.ekf2.filter.aid_sources.fake_position.one_fake_position import control_fake_position
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_fusion import control_gnss
 from fusetune.ekf2.filter.aid_sources.gravity.gravity_fusion import control_gravity_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion

@@ -6,9 +6,9 @@ Mirrors `initialiseFilter`, `initialiseTilt` of PX4 v1.13 `EKF/ekf.cpp` and `res
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import get_mag_declination
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.filter.world_field import get_mag_declination
 from fusetune.ekf2.numerics.rotations import quat_to_dcm, rotate_to_earth, update_yaw_in_rot_mat
 
 

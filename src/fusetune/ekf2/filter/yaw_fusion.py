@@ -9,7 +9,8 @@ Mirrors PX4 v1.16 `EKF/yaw_fusion.cpp`, whose resets stand in `resets/`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE
+from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance, reset_gyro_bias_z_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
@@ -40,6 +41,21 @@ compute_yaw_innov_var_and_h = by_release(_compute_by_down_error, "adds_quaternio
 
 
 @kernel
+def _keep_all_gains(ekf):
+    """A yaw corrects whatever is estimated."""
+
+
+@kernel
+def _keep_none_of_field(ekf):
+    """The field states stay, though they may have a covariance in the update that ended their fusion."""
+    for i in range(MAG_EARTH, MAG_BODY + 3):
+        ekf.scratch.K[i] = 0.0
+
+
+_keep_gains_of_yaw = by_release(_keep_all_gains, "forces_every_yaw", _keep_none_of_field)
+
+
+@kernel
 def fuse_yaw(ekf, params, aid, H_yaw):
     """Fuse a judged heading observation; return whether it was fused.
 
@@ -53,6 +69,7 @@ def fuse_yaw(ekf, params, aid, H_yaw):
     ekf.fs.bad_hdg = False
 
     compute_kalman_gain(ekf, H_yaw, aid.innovation_variance[0])
+    _keep_gains_of_yaw(ekf)
     ekf.reject.yaw = aid.innovation_rejected
     if aid.innovation_rejected:
         if not _may_force_yaw(ekf, aid):
@@ -91,3 +108,11 @@ def _always(ekf, aid):
 
 
 _is_force_due = by_release(_once_per_second, "forces_every_yaw", _always)
+
+
+@kernel
+def judge_angle(ekf, params, aid, observation, innovation, R):
+    """Judge an angle (rad) that is observed for the yaw with variance R (rad²); its H is left in `ekf.scratch.H`."""
+    variance = compute_yaw_innov_var_and_h(ekf, R, ekf.scratch.H)
+    set_axis(aid, 0, observation, R, innovation, variance)
+    update_aid_source_status(ekf, aid, 1, aid.timestamp_sample, max(params.EKF2_HDG_GATE, 1.0))

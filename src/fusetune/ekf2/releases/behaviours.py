@@ -669,7 +669,8 @@ class Behaviours:
         source="mag_fusion.cpp",
     )
     forces_every_yaw: bool = _behaviour(
-        "A heading that is rejected on the ground is fused all the same every time. v1.14 does so once a second.",
+        "A heading leaves the field states alone, and one that is rejected on the ground is fused all the same every "
+        "time. v1.14 does so once a second.",
         since="v1.13",
         until="v1.13",
         source="mag_fusion.cpp",
@@ -891,7 +892,7 @@ class Behaviours:
     )
     linearises_drag_by_force: bool = _behaviour(
         "Drag is linear in the air along its axis, as steep as at the speed for which the model has the measured "
-        "force.",
+        "force. It waits while the magnetometer could not be used for so long that the yaw is to be reset.",
         since="v1.13",
         until="v1.13",
         source="drag_fusion.cpp",

@@ -13,7 +13,6 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import entry_kernel, kernel
 from fusetune.ekf2.feed.buffers import size_buffers
 from fusetune.ekf2.feed.record_fields import fields
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import save_declination
 from fusetune.ekf2.filter.covariance import reset_accel_bias, reset_gyro_bias
 from fusetune.ekf2.filter.estimator import initialise_estimator, level_filter, update
 from fusetune.ekf2.filter.output_predictor.output_predictor import (
@@ -22,6 +21,7 @@ from fusetune.ekf2.filter.output_predictor.output_predictor import (
     predict_output,
 )
 from fusetune.ekf2.filter.quaternion_core.quaternion_prediction import follow_newest_turn
+from fusetune.ekf2.filter.world_field import save_declination
 from fusetune.ekf2.replay.commands import handle_command
 from fusetune.ekf2.replay.recording import EstimatorViews, begin_gap_recording, finish_recording, record_update
 from fusetune.ekf2.replay.withholding import pretend_fused

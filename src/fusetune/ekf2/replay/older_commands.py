@@ -7,7 +7,6 @@ Mirrors `setEkfGlobalOrigin` of PX4 v1.13 to v1.15 `EKF/ekf_helper.cpp`, `resetG
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import take_field_of_place
 from fusetune.ekf2.filter.common.conditions import is_horizontal_aiding_active
 from fusetune.ekf2.filter.common.local_origin import (
     get_global_horizontal_position,
@@ -19,6 +18,7 @@ from fusetune.ekf2.filter.common.local_origin import (
     set_origin_lat_lon,
 )
 from fusetune.ekf2.filter.resets.state_resets import reset_altitude_to, reset_local_horizontal_position_to
+from fusetune.ekf2.filter.world_field import take_field_of_place
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.releases.by_release import by_release
 

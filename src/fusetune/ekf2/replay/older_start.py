@@ -13,8 +13,8 @@ import numpy as np
 from fusetune.ekf2.feed.inputs import EstimatorInputs
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import DEGREE_PARTS, MIN_FIX_TYPE
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_3d_control import RESETS_AFTER_START
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import earth_field_vector
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH, TERRAIN
+from fusetune.ekf2.filter.world_field import earth_field_vector
 from fusetune.ekf2.numerics.geodesy import earth_rate_ned, project
 from fusetune.ekf2.numerics.world_magnetic_model import field_at
 from fusetune.px4.layouts.logged_state import LoggedState

@@ -15,10 +15,10 @@ from functools import cache
 import numpy as np
 
 from fusetune.ekf2.feed.inputs import BIAS_RESETS, EstimatorInputs, imu_samples, without_arrivals
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import earth_field_vector
 from fusetune.ekf2.filter.common.control_status import CONTROL_STATUS_NAMES
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT_REF_GNSS, HEIGHT_REF_UNKNOWN
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, ERROR_STATE_BLOCKS, MAG_BODY, MAG_EARTH, TERRAIN, WIND
+from fusetune.ekf2.filter.world_field import earth_field_vector
 from fusetune.ekf2.numerics.constants import ONE_G
 from fusetune.ekf2.numerics.geodesy import reproject
 from fusetune.ekf2.numerics.world_magnetic_model import field_at

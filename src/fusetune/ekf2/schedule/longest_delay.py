@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_NONE
 from fusetune.ekf2.releases.behaviours import BEHAVIOURS
 from fusetune.px4.aid_sources import SENSORS
 

@@ -16,7 +16,7 @@ from tests.ekf2.filter.height_and_field_records import (
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_control import control_mag_fusion
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import fuse_mag
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import check_mag_heading_consistency, reset_mag_heading
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import (
+from fusetune.ekf2.filter.world_field import (
     check_world_magnetic_model,
     earth_field_vector,
     get_mag_declination,

@@ -6,13 +6,12 @@ Mirrors PX4 v1.16 `EKF/aid_sources/zero_innovation_heading_update.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import judge_angle
 from fusetune.ekf2.filter.common.state import ERROR_STATE_SIZE
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.filter.covariance import initialise_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import multiply_covariance
-from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw
+from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw, judge_angle
 from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
 

@@ -219,6 +219,20 @@ _counts_as_fused = by_release(_always, "fuses_both_drag_axes", _where_both_were)
 
 
 @kernel
+def _is_any_heading(ekf):
+    return True
+
+
+@kernel
+def _was_field_usable(ekf):
+    """Not while the magnetometer could not be used for so long that the yaw is to be reset."""
+    return not ekf.mag_modes.inhibited_for_long
+
+
+_is_heading_good = by_release(_is_any_heading, "linearises_drag_by_force", _was_field_usable)
+
+
+@kernel
 def _is_due(ekf):
     return ekf.sensors.drag.data_ready
 
@@ -238,7 +252,7 @@ _is_sample_at_hand = by_release(_is_due, "feels_drag_in_air", _is_due_or_waits)
 @kernel
 def control_drag_fusion(ekf, params):
     """Estimate the wind from drag while `EKF2_DRAG_CTRL` asks for it."""
-    if not is_drag_enabled(ekf, params) or not ekf.sensors.drag.exists:
+    if not is_drag_enabled(ekf, params) or not ekf.sensors.drag.exists or not _is_heading_good(ekf):
         return
     if not ekf.cs.wind and not ekf.cs.fake_pos and ekf.cs.in_air:
         ekf.cs.wind = True

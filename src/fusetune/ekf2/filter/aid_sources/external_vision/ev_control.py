@@ -18,16 +18,16 @@ from fusetune.ekf2.filter.aid_sources.external_vision.ev_vel_control import (
     control_ev_vel_fusion,
     stop_ev_vel_fusion,
 )
-from fusetune.ekf2.filter.aid_sources.external_vision.ev_yaw_control import control_ev_yaw_fusion, stop_ev_yaw_fusion
+from fusetune.ekf2.filter.aid_sources.external_vision.ev_yaw_control import control_ev_yaw_fusion
 from fusetune.ekf2.filter.aid_sources.external_vision.vision_by_mask import control_vision_by_mask
 from fusetune.ekf2.filter.aid_sources.gnss.arrived_gnss_control import stop_arrived_gnss
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import stop_gnss_yaw_fusion
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import stop_heading_and_field
 from fusetune.ekf2.filter.bias_estimator.height_bias_estimator import predict_height_bias
 from fusetune.ekf2.filter.bias_estimator.position_bias_estimator import predict_position_bias
 from fusetune.ekf2.filter.common.core_memory import POSITION_REF_EV
 from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_EV
 from fusetune.ekf2.filter.common.timing import EV_MAX_INTERVAL, is_newest_sample_recent, is_timed_out
+from fusetune.ekf2.filter.source_stops.heading_and_field import stop_heading_and_field
+from fusetune.ekf2.filter.source_stops.yaw import stop_ev_yaw_fusion, stop_gnss_yaw_fusion
 from fusetune.ekf2.releases.by_release import by_release
 
 

@@ -13,12 +13,12 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_FRD, EV_FRAME_NED
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import EV_CTRL_YAW, MIN_NOISE, RESETS_AVAILABLE_AT_START
 from fusetune.ekf2.filter.common.aid_source_status import (
-    forget_aid_source_status,
     set_axis,
     update_aid_source_status,
 )
 from fusetune.ekf2.filter.common.timing import NO_AID_TIMEOUT_MAX, is_timed_out
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.filter.source_stops.yaw import stop_ev_yaw_fusion
 from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw
 from fusetune.ekf2.numerics.rotations import euler_yaw, quat_to_dcm, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
@@ -182,11 +182,3 @@ def _start_ev_yaw(ekf, params):
     if ekf.cs.ev_yaw:
         ekf.events.starting_vision_yaw_fusion = True
         ekf.ev.nb_yaw_reset_available = RESETS_AVAILABLE_AT_START
-
-
-@kernel
-def stop_ev_yaw_fusion(ekf):
-    """Leave external vision as yaw source."""
-    if ekf.cs.ev_yaw:
-        forget_aid_source_status(ekf, ekf.aid.ev_yaw, 1)
-    ekf.cs.ev_yaw = False

@@ -13,7 +13,7 @@ from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_memory import sensor_offset_body, sensor_velocity_body
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import stop_heading_and_field
+from fusetune.ekf2.filter.common.aid_mask import MASK_GNSS, MASK_POSITION, MASK_ROTATE, MASK_VELOCITY, MASK_YAW
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.local_origin import get_local_horizontal_position
 from fusetune.ekf2.filter.common.state import POSITION, VELOCITY
@@ -30,6 +30,7 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_quat_state_yaw,
     reset_velocity_to,
 )
+from fusetune.ekf2.filter.source_stops.heading_and_field import stop_heading_and_field
 from fusetune.ekf2.filter.vertical_innovations import fuse_vertical_velocity_apart
 from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw
 from fusetune.ekf2.numerics.rotations import (
@@ -43,7 +44,6 @@ from fusetune.ekf2.numerics.rotations import (
     wrap_pi,
 )
 
-MASK_GNSS, MASK_POSITION, MASK_YAW, MASK_ROTATE, MASK_VELOCITY = 1, 8, 16, 64, 256
 LEAST_STEP_VARIANCE = 0.5**2
 LEAST_POSITION_VARIANCE = 0.01**2
 LEAST_VELOCITY_VARIANCE = 0.05**2

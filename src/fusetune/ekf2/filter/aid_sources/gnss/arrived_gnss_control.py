@@ -7,7 +7,6 @@ import math
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
-from fusetune.ekf2.filter.aid_sources.external_vision.ev_yaw_control import stop_ev_yaw_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import is_gnss_distrusted, is_gnss_trusted
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, GPS_CTRL_VEL
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_position import (
@@ -22,13 +21,14 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_velocity import (
     update_gnss_velocity,
     velocity_of_antenna_offset,
 )
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion, stop_gnss_yaw_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.gps_control import has_yaw_failed, should_reset_gnss_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import reset_yaw_to_ekf_gsf
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.conditions import is_other_source_of_horizontal_aiding_than
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.timing import GNSS_MAX_INTERVAL, is_newest_sample_recent
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
+from fusetune.ekf2.filter.source_stops.yaw import stop_ev_yaw_fusion, stop_gnss_yaw_fusion
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
 from fusetune.ekf2.filter.yaw_estimator.matrix_bank import run_matrix_bank_in_air, tell_matrix_bank_velocity
 

@@ -14,10 +14,10 @@ from fusetune.ekf2.feed.record_fields import fields
 from fusetune.ekf2.feed.sensor_samples import GNSS_SAMPLE
 from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import clock_of_checks, run_gnss_checks
 from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import place_origin
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import look_field_up_by_fix
 from fusetune.ekf2.filter.common.earth_rate import set_earth_rate
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.local_origin import project_to_local
+from fusetune.ekf2.filter.world_field import look_field_up_by_fix
 from fusetune.ekf2.releases.by_release import by_release
 
 KEPT = 256

@@ -7,18 +7,14 @@ Mirrors PX4 v1.13 `EKF/gps_control.cpp` and `EKF/gps_fusion.cpp`, and the resets
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
-from fusetune.ekf2.filter.aid_sources.external_vision.vision_by_mask import (
-    MASK_GNSS,
-    MASK_ROTATE,
-    reset_position_to_vision,
-)
+from fusetune.ekf2.filter.aid_sources.external_vision.vision_by_mask import reset_position_to_vision
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import is_gnss_distrusted, is_gnss_trusted
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_by_mask import control_gnss_yaw_by_mask
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import stop_gnss_yaw_fusion
-from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import is_yaw_failure, reset_yaw_to_ekf_gsf
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_NONE
+from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import reset_yaw_to_ekf_gsf
+from fusetune.ekf2.filter.common.aid_mask import MASK_GNSS, MASK_ROTATE
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.conditions import is_other_source_of_horizontal_aiding_than
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.local_origin import get_local_horizontal_position
 from fusetune.ekf2.filter.common.state import POSITION, VELOCITY
 from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, horizon_us, is_recent, is_timed_out
@@ -29,7 +25,9 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_local_horizontal_position_to,
     reset_vertical_velocity_to,
 )
+from fusetune.ekf2.filter.source_stops.yaw import stop_gnss_yaw_fusion
 from fusetune.ekf2.filter.vertical_innovations import fuse_vertical_velocity_apart
+from fusetune.ekf2.filter.yaw_estimator.converged_yaw import is_yaw_failure
 
 LEAST_NOISE = 0.01
 VERTICAL_NOISE_RATIO = 1.5

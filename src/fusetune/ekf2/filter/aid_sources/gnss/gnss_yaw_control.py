@@ -13,9 +13,7 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_arrival import is_gnss_distrusted, is_gnss_trusted
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_YAW, have_checks_passed
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import stop_field, stop_heading
 from fusetune.ekf2.filter.common.aid_source_status import (
-    forget_aid_source_status,
     reset_aid_source_status_zero_innovation,
     set_axis,
     update_aid_source_status,
@@ -33,6 +31,8 @@ from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import multiply_covariance, scale_kalman_gain
 from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import attitude_variance, complete_attitude_jacobian
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.filter.source_stops.heading_and_field import stop_field, stop_heading
+from fusetune.ekf2.filter.source_stops.yaw import stop_gnss_yaw_fusion
 from fusetune.ekf2.numerics.constants import FLT_EPSILON_IN_EIGHT_DIGITS
 from fusetune.ekf2.numerics.rotations import rotate_to_earth, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release, does
@@ -358,30 +358,3 @@ def reset_yaw_to_gnss(ekf, params, yaw, yaw_offset):
         return False
     reset_quat_state_yaw(ekf, params, yaw, HEADING_NOISE * HEADING_NOISE)
     return True
-
-
-@kernel
-def _stop(ekf):
-    ekf.cs.gnss_yaw = False
-
-
-@kernel
-def _stop_and_lose_alignment(ekf):
-    if ekf.cs.gnss_yaw:
-        ekf.cs.gnss_yaw = False
-        forget_aid_source_status(ekf, ekf.aid.gnss_yaw, 1)
-        if not ekf.cs.in_air:
-            ekf.cs.yaw_align = False
-
-
-@kernel
-def _stop_and_forget(ekf):
-    if ekf.cs.gnss_yaw:
-        ekf.cs.gnss_yaw = False
-        forget_aid_source_status(ekf, ekf.aid.gnss_yaw, 1)
-
-
-stop_gnss_yaw_fusion = by_release(
-    by_release(_stop, "retries_gnss_yaw", _stop_and_lose_alignment), "checks_gnss_on_arrival", _stop_and_forget
-)
-"""Stop fusing the GNSS heading."""

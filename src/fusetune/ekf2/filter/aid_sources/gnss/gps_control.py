@@ -26,14 +26,10 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_velocity import (
     stop_gnss_vel_fusion,
     update_gnss_velocity,
 )
-from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion, stop_gnss_yaw_fusion
+from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import control_gnss_yaw_fusion
 from fusetune.ekf2.filter.aid_sources.gnss.gps_checks import check_gnss_sample
 from fusetune.ekf2.filter.aid_sources.gnss.origin_by_checks import collect_gnss_sample
-from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import (
-    control_gnss_yaw_estimator,
-    is_yaw_failure,
-    try_yaw_emergency_reset,
-)
+from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import control_gnss_yaw_estimator, try_yaw_emergency_reset
 from fusetune.ekf2.filter.common.imu_rates import gyro_bias
 from fusetune.ekf2.filter.common.timing import (
     GNSS_MAX_INTERVAL,
@@ -43,7 +39,9 @@ from fusetune.ekf2.filter.common.timing import (
     is_timed_out,
 )
 from fusetune.ekf2.filter.position_fusion import fuse_horizontal_position
+from fusetune.ekf2.filter.source_stops.yaw import stop_gnss_yaw_fusion
 from fusetune.ekf2.filter.velocity_fusion import fuse_velocity
+from fusetune.ekf2.filter.yaw_estimator.converged_yaw import is_yaw_failure
 from fusetune.ekf2.filter.yaw_estimator.gsf_memory import reset_gsf, set_gyro_bias
 from fusetune.ekf2.filter.yaw_estimator.yaw_bank import predict_yaw_bank
 from fusetune.ekf2.releases.by_release import by_release

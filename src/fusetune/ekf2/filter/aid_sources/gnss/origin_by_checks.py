@@ -6,7 +6,6 @@ Mirrors `collect_gps` of PX4 v1.15 `EKF/gps_checks.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import look_field_up_by_fix
 from fusetune.ekf2.filter.common.conditions import is_horizontal_aiding_active
 from fusetune.ekf2.filter.common.earth_rate import set_earth_rate
 from fusetune.ekf2.filter.common.local_origin import (
@@ -15,6 +14,7 @@ from fusetune.ekf2.filter.common.local_origin import (
     set_origin_altitude,
     set_origin_lat_lon,
 )
+from fusetune.ekf2.filter.world_field import look_field_up_by_fix
 from fusetune.ekf2.releases.by_release import by_release
 
 

@@ -10,29 +10,9 @@ import numpy as np
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, GPS_CTRL_VEL
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.filter.yaw_estimator.converged_yaw import is_yaw_emergency_estimate_available
 from fusetune.ekf2.filter.yaw_estimator.yaw_bank import fuse_yaw_bank_velocity
-from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
-
-CONVERGED_YAW_DEVIATION = 0.262
-"""Standard deviation (rad) below which the composite yaw counts as converged."""
-
-YAW_FAILURE = math.radians(25.0)
-
-
-@kernel
-def is_yaw_emergency_estimate_available(ekf):
-    """Whether the yaw estimator has converged."""
-    variance = ekf.gsf.yaw_variance
-    return ekf.gsf.vel_fuse_started and 0.0 < variance < CONVERGED_YAW_DEVIATION * CONVERGED_YAW_DEVIATION
-
-
-@kernel
-def is_yaw_failure(ekf):
-    """Whether the filter's yaw is off the converged yaw estimator's by more than 25°."""
-    if not is_yaw_emergency_estimate_available(ekf):
-        return False
-    return abs(wrap_pi(euler_yaw(ekf.R_to_earth) - ekf.gsf.yaw)) > YAW_FAILURE
 
 
 @kernel
@@ -69,7 +49,7 @@ def _reset_yaw_and_blame(ekf, params):
     if not is_yaw_emergency_estimate_available(ekf):
         return False
     reset_quat_state_yaw(ekf, params, ekf.gsf.yaw, ekf.gsf.yaw_variance)
-    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
     ekf.cs.yaw_align = True
     if ekf.cs.mag_hdg or ekf.cs.mag_3d:
         ekf.cs.mag_fault = True

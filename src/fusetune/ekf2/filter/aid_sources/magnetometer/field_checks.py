@@ -8,14 +8,9 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
-    CHECK_FORCE_WMM,
-    CHECK_INCLINATION,
-    CHECK_STRENGTH,
-    MAG_TYPE_3D,
-    MAG_TYPE_INDOOR,
-)
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import CHECK_FORCE_WMM, CHECK_INCLINATION, CHECK_STRENGTH
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_INDOOR
 from fusetune.ekf2.numerics.rotations import component_in_earth, wrap_pi
 
 AVERAGE_STRENGTH = 0.45

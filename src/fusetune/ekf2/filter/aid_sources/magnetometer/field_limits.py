@@ -6,7 +6,7 @@ Mirrors `limitDeclination` of PX4 v1.15 `EKF/mag_fusion.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import (
+from fusetune.ekf2.filter.world_field import (
     get_mag_declination,
     has_saved_declination,
     has_wmm_declination,

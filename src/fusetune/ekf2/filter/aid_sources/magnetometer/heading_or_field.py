@@ -4,7 +4,6 @@ Mirrors `runMagAndMagDeclFusions` and `resetMagHeading` of PX4 v1.14 `EKF/mag_co
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     fuse_declination,
     fuse_mag,
@@ -12,25 +11,17 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     recover_from_bad_mag_covariance,
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import is_course_told, measured_heading
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_INDOOR
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import get_mag_declination
-from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_INDOOR
+from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
-from fusetune.ekf2.filter.yaw_fusion import compute_yaw_innov_var_and_h, fuse_yaw
+from fusetune.ekf2.filter.world_field import get_mag_declination
+from fusetune.ekf2.filter.yaw_fusion import fuse_yaw, judge_angle
 from fusetune.ekf2.numerics.rotations import euler_yaw, rotate_to_earth, wrap_pi
 
 HEADING_VARIANCE_MIN = 1e-4
 HEADING_DEVIATION_MIN = 1e-2
 DECLINATION_DEVIATION_AT_FIRST = 0.02
 DECLINATION_DEVIATION = 0.5
-
-
-@kernel
-def judge_angle(ekf, params, aid, observation, innovation, R):
-    """Judge an angle (rad) that is observed for the yaw with variance R (rad²); its H is left in `ekf.scratch.H`."""
-    variance = compute_yaw_innov_var_and_h(ekf, R, ekf.scratch.H)
-    set_axis(aid, 0, observation, R, innovation, variance)
-    update_aid_source_status(ekf, aid, 1, aid.timestamp_sample, max(params.EKF2_HDG_GATE, 1.0))
 
 
 @kernel
@@ -99,4 +90,4 @@ def reset_yaw_to_filtered_field(ekf, params):
     reset_quat_state_yaw(ekf, params, yaw, max(params.EKF2_HEAD_NOISE, HEADING_DEVIATION_MIN) ** 2)
     take_filtered_field(ekf)
     reset_field_covariance(ekf, params)
-    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us

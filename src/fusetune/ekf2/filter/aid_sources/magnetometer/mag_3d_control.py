@@ -11,7 +11,6 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_checks import check_mag_field
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_limits import reference_declination
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
     R_MAG_MIN,
@@ -24,19 +23,14 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import (
     check_mag_heading_consistency,
     update_yaw_observability,
 )
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
-    MAG_TYPE_AUTO,
-    MAG_TYPE_HEADING,
-    MAG_TYPE_NONE,
-)
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import (
     check_hagl_yaw_reset_req,
     reset_mag_states,
     stop_mag_fusion,
 )
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import synthesise_z
 from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.common.timing import (
     MAG_MAX_INTERVAL,
@@ -44,6 +38,8 @@ from fusetune.ekf2.filter.common.timing import (
     is_newest_sample_recent,
     is_timed_out,
 )
+from fusetune.ekf2.filter.field_covariance import reset_field_covariance
+from fusetune.ekf2.filter.world_field import synthesise_z
 
 MAG_LPF_ALPHA = 0.1
 MIN_SAMPLES_TO_START = 5

@@ -23,24 +23,11 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import check_mag_heading_consistency
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_inhibition_control import control_mag_with_inhibition
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
-    MAG_TYPE_AUTO,
-    MAG_TYPE_HEADING,
-    MAG_TYPE_INIT,
-    MAG_TYPE_NONE,
-    clear_mag_faults,
-)
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_mode_control import control_mag_modes
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import (
     check_hagl_yaw_reset_req,
     reset_mag_states,
     stop_mag_fusion,
-)
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import (
-    check_world_magnetic_model,
-    has_saved_declination,
-    has_wmm_declination,
-    synthesise_z,
 )
 from fusetune.ekf2.filter.common.aid_source_status import (
     reset_aid_source_status_zero_innovation,
@@ -48,6 +35,7 @@ from fusetune.ekf2.filter.common.aid_source_status import (
     update_aid_source_status,
 )
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_INIT, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.common.timing import (
     MAG_MAX_INTERVAL,
@@ -57,6 +45,13 @@ from fusetune.ekf2.filter.common.timing import (
 )
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance
+from fusetune.ekf2.filter.source_stops.heading_and_field import clear_mag_faults
+from fusetune.ekf2.filter.world_field import (
+    check_world_magnetic_model,
+    has_saved_declination,
+    has_wmm_declination,
+    synthesise_z,
+)
 from fusetune.ekf2.releases.by_release import by_release
 
 MAG_LPF_ALPHA = 0.1
@@ -248,7 +243,7 @@ def _reset_with_unaided_heading(ekf, params):
     """North-east aiding knows the heading better; the field is aligned either way."""
     _reset_to_filtered(ekf, params, (ekf.cs.mag_hdg or ekf.cs.mag_3d) and not is_north_east_aiding_active(ekf))
     ekf.cs.mag_aligned_in_flight = True
-    ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
 
 
 _reset_on_climb = by_release(_reset_with_heading, "aligns_field_on_climb", _reset_with_unaided_heading)

@@ -9,15 +9,15 @@ Mirrors PX4 v1.16 `EKF/aid_sources/magnetometer/mag_fusion.cpp`; the Jacobians a
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_limits import limit_field
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
 from fusetune.ekf2.filter.common.aid_source_status import set_axis, update_aid_source_status
 from fusetune.ekf2.filter.common.state import ATTITUDE, GYRO_BIAS, MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.covariance import reset_quat_cov
+from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_innovation_variance, scale_kalman_gain
 from fusetune.ekf2.filter.quaternion_core.attitude_jacobians import complete_attitude_jacobian
+from fusetune.ekf2.filter.source_stops.heading_and_field import clear_mag_faults
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 from fusetune.ekf2.numerics.rotations import component_in_body, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release

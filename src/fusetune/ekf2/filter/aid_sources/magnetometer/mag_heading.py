@@ -9,11 +9,11 @@ Mirrors the heading part of PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import get_mag_declination
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.global_position import single_precision
 from fusetune.ekf2.filter.common.state import MAG_BODY
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.filter.world_field import get_mag_declination
 from fusetune.ekf2.numerics.rotations import euler_yaw, rotate_to_earth, wrap_pi
 from fusetune.ekf2.releases.by_release import by_release
 

@@ -10,27 +10,19 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_checks import is_strength_disturbed
-from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import (
-    fuse_field,
-    judge_angle,
-    judge_heading,
-    mag_variance,
-)
+from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import fuse_field, judge_heading, mag_variance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import judge_mag
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import measured_heading
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_INDOOR, MAG_TYPE_NONE
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import (
-    clear_heading_and_field,
-    select_mode,
-    update_declination_mode,
-)
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import select_mode, update_declination_mode
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import check_hagl_yaw_reset_req
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import synthesise_z
 from fusetune.ekf2.filter.aid_sources.magnetometer.yaw_by_course import realign_yaw_by_course, reset_yaw_to_field
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_INDOOR, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.state import ATTITUDE, TERRAIN
 from fusetune.ekf2.filter.covariance import reset_gyro_bias_z_cov, reset_mag_bias_cov
-from fusetune.ekf2.filter.yaw_fusion import fuse_yaw
+from fusetune.ekf2.filter.source_stops.heading_and_field import clear_heading_and_field
+from fusetune.ekf2.filter.world_field import synthesise_z
+from fusetune.ekf2.filter.yaw_fusion import fuse_yaw, judge_angle
 from fusetune.ekf2.numerics.rotations import euler_yaw, wrap_pi
 
 MAG_LPF_ALPHA = 0.1
@@ -127,7 +119,7 @@ def _control_with_sample(ekf, params):
     _update_inhibition(ekf, params)
     if ekf.cs.mag_3d:
         ekf.aid.mag.timestamp_sample = ekf.sensors.mag.sample.time_us
-        stable = ekf.time_delayed_us - ekf.mag.flt_mag_align_start_time > STABILISING_US
+        stable = ekf.imu_delayed.time_us - ekf.mag.flt_mag_align_start_time > STABILISING_US
         fuse_field(ekf, params, sample, stable)
     else:
         ekf.aid.mag_heading.timestamp_sample = ekf.sensors.mag.sample.time_us
@@ -162,8 +154,8 @@ def _update_inhibition(ekf, params):
     is_needed = is_north_east_aiding_active(ekf) or cs.ev_pos or cs.ev_vel
     modes.inhibited = cs.mag_field_disturbed or (int(params.EKF2_MAG_TYPE) == MAG_TYPE_INDOOR and not is_needed)
     if not modes.inhibited:
-        modes.time_last_used = ekf.time_delayed_us
-    elif ekf.time_delayed_us - modes.time_last_used > INHIBITED_FOR_US:
+        modes.time_last_used = ekf.imu_delayed.time_us
+    elif ekf.imu_delayed.time_us - modes.time_last_used > INHIBITED_FOR_US:
         modes.inhibited_for_long = True
 
 

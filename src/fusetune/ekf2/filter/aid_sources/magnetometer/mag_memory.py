@@ -69,11 +69,6 @@ for the next; variances of the field states while they are not estimated; the ya
 (rad, NaN if it did not), and what becomes of fusing that.
 """
 
-MAG_TYPE_AUTO, MAG_TYPE_HEADING, MAG_TYPE_3D, MAG_TYPE_INDOOR, MAG_TYPE_NONE, MAG_TYPE_INIT = 0, 1, 2, 4, 5, 6
-"""Values of EKF2_MAG_TYPE; 2 and 4 until v1.14, 6 since v1.15."""
-
-DECLINATION_FROM_WMM, DECLINATION_SAVED, DECLINATION_FUSED = 1, 2, 4
-"""Bits of EKF2_DECL_TYPE; the last until v1.14."""
 
 CHECK_STRENGTH, CHECK_INCLINATION, CHECK_FORCE_WMM = 1, 2, 4
 """Bits of EKF2_MAG_CHECK."""
@@ -99,11 +94,3 @@ def _never_came_to_rest(ekf):
 
 initialise_mag_modes = by_release(_have_no_modes, "fuses_heading_or_field", _never_came_to_rest)
 """What of `ekf.mag_modes` is not zero at start."""
-
-
-@kernel
-def clear_mag_faults(ekf):
-    """No axis of the magnetometer is at fault."""
-    ekf.fs.bad_mag_x = False
-    ekf.fs.bad_mag_y = False
-    ekf.fs.bad_mag_z = False

@@ -9,9 +9,7 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.feed.sample_arrival import is_fusion_due
-from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import is_yaw_emergency_estimate_available
 from fusetune.ekf2.filter.aid_sources.magnetometer.field_checks import is_strength_disturbed
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import (
     fuse_field,
     fuse_heading,
@@ -23,22 +21,21 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import (
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import judge_mag, predict_mag
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import measured_heading
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import MAG_TYPE_3D, MAG_TYPE_INDOOR, MAG_TYPE_NONE
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import (
-    select_mode,
-    stop_heading_and_field,
-    update_declination_mode,
-)
+from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import select_mode, update_declination_mode
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_resets import check_hagl_yaw_reset_req, put_body_field
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known, synthesise_z
 from fusetune.ekf2.filter.common.aid_source_status import forget_aid_source_status, set_axis
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_INDOOR, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.global_position import single_precision
 from fusetune.ekf2.filter.common.state import MAG_BODY
 from fusetune.ekf2.filter.common.timing import MAG_MAX_INTERVAL, is_newest_sample_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov
+from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import align_output_predictor
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
+from fusetune.ekf2.filter.source_stops.heading_and_field import stop_heading_and_field
+from fusetune.ekf2.filter.world_field import is_wmm_field_known, synthesise_z
+from fusetune.ekf2.filter.yaw_estimator.converged_yaw import is_yaw_emergency_estimate_available
 from fusetune.ekf2.numerics.rotations import dcm_to_quat, euler_yaw, quat_to_dcm, update_yaw_in_rot_mat, wrap_pi
 
 MAG_LPF_ALPHA = 0.1
@@ -190,7 +187,7 @@ def _is_body_field_known(ekf):
 @kernel
 def _reset_yaw(ekf, params):
     """Reset the yaw, to the yaw estimator with GNSS, else to the field; once per update. Return whether it was."""
-    is_repeated = ekf.mag.flt_mag_align_start_time == ekf.time_delayed_us
+    is_repeated = ekf.mag.flt_mag_align_start_time == ekf.imu_delayed.time_us
     if is_repeated or ekf.cs_prev.yaw_align != ekf.cs.yaw_align or ekf.mag.counter <= 1:
         return False
     if is_north_east_aiding_active(ekf) and is_yaw_emergency_estimate_available(ekf):
@@ -202,7 +199,7 @@ def _reset_yaw(ekf, params):
     ekf.cs.yaw_align = True
     if ekf.cs.in_air:
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
     return True
 
 

@@ -7,60 +7,19 @@ Mirrors the starts and stops of PX4 v1.14 `EKF/mag_control.cpp`.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import clear_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import update_yaw_observability
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import (
+from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
+from fusetune.ekf2.filter.common.field_parameters import (
     DECLINATION_FUSED,
     MAG_TYPE_3D,
     MAG_TYPE_HEADING,
     MAG_TYPE_INDOOR,
-    clear_mag_faults,
 )
-from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
-from fusetune.ekf2.filter.quaternion_core.field_covariance import restore_field_covariance, save_field_covariance
-from fusetune.ekf2.releases.by_release import does
+from fusetune.ekf2.filter.quaternion_core.field_covariance import restore_field_covariance
+from fusetune.ekf2.filter.source_stops.heading_and_field import stop_field, stop_heading
 
 SUITABLE_FOR_US = 2_000_000
 SUSTAINED_SHARE = 0.5
-
-
-_leaves_declination_mode = does("clears_field_whenever_stopped")
-
-
-@kernel
-def stop_field(ekf):
-    """Fuse the field no more; what is known of its covariance is saved."""
-    if not ekf.cs.mag_3d:
-        return
-    save_field_covariance(ekf)
-    ekf.cs.mag_3d = False
-    if not _leaves_declination_mode(ekf):
-        ekf.cs.mag_dec = False
-    clear_mag_faults(ekf)
-    ekf.fs.bad_mag_decl = False
-
-
-@kernel
-def stop_heading(ekf):
-    """Fuse the heading no more."""
-    if ekf.cs.mag_hdg:
-        ekf.cs.mag_hdg = False
-        ekf.fs.bad_hdg = False
-
-
-@kernel
-def clear_heading_and_field(ekf, params):
-    """Fuse neither; no field is known from now on."""
-    stop_field(ekf)
-    stop_heading(ekf)
-    clear_field_covariance(ekf)
-
-
-@kernel
-def stop_heading_and_field(ekf, params):
-    """Fuse neither, if one was fused."""
-    if ekf.cs.mag_hdg or ekf.cs.mag_3d:
-        clear_heading_and_field(ekf, params)
 
 
 @kernel
@@ -97,8 +56,8 @@ def _may_fuse_field(ekf, params):
     _update_bias_observability(ekf, params)
     modes = ekf.mag_modes
     if modes.bias_observable or ekf.field_history.yaw_observable:
-        modes.time_last_suitable = ekf.time_delayed_us
-    return ekf.cs.mag_aligned_in_flight and ekf.time_delayed_us - modes.time_last_suitable < SUITABLE_FOR_US
+        modes.time_last_suitable = ekf.imu_delayed.time_us
+    return ekf.cs.mag_aligned_in_flight and ekf.imu_delayed.time_us - modes.time_last_suitable < SUITABLE_FOR_US
 
 
 @kernel
@@ -109,10 +68,10 @@ def _update_bias_observability(ekf, params):
     if not modes.bias_observable:
         modes.bias_observable = abs(modes.turn_rate_lpf) > limit
     else:
-        duration = (ekf.time_delayed_us - modes.time_turn_started) * 1e-6
+        duration = (ekf.imu_delayed.time_us - modes.time_turn_started) * 1e-6
         modes.bias_observable = abs(modes.turn) > SUSTAINED_SHARE * limit * duration
     modes.turn = 0.0
-    modes.time_turn_started = ekf.time_delayed_us
+    modes.time_turn_started = ekf.imu_delayed.time_us
 
 
 @kernel

@@ -6,14 +6,17 @@ Mirrors the resets of PX4 v1.16 `EKF/aid_sources/magnetometer/mag_control.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.gnss.yaw_emergency import is_yaw_emergency_estimate_available
-from fusetune.ekf2.filter.aid_sources.magnetometer.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import reset_mag_heading
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import clear_mag_faults
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_modes import clear_heading_and_field, stop_heading_and_field
-from fusetune.ekf2.filter.aid_sources.magnetometer.world_field import is_wmm_field_known
 from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
+from fusetune.ekf2.filter.field_covariance import reset_field_covariance
+from fusetune.ekf2.filter.source_stops.heading_and_field import (
+    clear_heading_and_field,
+    clear_mag_faults,
+    stop_heading_and_field,
+)
+from fusetune.ekf2.filter.world_field import is_wmm_field_known
+from fusetune.ekf2.filter.yaw_estimator.converged_yaw import is_yaw_emergency_estimate_available
 from fusetune.ekf2.numerics.rotations import component_in_body, euler_yaw, rotate_to_earth
 from fusetune.ekf2.releases.by_release import by_release
 
@@ -77,7 +80,7 @@ def _reset_mag_states(ekf, params, mag, reset_heading):
         reset_mag_states_to_measurement(ekf, params, mag, reset_heading)
     if ekf.cs.in_air and _aligns_field(ekf, reset_heading):
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
 
 
 @kernel
@@ -113,7 +116,7 @@ def _reset_mag_states_by_yaw_estimator(ekf, params, mag, reset_heading):
         ekf.mag_I[0], ekf.mag_I[1], ekf.mag_I[2] = rotate_to_earth(ekf.R_to_earth, mag[0], mag[1], mag[2])
     if ekf.cs.in_air:
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.time_delayed_us
+        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
 
 
 reset_mag_states = by_release(_reset_mag_states, "puts_body_field_by_yaw_estimator", _reset_mag_states_by_yaw_estimator)

@@ -4,7 +4,7 @@ Mirrors PX4 v1.15 and v1.14 `EKF/fake_pos_control.cpp`.
 """
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.fake_pos_control import (
+from fusetune.ekf2.filter.aid_sources.fake_position.fake_pos_control import (
     FAILURE_TIMEOUT_US,
     INNOVATION_GATE,
     SIGMA_AT_REST,

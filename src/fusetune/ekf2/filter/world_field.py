@@ -8,8 +8,8 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
-from fusetune.ekf2.filter.aid_sources.magnetometer.mag_memory import DECLINATION_FROM_WMM, DECLINATION_SAVED
 from fusetune.ekf2.filter.common.conditions import is_local_horizontal_position_valid
+from fusetune.ekf2.filter.common.field_parameters import DECLINATION_FROM_WMM, DECLINATION_SAVED
 from fusetune.ekf2.filter.common.timing import is_timed_out
 from fusetune.ekf2.numerics.world_magnetic_model import (
     EDITION_OF_V1_13,

@@ -1,0 +1,1 @@
+"""Position that is held where nothing measures it."""
