@@ -481,7 +481,7 @@ class Behaviours:
         "v1.16 resets the height to its reference alone.",
         since="v1.14",
         until="v1.15",
-        source="baro_height_control.cpp, gnss_height_control.cpp",
+        source="baro_height_control.cpp, gnss_height_control.cpp, ev_height_control.cpp",
     )
     starts_at_filtered_baro: bool = _behaviour(
         "The barometer starts as height reference at the low-passed height less the bias that was found meanwhile, so "

@@ -10,7 +10,7 @@ from tests.ekf2.filter.aiding_estimator import START_US, hovering, parameters, s
 
 from fusetune.ekf2.feed.sensor_samples import EV_FRAME_BODY_FRD, EV_FRAME_FRD, EV_FRAME_NED
 from fusetune.ekf2.filter.aid_sources.external_vision.ev_control import control_external_vision_fusion
-from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_EV
+from fusetune.ekf2.filter.common.height_reference import HEIGHT_REF_BARO, HEIGHT_REF_EV
 
 HPOS, VPOS, VEL, YAW = 1, 2, 4, 8
 SAMPLE_INTERVAL_US = 40_000
@@ -46,15 +46,15 @@ class Vision:
         ekf["sensors"]["ev"]["data_ready"] = ekf["sensors"]["ev"]["exists"] = True
         ekf["sensors"]["ev"]["newest_time_us"] = self.now
         ekf["ev"]["newest_quality"] = quality
-        self._run()
+        self.run()
 
     def wait(self, seconds: float) -> None:
         self.now += round(seconds * 1e6)
         set_time(self.ekf, self.now)
         self.ekf["sensors"]["ev"]["data_ready"] = False
-        self._run()
+        self.run()
 
-    def _run(self) -> None:
+    def run(self) -> None:
         self.ekf["cs_prev"] = self.ekf["cs"]
         self.ekf["state_reset_prev"]["pos_ne_counter"] = self.ekf["state_reset"]["pos_ne_counter"]
         control_external_vision_fusion(self.ekf, self.params)
@@ -204,3 +204,22 @@ def test_rejected_positions_are_followed_after_a_second(ned: Vision) -> None:
     ned.offer(position=(100.0, 2.0, -10.0))
     assert ned.ekf["state_reset"]["pos_ne_counter"] == resets + 1
     assert ned.ekf["ev"]["nb_pos_reset_available"] == 4
+
+
+@pytest.mark.parametrize(("reference", "height"), [(HEIGHT_REF_BARO, 10.0), (HEIGHT_REF_EV, 12.0)])
+def test_where_all_heights_fail_vision_resets_as_the_reference_alone(reference: int, height: float) -> None:
+    params = parameters(EKF2_EV_CTRL=VPOS, EKF2_HGT_REF=reference)
+    memory = hovering(params)
+    ekf = memory[0]
+    ekf["cs"]["yaw_align"], ekf["gpos_alt"], ekf["height_sensor_ref"] = True, 10.0, reference
+    vision = Vision(params, memory)
+    vision.offer()
+    vision.offer()
+    assert ekf["cs"]["ev_hgt"]
+    ekf["vel"][2] = 0.5
+    # a bad vertical acceleration for 1 s of the 0.5 s that v1.16 allows; it leaves the vertical velocity
+    ekf["time_good_vert_accel"] = vision.now - 1_000_000
+    ekf["sensors"]["ev"]["sample"]["pos"] = 1.0, 2.0, -12.0
+    vision.run()
+    assert ekf["gpos_alt"] == pytest.approx(height, abs=0.2)
+    assert ekf["vel"][2] == pytest.approx(0.5, abs=0.05)

@@ -136,34 +136,6 @@ def _reset_height_to_ev(ekf, params, measurement, variance):
 
 
 @kernel
-def _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_sufficient):
-    bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
-    if ev_reset:
-        if not quality_sufficient:
-            stop_ev_hgt_fusion(ekf)
-            return
-        if ekf.height_sensor_ref == HEIGHT_REF_EV:
-            _reset_height_to_ev(ekf, params, measurement, variance)
-            reset_bias(bias)
-        else:
-            _set_bias_to_difference(ekf, measurement)
-        aid.time_last_fuse = ekf.time_delayed_us
-    elif quality_sufficient:
-        fuse_vertical_position(ekf, params, aid)
-    else:
-        aid.innovation_rejected = True
-
-    if is_height_reset_required(ekf) and quality_sufficient:
-        # all height sources are failing
-        _reset_height_to_ev(ekf, params, measurement - bias.bias, variance)
-        _set_bias_to_difference(ekf, measurement)
-        _reset_vertical_velocity(ekf, params)
-        aid.time_last_fuse = ekf.time_delayed_us
-    elif is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX):
-        stop_ev_hgt_fusion(ekf)
-
-
-@kernel
 def _reset_vertical_velocity(ekf, params):
     """To that of external vision where it is to be used, else to rest."""
     sample, R = ekf.sensors.ev.sample, ekf.R_to_earth
@@ -181,6 +153,61 @@ def _reset_vertical_velocity(ekf, params):
         velocity = vel[2] - component_in_earth(R, 2, ox, oy, oz)
         variance = sample.velocity_var[2]
     reset_vertical_velocity_to(ekf, params, velocity, max(variance, min_variance))
+
+
+@kernel
+def _is_reference(ekf):
+    return ekf.height_sensor_ref == HEIGHT_REF_EV
+
+
+@kernel
+def _always(ekf):
+    return True
+
+
+_may_reset = by_release(_is_reference, "resets_height_to_each_source", _always)
+
+
+@kernel
+def _reset_height_alone(ekf, params, measurement, variance):
+    """PX4 takes the bias, which the reference has none of, with the sign that altitudes have."""
+    _reset_height_to_ev(ekf, params, measurement + ekf.ev_hgt_b_est.bias, variance)
+
+
+@kernel
+def _reset_height_and_velocity(ekf, params, measurement, variance):
+    _reset_height_to_ev(ekf, params, measurement - ekf.ev_hgt_b_est.bias, variance)
+    _reset_vertical_velocity(ekf, params)
+
+
+_reset_all_failing = by_release(_reset_height_alone, "resets_height_to_each_source", _reset_height_and_velocity)
+
+
+@kernel
+def _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_sufficient):
+    bias, aid = ekf.ev_hgt_b_est, ekf.aid.ev_hgt
+    if ev_reset:
+        if not quality_sufficient:
+            stop_ev_hgt_fusion(ekf)
+            return
+        if ekf.height_sensor_ref == HEIGHT_REF_EV:
+            _reset_height_to_ev(ekf, params, measurement, variance)
+            reset_bias(bias)
+        else:
+            _set_bias_to_difference(ekf, measurement)
+        aid.time_last_fuse = ekf.time_delayed_us
+    elif quality_sufficient:
+        fuse_vertical_position(ekf, params, aid)
+    else:
+        aid.innovation_rejected = True
+
+    if is_height_reset_required(ekf) and quality_sufficient and _may_reset(ekf):
+        # all height sources are failing
+        _reset_all_failing(ekf, params, measurement, variance)
+        _set_bias_to_difference(ekf, measurement)
+        aid.time_last_fuse = ekf.time_delayed_us
+    elif is_timed_out(ekf, aid.time_last_fuse, HGT_FUSION_TIMEOUT_MAX):
+        stop_ev_hgt_fusion(ekf)
 
 
 @kernel
