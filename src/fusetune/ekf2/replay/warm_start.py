@@ -328,7 +328,9 @@ def _align_output(e: np.void) -> None:
     samples["vel"] = start + np.matmul(matrix, (samples["vel"] - start)[..., None])[..., 0]
     output["vel_offset"] = e["vel"] - start
     output["pos_offset"] = position_of_output(e) - oldest["pos"]
-    output["ref_lat"], output["ref_lon"], output["ref_alt"] = e["gpos_lat"], e["gpos_lon"], e["gpos_alt"]
+    # the predictor of a local position counts from the origin itself
+    reference = (0.0, 0.0, 0.0) if is_local(e) else (e["gpos_lat"], e["gpos_lon"], e["gpos_alt"])
+    output["ref_lat"], output["ref_lon"], output["ref_alt"] = reference
     newest = output["history"][int(output["head"])]
     output["newest"]["q"] = newest["q"]
     output["newest"]["vel"] = newest["vel"] + output["vel_offset"]
