@@ -36,7 +36,7 @@ QUANTITIES = {
 
 
 def measure(work: Workplace) -> Iterator[tuple[str, float]]:
-    """Times of runs from logs to the decision, and to the page, when the estimators of the releases that flew are ready."""
+    """Times of runs from logs to the decision, and to the page, with the estimators of all releases at hand."""
     logs = real_logs()
     if work.quick:
         logs = dict(list(logs.items())[-6:])
