@@ -33,7 +33,13 @@ def started(folder: Path, *arguments: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # a test that runs in the background of a shell would pass on that interrupts are ignored there
+        preexec_fn=_heed_interrupts,
     )
+
+
+def _heed_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_init_says_what_to_do_next_and_writes_over_nothing(tmp_path: Path, capsys: Captured) -> None:

@@ -63,7 +63,8 @@ def test_flow_turns_round_becomes_a_rate_and_is_stamped_mid_interval():
     np.testing.assert_allclose(samples["flow_rate"][0], [-1.0, 0.5])
     assert samples["gyro_rate"][0][1] == pytest.approx(-5.0)
     assert samples["time_us"][0] == 80_000
-    assert limits.tolist() == [[7.0, 0.1, 30.0]]
+    # the sensor's limits and the time that it integrated (µs)
+    assert limits.tolist() == [[7.0, 0.1, 30.0, 20_000.0]]
     assert convert.taken(rows, convert.flow_refusals(rows)).all()
 
 

@@ -153,7 +153,7 @@ def test_variances_are_clipped_in_v1_15(it):
 def test_manoeuvres_are_judged_with_the_biases_until_v1_15(it):
     it.ekf["accel_bias"] = 0.0, 0.0, -0.4
     it.ekf["accel_magnitude_filt"] = 0.0
-    bias_inhibition.update_imu_bias_inhibit.py_func(it.ekf, it.params)
+    asked(bias_inhibition.update_imu_bias_inhibit, it, it.params)
     expected = CONSTANTS_ONE_G if is_old(it) else CONSTANTS_ONE_G - 0.4
     assert math.isclose(it.ekf["accel_magnitude_filt"], expected)
 
@@ -199,10 +199,10 @@ def test_clipping_of_any_axis_is_counted_until_v1_15(it):
 
 
 def test_gravity_is_told_as_fused_where_it_was_until_v1_15(it):
-    it.ekf["cs"]["gnss_vel"] = True
+    it.ekf["cs"]["gnss_vel"] = it.ekf["cs"]["gnss_pos"] = True
     asked(gravity_fusion.control_gravity_fusion, it, it.params)
     assert it.ekf["aid"]["gravity"]["fused"] == (not is_old(it))
-    it.ekf["cs"]["gnss_vel"] = False
+    it.ekf["cs"]["gnss_vel"] = it.ekf["cs"]["gnss_pos"] = False
     asked(gravity_fusion.control_gravity_fusion, it, it.params)
     assert it.ekf["aid"]["gravity"]["fused"]
 
@@ -228,5 +228,5 @@ def test_nothing_tells_of_a_constant_position_until_v1_15(it):
 
 
 def test_the_terrain_has_no_variance_in_the_filter_until_v1_15(it):
-    initialise_covariance.py_func(it.ekf, it.params)
+    asked(initialise_covariance, it, it.params)
     assert it.ekf["P"][TERRAIN, TERRAIN] == (0.0 if is_old(it) else it.params["EKF2_MIN_RNG"] ** 2)

@@ -9,6 +9,7 @@ import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.gnss.gnss_memory import GPS_CTRL_HPOS, GPS_CTRL_VEL
+from fusetune.ekf2.filter.common.timing import horizon_us
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.filter.yaw_estimator.converged_yaw import is_yaw_emergency_estimate_available
 from fusetune.ekf2.filter.yaw_estimator.yaw_bank import fuse_yaw_bank_velocity
@@ -49,7 +50,7 @@ def _reset_yaw_and_blame(ekf, params):
     if not is_yaw_emergency_estimate_available(ekf):
         return False
     reset_quat_state_yaw(ekf, params, ekf.gsf.yaw, ekf.gsf.yaw_variance)
-    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
+    ekf.mag.flt_mag_align_start_time = horizon_us(ekf)
     ekf.cs.yaw_align = True
     if ekf.cs.mag_hdg or ekf.cs.mag_3d:
         ekf.cs.mag_fault = True

@@ -12,6 +12,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.mag_fusion import (
 )
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import is_course_told, measured_heading
 from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_INDOOR
+from fusetune.ekf2.filter.common.timing import horizon_us
 from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.filter.world_field import get_mag_declination
@@ -90,4 +91,4 @@ def reset_yaw_to_filtered_field(ekf, params):
     reset_quat_state_yaw(ekf, params, yaw, max(params.EKF2_HEAD_NOISE, HEADING_DEVIATION_MIN) ** 2)
     take_filtered_field(ekf)
     reset_field_covariance(ekf, params)
-    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
+    ekf.mag.flt_mag_align_start_time = horizon_us(ekf)

@@ -40,6 +40,7 @@ from fusetune.ekf2.filter.common.state import MAG_BODY, MAG_EARTH
 from fusetune.ekf2.filter.common.timing import (
     MAG_MAX_INTERVAL,
     RESET_TIMEOUT_MAX,
+    horizon_us,
     is_newest_sample_recent,
     is_timed_out,
 )
@@ -243,7 +244,7 @@ def _reset_with_unaided_heading(ekf, params):
     """North-east aiding knows the heading better; the field is aligned either way."""
     _reset_to_filtered(ekf, params, (ekf.cs.mag_hdg or ekf.cs.mag_3d) and not is_north_east_aiding_active(ekf))
     ekf.cs.mag_aligned_in_flight = True
-    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
+    ekf.mag.flt_mag_align_start_time = horizon_us(ekf)
 
 
 _reset_on_climb = by_release(_reset_with_heading, "aligns_field_on_climb", _reset_with_unaided_heading)

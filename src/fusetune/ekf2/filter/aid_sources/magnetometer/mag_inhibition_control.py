@@ -19,6 +19,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.yaw_by_course import realign_
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_INDOOR, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.state import ATTITUDE, TERRAIN
+from fusetune.ekf2.filter.common.timing import horizon_us
 from fusetune.ekf2.filter.covariance import reset_gyro_bias_z_cov, reset_mag_bias_cov
 from fusetune.ekf2.filter.source_stops.heading_and_field import clear_heading_and_field
 from fusetune.ekf2.filter.world_field import synthesise_z
@@ -119,7 +120,7 @@ def _control_with_sample(ekf, params):
     _update_inhibition(ekf, params)
     if ekf.cs.mag_3d:
         ekf.aid.mag.timestamp_sample = ekf.sensors.mag.sample.time_us
-        stable = ekf.imu_delayed.time_us - ekf.mag.flt_mag_align_start_time > STABILISING_US
+        stable = horizon_us(ekf) - ekf.mag.flt_mag_align_start_time > STABILISING_US
         fuse_field(ekf, params, sample, stable)
     else:
         ekf.aid.mag_heading.timestamp_sample = ekf.sensors.mag.sample.time_us
@@ -154,8 +155,8 @@ def _update_inhibition(ekf, params):
     is_needed = is_north_east_aiding_active(ekf) or cs.ev_pos or cs.ev_vel
     modes.inhibited = cs.mag_field_disturbed or (int(params.EKF2_MAG_TYPE) == MAG_TYPE_INDOOR and not is_needed)
     if not modes.inhibited:
-        modes.time_last_used = ekf.imu_delayed.time_us
-    elif ekf.imu_delayed.time_us - modes.time_last_used > INHIBITED_FOR_US:
+        modes.time_last_used = horizon_us(ekf)
+    elif horizon_us(ekf) - modes.time_last_used > INHIBITED_FOR_US:
         modes.inhibited_for_long = True
 
 

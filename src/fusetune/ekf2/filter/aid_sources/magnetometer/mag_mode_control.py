@@ -28,7 +28,7 @@ from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_INDOOR, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.global_position import single_precision
 from fusetune.ekf2.filter.common.state import MAG_BODY
-from fusetune.ekf2.filter.common.timing import MAG_MAX_INTERVAL, is_newest_sample_recent, is_timed_out
+from fusetune.ekf2.filter.common.timing import MAG_MAX_INTERVAL, horizon_us, is_newest_sample_recent, is_timed_out
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov
 from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.output_predictor.output_predictor import align_output_predictor
@@ -187,7 +187,7 @@ def _is_body_field_known(ekf):
 @kernel
 def _reset_yaw(ekf, params):
     """Reset the yaw, to the yaw estimator with GNSS, else to the field; once per update. Return whether it was."""
-    is_repeated = ekf.mag.flt_mag_align_start_time == ekf.imu_delayed.time_us
+    is_repeated = ekf.mag.flt_mag_align_start_time == horizon_us(ekf)
     if is_repeated or ekf.cs_prev.yaw_align != ekf.cs.yaw_align or ekf.mag.counter <= 1:
         return False
     if is_north_east_aiding_active(ekf) and is_yaw_emergency_estimate_available(ekf):
@@ -199,7 +199,7 @@ def _reset_yaw(ekf, params):
     ekf.cs.yaw_align = True
     if ekf.cs.in_air:
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
+        ekf.mag.flt_mag_align_start_time = horizon_us(ekf)
     return True
 
 

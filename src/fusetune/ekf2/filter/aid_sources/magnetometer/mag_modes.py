@@ -15,6 +15,7 @@ from fusetune.ekf2.filter.common.field_parameters import (
     MAG_TYPE_HEADING,
     MAG_TYPE_INDOOR,
 )
+from fusetune.ekf2.filter.common.timing import horizon_us
 from fusetune.ekf2.filter.quaternion_core.field_covariance import restore_field_covariance
 from fusetune.ekf2.filter.source_stops.heading_and_field import stop_field, stop_heading
 
@@ -56,8 +57,8 @@ def _may_fuse_field(ekf, params):
     _update_bias_observability(ekf, params)
     modes = ekf.mag_modes
     if modes.bias_observable or ekf.field_history.yaw_observable:
-        modes.time_last_suitable = ekf.imu_delayed.time_us
-    return ekf.cs.mag_aligned_in_flight and ekf.imu_delayed.time_us - modes.time_last_suitable < SUITABLE_FOR_US
+        modes.time_last_suitable = horizon_us(ekf)
+    return ekf.cs.mag_aligned_in_flight and horizon_us(ekf) - modes.time_last_suitable < SUITABLE_FOR_US
 
 
 @kernel
@@ -68,10 +69,10 @@ def _update_bias_observability(ekf, params):
     if not modes.bias_observable:
         modes.bias_observable = abs(modes.turn_rate_lpf) > limit
     else:
-        duration = (ekf.imu_delayed.time_us - modes.time_turn_started) * 1e-6
+        duration = (horizon_us(ekf) - modes.time_turn_started) * 1e-6
         modes.bias_observable = abs(modes.turn) > SUSTAINED_SHARE * limit * duration
     modes.turn = 0.0
-    modes.time_turn_started = ekf.imu_delayed.time_us
+    modes.time_turn_started = horizon_us(ekf)
 
 
 @kernel

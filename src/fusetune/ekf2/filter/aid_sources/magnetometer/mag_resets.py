@@ -8,6 +8,7 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.magnetometer.mag_heading import reset_mag_heading
 from fusetune.ekf2.filter.common.conditions import get_terrain_vpos, is_north_east_aiding_active
+from fusetune.ekf2.filter.common.timing import horizon_us
 from fusetune.ekf2.filter.covariance import reset_mag_bias_cov, reset_mag_earth_cov
 from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.source_stops.heading_and_field import (
@@ -80,7 +81,7 @@ def _reset_mag_states(ekf, params, mag, reset_heading):
         reset_mag_states_to_measurement(ekf, params, mag, reset_heading)
     if ekf.cs.in_air and _aligns_field(ekf, reset_heading):
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
+        ekf.mag.flt_mag_align_start_time = horizon_us(ekf)
 
 
 @kernel
@@ -116,7 +117,7 @@ def _reset_mag_states_by_yaw_estimator(ekf, params, mag, reset_heading):
         ekf.mag_I[0], ekf.mag_I[1], ekf.mag_I[2] = rotate_to_earth(ekf.R_to_earth, mag[0], mag[1], mag[2])
     if ekf.cs.in_air:
         ekf.cs.mag_aligned_in_flight = True
-        ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
+        ekf.mag.flt_mag_align_start_time = horizon_us(ekf)
 
 
 reset_mag_states = by_release(_reset_mag_states, "puts_body_field_by_yaw_estimator", _reset_mag_states_by_yaw_estimator)

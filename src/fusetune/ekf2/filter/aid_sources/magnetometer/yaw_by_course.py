@@ -15,6 +15,7 @@ from fusetune.ekf2.filter.aid_sources.magnetometer.heading_or_field import (
 from fusetune.ekf2.filter.common.conditions import is_north_east_aiding_active
 from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_INDOOR
 from fusetune.ekf2.filter.common.state import VELOCITY
+from fusetune.ekf2.filter.common.timing import horizon_us
 from fusetune.ekf2.filter.field_covariance import reset_field_covariance
 from fusetune.ekf2.filter.resets.state_resets import reset_quat_state_yaw
 from fusetune.ekf2.numerics.rotations import euler_yaw, rotate_to_earth, wrap_pi
@@ -31,7 +32,7 @@ def reset_yaw_to_field(ekf, params):
 
     Indoors, without anything that needs the yaw, it counts as aligned as it is.
     """
-    if ekf.imu_delayed.time_us == ekf.mag.flt_mag_align_start_time:
+    if horizon_us(ekf) == ekf.mag.flt_mag_align_start_time:
         return True
     if ekf.mag.counter == 0:
         return False
@@ -61,7 +62,7 @@ def realign_yaw_by_course(ekf, params):
     sample = ekf.sensors.mag.sample.mag
     ekf.mag_I[0], ekf.mag_I[1], ekf.mag_I[2] = rotate_to_earth(ekf.R_to_earth, sample[0], sample[1], sample[2])
     reset_field_covariance(ekf, params)
-    ekf.mag.flt_mag_align_start_time = ekf.imu_delayed.time_us
+    ekf.mag.flt_mag_align_start_time = horizon_us(ekf)
     if is_yaw_bad:
         reset_velocity_to_gnss(ekf, params)
         reset_horizontal_position_to_gnss(ekf, params)
