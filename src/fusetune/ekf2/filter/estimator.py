@@ -106,6 +106,33 @@ EKF = np.dtype(
 """The record `ekf`."""
 
 
+RELEASE_MEMORIES = (
+    ("levels_at_the_horizon", "levelling", LEVELLING_MEMORY),
+    ("controls_gnss_sources_apart", "gnss_trust", GNSS_TRUST),
+    ("scales_terrain_to_flow", "flow_rates", FLOW_RATES),
+    ("holds_unobservable_heading", "heading", HEADING_MEMORY),
+    ("limits_declination", "field_history", FIELD_HISTORY),
+    ("fuses_heading_or_field", "mag_modes", MAG_MODES),
+    ("filters_terrain_apart", "terrain_filter", TERRAIN_FILTER),
+    ("filters_terrain_apart", "rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR),
+    ("keeps_position_local", "local", LOCAL_POSITION),
+    ("adds_quaternion_errors", "quaternion", QUATERNION_CORE),
+    ("doubts_stuck_accel_bias", "accel_bias_check", ACCEL_BIAS_CHECK),
+    ("keeps_yaw_bank_as_matrices", "yaw_matrices", MATRIX_BANK),
+    ("retries_gnss_yaw", "gnss_yaw_retries", GNSS_YAW_RETRIES),
+    ("checks_gnss_on_arrival", "gnss_arrivals", GNSS_ARRIVALS),
+    ("checks_gnss_on_arrival", "yaw_velocity", YAW_VELOCITY),
+    ("integrates_flow", "flow_interval", np.dtype("f8")),
+    ("integrates_flow", "flow_integrals", FLOW_INTEGRALS),
+    ("feels_drag_in_air", "drag_waits", np.dtype("?")),
+    ("fuses_vision_by_mask", "vision_steps", VISION_STEPS),
+    ("aids_gnss_by_mask", "gnss_taken", GNSS_TAKEN),
+    ("aids_gnss_by_mask", "vertical", VERTICAL_INNOVATIONS),
+    ("has_one_height_source", "heights", HEIGHTS),
+)
+"""What a behaviour remembers, under which name of the record."""
+
+
 @cache
 def ekf_record(release: str) -> np.dtype:
     """The record `ekf` of a release: that of v1.16, followed by what its own behaviours remember."""
@@ -113,43 +140,9 @@ def ekf_record(release: str) -> np.dtype:
         return EKF
     does = BEHAVIOURS[release]
     memories = [(name, EKF[name]) for name in EKF.names or ()]
-    if does.levels_at_the_horizon:
-        memories.append(("levelling", LEVELLING_MEMORY))
-    if does.controls_gnss_sources_apart:
-        memories.append(("gnss_trust", GNSS_TRUST))
-    if does.scales_terrain_to_flow:
-        memories.append(("flow_rates", FLOW_RATES))
-    if does.holds_unobservable_heading:
-        memories.append(("heading", HEADING_MEMORY))
-    if does.limits_declination:
-        memories.append(("field_history", FIELD_HISTORY))
-    if does.fuses_heading_or_field:
-        memories.append(("mag_modes", MAG_MODES))
     if does.filters_terrain_apart:
         memories = [(name, OLD_AID_SOURCES if name == "aid" else memory) for name, memory in memories]
-        memories += [("terrain_filter", TERRAIN_FILTER), ("rng_hgt_b_est", HEIGHT_BIAS_ESTIMATOR)]
-    if does.keeps_position_local:
-        memories.append(("local", LOCAL_POSITION))
-    if does.adds_quaternion_errors:
-        memories.append(("quaternion", QUATERNION_CORE))
-    if does.doubts_stuck_accel_bias:
-        memories.append(("accel_bias_check", ACCEL_BIAS_CHECK))
-    if does.keeps_yaw_bank_as_matrices:
-        memories.append(("yaw_matrices", MATRIX_BANK))
-    if does.retries_gnss_yaw:
-        memories.append(("gnss_yaw_retries", GNSS_YAW_RETRIES))
-    if does.checks_gnss_on_arrival:
-        memories += [("gnss_arrivals", GNSS_ARRIVALS), ("yaw_velocity", YAW_VELOCITY)]
-    if does.integrates_flow:
-        memories += [("flow_interval", np.dtype("f8")), ("flow_integrals", FLOW_INTEGRALS)]
-    if does.feels_drag_in_air:
-        memories.append(("drag_waits", np.dtype("?")))
-    if does.fuses_vision_by_mask:
-        memories.append(("vision_steps", VISION_STEPS))
-    if does.aids_gnss_by_mask:
-        memories += [("gnss_taken", GNSS_TAKEN), ("vertical", VERTICAL_INNOVATIONS)]
-    if does.has_one_height_source:
-        memories.append(("heights", HEIGHTS))
+    memories += [(name, memory) for behaviour, name, memory in RELEASE_MEMORIES if getattr(does, behaviour)]
     return marked(np.dtype(memories, align=True), release)
 
 

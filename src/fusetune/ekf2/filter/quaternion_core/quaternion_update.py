@@ -8,6 +8,8 @@ Mirrors `measurementUpdate` of PX4 v1.14 `EKF/ekf.h`, `fuseVelPosHeight` of `EKF
 `EKF/ekf_helper.cpp`.
 """
 
+import math
+
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.common import state
 from fusetune.ekf2.filter.common.covariance_blocks import zero_covariance_block
@@ -23,8 +25,9 @@ def scale_gain(ekf, innovation_variance):
     """Write P Hᵀ / S into `ekf.scratch.K` (24,), and keep S."""
     K, PH = ekf.scratch.K, ekf.scratch.PH
     ekf.quaternion.innovation_variance = innovation_variance
+    inverse = 1.0 / innovation_variance
     for i in range(state.ERROR_STATE_SIZE):
-        K[i] = PH[i] / innovation_variance
+        K[i] = PH[i] * inverse
 
 
 @kernel
@@ -46,11 +49,13 @@ def update_by_gain(ekf, params, R, innovation):
 
 @kernel
 def _take_off_gain_squared(ekf):
-    """P ← P - S K Kᵀ; returns whether all variances stay positive."""
-    P, K, S = ekf.P, ekf.scratch.K, ekf.quaternion.innovation_variance
+    """P ← P - S K Kᵀ; returns whether all variances stay positive. `ekf.scratch.PH` becomes K √S."""
+    P, K, root = ekf.P, ekf.scratch.PH, math.sqrt(ekf.quaternion.innovation_variance)
+    for i in range(state.ERROR_STATE_SIZE):
+        K[i] = ekf.scratch.K[i] * root
     healthy = True
     for i in range(state.ERROR_STATE_SIZE):
-        if P[i, i] < (K[i] * K[i]) * S:
+        if P[i, i] < K[i] * K[i]:
             zero_covariance_block(ekf, i, 1)
             healthy = False
     if healthy:
@@ -58,7 +63,7 @@ def _take_off_gain_squared(ekf):
             k_i = K[i]
             if k_i != 0.0:
                 for j in range(state.ERROR_STATE_SIZE):
-                    P[i, j] -= (k_i * K[j]) * S
+                    P[i, j] -= k_i * K[j]
     return healthy
 
 
