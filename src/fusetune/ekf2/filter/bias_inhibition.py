@@ -6,13 +6,13 @@ Mirrors `updateIMUBiasInhibit` of PX4 v1.16 `EKF/ekf_helper.cpp`.
 import math
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.aid_mask import MASK_INHIBIT_ACCEL_BIAS
 from fusetune.ekf2.filter.common.conditions import IMU_CTRL_ACCEL_BIAS, IMU_CTRL_GYRO_BIAS
 from fusetune.ekf2.filter.common.imu_rates import body_rate, measured_force, measured_rate, specific_force
 from fusetune.ekf2.filter.common.state import ACCEL_BIAS, GYRO_BIAS
 from fusetune.ekf2.releases.by_release import by_release
 
 COSINE_OF_15_DEGREES = 0.966
-AID_MASK_INHIBIT_ACCEL_BIAS = 4
 
 
 @kernel
@@ -112,9 +112,7 @@ def _inhibit_by_manoeuvre(ekf, params):
     """The gyro's bias is always learnt, the accelerometer's also at rest and without aiding."""
     manoeuvring = _follow_motion_by_mean_interval(ekf, params)
     P, core = ekf.P, ekf.quaternion
-    inhibit_accel = (
-        (int(params.EKF2_AID_MASK) & AID_MASK_INHIBIT_ACCEL_BIAS) != 0 or manoeuvring or ekf.fs.bad_acc_vertical
-    )
+    inhibit_accel = (int(params.EKF2_AID_MASK) & MASK_INHIBIT_ACCEL_BIAS) != 0 or manoeuvring or ekf.fs.bad_acc_vertical
     for i in range(3):
         unlearnt = inhibit_accel or ekf.imu_delayed.delta_vel_clipping[i] != 0
         _switch_learning(P, ACCEL_BIAS, i, unlearnt, ekf.accel_bias_inhibit, core.kept_accel_bias_var)

@@ -8,14 +8,13 @@ import math
 import numpy as np
 
 from fusetune.ekf2.compiled.kernel import kernel
+from fusetune.ekf2.filter.common.aid_mask import MASK_DRAG
 from fusetune.ekf2.filter.common.state import WIND
 from fusetune.ekf2.filter.covariance import INITIAL_WIND_UNCERTAINTY, reset_covariance_block, reset_wind_cov
 from fusetune.ekf2.filter.measurement_update import measurement_update
 from fusetune.ekf2.filter.observation_gain import compute_kalman_gain
 from fusetune.ekf2.numerics.rotations import rotate_to_body
 from fusetune.ekf2.releases.by_release import by_release
-
-AID_MASK_DRAG = 32
 
 WIND_MEMORY = np.dtype([("external_init", "?")], align=True)
 """Sub-record `ekf.wind`: whether the wind was given from outside and no source has used it yet."""
@@ -58,7 +57,7 @@ def _is_asked_for(ekf, params):
 
 @kernel
 def _is_asked_for_by_mask(ekf, params):
-    return (int(params.EKF2_AID_MASK) & AID_MASK_DRAG) != 0
+    return (int(params.EKF2_AID_MASK) & MASK_DRAG) != 0
 
 
 is_drag_enabled = by_release(_is_asked_for, "selects_sources_by_mask", _is_asked_for_by_mask)

@@ -131,6 +131,12 @@ def check_world_magnetic_model(ekf):
 
 
 @kernel
+def _is_rough_fix(sample):
+    """Whether a fix, of two dimensions at least, tells where on Earth the vehicle is."""
+    return sample.fix_type >= ROUGH_FIX_TYPE and sample.hacc < ROUGH_FIX_ACCURACY
+
+
+@kernel
 def take_field_of_place(ekf, latitude_deg, longitude_deg):
     """Know the model's field at a place, as releases before v1.16 do at every new origin."""
     declination, inclination, strength = field_of_model(ekf, latitude_deg, longitude_deg)
@@ -157,7 +163,7 @@ def _look_up_every_second(ekf, sample, is_usable):
     if history.wmm_time_last_set != 0 and not is_timed_out(ekf, mag.wmm_time_last_checked, FIX_CHECK_INTERVAL):
         return False
     mag.wmm_time_last_checked = ekf.time_delayed_us
-    if not (is_usable and sample.fix_type >= ROUGH_FIX_TYPE and sample.hacc < ROUGH_FIX_ACCURACY):
+    if not (is_usable and _is_rough_fix(sample)):
         return False
     declination, inclination, _ = field_of_model(ekf, sample.lat_deg, sample.lon_deg)
     is_kept = (
@@ -176,7 +182,7 @@ def _look_up_until_origin(ekf, sample, is_usable):
 
     Mirrors `collect_gps` of PX4 v1.14 `EKF/gps_checks.cpp`.
     """
-    if not (is_usable and sample.fix_type >= ROUGH_FIX_TYPE and sample.hacc < ROUGH_FIX_ACCURACY):
+    if not (is_usable and _is_rough_fix(sample)):
         return False
     if not np.isfinite(ekf.mag.wmm_declination):
         ekf.mag_modes.yaw_reset_requested = True

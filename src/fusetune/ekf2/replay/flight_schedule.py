@@ -19,10 +19,10 @@ from fusetune.ekf2.feed.inputs import ARRIVAL_FIELDS, BIAS_RESETS, EstimatorInpu
 from fusetune.ekf2.feed.sample_arrival import NOTE, NOTED
 from fusetune.ekf2.feed.sensor_samples import DRAG_SAMPLE
 from fusetune.ekf2.filter.aid_sources.drag.drag_memory import drag_accumulator
+from fusetune.ekf2.filter.common.aid_mask import MASK_DRAG
 from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_3D, MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.parameters import taken_value
 from fusetune.ekf2.filter.imu_down_sampler.imu_down_sampler import DOWN_SAMPLER_MEMORY
-from fusetune.ekf2.filter.wind import AID_MASK_DRAG
 from fusetune.ekf2.releases.behaviours import BASELINE, BEHAVIOURS
 from fusetune.ekf2.replay.loop import (
     COMMAND,
@@ -185,7 +185,7 @@ def _asking_parameter(sensor: str, release: str) -> tuple[str, Callable[[float],
     """
     does = BEHAVIOURS[release]
     if does.selects_sources_by_mask and sensor in ("drag", "gnss"):
-        return ("EKF2_AID_MASK", lambda value: float(int(value) & AID_MASK_DRAG != 0)) if sensor == "drag" else None
+        return ("EKF2_AID_MASK", lambda value: float(int(value) & MASK_DRAG != 0)) if sensor == "drag" else None
     return None if sensor == "flow" and does.flies_flow_over_terrain else _WANTED.get(sensor)
 
 

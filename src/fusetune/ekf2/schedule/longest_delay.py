@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fusetune.ekf2.filter.common.aid_mask import MASK_FLOW, MASK_GNSS, MASK_POSITION, MASK_VELOCITY, MASK_YAW
 from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_NONE
 from fusetune.ekf2.releases.behaviours import BEHAVIOURS
 from fusetune.px4.aid_sources import SENSORS
 
 LONGEST_SENSOR_INTERVAL_MS = 10.0
 
-AID_MASK_GPS, AID_MASK_FLOW, AID_MASK_VISION = 1, 2, 8 | 16 | 256
+MASK_VISION = MASK_POSITION | MASK_YAW | MASK_VELOCITY
 HEIGHT_BY_BARO, HEIGHT_BY_RANGE = 0, 2
 
 Values = Callable[[str], float]
@@ -53,9 +54,9 @@ def _wanted_by_mask(values: Values) -> dict[str, bool]:
         "airspeed": values("EKF2_ARSP_THR") > 0.0,
         "mag": int(values("EKF2_MAG_TYPE")) != MAG_TYPE_NONE,
         "range": int(values("EKF2_RNG_AID")) != 0 or height == HEIGHT_BY_RANGE,
-        "gnss": mask & AID_MASK_GPS != 0,
-        "flow": mask & AID_MASK_FLOW != 0,
-        "ev": mask & AID_MASK_VISION != 0,
+        "gnss": mask & MASK_GNSS != 0,
+        "flow": mask & MASK_FLOW != 0,
+        "ev": mask & MASK_VISION != 0,
     }
 
 

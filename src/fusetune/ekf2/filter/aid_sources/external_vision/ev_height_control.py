@@ -36,7 +36,9 @@ from fusetune.ekf2.filter.resets.state_resets import (
     reset_vertical_velocity_to_zero,
 )
 from fusetune.ekf2.numerics.rotations import component_in_earth, variance_in_earth
-from fusetune.ekf2.releases.by_release import by_release
+from fusetune.ekf2.releases.by_release import by_release, does
+
+_resets_always = does("resets_height_to_each_source")
 
 
 @kernel
@@ -156,19 +158,6 @@ def _reset_vertical_velocity(ekf, params):
 
 
 @kernel
-def _is_reference(ekf):
-    return ekf.height_sensor_ref == HEIGHT_REF_EV
-
-
-@kernel
-def _always(ekf):
-    return True
-
-
-_may_reset = by_release(_is_reference, "resets_height_to_each_source", _always)
-
-
-@kernel
 def _reset_height_alone(ekf, params, measurement, variance):
     """PX4 takes the bias, which the reference has none of, with the sign that altitudes have."""
     _reset_height_to_ev(ekf, params, measurement + ekf.ev_hgt_b_est.bias, variance)
@@ -201,7 +190,11 @@ def _continue_ev_hgt(ekf, params, measurement, variance, ev_reset, quality_suffi
     else:
         aid.innovation_rejected = True
 
-    if is_height_reset_required(ekf) and quality_sufficient and _may_reset(ekf):
+    if (
+        is_height_reset_required(ekf)
+        and quality_sufficient
+        and (ekf.height_sensor_ref == HEIGHT_REF_EV or _resets_always(ekf))
+    ):
         # all height sources are failing
         _reset_all_failing(ekf, params, measurement, variance)
         _set_bias_to_difference(ekf, measurement)

@@ -14,10 +14,9 @@ from fusetune.ekf2.filter.aid_sources.gnss.gnss_yaw_control import (
     start_gnss_yaw_with_reset,
     update_gnss_yaw,
 )
+from fusetune.ekf2.filter.common.aid_mask import MASK_GNSS_YAW
 from fusetune.ekf2.filter.common.timing import GNSS_MAX_INTERVAL, RESET_TIMEOUT_MAX, is_recent, is_timed_out
 from fusetune.ekf2.filter.source_stops.yaw import stop_gnss_yaw_fusion
-
-MASK_GNSS_YAW = 128
 
 
 @kernel

@@ -128,17 +128,48 @@ def _restart_imu(ekf):
 
 
 @kernel
-def _integrate_imu(ekf):
-    """Add this update's rotation, or begin anew where no sample came for 0.2 s."""
+def add_rotation(ekf):
+    """Add this update's rotation (rad, FRD) to that since the last sample."""
     memory, dt = ekf.flow_integrals, ekf.imu_delayed.delta_ang_dt
-    if not memory.imu_time < LARGEST_INTERVAL_S:
-        _restart_imu(ekf)
-        return
     x, y, z = body_rate(ekf)
     memory.imu_angle[0] += x * dt
     memory.imu_angle[1] += y * dt
     memory.imu_angle[2] += z * dt
     memory.imu_time += dt
+
+
+@kernel
+def forget_rotation(memory):
+    """Begin the IMU's rotation since the last sample anew."""
+    for i in range(3):
+        memory.imu_angle[i] = 0.0
+    memory.imu_time = 0.0
+
+
+@kernel
+def follow_gyro_bias(memory):
+    """Filter the difference (rad/s) of the sensor's gyro from the IMU, a limited step at a time."""
+    for i in range(3):
+        difference = memory.gyro[i] / memory.sample_time - memory.imu_angle[i] / memory.imu_time
+        step = min(max(difference, -GYRO_BIAS_STEP_LIMIT), GYRO_BIAS_STEP_LIMIT)
+        memory.gyro_bias[i] = (1.0 - GYRO_BIAS_FORGETTING) * memory.gyro_bias[i] + GYRO_BIAS_FORGETTING * step
+
+
+@kernel
+def take_imu_for_gyro(memory):
+    """The sensor has no gyro: its rotation is the IMU's, without a bias."""
+    for i in range(3):
+        memory.gyro[i] = -memory.imu_angle[i] / memory.imu_time * memory.sample_time
+        memory.gyro_bias[i] = 0.0
+
+
+@kernel
+def _integrate_imu(ekf):
+    """Add this update's rotation, or begin anew where no sample came for 0.2 s."""
+    if not ekf.flow_integrals.imu_time < LARGEST_INTERVAL_S:
+        _restart_imu(ekf)
+        return
+    add_rotation(ekf)
 
 
 @kernel
@@ -160,25 +191,19 @@ def _compensate_gyro(ekf):
     PX4 holds the gyro against the IMU with the sign that its flow does not have.
     """
     memory = ekf.flow_integrals
-    gyro, angle, dt = memory.gyro, memory.imu_angle, memory.sample_time
+    gyro, dt = memory.gyro, memory.sample_time
     comparable = memory.imu_time > FLT_EPSILON and dt > FLT_EPSILON
     available = False
     if math.isfinite(gyro[0]) and math.isfinite(gyro[1]) and math.isfinite(gyro[2]):
         if comparable and abs(memory.imu_time - dt) < CLOSE_INTERVALS_S:
+            follow_gyro_bias(memory)
             for i in range(3):
-                difference = gyro[i] / dt - angle[i] / memory.imu_time
-                step = min(max(difference, -GYRO_BIAS_STEP_LIMIT), GYRO_BIAS_STEP_LIMIT)
-                memory.gyro_bias[i] = (1.0 - GYRO_BIAS_FORGETTING) * memory.gyro_bias[i] + GYRO_BIAS_FORGETTING * step
                 gyro[i] -= memory.gyro_bias[i] * dt
             available = True
     elif comparable:
-        for i in range(3):
-            gyro[i] = -angle[i] / memory.imu_time * dt
-            memory.gyro_bias[i] = 0.0
+        take_imu_for_gyro(memory)
         available = True
-    for i in range(3):
-        angle[i] = 0.0
-    memory.imu_time = 0.0
+    forget_rotation(memory)
     return available
 
 

@@ -11,8 +11,6 @@ import math
 from fusetune.ekf2.compiled.kernel import kernel
 from fusetune.ekf2.filter.aid_sources.optical_flow.flow_over_terrain import (
     COS_MAX_TILT,
-    GYRO_BIAS_FORGETTING,
-    GYRO_BIAS_STEP_LIMIT,
     judge_flow,
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow.integrated_flow import (
@@ -20,14 +18,19 @@ from fusetune.ekf2.filter.aid_sources.optical_flow.integrated_flow import (
     DATA_STOPPED_US,
     LARGEST_INTERVAL_S,
     TERRAIN_COAST_US,
+    add_rotation,
+    follow_gyro_bias,
+    forget_rotation,
     integrate_sample,
     is_flow_inhibited,
     publish_rates,
+    take_imu_for_gyro,
     watch_motion,
 )
 from fusetune.ekf2.filter.aid_sources.optical_flow.optical_flow_fusion import calc_opt_flow_meas_var, set_flow_rejection
+from fusetune.ekf2.filter.common.aid_mask import MASK_FLOW
 from fusetune.ekf2.filter.common.conditions import get_hagl, is_other_source_of_horizontal_aiding_than
-from fusetune.ekf2.filter.common.imu_rates import body_rate
+from fusetune.ekf2.filter.common.field_parameters import MAG_TYPE_NONE
 from fusetune.ekf2.filter.common.local_origin import remember_horizontal_position
 from fusetune.ekf2.filter.common.state import ATTITUDE, ERROR_STATE_SIZE, POSITION, TERRAIN
 from fusetune.ekf2.filter.common.timing import RESET_TIMEOUT_MAX, horizon_us, is_recent, is_timed_out
@@ -37,8 +40,6 @@ from fusetune.ekf2.filter.observation_gain import compute_kalman_gain, multiply_
 from fusetune.ekf2.filter.resets.state_resets import reset_horizontal_velocity_to, reset_local_horizontal_position_to
 from fusetune.ekf2.numerics.constants import FLT_EPSILON
 
-AID_MASK_FLOW = 2
-MAG_TYPE_NONE = 5
 LONGEST_SUM_S = 1.0
 LEAST_REACH = 0.3
 
@@ -52,12 +53,7 @@ def control_flow_at_once(ekf, params):
         if ekf.sensors.flow.data_ready:
             integrate_sample(ekf)
     watch_motion(ekf)
-    x, y, z = body_rate(ekf)
-    dt = ekf.imu_delayed.delta_ang_dt
-    memory.imu_angle[0] += x * dt
-    memory.imu_angle[1] += y * dt
-    memory.imu_angle[2] += z * dt
-    memory.imu_time += dt
+    add_rotation(ekf)
     if terrain.flow_is_good:
         _prepare_sample(ekf, params)
         publish_rates(ekf, memory)
@@ -71,26 +67,19 @@ def control_flow_at_once(ekf, params):
 def _learn_gyro_bias(ekf):
     """Hold the sensor's gyro against the IMU, or take that for it; return whether either could be done."""
     memory = ekf.flow_integrals
-    gyro, angle, dt = memory.gyro, memory.imu_angle, memory.sample_time
+    gyro, dt = memory.gyro, memory.sample_time
     comparable = memory.imu_time > FLT_EPSILON and dt > FLT_EPSILON
     available = False
     if memory.imu_time > LONGEST_SUM_S:
         available = False
     elif math.isfinite(gyro[0]) and math.isfinite(gyro[1]) and math.isfinite(gyro[2]):
         if comparable and abs(memory.imu_time - dt) < CLOSE_INTERVALS_S:
-            for i in range(3):
-                difference = gyro[i] / dt - angle[i] / memory.imu_time
-                step = min(max(difference, -GYRO_BIAS_STEP_LIMIT), GYRO_BIAS_STEP_LIMIT)
-                memory.gyro_bias[i] = (1.0 - GYRO_BIAS_FORGETTING) * memory.gyro_bias[i] + GYRO_BIAS_FORGETTING * step
+            follow_gyro_bias(memory)
             available = True
     elif comparable:
-        for i in range(3):
-            gyro[i] = -angle[i] / memory.imu_time * dt
-            memory.gyro_bias[i] = 0.0
+        take_imu_for_gyro(memory)
         available = True
-    for i in range(3):
-        angle[i] = 0.0
-    memory.imu_time = 0.0
+    forget_rotation(memory)
     return available
 
 
@@ -125,7 +114,7 @@ def _prepare_sample(ekf, params):
 
 @kernel
 def _use_flow(ekf, params):
-    enabled, inhibited = int(params.EKF2_AID_MASK) & AID_MASK_FLOW != 0, is_flow_inhibited(ekf, params)
+    enabled, inhibited = int(params.EKF2_AID_MASK) & MASK_FLOW != 0, is_flow_inhibited(ekf, params)
     if ekf.cs.opt_flow and (not enabled or inhibited):
         ekf.cs.opt_flow = False
         return
